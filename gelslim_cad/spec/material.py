@@ -1,0 +1,51 @@
+"""Material properties of gel and acrylic."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from gelslim_cad.spec.base import Block
+
+STIFF_GEL_MPA = 5.0
+
+
+class GelMaterial(Block):
+    """Platinum-cure silicone of the pad."""
+
+    name: str = Field(default="XP-565 silicone", max_length=80, description="Gel, for the BOM")
+    youngs_modulus_mpa: float = Field(default=0.147, gt=0, le=2000, description="Young's modulus E")
+    poissons_ratio: float = Field(default=0.3223, ge=0, lt=0.5, description="Poisson's ratio")
+    density_kg_m3: float = Field(default=1020.0, ge=200, le=4000, description="Density")
+    refractive_index: float = Field(default=1.41, ge=1, le=2, description="Refractive index")
+    mix_ratio_a: float = Field(default=15.0, gt=0, le=1000, description="Parts A by mass")
+    mix_ratio_b: float = Field(default=1.0, gt=0, le=1000, description="Parts B by mass")
+
+
+class AcrylicMaterial(Block):
+    """PMMA of the light guide."""
+
+    refractive_index: float = Field(default=1.4906, gt=1, le=2, description="Refractive index")
+    absorption_per_m: float = Field(
+        default=2.0, ge=0, le=200, description="Absorption coefficient per metre"
+    )
+
+
+class Material(Block):
+    """Gel and acrylic."""
+
+    gel: GelMaterial = Field(default=GelMaterial(), description="The gel")
+    acrylic: AcrylicMaterial = Field(default=AcrylicMaterial(), description="The light guide")
+    allow_stiff_gel: bool = Field(
+        default=False, description="Accept a gel stiffer than 5 MPa (no tactile gel is)"
+    )
+
+    @model_validator(mode="after")
+    def _soft(self) -> Material:
+        modulus = self.gel.youngs_modulus_mpa
+        if modulus > STIFF_GEL_MPA and not self.allow_stiff_gel:
+            raise ValueError(
+                f"gel.youngs_modulus_mpa = {modulus:g}: must be <= {STIFF_GEL_MPA:g} MPa; a tactile "
+                f"gel has about 0.05 to 1 MPa (did you mean {modulus / 1000:g}, that is "
+                f"{modulus:g} kPa?); set material.allow_stiff_gel: true to insist"
+            )
+        return self

@@ -1,0 +1,38 @@
+"""The finite-element mesh of the pad."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from gelslim_cad.spec.base import Block
+
+Count = Annotated[int, Field(ge=1, le=400)]
+
+
+class Mesh(Block):
+    """Cells of the pad mesh: by pitch (a divisor of the marker pitch) or by counts."""
+
+    nodes_per_marker_pitch: int = Field(
+        default=2,
+        ge=1,
+        le=20,
+        description="Mesh cells per marker pitch, so that nodes meet markers",
+    )
+    cells_along: Count | None = Field(
+        default=None, description="Cells along the finger, instead of nodes_per_marker_pitch"
+    )
+    cells_across: Count | None = Field(
+        default=None, description="Cells across the finger, instead of nodes_per_marker_pitch"
+    )
+    layers: int = Field(default=1, ge=1, le=32, description="Cell layers through the thickness")
+    element: Literal["full", "bbar"] = Field(
+        default="bbar", description="Hex-8 integration: full 2×2×2 or B-bar (mean dilatation)"
+    )
+
+    @model_validator(mode="after")
+    def _both(self) -> Mesh:
+        if (self.cells_along is None) != (self.cells_across is None):
+            raise ValueError("give cells_along and cells_across together, or neither")
+        return self

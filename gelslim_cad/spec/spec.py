@@ -1,0 +1,33 @@
+"""The whole spec: what the user chose."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from gelslim_cad.spec.base import Block
+from gelslim_cad.spec.camera import Camera
+from gelslim_cad.spec.design import Design
+from gelslim_cad.spec.manufacturing import Manufacturing
+from gelslim_cad.spec.material import Material
+from gelslim_cad.spec.mesh import Mesh
+
+
+class Spec(Block):
+    """A finger: its camera, its design, its materials, its making and its mesh."""
+
+    format: Literal["gelslim-spec/1"] = Field(description="Format of this file")
+    name: str = Field(
+        min_length=1,
+        max_length=60,
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+        description="Name of the finger; becomes the output folder",
+    )
+    camera: Camera = Field(description="The camera, as given by its data sheet")
+    design: Design = Field(description="What the designer chooses")
+    material: Material = Field(default=Material(), description="Gel and acrylic")
+    manufacturing: Manufacturing = Field(
+        default=Manufacturing(), description="Processes, tolerances, stock"
+    )
+    mesh: Mesh = Field(default=Mesh(), description="Finite-element mesh of the pad")
