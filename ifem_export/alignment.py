@@ -1,0 +1,73 @@
+"""Phase of a lattice that puts given points (markers) on its nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ifem_export.errors import MeshError
+
+
+def points_xy(points_mm: ArrayLike) -> NDArray[np.float64]:
+    """The points' x and y, (k, 2).
+
+    Raises:
+        MeshError: wrong shape or a value that is not finite.
+    """
+    points = np.asarray(points_mm, dtype=float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
+        raise MeshError(f"points_mm has shape {points.shape}: must be (k, 2) or (k, 3), k >= 1")
+    if not np.isfinite(points).all():
+        raise MeshError("points_mm holds a value that is not finite: check the markers")
+    return points[:, :2]
+
+
+def shift_to(
+    points: NDArray[np.float64], start: NDArray[np.float64], pitch: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], int, float]:
+    """Shift a lattice, along each axis on its own, so that most points fall on its lines.
+
+    Args:
+        points: (k, 2) in mm.
+        start: (x, y) of a lattice node in mm.
+        pitch: (hx, hy) in mm.
+
+    Returns:
+        The shifted start, the number of points on nodes, and the largest distance of a point
+        from the nearest line along an axis in mm.
+    """
+    shifted = start.copy()
+    for axis in (0, 1):
+        distinct, weights = np.unique(np.round(points[:, axis], 9), return_counts=True)
+        offset = (distinct - start[axis]) / pitch[axis]
+        gap = offset[None, :] - offset[:, None]
+        gap = np.abs(gap - np.rint(gap)) * pitch[axis]
+        on_line = ((gap < 1e-6) * weights).sum(axis=1)
+        # Most points on lines; then the smallest worst distance; then the smallest shift.
+        shift = offset - np.rint(offset)
+        best = np.lexsort((np.abs(shift), gap.max(axis=1).round(9), -on_line))[0]
+        shifted[axis] += shift[best] * pitch[axis]
+    offset = (points - shifted) / pitch
+    distance = np.abs(offset - np.rint(offset)) * pitch
+    return shifted, int((distance.max(axis=1) < 1e-6).sum()), float(distance.max())
+
+
+def misaligned(
+    points: NDArray[np.float64],
+    pitch: NDArray[np.float64],
+    error: float,
+    aligned: int,
+    tolerance: float,
+) -> str:
+    """Refusal that names the nearest pitch that divides the markers' own spacing."""
+    fitting = []
+    for axis in (0, 1):
+        gaps = np.diff(np.unique(np.round(points[:, axis], 9)))
+        spacing = float(gaps.min()) if len(gaps) else float(pitch[axis])
+        fitting.append(spacing / max(1, round(spacing / pitch[axis])))
+    return (
+        f"{len(points) - aligned} of {len(points)} points to align with miss the lattice of "
+        f"pitch {pitch[0]:g} x {pitch[1]:g} mm by up to {error:.4g} mm, "
+        f"the limit is {tolerance:g} mm: use a pitch that divides the marker spacing, "
+        f"such as {fitting[0]:.6g} x {fitting[1]:.6g} mm"
+    )
