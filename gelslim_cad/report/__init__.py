@@ -1,0 +1,25 @@
+"""The finger's report: one HTML file that opens in a browser with the network off."""
+
+from gelslim_cad.report.data import (
+    BomRow,
+    CameraView,
+    DimensionRow,
+    FileRow,
+    Note,
+    Picture,
+    ReportData,
+    RuleRow,
+)
+from gelslim_cad.report.render import render_report
+
+__all__ = [
+    "BomRow",
+    "CameraView",
+    "DimensionRow",
+    "FileRow",
+    "Note",
+    "Picture",
+    "ReportData",
+    "RuleRow",
+    "render_report",
+]

@@ -1,0 +1,157 @@
+"""Still pictures of the finger: whole, exploded, cut open. Drawn off screen with VTK.
+
+VTK is used without PyVista's plotter, whose import alone takes longer than all three pictures.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import os
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from gelslim_cad.report.stage import Stage, View
+
+Mesh = tuple[
+    str,
+    np.ndarray,
+    np.ndarray,
+    tuple[float, float, float, float],
+    tuple[float, float, float],
+]
+"""Name, vertices (n, 3) in mm, faces (m, 3), sRGB colour with opacity, explode vector in mm."""
+
+Axis = Literal["x", "y", "z"]
+
+ISO = View(yaw_deg=-56.0, pitch_deg=27.0)
+SECTIONS = {"x": View(0.0, 0.0), "y": View(-90.0, 0.0), "z": View(-90.0, 90.0)}
+"""The cut faces the viewer: x from the tip, y from the -y side, z from above the gel."""
+
+WIDTH_PX = 1200
+OVERSAMPLING = 2
+
+
+class PictureError(RuntimeError):
+    """No picture can be drawn on this machine; the message says what to install."""
+
+
+def picture_whole(meshes: Sequence[Mesh]) -> bytes:
+    """Draw the assembled finger as PNG.
+
+    Raises:
+        PictureError: VTK or a system library it needs is missing.
+        ValueError: a mesh is empty or not (n, 3) and (m, 3).
+    """
+    return _draw(meshes, ISO, explode=0.0)
+
+
+def picture_exploded(meshes: Sequence[Mesh], explode: float = 1.0) -> bytes:
+    """Draw the parts moved by `explode` times their explode vectors; raises as picture_whole."""
+    return _draw(meshes, ISO, explode=explode)
+
+
+def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0) -> bytes:
+    """Draw the finger cut at `axis` = `at_mm`, seen square on, cut faces hatched.
+
+    What lies before the plane is taken away. Raises as picture_whole, and ValueError where the
+    plane misses every part.
+    """
+    index = "xyz".index(axis)
+    spans = [(mesh[1][:, index].min(), mesh[1][:, index].max()) for mesh in _checked(meshes)]
+    if not any(low < at_mm < high for low, high in spans):
+        low, high = min(s[0] for s in spans), max(s[1] for s in spans)
+        raise ValueError(
+            f"section at {axis} = {at_mm} mm meets no part; they span {low:.2f} to {high:.2f} mm"
+        )
+    return _draw(meshes, SECTIONS[axis], explode=0.0, cut=(index, at_mm))
+
+
+def _draw(
+    meshes: Sequence[Mesh], view: View, explode: float, cut: tuple[int, float] | None = None
+) -> bytes:
+    checked = _checked(meshes)
+    window = _render_window()
+    stage = Stage(window, view, cut)
+    for number, (_, vertices, faces, rgba, shift) in enumerate(checked):
+        stage.add(vertices + explode * np.asarray(shift), faces, rgba, hatch_up=number % 2 == 0)
+    try:
+        return _png(stage.image(WIDTH_PX, OVERSAMPLING))
+    finally:
+        window.Finalize()
+
+
+def _checked(meshes: Sequence[Mesh]) -> list[Mesh]:
+    if not meshes:
+        raise ValueError("no meshes to draw")
+    checked = []
+    for name, vertices, faces, rgba, shift in meshes:
+        points = np.asarray(vertices, dtype=float)
+        cells = np.asarray(faces, dtype=np.int64)
+        for array, label in ((points, "vertices"), (cells, "faces")):
+            if array.ndim != 2 or array.shape[1] != 3 or not len(array):
+                raise ValueError(f"mesh {name!r}: {label} have shape {array.shape}, must be (n, 3)")
+        if not np.isfinite(points).all() or cells.min() < 0 or cells.max() >= len(points):
+            raise ValueError(f"mesh {name!r}: a vertex is not finite or a face names none")
+        checked.append((name, points, cells, rgba, shift))
+    return checked
+
+
+def _render_window() -> Any:
+    """Open an off-screen window that needs no display: EGL, else OSMesa.
+
+    VTK ends the process where neither works, so that is looked at first.
+    """
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    try:
+        import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 registers the implementation
+        from vtkmodules.vtkCommonCore import vtkObject
+        from vtkmodules.vtkRenderingCore import vtkRenderWindow
+    except ImportError as error:
+        raise PictureError(_missing(str(error))) from error
+    vtkObject.GlobalWarningDisplayOff()
+    window = vtkRenderWindow()
+    kind = type(window).__name__
+    if "OSOpenGL" in kind and not any(map(_loads, ("libOSMesa.so.8", "libOSMesa.so.6"))):
+        raise PictureError(
+            "no off-screen OpenGL: neither EGL nor OSMesa works here; "
+            "install the Debian packages libegl1 and libgl1-mesa-dri"
+        )
+    window.SetOffScreenRendering(1)
+    return window
+
+
+def _missing(reason: str) -> str:
+    packages = {
+        "libGL.so": "libgl1",
+        "libEGL": "libegl1",
+        "libOpenGL": "libopengl0",
+        "libXrender": "libxrender1",
+        "libXcursor": "libxcursor1",
+        "libXfixes": "libxfixes3",
+        "libX11": "libx11-6",
+        "libSM": "libsm6",
+        "libICE": "libice6",
+    }
+    for library, package in packages.items():
+        if library in reason:
+            return f"VTK cannot load {library}: install the Debian package {package} ({reason})"
+    return f"VTK is not installed: pip install 'gelslim-cad[view]' ({reason})"
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def _png(image: np.ndarray) -> bytes:
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(image).save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()

@@ -1,0 +1,175 @@
+"""Puts the report together: one HTML file that asks nothing of the network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from importlib import resources
+
+from gelslim_cad.report import tables
+from gelslim_cad.report.camera_view import camera_view, ramp_style
+from gelslim_cad.report.data import Picture, ReportData
+from gelslim_cad.report.markup import text
+from gelslim_cad.report.rules import pill, rules, verdict
+
+SCRIPTS = (
+    "viewer_glb.js",
+    "viewer_camera.js",
+    "viewer_draw.js",
+    "viewer.js",
+    "viewer_input.js",
+    "page.js",
+)
+
+
+def render_report(data: ReportData) -> bytes:
+    """Write the report as UTF-8 HTML; the same data gives the same bytes.
+
+    Style and script are inlined and named by their hash in the content security policy, which
+    allows nothing else: text in `data` stays text even if it holds markup.
+    """
+    style = _asset("style.css") + ramp_style()
+    script = "(() => {\n" + '"use strict";\n' + "\n".join(map(_asset, SCRIPTS)) + "})();\n"
+    sections = _sections(data)
+    body = "\n".join(
+        f'<section id="{key}" aria-labelledby="{key}-title">'
+        f'<h2 id="{key}-title">{title}</h2>{content}</section>'
+        for key, title, content in sections
+    )
+    links = "".join(f'<a href="#{key}">{_plain(title)}</a>' for key, title, _ in sections)
+    page = _fill(
+        _asset("page.html"),
+        {
+            "policy": text(_policy(style, script)),
+            "title": text(f"{data.name} – tactile finger"),
+            "style": style,
+            "header": _header(data),
+            "navigation": links,
+            "sections": body,
+            "footer": _footer(data),
+            "model": _model(data.glb),
+            "script": script,
+        },
+    )
+    return page.encode("utf-8", errors="replace")
+
+
+def _sections(data: ReportData) -> list[tuple[str, str, str]]:
+    view = data.camera_view
+    found = [
+        ("view", "View", _viewer(data)),
+        ("pictures", "Pictures", _pictures(data.pictures)),
+        ("thickness", "What sets the thickness", _binding(data.binding)),
+        ("rules", f"Design rules <small>{text(_tally(data))}</small>", rules(data.rules)),
+        (
+            "camera",
+            "What the camera sees",
+            camera_view(view) if view else '<p class="card empty">No markers were projected.</p>',
+        ),
+        ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),
+        ("files", "Files", tables.files(data.files)),
+        ("bom", "Bill of materials", tables.bom(data.bom)),
+    ]
+    if data.notes:
+        found.append(("notes", "Notes", tables.notes(data.notes)))
+    found.append(("spec", "Spec", tables.spec(data.spec_text, data.spec_hash)))
+    return found
+
+
+def _header(data: ReportData) -> str:
+    tiles = "".join(
+        f"<div><dt>{text(label)}</dt><dd>{text(value)}</dd></div>" for label, value in data.headline
+    )
+    summary = f'<p class="summary">{text(data.summary)}</p>' if data.summary else ""
+    return (
+        '<p class="kicker">Vision-based tactile finger</p>'
+        f'<div class="title"><h1>{text(data.name)}</h1>{pill(*verdict(data))}</div>{summary}'
+        f'<dl class="tiles">{tiles}</dl>'
+    )
+
+
+def _viewer(data: ReportData) -> str:
+    shown = [picture for picture in data.pictures if picture.png]
+    if not data.glb:
+        return '<p class="card empty">This report was written without a 3D model.</p>'
+    instead = (
+        "A picture instead:" if shown else "Open the STEP or GLB file of the list below instead."
+    )
+    picture = _image(shown[0]) if shown else ""
+    return _fill(_asset("viewer.html"), {"picture": picture, "instead": instead})
+
+
+def _model(glb: bytes) -> str:
+    if not glb:
+        return ""
+    encoded = base64.b64encode(glb).decode("ascii")
+    return f'<script type="application/octet-stream" id="model">{encoded}</script>'
+
+
+def _pictures(pictures: tuple[Picture, ...]) -> str:
+    if not pictures:
+        return '<p class="card empty">No pictures were made.</p>'
+    shown = []
+    for picture in pictures:
+        if picture.png:
+            body = _image(picture)
+        else:
+            reason = text(picture.problem or "it was not made")
+            body = f'<p class="missing">This picture is missing: {reason}</p>'
+        shown.append(
+            f'<figure class="card">{body}<figcaption><strong>{text(picture.title)}</strong>'
+            f"{text(picture.caption)}</figcaption></figure>"
+        )
+    return f'<div class="pictures">{"".join(shown)}</div>'
+
+
+def _image(picture: Picture) -> str:
+    encoded = base64.b64encode(picture.png).decode("ascii")
+    return f'<img src="data:image/png;base64,{encoded}" alt="{text(picture.title)}">'
+
+
+def _binding(sentences: tuple[str, ...]) -> str:
+    if not sentences:
+        return '<p class="card empty">The thickness was not analysed.</p>'
+    items = "".join(f"<li>{text(sentence)}</li>" for sentence in sentences)
+    return f'<ul class="card binding">{items}</ul>'
+
+
+def _tally(data: ReportData) -> str:
+    counts = data.counts
+    return f"{counts['pass']} pass, {counts['warn']} warn, {counts['fail']} fail"
+
+
+def _footer(data: ReportData) -> str:
+    versions = ", ".join(f"{text(name)} {text(version)}" for name, version in data.versions)
+    return (
+        f"<p>Spec hash <code>{text(data.spec_hash)}</code>. {versions}{'.' if versions else ''} "
+        "Sensor frame: origin at the centre of the gel’s outer surface, x towards the tip, "
+        "y across, z out of the gel.</p>"
+    )
+
+
+def _policy(style: str, script: str) -> str:
+    return (
+        "default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
+        f"style-src '{_digest(style)}'; script-src '{_digest(script)}'"
+    )
+
+
+def _digest(source: str) -> str:
+    digest = hashlib.sha256(source.encode()).digest()
+    return "sha256-" + base64.b64encode(digest).decode("ascii")
+
+
+def _fill(template: str, values: dict[str, str]) -> str:
+    """Fill `{{name}}` once: what is put in is not looked at again."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found.group(1)], template)
+
+
+def _plain(title: str) -> str:
+    return re.sub(r"\s*<small>.*</small>", "", title)
+
+
+def _asset(name: str) -> str:
+    return resources.files("gelslim_cad.report").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,278 @@
+"""A lit scene of closed meshes on white, seen in parallel projection; imports VTK when used."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+CREASE_DEG = 24.0
+HATCH_MM = 0.035
+"""Distance of the hatch lines as a share of the picture's width."""
+LIFT = 0.07
+"""Black parts are drawn a little lighter, so that their edges and faces can be told apart."""
+INK = (0.09, 0.11, 0.14)
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the viewer stands: yaw from +x about z, pitch above the xy plane."""
+
+    yaw_deg: float
+    pitch_deg: float
+
+    def axes(self) -> np.ndarray:
+        """Unit vectors right, up, towards the viewer, as rows (3, 3)."""
+        y, p = math.radians(self.yaw_deg), math.radians(self.pitch_deg)
+        right = (-math.sin(y), math.cos(y), 0.0)
+        up = (-math.sin(p) * math.cos(y), -math.sin(p) * math.sin(y), math.cos(p))
+        back = (math.cos(p) * math.cos(y), math.cos(p) * math.sin(y), math.sin(p))
+        return np.array([right, up, back])
+
+
+class Stage:
+    """Collects meshes, then draws them once into an RGB array.
+
+    `cut` = (axis, place in mm) removes what lies between the plane and the viewer and closes
+    the opened solids with hatched faces.
+    """
+
+    def __init__(self, window: Any, view: View, cut: tuple[int, float] | None = None) -> None:
+        from vtkmodules.vtkRenderingCore import vtkRenderer
+
+        self._window = window
+        self._view = view
+        self._cut = cut
+        self._low = np.full(3, np.inf)
+        self._high = np.full(3, -np.inf)
+        self._solids: list[tuple[Any, tuple[float, ...], bool]] = []
+        self._renderer = vtkRenderer()
+        self._renderer.SetBackground(1.0, 1.0, 1.0)
+
+    def add(
+        self,
+        vertices: np.ndarray,
+        faces: np.ndarray,
+        rgba: tuple[float, float, float, float],
+        hatch_up: bool = True,
+    ) -> None:
+        """Add a mesh: vertices (n, 3) in mm, faces (m, 3), sRGB colour with opacity."""
+        corners = view_box(vertices, self._view)
+        self._low = np.minimum(self._low, corners[0])
+        self._high = np.maximum(self._high, corners[1])
+        shown = (*(LIFT + (1 - LIFT) * channel for channel in rgba[:3]), rgba[3])
+        self._solids.append((_poly_data(vertices, faces), shown, hatch_up))
+
+    def image(self, width_px: int, oversampling: int) -> np.ndarray:
+        """Draw; the height follows from what is shown. Returns uint8 (height, width, 3)."""
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+
+        spread = self._high - self._low
+        shape = min(0.8, max(0.36, spread[1] / max(spread[0], 1e-9) * 1.02))
+        height_px = round(width_px * shape)
+        self._aim(shape)
+        for poly, rgba, hatch_up in self._solids:
+            self._show(poly, rgba, hatch_up)
+        self._light()
+        window = self._window
+        window.SetSize(width_px * oversampling, height_px * oversampling)
+        window.SetMultiSamples(0)
+        window.SetAlphaBitPlanes(1)
+        renderer = self._renderer
+        renderer.SetUseDepthPeeling(True)
+        renderer.SetMaximumNumberOfPeels(4)
+        renderer.SetOcclusionRatio(0.0)
+        window.AddRenderer(renderer)
+        window.Render()
+        grab = vtkWindowToImageFilter()
+        grab.SetInput(window)
+        grab.ReadFrontBufferOff()
+        grab.SetInputBufferTypeToRGB()
+        grab.Update()
+        flat = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars())
+        k = oversampling
+        tall = flat.reshape(height_px, k, width_px, k, 3)[::-1]
+        return np.ascontiguousarray(np.rint(tall.mean(axis=(1, 3))).astype(np.uint8))
+
+    def _aim(self, shape: float) -> None:
+        right, up, back = self._view.axes()
+        middle = (self._low + self._high) / 2
+        target = middle[0] * right + middle[1] * up + middle[2] * back
+        half = (self._high - self._low) / 2
+        reach = float(np.linalg.norm(half)) + 1.0
+        camera = self._renderer.GetActiveCamera()
+        camera.ParallelProjectionOn()
+        camera.SetFocalPoint(*target)
+        camera.SetPosition(*(target + 3 * reach * back))
+        camera.SetViewUp(*up)
+        self._scale_mm = 1.06 * max(half[1], half[0] * shape)
+        camera.SetParallelScale(self._scale_mm)
+        camera.SetClippingRange(reach, 5 * reach)
+
+    def _show(self, poly: Any, rgba: tuple[float, ...], hatch_up: bool) -> None:
+        from vtkmodules.vtkFiltersCore import vtkClipPolyData, vtkFeatureEdges, vtkPolyDataNormals
+        from vtkmodules.vtkFiltersHybrid import vtkPolyDataSilhouette
+
+        plane = self._plane()
+        normals = vtkPolyDataNormals()
+        normals.SetInputData(poly)
+        normals.SetFeatureAngle(CREASE_DEG)
+        faces: Any = normals
+        if plane is not None:
+            faces = vtkClipPolyData()
+            faces.SetInputConnection(normals.GetOutputPort())
+            faces.SetClipFunction(plane)
+        self._actor(faces, rgba, smooth=True)
+        edges = vtkFeatureEdges()
+        edges.SetInputData(poly)
+        edges.SetFeatureAngle(CREASE_DEG)
+        edges.ManifoldEdgesOff()
+        edges.NonManifoldEdgesOff()
+        edges.ColoringOff()
+        rim = vtkPolyDataSilhouette()
+        rim.SetInputData(poly)
+        rim.SetCamera(self._renderer.GetActiveCamera())
+        rim.SetEnableFeatureAngle(0)
+        dark = tuple(min(0.32, 0.45 * channel) for channel in rgba[:3])
+        strength = 0.9 if rgba[3] >= 0.999 else 0.55
+        for lines, width in ((edges, 2.0), (rim, 2.6)):
+            source: Any = lines
+            if plane is not None:
+                source = vtkClipPolyData()
+                source.SetInputConnection(lines.GetOutputPort())
+                source.SetClipFunction(plane)
+            self._lines(source, dark, width, strength)
+        if plane is not None:
+            self._close(poly, plane, rgba, hatch_up)
+
+    def _plane(self) -> Any:
+        from vtkmodules.vtkCommonDataModel import vtkPlane
+
+        if self._cut is None:
+            return None
+        axis, place = self._cut
+        origin, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        origin[axis] = place
+        normal[axis] = -math.copysign(1.0, self._view.axes()[2][axis])
+        plane = vtkPlane()
+        plane.SetOrigin(*origin)
+        plane.SetNormal(*normal)
+        return plane
+
+    def _close(self, poly: Any, plane: Any, rgba: tuple[float, ...], hatch_up: bool) -> None:
+        from vtkmodules.vtkCommonDataModel import vtkPlane
+        from vtkmodules.vtkFiltersCore import vtkCutter
+        from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
+
+        contour = vtkCutter()
+        contour.SetInputData(poly)
+        contour.SetCutFunction(plane)
+        contour.Update()
+        if not contour.GetOutput().GetNumberOfCells():
+            return
+        face = vtkContourTriangulator()
+        face.SetInputConnection(contour.GetOutputPort())
+        face.Update()
+        light = tuple(0.22 + 0.78 * channel for channel in rgba[:3])
+        self._actor(face, (*light, max(0.85, rgba[3])), smooth=False)
+        right, up, _ = self._view.axes()
+        stripes = vtkPlane()
+        stripes.SetOrigin(0.0, 0.0, 0.0)
+        stripes.SetNormal(*((right + (up if hatch_up else -up)) / math.sqrt(2)))
+        step = HATCH_MM * 2 * self._scale_mm
+        reach = math.ceil(3 * float(np.abs([self._low, self._high]).max()) / step)
+        hatch = vtkCutter()
+        hatch.SetInputConnection(face.GetOutputPort())
+        hatch.SetCutFunction(stripes)
+        hatch.SetNumberOfContours(2 * reach + 1)
+        for number in range(-reach, reach + 1):
+            hatch.SetValue(number + reach, number * step)
+        self._lines(hatch, tuple(0.55 * channel for channel in light), 1.5, 0.9)
+        self._lines(contour, INK, 3.4, 1.0)
+
+    def _actor(self, source: Any, rgba: tuple[float, ...], smooth: bool) -> None:
+        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+        mapper = vtkPolyDataMapper()
+        mapper.SetInputConnection(source.GetOutputPort())
+        mapper.ScalarVisibilityOff()
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        actor = vtkActor()
+        actor.SetMapper(mapper)
+        look = actor.GetProperty()
+        look.SetColor(*rgba[:3])
+        look.SetOpacity(rgba[3])
+        look.SetAmbient(0.34)
+        look.SetDiffuse(0.72)
+        look.SetSpecular(0.16)
+        look.SetSpecularPower(28.0)
+        look.SetInterpolationToGouraud() if smooth else look.LightingOff()
+        self._renderer.AddActor(actor)
+
+    def _lines(
+        self, source: Any, colour: tuple[float, ...], width_px: float, opacity: float
+    ) -> None:
+        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+        mapper = vtkPolyDataMapper()
+        mapper.SetInputConnection(source.GetOutputPort())
+        mapper.ScalarVisibilityOff()
+        actor = vtkActor()
+        actor.SetMapper(mapper)
+        look = actor.GetProperty()
+        look.SetColor(*colour)
+        look.SetOpacity(opacity)
+        look.SetLineWidth(width_px)
+        look.LightingOff()
+        self._renderer.AddActor(actor)
+
+    def _light(self) -> None:
+        from vtkmodules.vtkRenderingCore import vtkLight
+
+        self._renderer.RemoveAllLights()
+        for place, strength in (
+            ((-0.6, 0.9, 0.8), 0.72),
+            ((0.9, 0.2, 0.6), 0.28),
+            ((0, 0, 1), 0.22),
+        ):
+            light = vtkLight()
+            light.SetLightTypeToCameraLight()
+            light.SetPosition(*place)
+            light.SetFocalPoint(0.0, 0.0, 0.0)
+            light.SetIntensity(strength)
+            self._renderer.AddLight(light)
+
+
+def view_box(vertices: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Extent of points (n, 3) along right, up and depth of a view, in mm."""
+    seen = vertices @ view.axes().T
+    return seen.min(axis=0), seen.max(axis=0)
+
+
+def _poly_data(vertices: np.ndarray, faces: np.ndarray) -> Any:
+    """Build VTK's mesh with vertices at one place merged, so that edges know both faces."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+    from vtkmodules.vtkFiltersCore import vtkCleanPolyData
+
+    points = vtkPoints()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(vertices, dtype=float), deep=True))
+    cells = vtkCellArray()
+    offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=np.int64)
+    cells.SetData(
+        numpy_to_vtkIdTypeArray(offsets, deep=True),
+        numpy_to_vtkIdTypeArray(np.ascontiguousarray(faces, dtype=np.int64).ravel(), deep=True),
+    )
+    poly = vtkPolyData()
+    poly.SetPoints(points)
+    poly.SetPolys(cells)
+    merge = vtkCleanPolyData()
+    merge.SetInputData(poly)
+    merge.SetToleranceIsAbsolute(True)
+    merge.SetAbsoluteTolerance(1e-5)
+    merge.Update()
+    return merge.GetOutput()
