@@ -1,0 +1,46 @@
+"""The `format:` line, looked at before all else: a file of another format has other fields."""
+
+from __future__ import annotations
+
+import re
+
+from pydantic import BaseModel
+
+from gelslim_cad.spec.errors import Problem, SpecError
+from gelslim_cad.spec.fields import field_at
+from gelslim_cad.spec.nodes import MappingNode, Scalar
+from gelslim_cad.spec.source import Source
+
+_FORMAT = re.compile(r"([A-Za-z0-9-]+)/([0-9]{1,9})\Z")
+
+
+def check_format(source: Source, root: MappingNode, model: type[BaseModel]) -> None:
+    """Refuse a file whose `format:` is given and is none that `model` supports.
+
+    A missing line, or one that is no text, is left to the model. Raises `SpecError`.
+    """
+    field = field_at(model, "format")
+    entry = root.entries.get("format")
+    if field is None or not field.choices or entry is None or not isinstance(entry.node, Scalar):
+        return
+    node = entry.node
+    if not isinstance(node.value, str) or node.value in field.choices:
+        return
+    message, remedy = _difference(node.value, tuple(str(choice) for choice in field.choices))
+    problem = Problem(source.path, *node.position, "format", node.raw, message, remedy)
+    raise SpecError((problem,))
+
+
+def _difference(given: str, supported: tuple[str, ...]) -> tuple[str, str]:
+    newest = supported[-1]
+    reads = f"this program reads {' and '.join(supported)}"
+    name, version = newest.rsplit("/", 1)
+    found = _FORMAT.match(given)
+    if not found or found.group(1) != name:
+        return f"not a format of this kind of file, {reads}", f"write `format: {newest}`"
+    if int(found.group(2)) > int(version):
+        return f"newer than this program, {reads}", "update gelslim-cad"
+    return (
+        f"no longer supported, {reads}",
+        f"start from `gelslim new` and write `format: {newest}`",
+    )

@@ -1,0 +1,123 @@
+"""A commented spec to start from, generated from the models."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from pydantic import BaseModel
+
+from gelslim_cad.spec.errors import SpecError
+from gelslim_cad.spec.fields import Field, children
+from gelslim_cad.spec.phrases import range_phrase
+from gelslim_cad.spec.reader import load_bytes
+from gelslim_cad.spec.scalars import RefusedScalarError, resolve
+from gelslim_cad.spec.spec import Spec
+from gelslim_cad.spec.suggest import one_of
+
+SPY_CAMERA: dict[str, Any] = {
+    "camera.name": "Raspberry Pi spy camera (OV5647)",
+    "camera.image_width_px": 640,
+    "camera.image_height_px": 480,
+    "camera.sensor_width_mm": 3.6288,
+    "camera.sensor_height_mm": 2.7216,
+    "camera.focal_length_mm": 3.6,
+    "camera.f_number": 2.9,
+}
+"""2592 x 1944 pixels of 1.4 µm, read out as 640 x 480 over the whole sensor; f = 3.60 mm, f/2.9."""
+
+_HEAD = """\
+## A GelSlim-type tactile finger. All sizes in the unit that ends the name.
+## What is not given takes its default, shown behind "# "; to change one, delete the "# "
+## in front of it and of the blocks it lies in. Lines with "##" are remarks.
+"""
+_PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_.\-/ ]*[A-Za-z0-9_.\-/]|[A-Za-z]")
+
+
+def starter_text(
+    name: str,
+    gel_length_mm: float = 24.0,
+    gel_width_mm: float = 22.0,
+    camera: Mapping[str, Any] = SPY_CAMERA,
+) -> str:
+    """A complete spec called `name`: required fields filled in, all others as comments.
+
+    `camera` gives values by dotted path. The text is read back before it is returned.
+    Raises `SpecError` where it would be refused, as for a `name` with spaces.
+    """
+    values = {
+        "format": Spec.model_fields["format"].annotation.__args__[0],  # type: ignore[union-attr]
+        "name": name,
+        "design.gel.length_mm": gel_length_mm,
+        "design.gel.width_mm": gel_width_mm,
+        **camera,
+    }
+    text = _HEAD + "\n".join(_block(Spec, "", values, 0)) + "\n"
+    try:
+        load_bytes("gelslim new", text.encode(), Spec)
+    except SpecError as error:
+        problems = tuple(replace(problem, line=None, column=None) for problem in error.problems)
+        raise SpecError(problems) from None
+    return text
+
+
+def _block(
+    model: type[BaseModel], path: str, values: Mapping[str, Any], depth: int
+) -> Iterator[str]:
+    for field in children(model, path):
+        here = f"{path}.{field.name}" if path else field.name
+        if field.models:
+            yield from _below(model, replace(field, path=here), values, depth)
+        else:
+            yield _line(replace(field, path=here), values, depth)
+
+
+def _below(
+    model: type[BaseModel], field: Field, values: Mapping[str, Any], depth: int
+) -> Iterator[str]:
+    inside = list(_block(model, field.path, values, depth + 1))
+    head = f"{'  ' * depth}{field.name}:"
+    if depth == 0:
+        yield ""
+    if not any(given.startswith(f"{field.path}.") for given in values):
+        # The marks stand in the column of the block, so that deleting them keeps the indentation.
+        inside = [_commented(_uncommented(line), depth) for line in inside]
+        head = _commented(head, depth)
+    yield f"{head}  # {field.description}" if field.description else head
+    yield from inside
+
+
+def _line(field: Field, values: Mapping[str, Any], depth: int) -> str:
+    value = values.get(field.path, field.default)
+    limits = range_phrase(field) or (one_of(field.choices) if len(field.choices) > 1 else "")
+    remark = field.description + (f" ({limits})" if limits else "")
+    text = f"{'  ' * depth}{field.name}: {_yaml(value)}" + (f"  # {remark}" if remark else "")
+    return text if field.path in values else _commented(text, depth)
+
+
+def _commented(line: str, depth: int) -> str:
+    indent = "  " * depth
+    return f"{indent}# {line[len(indent) :]}"
+
+
+def _uncommented(line: str) -> str:
+    return re.sub(r"^( *)# ", r"\1", line)
+
+
+def _yaml(value: Any) -> str:
+    """`value` as YAML that reads back as the very same."""
+    if isinstance(value, str):
+        return value if _PLAIN.fullmatch(value) and _is_text(value) else json.dumps(value)
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(_yaml(item) for item in value)}]"
+    return json.dumps(value)
+
+
+def _is_text(value: str) -> bool:
+    try:
+        return isinstance(resolve(value), str)
+    except RefusedScalarError:
+        return False
