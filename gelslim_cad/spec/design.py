@@ -56,7 +56,7 @@ class LightGuide(Block):
 
 
 class Leds(Block):
-    """Side-emitting strips: red on the left (+y), green on the right (-y)."""
+    """Two strips under the legs: red at -y (left in the image), green at +y."""
 
     model: str = Field(default="LUXEON CZ", max_length=80, description="LED type, for the BOM")
     package_mm: float = Field(default=2.0, ge=0.3, le=10, description="Package edge length")
@@ -83,10 +83,10 @@ class Markers(Block):
         default=None,
         ge=5,
         le=200,
-        description="Lattice rows along the finger; filled when left out",
+        description="Lattice rows along the finger; left out: fill the gel",
     )
     columns: int | None = Field(
-        default=None, ge=5, le=200, description="Lattice columns across; filled when left out"
+        default=None, ge=5, le=200, description="Lattice columns across; left out: fill the gel"
     )
     edge_margin_mm: float = Field(
         default=0.5, ge=0, le=20, description="Gel left free between outermost dots and the edge"

@@ -44,7 +44,7 @@ class Material(Block):
         modulus = self.gel.youngs_modulus_mpa
         if modulus > STIFF_GEL_MPA and not self.allow_stiff_gel:
             raise ValueError(
-                f"gel.youngs_modulus_mpa = {modulus:g}: must be <= {STIFF_GEL_MPA:g} MPa; a tactile "
+                f"gel.youngs_modulus_mpa = {modulus:g}: must be <= {STIFF_GEL_MPA:g}; a tactile "
                 f"gel has about 0.05 to 1 MPa (did you mean {modulus / 1000:g}, that is "
                 f"{modulus:g} kPa?); set material.allow_stiff_gel: true to insist"
             )

@@ -18,7 +18,7 @@ class Mesh(Block):
         default=2,
         ge=1,
         le=20,
-        description="Mesh cells per marker pitch, so that nodes meet markers",
+        description="Mesh cells per marker pitch; nodes meet markers",
     )
     cells_along: Count | None = Field(
         default=None, description="Cells along the finger, instead of nodes_per_marker_pitch"

@@ -1,0 +1,5 @@
+"""Dependent dimensions: what follows from the spec, each with its formula."""
+
+from gelslim_cad.dimensions.dimensions import Dimensions, definition, derive, derive_batch
+
+__all__ = ["Dimensions", "definition", "derive", "derive_batch"]

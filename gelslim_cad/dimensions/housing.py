@@ -1,0 +1,185 @@
+"""The printed finger around the optics: ledge, channels, cover, chamber, mount."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.registry import dimension
+
+CLAMP_CHEEK_MM = 3.5
+CLAMP_BAR_MM = 1.5
+COVER_TAB_MM = 5.0
+MOUNT_WALL_MM = 1.5
+
+
+@dimension("shim.compressed_mm", formula="free thickness - precompression")
+def shim_compressed_mm(housing_shim_thickness_mm: Any, housing_precompression_mm: Any) -> Any:
+    """Shim thickness once the bezel is screwed down."""
+    return housing_shim_thickness_mm - housing_precompression_mm
+
+
+@dimension("ledge.depth_mm", formula="compressed shim + ledge")
+def ledge_depth_mm(shim_compressed_mm: Any, housing_ledge_mm: Any) -> Any:
+    """How far the ledge under the window's ends reaches down."""
+    return shim_compressed_mm + housing_ledge_mm
+
+
+@dimension("ledge.edge_x_mm", formula="min(-L/2 - 0.2, near ray at the ledge's foot - clearance)")
+def ledge_edge_x_mm(fold_layout: Fold) -> Any:
+    """Edge of the proximal ledge, outside the camera's view."""
+    return fold_layout.ledge_edge_x_mm
+
+
+@dimension("channel.inner_y_mm", formula="flat width / 2 + R - fit")
+def channel_inner_y_mm(
+    guide_flat_width_mm: Any, guide_inner_radius_mm: Any, housing_fit_clearance_mm: Any
+) -> Any:
+    """Inner side of the LED channel, the outer face of the baffle."""
+    return guide_flat_width_mm / 2 + guide_inner_radius_mm - housing_fit_clearance_mm
+
+
+@dimension("channel.outer_y_mm", formula="guide outer width / 2 + fit")
+def channel_outer_y_mm(guide_outer_width_mm: Any, housing_fit_clearance_mm: Any) -> Any:
+    """Outer side of the LED channel, the inner face of the side wall."""
+    return guide_outer_width_mm / 2 + housing_fit_clearance_mm
+
+
+@dimension("baffle.inner_y_mm", formula="channel inner side - baffle thickness")
+def baffle_inner_y_mm(channel_inner_y_mm: Any, housing_baffle_mm: Any) -> Any:
+    """Face of the baffle towards the camera's view."""
+    return channel_inner_y_mm - housing_baffle_mm
+
+
+@dimension("baffle.top_z_mm", formula="window bottom - R (bend centre)")
+def baffle_top_z_mm(stack_window_bottom_z_mm: Any, guide_inner_radius_mm: Any) -> Any:
+    """Upper edge of the baffle, just under the bend."""
+    return stack_window_bottom_z_mm - guide_inner_radius_mm
+
+
+@dimension("clamp.width_mm", formula="module width + 2 (fit + cheek)")
+def clamp_width_mm(camera_module_width_mm: Any, housing_fit_clearance_mm: Any) -> Any:
+    """Camera clamp across the finger."""
+    return camera_module_width_mm + 2 * (housing_fit_clearance_mm + CLAMP_CHEEK_MM)
+
+
+@dimension("bezel.thickness_mm", formula="gel total - proud")
+def bezel_thickness_mm(stack_gel_total_mm: Any, housing_gel_proud_mm: Any) -> Any:
+    """Thickness of the bezel plate between acrylic and outside."""
+    return stack_gel_total_mm - housing_gel_proud_mm
+
+
+@dimension("bezel.proximal_x_mm", formula="guide end - fit - tip wall")
+def bezel_proximal_x_mm(
+    guide_proximal_end_x_mm: Any, housing_fit_clearance_mm: Any, housing_tip_wall_mm: Any
+) -> Any:
+    """Gripper end of the bezel, which is screwed to the roof there."""
+    return guide_proximal_end_x_mm - housing_fit_clearance_mm - housing_tip_wall_mm
+
+
+@dimension("finger.depth_mm", formula="max(mirror, camera + clearance, guide stack)")
+def finger_depth_mm(fold_layout: Fold) -> Any:
+    """Depth below the window that mirror, camera and guide need."""
+    return fold_layout.depth_mm
+
+
+@dimension("finger.mirror_depth_mm", formula="window bottom - lowest corner of the mirror")
+def finger_mirror_depth_mm(fold_layout: Fold) -> Any:
+    """Depth below the window that the mirror needs."""
+    return fold_layout.mirror_depth_mm
+
+
+@dimension("finger.camera_depth_mm", formula="window bottom - lowest corner of the housing + gap")
+def finger_camera_depth_mm(fold_layout: Fold) -> Any:
+    """Depth below the window that the camera needs."""
+    return fold_layout.camera_depth_mm
+
+
+@dimension(
+    "finger.thickness_mm",
+    formula="T = back wall + depth + guide thickness + gel total",
+    source="PHYSICS: camera, fold mirror, thickness",
+)
+def finger_thickness_mm(
+    housing_back_wall_mm: Any,
+    finger_depth_mm: Any,
+    light_guide_thickness_mm: Any,
+    stack_gel_total_mm: Any,
+) -> Any:
+    """Finger thickness from the back to the gel's outer surface."""
+    return housing_back_wall_mm + finger_depth_mm + light_guide_thickness_mm + stack_gel_total_mm
+
+
+@dimension("finger.width_mm", formula="2 · max(channel outer side, clamp / 2 + fit) + 2 side wall")
+def finger_width_mm(
+    channel_outer_y_mm: Any,
+    clamp_width_mm: Any,
+    housing_fit_clearance_mm: Any,
+    housing_side_wall_mm: Any,
+) -> Any:
+    """Finger width."""
+    inside = np.maximum(channel_outer_y_mm, clamp_width_mm / 2 + housing_fit_clearance_mm)
+    return 2 * (inside + housing_side_wall_mm)
+
+
+@dimension("finger.tip_x_mm", formula="guide tip end + fit + tip wall")
+def finger_tip_x_mm(
+    guide_distal_end_x_mm: Any, housing_fit_clearance_mm: Any, housing_tip_wall_mm: Any
+) -> Any:
+    """Tip of the finger."""
+    return guide_distal_end_x_mm + housing_fit_clearance_mm + housing_tip_wall_mm
+
+
+@dimension("cover.top_z_mm", formula="-T + back wall")
+def cover_top_z_mm(finger_thickness_mm: Any, housing_back_wall_mm: Any) -> Any:
+    """Inner face of the back cover."""
+    return housing_back_wall_mm - finger_thickness_mm
+
+
+@dimension("chamber.rear_x_mm", formula="camera rear - clamp bar - cable bend radius - fit")
+def chamber_rear_x_mm(
+    camera_pose_rear_x_mm: Any,
+    bezel_proximal_x_mm: Any,
+    camera_cable_bend_radius_mm: Any,
+    housing_fit_clearance_mm: Any,
+) -> Any:
+    """Rear wall of the camera chamber."""
+    behind = camera_cable_bend_radius_mm + CLAMP_BAR_MM + housing_fit_clearance_mm
+    return np.minimum(camera_pose_rear_x_mm - behind, bezel_proximal_x_mm - 1.0)
+
+
+@dimension("finger.proximal_x_mm", formula="chamber rear - wall - max(tongue, cover tab)")
+def finger_proximal_x_mm(
+    chamber_rear_x_mm: Any, mount_tongue_length_mm: Any, housing_fit_clearance_mm: Any
+) -> Any:
+    """Gripper end of the body."""
+    inside = np.maximum(mount_tongue_length_mm + housing_fit_clearance_mm, COVER_TAB_MM)
+    return chamber_rear_x_mm - MOUNT_WALL_MM - inside
+
+
+@dimension("finger.length_mm", formula="tip - gripper end (flange not counted)")
+def finger_length_mm(finger_tip_x_mm: Any, finger_proximal_x_mm: Any) -> Any:
+    """Overall length of the finger."""
+    return finger_tip_x_mm - finger_proximal_x_mm
+
+
+@dimension("tongue.inner_y_mm", formula="cable width / 2 + 1.5")
+def tongue_inner_y_mm(camera_cable_width_mm: Any) -> Any:
+    """Inner side of the mount tongues, beside the cable."""
+    return camera_cable_width_mm / 2 + 1.5
+
+
+@dimension("tongue.outer_y_mm", formula="finger width / 2 - side wall - fit")
+def tongue_outer_y_mm(
+    finger_width_mm: Any, housing_side_wall_mm: Any, housing_fit_clearance_mm: Any
+) -> Any:
+    """Outer side of the mount tongues."""
+    return finger_width_mm / 2 - housing_side_wall_mm - housing_fit_clearance_mm
+
+
+@dimension("tongue.z_mm", formula="middle of the mount block")
+def tongue_z_mm(finger_thickness_mm: Any, housing_gel_proud_mm: Any) -> Any:
+    """Mid-plane of the mount tongues."""
+    return -(finger_thickness_mm + housing_gel_proud_mm) / 2

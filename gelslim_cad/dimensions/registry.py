@@ -1,0 +1,64 @@
+"""The list of dependent dimensions: each a pure function of named inputs with its formula.
+
+A function's parameters are names: of spec fields (`design.gel.length_mm` is `gel_length_mm`; the
+other blocks keep their name, `camera.f_number` is `camera_f_number`) or of other dimensions
+(`finger.thickness_mm` is `finger_thickness_mm`). Functions work on floats and on arrays alike.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dependent variable: how it is named, computed and justified."""
+
+    name: str
+    unit: str
+    formula: str
+    source: str
+    inputs: tuple[str, ...]
+    compute: Callable[..., Any]
+    internal: bool = False
+
+    @property
+    def identifier(self) -> str:
+        """The name as a function parameter."""
+        return self.name.replace(".", "_")
+
+    @property
+    def title(self) -> str:
+        """First line of the function's docstring."""
+        return (self.compute.__doc__ or "").strip().splitlines()[0]
+
+
+REGISTRY: dict[str, Dimension] = {}
+"""All dimensions by identifier, in the order of definition."""
+
+
+def dimension(
+    name: str, *, formula: str, source: str = "", internal: bool = False
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Register a function as the dimension `name`; its unit is the name's suffix."""
+
+    def register(function: Callable[..., Any]) -> Callable[..., Any]:
+        inputs = tuple(inspect.signature(function).parameters)
+        entry = Dimension(name, unit_of(name), formula, source, inputs, function, internal)
+        if entry.identifier in REGISTRY:
+            raise ValueError(f"dimension {name} is defined twice")
+        REGISTRY[entry.identifier] = entry
+        return function
+
+    return register
+
+
+UNITS = {"mm": "mm", "deg": "°", "px": "px", "mm2": "mm²", "mm3": "mm³", "percent": "%", "n": "N"}
+
+
+def unit_of(name: str) -> str:
+    """Unit of a name by its suffix; empty for a plain number."""
+    return UNITS.get(name.rsplit("_", 1)[-1], "")

@@ -1,0 +1,99 @@
+"""The thinnest finger that lets the camera see the gel: a deterministic search over folds.
+
+Three unknowns (mean ray angle, used part of the field of view, mirror angle) are searched on a
+coarse grid and then on ever smaller grids around the best candidates. Infeasible candidates rank
+by how far they miss, so that slivers of feasible designs are found and a hopeless design ends at
+its least bad fold, which the design rules then report.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+
+from gelslim_cad.dimensions.fold import Array, Fold, FoldProblem, fold
+
+LOWER = np.array([np.radians(-12.0), 0.25, np.radians(12.0)])
+UPPER = np.array([np.radians(58.0), 1.0, np.radians(50.0)])
+COARSE = (18, 10, 20)
+FINE = 5
+SHRINK = 0.55
+LEVELS = 18
+CHUNK = 128
+INFEASIBLE_MM = 1000.0
+KEYSTONE_WEIGHT_MM = 0.02
+LENGTH_WEIGHT = 0.002
+
+
+def objective(candidates: Fold) -> Array:
+    """Depth in mm; among equals the smaller keystone, then the shorter finger."""
+    keystone = candidates.far_distance_mm / candidates.near_distance_mm
+    tie = KEYSTONE_WEIGHT_MM * (keystone - 1) - LENGTH_WEIGHT * candidates.camera_rear_x_mm
+    missed = candidates.worst()
+    return np.where(missed > 1e-9, INFEASIBLE_MM * (1 + missed), candidates.depth_mm + tie)
+
+
+def solve_fold(problem: FoldProblem) -> Fold:
+    """Best fold per design, every field (n,); infeasible designs keep violations > 0."""
+    parts = [
+        _solve_chunk(problem.rows(slice(start, start + CHUNK)))
+        for start in range(0, len(problem), CHUNK)
+    ]
+    return _concatenate(parts)
+
+
+def _solve_chunk(problem: FoldProblem) -> Fold:
+    count = len(problem)
+    axes = [np.linspace(lo, hi, n) for lo, hi, n in zip(LOWER, UPPER, COARSE, strict=True)]
+    best = _best(problem, *(np.broadcast_to(axis, (count, len(axis))) for axis in axes))
+    width = (UPPER - LOWER) / (np.array(COARSE) - 1)
+    ticks = np.linspace(-1.0, 1.0, FINE)
+    for _ in range(LEVELS):
+        around = [
+            np.clip(b[:, None] + ticks * w, lo, hi)
+            for b, w, lo, hi in zip(best, width, LOWER, UPPER, strict=True)
+        ]
+        best = _best(problem, *around)
+        width = width * SHRINK
+    mid, spread, mirror = (b[:, None, None] for b in best)
+    return _squeeze(fold(problem, mid, spread, mirror))
+
+
+def _best(problem: FoldProblem, mid: Array, spread: Array, mirror: Array) -> list[Array]:
+    """Best of the grid spanned by three axes (n, k) per design; three arrays (n,).
+
+    Rays depend on the first two axes only: they broadcast against the mirror axis.
+    """
+    shape = (len(mid), mid.shape[1], spread.shape[1])
+    pairs = [
+        np.broadcast_to(mid[:, :, None], shape).reshape(len(mid), -1, 1),
+        np.broadcast_to(spread[:, None, :], shape).reshape(len(mid), -1, 1),
+    ]
+    score = objective(fold(problem, pairs[0], pairs[1], mirror[:, None, :]))
+    winner = np.argmin(score.reshape(len(mid), -1), axis=1)
+    pair, angle = np.divmod(winner, mirror.shape[1])
+    row = np.arange(len(mid))
+    return [pairs[0][row, pair, 0], pairs[1][row, pair, 0], mirror[row, angle]]
+
+
+def _squeeze(solved: Fold) -> Fold:
+    values = {
+        f.name: np.broadcast_to(getattr(solved, f.name), solved.depth_mm.shape)[:, 0, 0]
+        for f in fields(Fold)
+        if f.name != "violations"
+    }
+    shape = solved.depth_mm.shape
+    missed = {k: np.broadcast_to(v, shape)[:, 0, 0] for k, v in solved.violations.items()}
+    return Fold(**values, violations=missed)
+
+
+def _concatenate(parts: list[Fold]) -> Fold:
+    values = {
+        f.name: np.concatenate([getattr(part, f.name) for part in parts])
+        for f in fields(Fold)
+        if f.name != "violations"
+    }
+    names = parts[0].violations
+    missed = {k: np.concatenate([part.violations[k] for part in parts]) for k in names}
+    return Fold(**values, violations=missed)

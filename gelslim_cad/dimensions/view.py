@@ -1,0 +1,343 @@
+"""Camera, mirror and what the camera sees: dimensions that follow from the solved fold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.dimensions.fold import Fold, FoldProblem
+from gelslim_cad.dimensions.registry import dimension
+from gelslim_cad.dimensions.solver import solve_fold
+
+FOLD = "PHYSICS: camera, fold mirror, thickness"
+
+
+@dimension("view.pixel_pitch_mm", formula="sensor width / image width")
+def view_pixel_pitch_mm(camera_sensor_width_mm: Any, camera_image_width_px: Any) -> Any:
+    """Size of one image pixel on the sensor."""
+    return camera_sensor_width_mm / camera_image_width_px
+
+
+@dimension("view.focal_px", formula="f / pixel pitch", source="pinhole camera")
+def view_focal_px(camera_focal_length_mm: Any, view_pixel_pitch_mm: Any) -> Any:
+    """Focal length in pixels."""
+    return camera_focal_length_mm / view_pixel_pitch_mm
+
+
+@dimension("view.across_fov_deg", formula="min(given, 2 atan(sensor width / 2f))", source=FOLD)
+def view_across_fov_deg(
+    camera_sensor_width_mm: Any, camera_focal_length_mm: Any, camera_horizontal_fov_deg: Any
+) -> Any:
+    """Field of view across the finger."""
+    return _fov_deg(camera_sensor_width_mm, camera_focal_length_mm, camera_horizontal_fov_deg)
+
+
+@dimension("view.along_fov_deg", formula="min(given, 2 atan(sensor height / 2f))", source=FOLD)
+def view_along_fov_deg(
+    camera_sensor_height_mm: Any, camera_focal_length_mm: Any, camera_vertical_fov_deg: Any
+) -> Any:
+    """Field of view along the finger."""
+    return _fov_deg(camera_sensor_height_mm, camera_focal_length_mm, camera_vertical_fov_deg)
+
+
+def _fov_deg(side_mm: Any, focal_mm: Any, given_deg: Any) -> Any:
+    implied = np.degrees(2 * np.arctan(side_mm / 2 / focal_mm))
+    return implied if given_deg is None else np.minimum(implied, given_deg)
+
+
+@dimension("view.aperture_mm", formula="f / N", source="thin lens")
+def view_aperture_mm(camera_focal_length_mm: Any, camera_f_number: Any) -> Any:
+    """Diameter of the lens opening."""
+    return camera_focal_length_mm / camera_f_number
+
+
+@dimension("view.blur_limit_mm", formula="blur_per_diameter · marker diameter", source=FOLD)
+def view_blur_limit_mm(optics_blur_per_diameter: Any, markers_diameter_mm: Any) -> Any:
+    """Largest blur on the gel that the design allows."""
+    return optics_blur_per_diameter * markers_diameter_mm
+
+
+@dimension(
+    "fold.layout",
+    formula="thinnest fold that keeps all limits (search over two ray angles and the mirror)",
+    source=FOLD,
+    internal=True,
+)
+def fold_layout(
+    gel_length_mm: Any,
+    gel_width_mm: Any,
+    stack_gel_total_mm: Any,
+    material_gel_refractive_index: Any,
+    light_guide_thickness_mm: Any,
+    material_acrylic_refractive_index: Any,
+    view_across_fov_deg: Any,
+    view_along_fov_deg: Any,
+    optics_image_margin: Any,
+    camera_focal_length_mm: Any,
+    view_focal_px: Any,
+    view_aperture_mm: Any,
+    camera_lens_travel_mm: Any,
+    camera_focus_nearest_mm: Any,
+    camera_module_height_mm: Any,
+    camera_module_depth_mm: Any,
+    camera_lens_diameter_mm: Any,
+    camera_lens_height_mm: Any,
+    mirror_thickness_mm: Any,
+    mirror_border_mm: Any,
+    optics_clearance_mm: Any,
+    ledge_depth_mm: Any,
+    light_guide_end_support_mm: Any,
+    guide_stack_mm: Any,
+    markers_diameter_mm: Any,
+    view_blur_limit_mm: Any,
+    optics_min_px_per_marker: Any,
+    optics_max_keystone: Any,
+) -> Fold:
+    """The solved fold of camera and mirror."""
+    free = 1 - optics_image_margin
+    given = {
+        "gel_length_mm": gel_length_mm,
+        "gel_width_mm": gel_width_mm,
+        "gel_total_mm": stack_gel_total_mm,
+        "gel_index": material_gel_refractive_index,
+        "guide_thickness_mm": light_guide_thickness_mm,
+        "guide_index": material_acrylic_refractive_index,
+        "half_horizontal_tan": np.tan(np.radians(view_across_fov_deg) / 2) * free,
+        "half_vertical_tan": np.tan(np.radians(view_along_fov_deg) / 2) * free,
+        "focal_length_mm": camera_focal_length_mm,
+        "focal_px": view_focal_px,
+        "aperture_mm": view_aperture_mm,
+        "lens_travel_mm": camera_lens_travel_mm,
+        "focus_nearest_mm": camera_focus_nearest_mm,
+        "module_height_mm": camera_module_height_mm,
+        "module_depth_mm": camera_module_depth_mm,
+        "lens_diameter_mm": camera_lens_diameter_mm,
+        "lens_height_mm": camera_lens_height_mm,
+        "mirror_thickness_mm": mirror_thickness_mm,
+        "mirror_border_mm": mirror_border_mm,
+        "clearance_mm": optics_clearance_mm,
+        "ledge_depth_mm": ledge_depth_mm,
+        "ledge_support_mm": light_guide_end_support_mm,
+        "guide_stack_mm": guide_stack_mm,
+        "marker_diameter_mm": markers_diameter_mm,
+        "blur_limit_mm": view_blur_limit_mm,
+        "min_px_per_marker": optics_min_px_per_marker,
+        "max_keystone": optics_max_keystone,
+    }
+    flat = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given.values()))
+    columns = dict(zip(given, (v.reshape(-1, 1, 1) for v in flat), strict=True))
+    return solve_fold(FoldProblem(**columns))
+
+
+@dimension("view.near_ray_deg", formula="solved", source=FOLD)
+def view_near_ray_deg(fold_layout: Fold) -> Any:
+    """Air angle of the ray to the near (proximal) gel edge, from the gel's normal."""
+    return np.degrees(fold_layout.near_ray_rad)
+
+
+@dimension("view.far_ray_deg", formula="solved", source=FOLD)
+def view_far_ray_deg(fold_layout: Fold) -> Any:
+    """Air angle of the ray to the far (tip) gel edge, from the gel's normal."""
+    return np.degrees(fold_layout.far_ray_rad)
+
+
+@dimension(
+    "view.tilt_deg", formula="γ = smallest tilt that keeps both edges in the image", source=FOLD
+)
+def view_tilt_deg(fold_layout: Fold) -> Any:
+    """Tilt of the virtual axis from the gel's normal."""
+    return np.degrees(fold_layout.tilt_rad)
+
+
+@dimension("view.virtual_x_mm", formula="-L/2 - r(θ near)", source=FOLD)
+def view_virtual_x_mm(fold_layout: Fold) -> Any:
+    """Virtual camera position along the finger."""
+    return fold_layout.virtual_x_mm
+
+
+@dimension(
+    "view.virtual_z_mm",
+    formula="window bottom - (L - Δr layers) / (tan θ far - tan θ near)",
+    source=FOLD,
+)
+def view_virtual_z_mm(fold_layout: Fold) -> Any:
+    """Virtual camera position across the thickness."""
+    return fold_layout.virtual_z_mm
+
+
+@dimension("view.near_distance_mm", formula="(h_air + t/n + g/n_g) cos(θ-γ) / cos θ", source=FOLD)
+def view_near_distance_mm(fold_layout: Fold) -> Any:
+    """Apparent distance along the axis to the near gel edge, Z near."""
+    return fold_layout.near_distance_mm
+
+
+@dimension("view.far_distance_mm", formula="(h_air + t/n + g/n_g) cos(θ-γ) / cos θ", source=FOLD)
+def view_far_distance_mm(fold_layout: Fold) -> Any:
+    """Apparent distance along the axis to the far gel edge, Z far."""
+    return fold_layout.far_distance_mm
+
+
+@dimension("view.depth_range_mm", formula="Z far - Z near (L sin γ in air)", source=FOLD)
+def view_depth_range_mm(view_far_distance_mm: Any, view_near_distance_mm: Any) -> Any:
+    """Depth of field the picture needs."""
+    return view_far_distance_mm - view_near_distance_mm
+
+
+@dimension("view.keystone", formula="k = Z far / Z near", source=FOLD)
+def view_keystone(view_far_distance_mm: Any, view_near_distance_mm: Any) -> Any:
+    """Keystone ratio."""
+    return view_far_distance_mm / view_near_distance_mm
+
+
+@dimension("view.focus_mm", formula="s = 2 Zn Zf / (Zn + Zf)", source=FOLD)
+def view_focus_mm(view_near_distance_mm: Any, view_far_distance_mm: Any) -> Any:
+    """Best focus distance: equal blur in the image at both edges."""
+    n, f = view_near_distance_mm, view_far_distance_mm
+    return 2 * n * f / (n + f)
+
+
+@dimension(
+    "view.lens_extension_mm",
+    formula="f²/(s - f) from the infinity position; 0 where s is in the delivered range",
+    source="thin lens",
+)
+def view_lens_extension_mm(
+    view_focus_mm: Any, camera_focal_length_mm: Any, camera_focus_nearest_mm: Any
+) -> Any:
+    """How far the lens must be unscrewed."""
+    moved = camera_focal_length_mm**2 / np.maximum(view_focus_mm - camera_focal_length_mm, 1e-3)
+    return np.where(view_focus_mm >= camera_focus_nearest_mm, 0.0, moved)
+
+
+@dimension("view.near_blur_mm", formula="A (s - Zn) / s", source=FOLD)
+def view_near_blur_mm(view_aperture_mm: Any, view_focus_mm: Any, view_near_distance_mm: Any) -> Any:
+    """Blur on the gel at the near edge."""
+    return view_aperture_mm * np.abs(view_near_distance_mm - view_focus_mm) / view_focus_mm
+
+
+@dimension("view.far_blur_mm", formula="A (Zf - s) / s", source=FOLD)
+def view_far_blur_mm(view_aperture_mm: Any, view_focus_mm: Any, view_far_distance_mm: Any) -> Any:
+    """Blur on the gel at the far edge, the largest on the pad."""
+    return view_aperture_mm * np.abs(view_far_distance_mm - view_focus_mm) / view_focus_mm
+
+
+@dimension(
+    "view.image_blur_px", formula="(f²/N) (Zf - s) / (Zf (s - f)) / pixel pitch", source=FOLD
+)
+def view_image_blur_px(
+    view_aperture_mm: Any,
+    camera_focal_length_mm: Any,
+    view_focus_mm: Any,
+    view_far_distance_mm: Any,
+    view_pixel_pitch_mm: Any,
+) -> Any:
+    """Blur diameter in the image at the far edge."""
+    f, s, z = camera_focal_length_mm, view_focus_mm, view_far_distance_mm
+    return (
+        view_aperture_mm * f * np.abs(z - s) / (z * np.maximum(s - f, 1e-3)) / view_pixel_pitch_mm
+    )
+
+
+@dimension("view.marker_across_px", formula="f_px d / Zf", source=FOLD)
+def view_marker_across_px(
+    view_focal_px: Any, markers_diameter_mm: Any, view_far_distance_mm: Any
+) -> Any:
+    """Width of a far marker in the image."""
+    return view_focal_px * markers_diameter_mm / view_far_distance_mm
+
+
+@dimension(
+    "view.marker_along_px", formula="f_px d D / Zf², D = height above the plane", source=FOLD
+)
+def view_marker_along_px(fold_layout: Fold, view_marker_across_px: Any) -> Any:
+    """Height of a far marker in the image, foreshortened."""
+    apparent = fold_layout.far_distance_mm * np.cos(fold_layout.far_ray_rad)
+    apparent = apparent / np.cos(fold_layout.far_ray_rad - fold_layout.tilt_rad)
+    return view_marker_across_px * np.minimum(1.0, apparent / fold_layout.far_distance_mm)
+
+
+@dimension("view.across_use", formula="largest image x of the gel / half image", source=FOLD)
+def view_across_use(fold_layout: Fold, view_across_fov_deg: Any) -> Any:
+    """Part of the half image width that the gel fills; above 1 it is not seen whole."""
+    return fold_layout.corner_horizontal_tan / np.tan(np.radians(view_across_fov_deg) / 2)
+
+
+@dimension("view.along_use", formula="largest image y of the gel / half image", source=FOLD)
+def view_along_use(fold_layout: Fold, view_along_fov_deg: Any) -> Any:
+    """Part of the half image height that the gel fills; above 1 it is not seen whole."""
+    return fold_layout.corner_vertical_tan / np.tan(np.radians(view_along_fov_deg) / 2)
+
+
+@dimension("camera_pose.x_mm", formula="mirror image of the virtual camera", source=FOLD)
+def camera_pose_x_mm(fold_layout: Fold) -> Any:
+    """Pinhole (front of the lens) along the finger."""
+    return fold_layout.camera_x_mm
+
+
+@dimension("camera_pose.z_mm", formula="mirror image of the virtual camera", source=FOLD)
+def camera_pose_z_mm(fold_layout: Fold) -> Any:
+    """Pinhole (front of the lens) across the thickness."""
+    return fold_layout.camera_z_mm
+
+
+@dimension("camera_pose.pitch_deg", formula="ψ = 90° - 2α - γ", source=FOLD)
+def camera_pose_pitch_deg(mirror_angle_deg: Any, view_tilt_deg: Any) -> Any:
+    """Pitch of the camera down towards the mirror."""
+    return 90.0 - 2 * mirror_angle_deg - view_tilt_deg
+
+
+@dimension("camera_pose.rear_x_mm", formula="rearmost corner of the housing", source=FOLD)
+def camera_pose_rear_x_mm(fold_layout: Fold) -> Any:
+    """Rearmost point of the camera housing."""
+    return fold_layout.camera_rear_x_mm
+
+
+@dimension("camera_pose.front_x_mm", formula="foremost corner of lens and housing", source=FOLD)
+def camera_pose_front_x_mm(fold_layout: Fold) -> Any:
+    """Foremost point of lens and housing."""
+    return fold_layout.camera_front_x_mm
+
+
+@dimension("mirror.angle_deg", formula="solved", source=FOLD)
+def mirror_angle_deg(fold_layout: Fold) -> Any:
+    """Mirror angle α to the gel plane."""
+    return np.degrees(fold_layout.mirror_rad)
+
+
+@dimension("mirror.upper_x_mm", formula="far ray at the mirror's upper edge", source=FOLD)
+def mirror_upper_x_mm(fold_layout: Fold, mirror_border_mm: Any) -> Any:
+    """Upper end of the reflecting face, border included."""
+    return fold_layout.mirror_upper_x_mm + mirror_border_mm * np.cos(fold_layout.mirror_rad)
+
+
+@dimension("mirror.upper_z_mm", formula="window bottom - clearance", source=FOLD)
+def mirror_upper_z_mm(fold_layout: Fold, mirror_border_mm: Any) -> Any:
+    """Upper end of the reflecting face, border included."""
+    return fold_layout.mirror_upper_z_mm + mirror_border_mm * np.sin(fold_layout.mirror_rad)
+
+
+@dimension("mirror.lower_x_mm", formula="near ray at the mirror", source=FOLD)
+def mirror_lower_x_mm(fold_layout: Fold, mirror_border_mm: Any) -> Any:
+    """Lower end of the reflecting face, border included."""
+    return fold_layout.mirror_lower_x_mm - mirror_border_mm * np.cos(fold_layout.mirror_rad)
+
+
+@dimension("mirror.lower_z_mm", formula="near ray at the mirror", source=FOLD)
+def mirror_lower_z_mm(fold_layout: Fold, mirror_border_mm: Any) -> Any:
+    """Lower end of the reflecting face, border included."""
+    return fold_layout.mirror_lower_z_mm - mirror_border_mm * np.sin(fold_layout.mirror_rad)
+
+
+@dimension("mirror.length_mm", formula="|upper end - lower end|")
+def mirror_length_mm(
+    mirror_upper_x_mm: Any, mirror_upper_z_mm: Any, mirror_lower_x_mm: Any, mirror_lower_z_mm: Any
+) -> Any:
+    """Mirror length along its slope."""
+    return np.hypot(mirror_upper_x_mm - mirror_lower_x_mm, mirror_upper_z_mm - mirror_lower_z_mm)
+
+
+@dimension("mirror.width_mm", formula="2 (widest corner ray at the mirror + border)", source=FOLD)
+def mirror_width_mm(fold_layout: Fold, mirror_border_mm: Any) -> Any:
+    """Mirror width across the finger."""
+    return 2 * (fold_layout.mirror_half_width_mm + mirror_border_mm)
