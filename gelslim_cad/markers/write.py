@@ -1,0 +1,79 @@
+"""Write the marker files of one design into a folder."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from gelslim_cad.markers.csv import render_csv
+from gelslim_cad.markers.nodes import NearestNodes
+from gelslim_cad.markers.outline import Outline, as_outline
+from ifem_export.marker_grid import MarkerGrid
+
+
+def render_marker_files(
+    grid: MarkerGrid,
+    nodes: NearestNodes,
+    gel_outline: Outline | ArrayLike,
+    *,
+    kerf_mm: float = 0.0,
+) -> dict[str, bytes]:
+    """Return the content of every marker file by its name.
+
+    `kerf_mm` is that of the cutter for `stencil.dxf`. Raises ValueError when a dot crosses the
+    outline or there is not one node per marker.
+    """
+    from gelslim_cad.markers.dxf import render_dxf
+    from gelslim_cad.markers.gerber import (
+        render_gerber,
+        render_gerber_alignment,
+        render_gerber_profile,
+    )
+    from gelslim_cad.markers.pdf import render_pdf
+    from gelslim_cad.markers.stencil import lay_out_stencil, render_stencil
+    from gelslim_cad.markers.svg import render_svg
+
+    outline = as_outline(gel_outline)
+    sheet = lay_out_stencil(grid, outline)
+    return {
+        "markers.csv": render_csv(grid, nodes),
+        "markers.svg": render_svg(grid, outline),
+        "markers_mirrored.svg": render_svg(grid, outline, mirrored=True),
+        "markers.dxf": render_dxf(grid, outline),
+        "markers.pdf": render_pdf(grid, outline),
+        "markers_mirrored.pdf": render_pdf(grid, outline, mirrored=True),
+        "markers-F_Paste.gbr": render_gerber(grid, outline),
+        "markers-Edge_Cuts.gbr": render_gerber_profile(outline),
+        "markers-Alignment.gbr": render_gerber_alignment(sheet),
+        "stencil.dxf": render_stencil(sheet, kerf_mm=kerf_mm),
+    }
+
+
+def write_marker_files(
+    directory: Path,
+    grid: MarkerGrid,
+    nodes: NearestNodes,
+    gel_outline: Outline | ArrayLike,
+    *,
+    kerf_mm: float = 0.0,
+) -> list[Path]:
+    """Write every marker file into `directory` and return the paths, sorted by name.
+
+    Everything is rendered before the first file is touched, and each file is replaced whole.
+    Raises ValueError as `render_marker_files`, OSError when the folder cannot be written.
+    """
+    files = render_marker_files(grid, nodes, gel_outline, kerf_mm=kerf_mm)
+    directory = Path(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name in sorted(files):
+        part = directory / f".{name}.part"
+        try:
+            part.write_bytes(files[name])
+            os.replace(part, directory / name)
+        finally:
+            part.unlink(missing_ok=True)
+        paths.append(directory / name)
+    return paths

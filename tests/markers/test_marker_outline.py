@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+import shapely
+
+from gelslim_cad.markers.outline import Outline, as_outline
+
+L_SHAPE = [(0, 0), (6, 0), (6, 2), (2, 2), (2, 5), (0, 5)]
+
+
+@pytest.mark.parametrize("radius", [0.0, 2.0, 8.0])
+def test_rounded_rectangle_has_the_closed_form_area(radius):
+    outline = Outline.rounded_rectangle(20.0, 16.0, radius)
+    assert outline.area_mm2 == pytest.approx(320.0 - (4 - np.pi) * radius**2, rel=1e-12)
+    assert outline.bounds_mm == pytest.approx((-10, -8, 10, 8), abs=1e-3)
+    assert shapely.Polygon(outline.flattened(0.001)).area == pytest.approx(
+        outline.area_mm2, abs=0.06
+    )
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        Outline.rounded_rectangle(10, 6, 3),
+        Outline.polygon(L_SHAPE),
+        Outline([(-2, 0), (2, 0)], [0.5, 1.0]),
+    ],
+    ids=["stadium", "L", "lens"],
+)
+def test_contains_agrees_with_shapely(outline):
+    points = np.random.default_rng(3).uniform(-7, 7, (4000, 2))
+    shape = shapely.Polygon(outline.flattened())
+    np.testing.assert_array_equal(outline.contains(points), shapely.contains_xy(shape, points))
+    assert 0 < outline.contains(points).sum() < 4000
+
+
+def test_clockwise_input_is_turned_round_with_its_arcs():
+    forward = Outline.rounded_rectangle(10, 6, 2)
+    backward = Outline(forward.points_mm[::-1], -np.roll(forward.bulges[::-1], -1))
+    assert backward.area_mm2 == pytest.approx(forward.area_mm2)
+    np.testing.assert_array_equal(backward.points_mm, forward.points_mm)
+    np.testing.assert_array_equal(backward.bulges, forward.bulges)
+
+
+def test_mirror_image_is_a_reflection_in_x():
+    outline = Outline([(0, 0), (5, 0), (5, 4)], [0.0, 0.3, 0.0])
+    points = np.random.default_rng(4).uniform(-1, 7, (2000, 2))
+    np.testing.assert_array_equal(
+        outline.mirrored().contains(points * [1, -1]), outline.contains(points)
+    )
+    assert outline.mirrored().area_mm2 == pytest.approx(outline.area_mm2)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([(0, 0), (1, 0)], "do not enclose"),
+        ([(0, 0), (1, 0), (2, 0)], "no area"),
+        ([(0, 0), (1, 0), (1, np.nan)], "finite"),
+        ([(0, 0), (0, 0), (1, 0), (1, 1)], "coincide"),
+        ([0, 1, 2], "expected points"),
+    ],
+)
+def test_bad_outlines_are_refused(points, message):
+    with pytest.raises(ValueError, match=message):
+        as_outline(points)
+
+
+def test_too_large_a_radius_is_refused():
+    with pytest.raises(ValueError, match="half the shorter side, 3 mm"):
+        Outline.rounded_rectangle(10, 6, 3.1)
