@@ -64,8 +64,8 @@ def _drawing(view: CameraView, blur: tuple[float, ...], areas: list[float]) -> s
         f"{coordinate(view.image_height_px + 2 * pad)}"
     )
     return (
-        f'<svg class="view" viewBox="{box}" role="img" aria-labelledby="camera-title">'
-        f'<title id="camera-title">{len(areas)} markers in an image of {width} × {height} px'
+        f'<svg class="view" viewBox="{box}" role="img" aria-labelledby="marker-view-title">'
+        f'<title id="marker-view-title">{len(areas)} markers in an image of {width} × {height} px'
         f'</title><rect class="border" width="{width}" height="{height}"/>{outline}'
         f'<g stroke-opacity="0.4">{dots}</g>{_corners(view, pad)}</svg>'
     )
@@ -90,7 +90,7 @@ def _dot(view: CameraView, index: int, by_blur: int, by_size: int) -> str:
 
 def _corners(view: CameraView, pad: float) -> str:
     width, height = view.image_width_px, view.image_height_px
-    size = coordinate(pad * 0.6)
+    size = coordinate(pad * 0.75)
     return (
         f'<g class="tick" font-size="{size}"><text x="0" y="{coordinate(-0.3 * pad)}">0, 0</text>'
         f'<text x="{coordinate(width)}" y="{coordinate(height + 0.75 * pad)}" text-anchor="end">'

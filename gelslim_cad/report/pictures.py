@@ -8,11 +8,12 @@ from __future__ import annotations
 import ctypes
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
 
+from gelslim_cad.report.data import Picture
 from gelslim_cad.report.stage import Stage, View
 
 Mesh = tuple[
@@ -67,6 +68,34 @@ def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0
             f"section at {axis} = {at_mm} mm meets no part; they span {low:.2f} to {high:.2f} mm"
         )
     return _draw(meshes, SECTIONS[axis], explode=0.0, cut=(index, at_mm))
+
+
+def finger_pictures(meshes: Sequence[Mesh]) -> tuple[Picture, ...]:
+    """Make the report's pictures; where one cannot be made its `problem` says why.
+
+    Raises:
+        ValueError: a mesh is empty or not (n, 3) and (m, 3).
+    """
+    planned: tuple[tuple[str, str, Callable[[], bytes]], ...] = (
+        ("Whole", "As assembled, seen from the tip’s side.", lambda: picture_whole(meshes)),
+        (
+            "Exploded",
+            "Parts moved along their assembly directions.",
+            lambda: picture_exploded(meshes),
+        ),
+        (
+            "Section",
+            "Cut along the middle, y = 0; cut faces are hatched.",
+            lambda: picture_section(meshes, "y", 0.0),
+        ),
+    )
+    made = []
+    for title, caption, draw in planned:
+        try:
+            made.append(Picture(title, caption, draw()))
+        except PictureError as error:
+            made.append(Picture(title, caption, b"", str(error)))
+    return tuple(made)
 
 
 def _draw(

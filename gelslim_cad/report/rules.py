@@ -111,10 +111,10 @@ def _bar(row: RuleRow, sense: Literal["max", "min", ""]) -> str:
 def bar_places(value: float, limit: float) -> tuple[float, float, float]:
     """Place zero, the value and the limit on a bar of `WIDTH`, all inside it.
 
-    Where zero, value and limit have one sign the limit sits at `LIMIT_AT` and a value far
-    beyond it is cut at the end; otherwise the bar spans all three.
+    For a positive limit and a value that is not negative the bar starts at zero, the limit sits
+    at `LIMIT_AT` and a value far beyond it is cut at the end; otherwise the bar spans all three.
     """
-    if limit != 0 and value * limit >= 0:
+    if limit > 0 and value >= 0:
         share = min(value / limit * LIMIT_AT, 1.0)
         return 0.0, share * WIDTH, LIMIT_AT * WIDTH
     low, high = min(0.0, value, limit), max(0.0, value, limit)

@@ -13,6 +13,8 @@ HATCH_MM = 0.035
 """Distance of the hatch lines as a share of the picture's width."""
 LIFT = 0.07
 """Black parts are drawn a little lighter, so that their edges and faces can be told apart."""
+NUDGE_MM = 1.3e-4
+"""Keeps the cut off vertices and faces which lie exactly in it, as seams do at y = 0."""
 INK = (0.09, 0.11, 0.14)
 
 
@@ -117,14 +119,15 @@ class Stage:
         from vtkmodules.vtkFiltersHybrid import vtkPolyDataSilhouette
 
         plane = self._plane()
-        normals = vtkPolyDataNormals()
-        normals.SetInputData(poly)
-        normals.SetFeatureAngle(CREASE_DEG)
-        faces: Any = normals
-        if plane is not None:
-            faces = vtkClipPolyData()
-            faces.SetInputConnection(normals.GetOutputPort())
-            faces.SetClipFunction(plane)
+        faces = vtkPolyDataNormals()
+        faces.SetFeatureAngle(CREASE_DEG)
+        if plane is None:
+            faces.SetInputData(poly)
+        else:  # cut first: the clipper merges points and would mix normals across an edge
+            clipped = vtkClipPolyData()
+            clipped.SetInputData(poly)
+            clipped.SetClipFunction(plane)
+            faces.SetInputConnection(clipped.GetOutputPort())
         self._actor(faces, rgba, smooth=True)
         edges = vtkFeatureEdges()
         edges.SetInputData(poly)
@@ -155,7 +158,7 @@ class Stage:
             return None
         axis, place = self._cut
         origin, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        origin[axis] = place
+        origin[axis] = place + NUDGE_MM
         normal[axis] = -math.copysign(1.0, self._view.axes()[2][axis])
         plane = vtkPlane()
         plane.SetOrigin(*origin)

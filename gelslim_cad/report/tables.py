@@ -117,7 +117,7 @@ def bom(rows: tuple[BomRow, ...]) -> str:
         for row in rows
     )
     return (
-        '<div class="card scroll"><table><thead><tr><th class="num">Quantity</th><th>Part</th>'
+        '<div class="card bom scroll"><table><thead><tr><th class="num">Quantity</th><th>Part</th>'
         '<th>Material</th><th>Process</th><th class="num">Mass, g</th><th>Note</th></tr></thead>'
         f"<tbody>{lines}</tbody></table></div>"
     )

@@ -1,0 +1,129 @@
+"""Still pictures: true to scale, the same each time, and a clear word where none can be made."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_sample
+
+pytest.importorskip("vtkmodules", reason="VTK is not installed: no still pictures")
+from PIL import Image
+
+from gelslim_cad.report import pictures
+
+
+def mesh(solid, rgba=(0.8, 0.1, 0.1, 1.0), explode=(0.0, 0.0, 0.0), name="part"):
+    return (name, np.asarray(solid.vertices), np.asarray(solid.faces), rgba, explode)
+
+
+def finger():
+    return [mesh(solid, rgba, shift, name) for name, solid, rgba, shift in report_sample.pieces()]
+
+
+def pixels(png: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+
+
+def extent(image: np.ndarray) -> tuple[int, int]:
+    """Width and height of what is not white."""
+    rows, columns = np.nonzero((image < 245).any(axis=2))
+    return int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
+
+
+def hollow():
+    """A 40 x 30 x 20 mm box around a closed cavity of 24 x 16 x 8 mm."""
+    return report_sample.block((40, 30, 20), (0, 0, 0)).difference(
+        [report_sample.block((24, 16, 8), (0, 0, 0))]
+    )
+
+
+@pytest.fixture(scope="module")
+def drawn() -> list[bytes]:
+    return [picture.png for picture in pictures.finger_pictures(finger())]
+
+
+def test_pictures_show_many_parts_on_white(drawn):
+    for png in drawn:
+        image = pixels(png)
+        assert image.shape[1] == pictures.WIDTH_PX
+        assert (image[0, 0] == 255).all()
+        assert (image[-1, -1] == 255).all()
+        assert len(np.unique(image.reshape(-1, 3) // 8, axis=0)) > 60
+    assert len({hashlib.sha256(png).digest() for png in drawn}) == 3
+
+
+def test_pictures_are_the_same_in_a_fresh_process(drawn):
+    code = (
+        "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
+        "import test_report_pictures as t\n"
+        "made = t.pictures.finger_pictures(t.finger())\n"
+        "print(*(hashlib.sha256(p.png).hexdigest() for p in made))"
+    )
+    here = str(Path(__file__).parent)
+    out = subprocess.run([sys.executable, "-c", code, here], capture_output=True, text=True)
+    assert out.stdout.split() == [hashlib.sha256(png).hexdigest() for png in drawn], out.stderr
+
+
+@pytest.mark.parametrize(("axis", "shape"), [("x", (30, 20)), ("y", (40, 20)), ("z", (40, 30))])
+def test_section_is_to_scale_and_its_cap_has_the_true_area(axis, shape):
+    image = pixels(pictures.picture_section([mesh(hollow())], axis, 0.0))
+    width, height = extent(image)
+    assert width / height == pytest.approx(shape[0] / shape[1], rel=0.01)
+    middle = image[image.shape[0] // 2, image.shape[1] // 2]
+    wall = {"x": (16, 8), "y": (24, 8), "z": (24, 16)}[axis]
+    # Cut faces are flat and light; the back of the cavity is the full red of the part.
+    cavity = np.abs(image - middle).max(axis=2) <= 3
+    share = cavity.sum() / (width * height)
+    assert share == pytest.approx(wall[0] * wall[1] / (shape[0] * shape[1]), rel=0.04)
+
+
+def test_exploding_moves_parts_apart():
+    lower = mesh(report_sample.block((20, 20, 4), (0, 0, -2)))
+    upper = mesh(report_sample.block((20, 20, 4), (0, 0, 2)), explode=(0, 0, 30.0))
+    closed = extent(pixels(pictures.picture_whole([lower, upper])))
+    apart = extent(pixels(pictures.picture_exploded([lower, upper])))
+    assert apart[1] / apart[0] > 1.5 * closed[1] / closed[0]
+
+
+def test_what_cannot_be_drawn_is_refused():
+    with pytest.raises(ValueError, match="no meshes"):
+        pictures.picture_whole([])
+    with pytest.raises(ValueError, match=r"'part': vertices have shape \(0,\)"):
+        pictures.picture_whole([("part", np.zeros(0), np.zeros((1, 3)), (1, 1, 1, 1), (0, 0, 0))])
+    with pytest.raises(ValueError, match="a face names none"):
+        pictures.picture_whole(
+            [("part", np.zeros((3, 3)), np.array([[0, 1, 3]]), (1, 1, 1, 1), (0, 0, 0))]
+        )
+    with pytest.raises(ValueError, match=r"y = 90.0 mm meets no part; they span -15.00 to 15.00"):
+        pictures.picture_section([mesh(hollow())], "y", 90.0)
+
+
+def test_without_any_opengl_the_report_gets_the_reason_not_a_crash():
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import test_report_pictures as t\n"
+        "t.pictures._loads = lambda name: False\n"
+        "for p in t.pictures.finger_pictures(t.finger()): print(len(p.png), p.problem)"
+    )
+    env = os.environ | {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent", "DISPLAY": ""}
+    here = str(Path(__file__).parent)
+    out = subprocess.run(
+        [sys.executable, "-c", code, here], capture_output=True, text=True, env=env
+    )
+    assert out.returncode == 0, out.stderr
+    lines = out.stdout.splitlines()
+    assert len(lines) == 3
+    assert all(line.startswith("0 ") and "libegl1" in line for line in lines)
+
+
+def test_a_missing_library_is_named_with_its_debian_package():
+    told = pictures._missing("libXrender.so.1: cannot open shared object file")
+    assert "libxrender1" in told
+    assert "pip install 'gelslim-cad[view]'" in pictures._missing("No module named 'vtkmodules'")
