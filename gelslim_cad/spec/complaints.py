@@ -36,6 +36,11 @@ class Translator:
             return self._unknown(complaint)
         if kind in ("value_error", "assertion_error"):
             return self._rule(complaint), Suggestion("")
+        if kind == "union_tag_invalid":
+            tag = str(complaint.detail["discriminator"]).strip("'")
+            place = locate(self.root, (*complaint.place.parts, tag))
+            message, remedy = sentence(replace(complaint, place=place), None, False)
+            return self._at(place, message, remedy), Suggestion("")
         field, is_item = self._field(complaint.place)
         message, remedy = sentence(complaint, field, is_item)
         return self._at(complaint.place, message, remedy), Suggestion("")

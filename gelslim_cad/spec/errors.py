@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 MAX_SHOWN = 60
@@ -77,6 +78,15 @@ class SpecError(Exception):
             "omitted": self.omitted,
         }
         return json.dumps(body, indent=2)
+
+
+def listed(problems: Iterable[Problem], unread: int = 0) -> SpecError:
+    """The error with the first `MAX_PROBLEMS` of `problems` in file order; the rest are counted.
+
+    `unread` further problems were never spelt out.
+    """
+    ordered = sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
+    return SpecError(tuple(ordered[:MAX_PROBLEMS]), unread + max(0, len(ordered) - MAX_PROBLEMS))
 
 
 class FieldError(ValueError):

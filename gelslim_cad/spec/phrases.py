@@ -20,7 +20,7 @@ def kind_phrase(field: Field | None, item: bool = False) -> str:
         return "another kind of value"
     if item:
         return "a number" if field.item_limits else "an item of another kind"
-    phrases = [_kind(kind) for kind in dict.fromkeys(field.types)]
+    phrases = list(dict.fromkeys(_kind(kind) for kind in field.types))
     if field.choices:
         phrases.append(one_of(field.choices))
     return " or ".join(phrases) or "another kind of value"

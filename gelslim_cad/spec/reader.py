@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from gelslim_cad.spec.complaints import Translator
-from gelslim_cad.spec.errors import MAX_PROBLEMS, Problem, SpecError
+from gelslim_cad.spec.errors import MAX_PROBLEMS, Problem, listed
 from gelslim_cad.spec.fields import children, field_at
 from gelslim_cad.spec.formats import check_format
 from gelslim_cad.spec.nodes import MappingNode, join_path, plain, positions
@@ -19,7 +19,7 @@ from gelslim_cad.spec.phrases import give
 from gelslim_cad.spec.place import Complaint, locate
 from gelslim_cad.spec.source import Source, SourceMap, decode_source, read_source
 from gelslim_cad.spec.spec import Spec
-from gelslim_cad.spec.tree import parse_tree
+from gelslim_cad.spec.tree import NUMBER_REMEDY, parse_tree
 from gelslim_cad.spec.unions import settle_unions
 
 M = TypeVar("M", bound=BaseModel)
@@ -85,7 +85,7 @@ def load_source(source: Source, model: type[M]) -> Loaded[M]:
 
 
 def _with_remedy(problem: Problem, model: type[BaseModel]) -> Problem:
-    if problem.remedy:
+    if problem.remedy != NUMBER_REMEDY:
         return problem
     path, is_item = problem.field, problem.field.endswith("]")
     field = field_at(model, path.rpartition("[")[0] if is_item else path)
@@ -99,13 +99,12 @@ def _validated(
     try:
         instance = model.model_validate_json(json.dumps(plain(root)), strict=True)
     except ValidationError as error:
-        problems = (*refused, *_problems(source, root, model, error, refused))
+        problems, unread = _problems(source, root, model, error, refused)
     else:
-        problems = refused
-        if not problems:
+        problems, unread = [], 0
+        if not refused:
             return instance
-    ordered = sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
-    raise SpecError(tuple(ordered[:MAX_PROBLEMS]), max(0, len(ordered) - MAX_PROBLEMS))
+    raise listed((*refused, *problems), unread)
 
 
 def _problems(
@@ -114,17 +113,21 @@ def _problems(
     model: type[BaseModel],
     error: ValidationError,
     refused: tuple[Problem, ...],
-) -> Iterator[Problem]:
+) -> tuple[list[Problem], int]:
+    """The problems behind `error`, the first of them in file order, and how many more there are."""
     complaints = [_complaint(root, item) for item in error.errors(include_url=False)]
     heard = [c for c in complaints if not _answered(c, {p.field for p in refused})]
     translator = Translator(source.path, root, model)
-    listed = settle_unions(heard)
+    ordered = sorted(settle_unions(heard), key=lambda complaint: complaint.place.position)
     # Suggestions compare a key with every field: a file of nonsense pays for the listed ones only.
-    translated = [translator.problem(complaint) for complaint in listed[: 2 * MAX_PROBLEMS]]
+    translated = [translator.problem(complaint) for complaint in ordered[:MAX_PROBLEMS]]
     meant = {s.paths[0] for _, s in translated if len(s.paths) == 1}
-    for problem, _ in translated:
-        if problem.message != "missing" or problem.field not in meant:
-            yield problem
+    problems = [
+        problem
+        for problem, _ in translated
+        if problem.message != "missing" or problem.field not in meant
+    ]
+    return problems, len(ordered) - len(translated)
 
 
 def _complaint(root: MappingNode, item: Any) -> Complaint:

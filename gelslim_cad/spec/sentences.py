@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_args
 
 from gelslim_cad.spec.errors import shown
 from gelslim_cad.spec.fields import Field
 from gelslim_cad.spec.nodes import ListNode, MappingNode, Node, Scalar
 from gelslim_cad.spec.phrases import SIGNS, give, kind_phrase, number, unit_label
 from gelslim_cad.spec.place import Complaint
-from gelslim_cad.spec.suggest import suggest_choice
+from gelslim_cad.spec.suggest import one_of, suggest_choice
 from gelslim_cad.spec.texts import text_remedy
 
 _LIMIT_KINDS = {
@@ -27,21 +27,23 @@ def sentence(complaint: Complaint, field: Field | None, is_item: bool) -> tuple[
     place, kind, detail = complaint.place, complaint.kind, complaint.detail
     if kind in _LIMIT_KINDS:
         return _limit(field, is_item, kind, detail, place.node)
-    if kind in ("literal_error", "enum", "union_tag_invalid"):
+    if kind.startswith("union_tag"):
+        return _tag(detail, field, place.node)
+    if kind in ("literal_error", "enum"):
         return _choice(complaint, field)
     if kind in ("too_short", "too_long"):
         return _length(kind, detail)
     if kind in _TEXT_RULES:
         return _TEXT_RULES[kind](detail, place.node)
-    if kind.endswith(("_type", "_from_float", "_parsing")) or kind == "union_tag_not_found":
+    if kind.endswith(("_type", "_from_float", "_parsing")):
         return _wrong_type(field, is_item, place.node)
     return shown(complaint.text, 200), give(field, is_item)
 
 
 def _choice(complaint: Complaint, field: Field | None) -> tuple[str, str]:
     node = complaint.place.node
-    expected = str(complaint.detail.get("expected", complaint.detail.get("expected_tags", "")))
     if field is None or not field.choices:
+        expected = str(complaint.detail.get("expected", "another value"))
         return f"must be {expected.replace(chr(39), '')}", "write one of these"
     if not isinstance(node, Scalar) or isinstance(node.value, bool) or node.value is None:
         return _wrong_type(field, False, node)
@@ -50,6 +52,20 @@ def _choice(complaint: Complaint, field: Field | None) -> tuple[str, str]:
     if numeric and not choices.startswith("did you"):
         return _wrong_type(field, False, node)
     return f"must be {kind_phrase(field)}", choices
+
+
+def _tag(detail: dict[str, Any], field: Field | None, node: Node) -> tuple[str, str]:
+    """For a block whose kind is told by one of its fields, and that field is missing or wrong."""
+    tag = str(detail["discriminator"]).strip("'")
+    kinds = tuple(
+        choice
+        for model in (field.models if field else ())
+        for choice in get_args(model.model_fields[tag].annotation)
+    )
+    if isinstance(node, Scalar) and field is None:
+        tags = tuple(re.findall("'([^']*)'", str(detail.get("expected_tags", ""))))
+        return f"must be {one_of(tags)}", suggest_choice(node.value, tags)
+    return f"has no {tag}", f"add `{tag}: {one_of(kinds) if kinds else '...'}`"
 
 
 def _limit(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
 from pydantic import BaseModel
 
 from gelslim_cad.spec.errors import shown
-from gelslim_cad.spec.fields import Field, children, field_table
+from gelslim_cad.spec.fields import Field, children, field_table, pattern
 from gelslim_cad.spec.units import converted, split_unit
 
 _CLOSE = 0.72
@@ -95,8 +95,15 @@ def suggest_key(model: type[BaseModel], parent: str, key: str, value: Any) -> Su
         block = f"{parent} has the fields" if parent else "the fields are"
         return Suggestion(f"{block} {names}" if names else "delete it")
     found = found[:_NAMED] if _exact(name, found) or len(found) == 1 else found[:1]
+    found = [replace(field, path=_beside(field.path, parent)) for field in found]
     named = " or ".join(_named(field, name, value) for field in found)
     return Suggestion(f"did you mean {named}?", tuple(field.path for field in found))
+
+
+def _beside(path: str, parent: str) -> str:
+    """`path` with the indices of `parent` where it lies below it."""
+    general = pattern(parent)
+    return parent + path[len(general) :] if path.startswith(f"{general}.") else path
 
 
 def _exact(name: str, found: list[Field]) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from gelslim_cad.spec.errors import Problem, SpecError, shown
+from gelslim_cad.spec.errors import Problem, SpecError, listed, shown
 from gelslim_cad.spec.nodes import Entry, ListNode, MappingNode, Node, PathPart, Scalar, join_path
 from gelslim_cad.spec.scalars import RefusedScalarError, resolve
 from gelslim_cad.spec.source import Position, Source, refusal
@@ -19,6 +19,7 @@ from gelslim_cad.spec.syntax import syntax_error
 
 MAX_DEPTH = 24
 MAX_NODES = 20_000
+NUMBER_REMEDY = "give a value within range"
 
 
 @dataclass(slots=True)
@@ -135,7 +136,7 @@ class _Builder:
                 raise RefusedScalarError("holds half a character (a lone surrogate)")
         except RefusedScalarError as error:
             if not self.awaits_key():
-                self.problem(position, raw, str(error), "")
+                self.problem(position, raw, str(error), NUMBER_REMEDY)
             return Scalar(position, None, raw, refused=True)
         return Scalar(position, value, raw)
 
@@ -143,7 +144,7 @@ class _Builder:
 def parse_tree(source: Source) -> tuple[MappingNode, tuple[Problem, ...]]:
     """The top-level mapping of the one document in `source`, and what it holds that is refused.
 
-    A problem with an empty remedy is one whose remedy depends on the field.
+    A problem with `NUMBER_REMEDY` is one about which the field's limits could say more.
     Raises `SpecError` where there is no such mapping: syntax errors, an empty file, several
     documents, a list at the top, nesting beyond `MAX_DEPTH`, more than `MAX_NODES` values.
     """
@@ -154,7 +155,7 @@ def parse_tree(source: Source) -> tuple[MappingNode, tuple[Problem, ...]]:
         raise
     except Exception as error:
         # The parser meets hostile input here; some of it raises other errors than its own.
-        raise SpecError((*builder.problems, syntax_error(source, error, builder.last))) from None
+        raise listed((*builder.problems, syntax_error(source, error, builder.last))) from None
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.raw == "" and not builder.problems):
         raise refusal(source.path, "is empty", "`gelslim new` writes a spec to start from")
