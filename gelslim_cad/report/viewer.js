@@ -18,6 +18,11 @@ class Viewer {
     this.wireControls();
     wirePointer(this);
     wireKeys(this);
+    this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    this.canvas.addEventListener("webglcontextrestored", () => {
+      this.painter = new Painter(this.canvas, parts);
+      this.redraw();
+    });
     new ResizeObserver(() => this.redraw()).observe(this.canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
     this.render();

@@ -140,7 +140,9 @@ class Painter {
   // scene: camera (matrix), eye, key, plane or null, section {axis, at}, background, shift(part),
   // visible(part), tint(part), edge colour. Returns the number of triangles drawn.
   draw(scene) {
-    const { gl } = this, plane = scene.plane || OFF;
+    const { gl } = this;
+    if (gl.isContextLost()) return 0;
+    const plane = scene.plane || OFF;
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.clearColor(...scene.background, 1);
     gl.enable(gl.DEPTH_TEST);

@@ -58,7 +58,7 @@ def drive(folder: Path, page: bytes, steps: str, *switches: str) -> dict:
     free, count = re.subn(rb'<meta http-equiv="Content-Security-Policy"[^>]*>', b"", page)
     assert count == 1
     script = (
-        "<script>addEventListener('load', () => { const v = window.fingerViewer, out = {};"
+        "<script>addEventListener('load', async () => { const v = window.fingerViewer, out = {};"
         f"try {{ {steps} }} catch (e) {{ out.error = String(e); }}"
         "document.body.dataset.out = JSON.stringify(out); });</script></body>"
     )
@@ -136,6 +136,26 @@ def test_hiding_exploding_and_picking(tmp_path, page):
     assert out["grown"] > 1.5
     assert out["back"] == 0
     assert out["yaw"] == pytest.approx(-82.5)
+
+
+def test_a_lost_graphics_context_comes_back(tmp_path, page):
+    out = drive(
+        tmp_path, page,
+        READ + """
+        const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+        const colours = () => new Set(new Uint32Array(still().p.buffer)).size;
+        out.before = colours();
+        const extension = v.painter.gl.getExtension("WEBGL_lose_context");
+        extension.loseContext(); await wait(200); v.render();
+        out.lost = Number(v.root.dataset.triangles);
+        extension.restoreContext(); await wait(600);
+        out.after = colours(); out.drawn = Number(v.root.dataset.triangles);
+        """,
+    )  # fmt: skip
+    assert out["before"] > 50
+    assert out["lost"] == 0
+    assert out["after"] == out["before"]
+    assert out["drawn"] == report_sample.triangles()
 
 
 def test_section_caps_exactly_the_cut_material(tmp_path):
