@@ -102,6 +102,20 @@ def pieces() -> tuple[Piece, ...]:
     )
 
 
+def meshes() -> list[tuple]:
+    """The parts as `report.pictures` takes them, colours in sRGB."""
+    return [
+        (
+            name,
+            np.asarray(solid.vertices),
+            np.asarray(solid.faces),
+            (*(channel ** (1 / 2.2) for channel in rgba[:3]), rgba[3]),
+            shift,
+        )
+        for name, solid, rgba, shift in pieces()
+    ]
+
+
 def _hole(x: float, y: float) -> trimesh.Trimesh:
     solid = cylinder(radius=1.3, height=60, sections=32)
     solid.apply_translation((x, y, -20))

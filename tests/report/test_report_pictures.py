@@ -28,10 +28,6 @@ def mesh(solid, rgba=(0.8, 0.1, 0.1, 1.0), explode=(0.0, 0.0, 0.0), name="part")
     return (name, np.asarray(solid.vertices), np.asarray(solid.faces), rgba, explode)
 
 
-def finger():
-    return [mesh(solid, rgba, shift, name) for name, solid, rgba, shift in report_sample.pieces()]
-
-
 def pixels(png: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
 
@@ -51,7 +47,7 @@ def hollow():
 
 @pytest.fixture(scope="module")
 def drawn() -> list[bytes]:
-    return [picture.png for picture in pictures.finger_pictures(finger())]
+    return [picture.png for picture in pictures.finger_pictures(report_sample.meshes())]
 
 
 def test_pictures_show_many_parts_on_white(drawn):
@@ -67,8 +63,8 @@ def test_pictures_show_many_parts_on_white(drawn):
 def test_pictures_are_the_same_in_a_fresh_process(drawn):
     code = (
         "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
-        "import test_report_pictures as t\n"
-        "made = t.pictures.finger_pictures(t.finger())\n"
+        "import report_sample; from gelslim_cad.report import pictures\n"
+        "made = pictures.finger_pictures(report_sample.meshes())\n"
         "print(*(hashlib.sha256(p.png).hexdigest() for p in made))"
     )
     here = str(Path(__file__).parent)
@@ -113,9 +109,10 @@ def test_what_cannot_be_drawn_is_refused():
 def test_without_any_opengl_the_report_gets_the_reason_not_a_crash():
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import test_report_pictures as t\n"
-        "t.pictures._loads = lambda name: False\n"
-        "for p in t.pictures.finger_pictures(t.finger()): print(len(p.png), p.problem)"
+        "import report_sample; from gelslim_cad.report import pictures\n"
+        "pictures._loads = lambda name: False\n"
+        "made = pictures.finger_pictures(report_sample.meshes())\n"
+        "for p in made: print(len(p.png), p.problem)"
     )
     env = os.environ | {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent", "DISPLAY": ""}
     here = str(Path(__file__).parent)
