@@ -43,7 +43,7 @@ class FoldProblem:
     mirror_border_mm: Array
     clearance_mm: Array
     ledge_depth_mm: Array
-    ledge_support_mm: Array
+    ledge_reach_mm: Array
     guide_stack_mm: Array
     marker_diameter_mm: Array
     blur_limit_mm: Array
@@ -161,7 +161,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
     ]
     lower_end_x = lower_x - p.mirror_border_mm * ca
     before_mirror = [x - lower_end_x + p.clearance_mm for x, _ in housing]
-    ledge_x = ledge_edge - p.ledge_support_mm
+    ledge_x = ledge_edge - p.ledge_reach_mm
     under_ledge = [np.minimum(x - ledge_x, z - ledge_z + p.clearance_mm) for x, z in housing]
     violations = {
         "field of view along": vertical / p.half_vertical_tan - 1,

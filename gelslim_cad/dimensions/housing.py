@@ -8,10 +8,12 @@ import numpy as np
 
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import dimension
+from gelslim_cad.fasteners import SCREWS
 
 CLAMP_CHEEK_MM = 3.5
 CLAMP_BAR_MM = 1.5
-COVER_TAB_MM = 5.0
+COVER_TAB_MM = 4.0
+BEAM_MM = 2.0
 MOUNT_WALL_MM = 1.5
 
 
@@ -25,6 +27,12 @@ def shim_compressed_mm(housing_shim_thickness_mm: Any, housing_precompression_mm
 def ledge_depth_mm(shim_compressed_mm: Any, housing_ledge_mm: Any) -> Any:
     """How far the ledge under the window's ends reaches down."""
     return shim_compressed_mm + housing_ledge_mm
+
+
+@dimension("ledge.reach_mm", formula="end support + fit + beam under the roof's edge")
+def ledge_reach_mm(light_guide_end_support_mm: Any, housing_fit_clearance_mm: Any) -> Any:
+    """How far ledge and beam reach from the ledge's edge towards the camera."""
+    return light_guide_end_support_mm + housing_fit_clearance_mm + BEAM_MM
 
 
 @dimension("ledge.edge_x_mm", formula="min(-L/2 - 0.2, near ray at the ledge's foot - clearance)")
@@ -150,13 +158,22 @@ def chamber_rear_x_mm(
     return np.minimum(camera_pose_rear_x_mm - behind, bezel_proximal_x_mm - 1.0)
 
 
-@dimension("finger.proximal_x_mm", formula="chamber rear - wall - max(tongue, cover tab)")
-def finger_proximal_x_mm(
-    chamber_rear_x_mm: Any, mount_tongue_length_mm: Any, housing_fit_clearance_mm: Any
+@dimension("mount.length_mm", formula="max(tongue + fit + wall, bolt head + 2.4 + gap + cover tab)")
+def mount_length_mm(
+    mount_tongue_length_mm: Any, housing_fit_clearance_mm: Any, mount_bolt: str
 ) -> Any:
+    """Solid block behind the camera chamber that takes the tongues."""
+    head_mm = SCREWS[mount_bolt].cap_head_mm
+    return np.maximum(
+        mount_tongue_length_mm + housing_fit_clearance_mm + MOUNT_WALL_MM,
+        head_mm + 2.4 + 0.8 + COVER_TAB_MM,
+    )
+
+
+@dimension("finger.proximal_x_mm", formula="chamber rear - mount length")
+def finger_proximal_x_mm(chamber_rear_x_mm: Any, mount_length_mm: Any) -> Any:
     """Gripper end of the body."""
-    inside = np.maximum(mount_tongue_length_mm + housing_fit_clearance_mm, COVER_TAB_MM)
-    return chamber_rear_x_mm - MOUNT_WALL_MM - inside
+    return chamber_rear_x_mm - mount_length_mm
 
 
 @dimension("finger.length_mm", formula="tip - gripper end (flange not counted)")

@@ -169,7 +169,7 @@ class Mount(Block):
     gripper: str = Field(default="generic", max_length=80, description="Gripper, for the BOM")
     bolt: Literal["M2", "M2.5", "M3", "M4"] = Field(default="M3", description="Cross bolt")
     tongue_length_mm: float = Field(
-        default=9.0, ge=5, le=60, description="Tongue length inside the finger"
+        default=10.0, ge=5, le=60, description="Tongue length inside the finger"
     )
     tongue_thickness_mm: float = Field(
         default=5.0, ge=2, le=30, description="Tongue thickness across the finger's thickness"

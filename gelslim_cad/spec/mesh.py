@@ -34,5 +34,7 @@ class Mesh(Block):
     @model_validator(mode="after")
     def _both(self) -> Mesh:
         if (self.cells_along is None) != (self.cells_across is None):
-            raise ValueError("give cells_along and cells_across together, or neither")
+            raise ValueError(
+                "give cells_along and cells_across together, or neither; add the other or delete it"
+            )
         return self
