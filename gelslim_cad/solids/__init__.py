@@ -1,0 +1,1 @@
+"""The parts of the finger, one small module each. Imports cadquery."""

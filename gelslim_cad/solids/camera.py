@@ -1,0 +1,98 @@
+"""Camera mock-up and the clamp that holds it at its pitch."""
+
+from __future__ import annotations
+
+import cadquery as cq
+
+from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.dimensions.housing import CLAMP_BAR_MM, CLAMP_CHEEK_MM
+from gelslim_cad.part import Part
+from gelslim_cad.solids.layout import Layout
+from gelslim_cad.solids.materials import CAMERA, CLAMP, PRINTED
+from gelslim_cad.solids.shapes import Point2, box, pair, rod, single, subtract, union
+
+FAR_MM = 200.0
+LIP_MM = 1.2
+SCREW_DEPTH_MM = 5.0
+
+
+def _placed(d: Dimensions, local: cq.Shape) -> cq.Shape:
+    """From the camera's own frame (pinhole at 0, looking along +x) into the finger."""
+    turned = local.rotate(cq.Vector(), cq.Vector(0, 1, 0), d["camera_pose.pitch_deg"])
+    return turned.translate(cq.Vector(d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]))
+
+
+def camera(d: Dimensions) -> Part:
+    """Housing and lens barrel as the data sheet gives them."""
+    face, depth = -d["camera.lens_height_mm"], d["camera.module_depth_mm"]
+    half_w, half_h = d["camera.module_width_mm"] / 2, d["camera.module_height_mm"] / 2
+    shape: cq.Shape = box((face - depth, face), (-half_w, half_w), (-half_h, half_h))
+    if face < 0:
+        lens = cq.Solid.makeCylinder(
+            d["camera.lens_diameter_mm"] / 2,
+            -face + depth / 2,
+            cq.Vector(face - depth / 2, 0, 0),
+            cq.Vector(1, 0, 0),
+        )
+        shape = shape.fuse(lens)
+    return Part(
+        name="camera",
+        solid=single(_placed(d, shape), "camera"),
+        material=d["camera.name"],
+        process="buy",
+        colour=CAMERA,
+        explode_mm=(-14, 0, -12),
+        note=f"unscrew the lens by {d['view.lens_extension_mm']:.2f} mm from infinity focus",
+    )
+
+
+def clamp_screw_places(d: Dimensions) -> list[Point2]:
+    """Screws (x, y) that hold the clamp's cheeks from below."""
+    middle = -d["camera.lens_height_mm"] - d["camera.module_depth_mm"] / 2
+    x = _placed(d, cq.Vertex.makeVertex(middle, 0, -d["camera.module_height_mm"] / 2)).Center().x
+    y = d["clamp.width_mm"] / 2 - CLAMP_CHEEK_MM / 2
+    return [(x, -y), (x, y)]
+
+
+def camera_clamp(d: Dimensions) -> Part:
+    """U-shaped cradle: two cheeks with front lips and a rear bar; open on the gel side."""
+    at = Layout(d)
+    fit = d["design.housing.fit_clearance_mm"]
+    face = -d["camera.lens_height_mm"]
+    rear = face - d["camera.module_depth_mm"] - fit
+    inner = d["camera.module_width_mm"] / 2 + fit
+    outer = inner + CLAMP_CHEEK_MM
+    high = d["camera.module_height_mm"] / 2
+    lens = d["camera.lens_diameter_mm"] / 2
+    pieces: list[cq.Shape] = [
+        *pair((rear - CLAMP_BAR_MM, face), (inner, outer), (-FAR_MM, high)),
+        box((rear - CLAMP_BAR_MM, rear), (-outer, outer), (-FAR_MM, 0)),
+    ]
+    lip = min(LIP_MM, -face - fit - 0.2)
+    if lip > 0.4 and lens + fit < inner - 0.4:
+        pieces += pair((face - 0.1, face + fit + lip), (inner, outer), (-FAR_MM, lens))
+        pieces += pair((face + fit, face + fit + lip), (lens + fit, inner + 0.1), (-FAR_MM, lens))
+    slab = box(
+        (-FAR_MM, FAR_MM),
+        (-FAR_MM, FAR_MM),
+        (d["cover.top_z_mm"], d["stack.window_bottom_z_mm"] - 0.1),
+    )
+    cradle = _placed(d, union(pieces)).intersect(slab)
+    holes = [
+        rod(
+            x,
+            y,
+            (d["cover.top_z_mm"] - 0.1, d["cover.top_z_mm"] + SCREW_DEPTH_MM),
+            at.screw.pilot_mm,
+        )
+        for x, y in clamp_screw_places(d)
+    ]
+    return Part(
+        name="camera_clamp",
+        solid=single(subtract(cradle, holes), "camera_clamp"),
+        material=PRINTED[d["manufacturing.print_process"]],
+        process="print",
+        colour=CLAMP,
+        explode_mm=(-14, 0, -22),
+        note="drop the camera in from the gel side; a dot of glue holds it",
+    )

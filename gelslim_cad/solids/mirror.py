@@ -1,0 +1,86 @@
+"""Front-surface fold mirror and the wedge it is glued to."""
+
+from __future__ import annotations
+
+import math
+
+from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.part import Part
+from gelslim_cad.solids.layout import Layout
+from gelslim_cad.solids.materials import MIRROR, PRINTED, SEAT
+from gelslim_cad.solids.shapes import Point2, prism_across, rod, single, subtract
+
+STOP_MM = 1.0
+SCREW_DEPTH_MM = 5.0
+
+
+def _face(d: Dimensions) -> tuple[Point2, Point2, Point2, Point2]:
+    """Lower and upper end (x, z) of the mirror's front, then of its back."""
+    angle, t = math.radians(d["mirror.angle_deg"]), d["design.mirror.thickness_mm"]
+    low = (d["mirror.lower_x_mm"], d["mirror.lower_z_mm"])
+    high = (d["mirror.upper_x_mm"], d["mirror.upper_z_mm"])
+    dx, dz = t * math.sin(angle), -t * math.cos(angle)
+    return low, high, (low[0] + dx, low[1] + dz), (high[0] + dx, high[1] + dz)
+
+
+def mirror(d: Dimensions) -> Part:
+    """The mirror plate, reflecting face up."""
+    low, high, low_back, high_back = _face(d)
+    half = d["mirror.width_mm"] / 2
+    return Part(
+        name="mirror",
+        solid=single(prism_across([low, high, high_back, low_back], half), "mirror"),
+        material=f"front-surface mirror, {d['design.mirror.thickness_mm']:g} mm glass",
+        process="buy",
+        colour=MIRROR,
+        explode_mm=(0, 0, -12),
+        note="front-surface: a back-surface mirror ghosts; cut to size, edges masked",
+    )
+
+
+def seat_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
+    """x from, x to and half width of the seat on the cover."""
+    low, _, _, high_back = _face(d)
+    return low[0] - STOP_MM, high_back[0], d["mirror.width_mm"] / 2
+
+
+def seat_screw_places(d: Dimensions, at: Layout) -> list[Point2]:
+    """Screws (x, y) that hold the seat from below, where it is thick."""
+    _, x1, half = seat_footprint(d, at)
+    x = x1 - min(3.0, 0.25 * (x1 - d["mirror.lower_x_mm"]))
+    return [(x, s * half / 2) for s in (-1, 1)] if seat_pilot_mm(d, at, x) > 0 else []
+
+
+def seat_pilot_mm(d: Dimensions, at: Layout, x: float) -> float:
+    """Depth of the threaded hole in the seat at x; 0 where the wedge is too thin."""
+    _, _, low_back, high_back = _face(d)
+    slope = (high_back[1] - low_back[1]) / (high_back[0] - low_back[0])
+    base = d["cover.top_z_mm"] - at.recess_mm
+    height = low_back[1] + slope * (x - at.screw.pilot_mm / 2 - low_back[0]) - base
+    depth = min(SCREW_DEPTH_MM, height - 0.8)
+    return depth if depth >= 2.0 else 0.0
+
+
+def mirror_seat(d: Dimensions) -> Part:
+    """Wedge under the mirror with a stop at the mirror's lower end."""
+    at = Layout(d)
+    low, _, low_back, high_back = _face(d)
+    base = d["cover.top_z_mm"] - at.recess_mm
+    stop = tuple(b + 0.7 * (f - b) for f, b in zip(low, low_back, strict=True))
+    x0, x1, half = seat_footprint(d, at)
+    wedge = prism_across(
+        [low_back, high_back, (x1, base), (x0, base), (x0, stop[1]), (stop[0], stop[1])], half
+    )
+    holes = [
+        rod(x, y, (base - 0.1, base + seat_pilot_mm(d, at, x)), at.screw.pilot_mm)
+        for x, y in seat_screw_places(d, at)
+    ]
+    return Part(
+        name="mirror_seat",
+        solid=single(subtract(wedge, holes), "mirror_seat"),
+        material=PRINTED[d["manufacturing.print_process"]],
+        process="print",
+        colour=SEAT,
+        explode_mm=(0, 0, -22),
+        note="glue the mirror against the stop; reprint to trim the angle",
+    )

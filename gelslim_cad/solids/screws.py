@@ -1,0 +1,116 @@
+"""Screws in their places; threads are drawn at core diameter, so they fill their pilot holes."""
+
+from __future__ import annotations
+
+import math
+
+import cadquery as cq
+
+from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.fasteners import ScrewSize, stock_length_mm
+from gelslim_cad.part import Part
+from gelslim_cad.solids.camera import clamp_screw_places
+from gelslim_cad.solids.layout import Layout
+from gelslim_cad.solids.materials import STEEL
+from gelslim_cad.solids.mirror import seat_pilot_mm, seat_screw_places
+from gelslim_cad.solids.shapes import single
+
+PLAY_MM = 0.01
+SHORT_MM = 4.0
+
+
+def _countersunk(
+    size: ScrewSize, x: float, y: float, z: float, inward: int, length: float
+) -> cq.Solid:
+    direction, at = cq.Vector(0, 0, inward), cq.Vector(x, y, z)
+    core = size.pilot_mm / 2 - PLAY_MM
+    head = size.countersunk_head_mm / 2 - 2 * PLAY_MM
+    shank = cq.Solid.makeCylinder(core, length, at, direction)
+    cone = cq.Solid.makeCone(head, core, head - core, at, direction)
+    socket = _socket(x, y, z, inward, 0.3 * size.countersunk_head_mm, 0.5 * (head - core))
+    return single(shank.fuse(cone).cut(socket), "screw")
+
+
+def _cap(size: ScrewSize, x: float, y: float, z: float, length: float) -> cq.Solid:
+    up, at = cq.Vector(0, 0, 1), cq.Vector(x, y, z)
+    shank = cq.Solid.makeCylinder(size.pilot_mm / 2 - PLAY_MM, length + 0.1, at, up)
+    head = cq.Solid.makeCylinder(
+        size.cap_head_mm / 2, size.cap_height_mm, at - cq.Vector(0, 0, size.cap_height_mm), up
+    )
+    bottom = z - size.cap_height_mm
+    socket = _socket(x, y, bottom, 1, 0.48 * size.cap_head_mm, 0.5 * size.cap_height_mm)
+    return single(shank.fuse(head).cut(socket), "bolt")
+
+
+def _socket(x: float, y: float, z: float, inward: int, across: float, depth: float) -> cq.Solid:
+    """Hexagon socket, `across` corners wide, sunk from the head's face at z."""
+    corners = [
+        cq.Vector(
+            x + across / 2 * math.cos(k * math.pi / 3),
+            y + across / 2 * math.sin(k * math.pi / 3),
+            z - 0.01 * inward,
+        )
+        for k in range(6)
+    ]
+    wire = cq.Wire.makePolygon([*corners, corners[0]])
+    return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, inward * (depth + 0.01)))
+
+
+def screws(d: Dimensions) -> tuple[Part, ...]:
+    """All screws, one part each; the first of a kind carries the quantity."""
+    at = Layout(d)
+    name = d["design.housing.screw"]
+    wall = d["design.housing.back_wall_mm"]
+    parts: list[Part] = []
+    kinds: dict[str, list[tuple[cq.Solid, float, int]]] = {"bezel": [], "cover": []}
+    for kind, holes in (("bezel", at.bezel_holes()), ("cover", at.cover_holes())):
+        for h in holes:
+            n = h.screw_length_mm
+            solid = _countersunk(at.screw, h.x_mm, h.y_mm, h.surface_z_mm, h.inward, n)
+            kinds[kind].append((solid, n, -h.inward))
+    kinds["clamp"] = [
+        (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
+        for x, y in clamp_screw_places(d)
+        for n in (stock_length_mm(wall + SHORT_MM),)
+    ]
+    kinds["seat"] = [
+        (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
+        for x, y in seat_screw_places(d, at)
+        for n in (stock_length_mm(wall - at.recess_mm + seat_pilot_mm(d, at, x) - 0.2),)
+    ]
+    for kind, places in kinds.items():
+        parts += _instances(f"{kind}_screw", f"{name} countersunk, steel", places)
+    bolts = _mount_bolts(d, at)
+    return (*parts, *_instances("mount_bolt", f"{d['design.mount.bolt']} cap head, steel", bolts))
+
+
+def _mount_bolts(d: Dimensions, at: Layout) -> list[tuple[cq.Solid, float, int]]:
+    low, high = at.slot_z_mm
+    head = min(at.bolt.cap_height_mm + 0.2, low - at.back_z_mm - 1.0)
+    seat = at.back_z_mm + max(0.0, head)
+    room = high + max(0.5, min(6.0, at.top_z_mm - high - 1.0)) - seat
+    n = stock_length_mm(room - 0.3)
+    return [
+        (_cap(at.bolt, at.bolt_x_mm(), y, seat, n), n, -1)
+        for y in (-at.tongue_y_mm, at.tongue_y_mm)
+    ]
+
+
+def _instances(kind: str, material: str, places: list[tuple[cq.Solid, float, int]]) -> list[Part]:
+    parts = []
+    lengths = [n for _, n, _ in places]
+    for k, (solid, length, side) in enumerate(places):
+        first = lengths.index(length) == k
+        parts.append(
+            Part(
+                name=f"{kind}_{k + 1}",
+                solid=solid,
+                material=f"{material}, {length:g} mm",
+                process="buy",
+                colour=STEEL,
+                quantity=lengths.count(length) if first else 0,
+                explode_mm=(0, 0, 48 * side),
+                tags=frozenset({"fastener"} if first else {"fastener", "instance"}),
+            )
+        )
+    return parts
