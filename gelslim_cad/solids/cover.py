@@ -9,7 +9,7 @@ from gelslim_cad.part import Part
 from gelslim_cad.solids.camera import clamp_screw_places
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import COVER, PRINTED
-from gelslim_cad.solids.mirror import seat_footprint, seat_screw_places
+from gelslim_cad.solids.mirror import seat_screw_places, sunk_footprint
 from gelslim_cad.solids.shapes import (
     box,
     countersink,
@@ -65,7 +65,7 @@ def _pedestals(d: Dimensions, top: float) -> tuple[cq.Solid, ...]:
 def _cuts(d: Dimensions, at: Layout) -> list[cq.Shape]:
     """Recess of the mirror seat and all screw holes."""
     top, wall = d["cover.top_z_mm"], d["design.housing.back_wall_mm"]
-    x0, x1, half = seat_footprint(d, at)
+    x0, x1, half = sunk_footprint(d, at)
     gap = d["design.housing.fit_clearance_mm"]
     recess = box((x0 - gap, x1 + gap), (-half - gap, half + gap), (top - at.recess_mm, top + 1.0))
     places = [(h.x_mm, h.y_mm) for h in at.cover_holes()]

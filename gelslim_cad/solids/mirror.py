@@ -11,6 +11,7 @@ from gelslim_cad.solids.materials import MIRROR, PRINTED, SEAT
 from gelslim_cad.solids.shapes import Point2, prism_across, rod, single, subtract
 
 STOP_MM = 1.0
+SUNK_SHARE = 0.4
 SCREW_DEPTH_MM = 5.0
 
 
@@ -44,6 +45,12 @@ def seat_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
     return low[0] - STOP_MM, high_back[0], d["mirror.width_mm"] / 2
 
 
+def sunk_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
+    """The seat's thin end, which is sunk into the cover: it locates the seat."""
+    x0, x1, half = seat_footprint(d, at)
+    return x0, x0 + SUNK_SHARE * (x1 - x0), half
+
+
 def seat_screw_places(d: Dimensions, at: Layout) -> list[Point2]:
     """Screws (x, y) that hold the seat from below, where it is thick."""
     _, x1, half = seat_footprint(d, at)
@@ -55,8 +62,8 @@ def seat_pilot_mm(d: Dimensions, at: Layout, x: float) -> float:
     """Depth of the threaded hole in the seat at x; 0 where the wedge is too thin."""
     _, _, low_back, high_back = _face(d)
     slope = (high_back[1] - low_back[1]) / (high_back[0] - low_back[0])
-    base = d["cover.top_z_mm"] - at.recess_mm
-    height = low_back[1] + slope * (x - at.screw.pilot_mm / 2 - low_back[0]) - base
+    height = low_back[1] + slope * (x - at.screw.pilot_mm / 2 - low_back[0])
+    height -= d["cover.top_z_mm"]
     depth = min(SCREW_DEPTH_MM, height - 0.8)
     return depth if depth >= 2.0 else 0.0
 
@@ -68,11 +75,11 @@ def mirror_seat(d: Dimensions) -> Part:
     base = d["cover.top_z_mm"] - at.recess_mm
     stop = tuple(b + 0.7 * (f - b) for f, b in zip(low, low_back, strict=True))
     x0, x1, half = seat_footprint(d, at)
-    wedge = prism_across(
-        [low_back, high_back, (x1, base), (x0, base), (x0, stop[1]), (stop[0], stop[1])], half
-    )
+    step, floor = sunk_footprint(d, at)[1], d["cover.top_z_mm"]
+    foot = [(x1, floor), (step, floor), (step, base), (x0, base)]
+    wedge = prism_across([low_back, high_back, *foot, (x0, stop[1]), (stop[0], stop[1])], half)
     holes = [
-        rod(x, y, (base - 0.1, base + seat_pilot_mm(d, at, x)), at.screw.pilot_mm)
+        rod(x, y, (floor - 0.1, floor + seat_pilot_mm(d, at, x)), at.screw.pilot_mm)
         for x, y in seat_screw_places(d, at)
     ]
     return Part(

@@ -76,7 +76,7 @@ def screws(d: Dimensions) -> tuple[Part, ...]:
     kinds["seat"] = [
         (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
         for x, y in seat_screw_places(d, at)
-        for n in (stock_length_mm(wall - at.recess_mm + seat_pilot_mm(d, at, x) - 0.2),)
+        for n in (stock_length_mm(wall + seat_pilot_mm(d, at, x) - 0.2),)
     ]
     for kind, places in kinds.items():
         parts += _instances(f"{kind}_screw", f"{name} countersunk, steel", places)
