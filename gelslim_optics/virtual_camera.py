@@ -91,7 +91,7 @@ class VirtualCamera:
         """Height of the air between virtual pinhole and window."""
         return float(self.window_bottom_z_mm - self.position_mm[2])
 
-    def _air_directions(self, points_mm: Vector) -> Vector:
+    def air_directions(self, points_mm: Vector) -> Vector:
         """Unit directions (n, 3), in air, of the rays that end at `points_mm` (n, 3)."""
         lateral = points_mm[:, :2] - self.position_mm[:2]
         reach = np.hypot(lateral[:, 0], lateral[:, 1])
@@ -117,7 +117,7 @@ class VirtualCamera:
         Pixel centres are at integer coordinates; the axis meets the middle of the image.
         """
         points = np.atleast_2d(np.asarray(points_mm, dtype=float))
-        d = self._air_directions(points)
+        d = self.air_directions(points)
         depth = d @ self.forward
         u = self.focal_px * (d @ self.right) / depth + (self.image_width_px - 1) / 2
         v = self.focal_px * (d @ self.down) / depth + (self.image_height_px - 1) / 2
@@ -129,7 +129,7 @@ class VirtualCamera:
         The layers shorten a length h to h/n for rays near the normal (paraxial).
         """
         points = np.atleast_2d(np.asarray(points_mm, dtype=float))
-        d = self._air_directions(points)
+        d = self.air_directions(points)
         height = points[:, 2] - self.window_bottom_z_mm
         apparent = np.full(len(points), self.air_height_mm)
         for k, layer in enumerate(self.layers):

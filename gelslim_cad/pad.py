@@ -1,0 +1,79 @@
+"""Marker grid, pad mesh and stiffness bundle of a finger: one marker grid serves them all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import numpy as np
+
+from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.sight import camera_record
+from gelslim_cad.spec import Spec
+from ifem_export.bundle import Bundle, build_bundle
+from ifem_export.crop import CropReport
+from ifem_export.marker_grid import MarkerGrid, build_marker_grid
+from ifem_export.material import Material
+from ifem_export.outline import RoundedRectangle
+from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+
+
+def spec_hash(spec: Spec) -> str:
+    """SHA-256 of the spec's content: comments, order and spelt-out defaults do not change it."""
+    content = json.dumps(spec.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def pad_outline(d: Dimensions) -> RoundedRectangle:
+    """The gel seen from above."""
+    return RoundedRectangle(
+        d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.corner_radius_mm"]
+    )
+
+
+def marker_grid(d: Dimensions) -> MarkerGrid:
+    """The printed lattice, dots that would cross the gel's outline left out."""
+    grid = build_marker_grid(
+        round(d["marker_grid.rows"]),
+        round(d["marker_grid.columns"]),
+        d["design.markers.pitch_mm"],
+        d["design.markers.diameter_mm"],
+        anchors=d["design.markers.anchors"],
+    )
+    outline = pad_outline(d)
+    return grid.clipped(lambda points: outline.contains(points[:, 0], points[:, 1]))
+
+
+def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
+    """Hex-8 mesh of the pad; nodes meet the markers where the cell size allows it."""
+    outline, thickness = pad_outline(d), d["design.gel.thickness_mm"]
+    if d["mesh.cells_along"] is not None:
+        cells = (d["mesh.cells_along"], d["mesh.cells_across"], d["mesh.layers"])
+        return build_pad_mesh(outline, thickness, cells=cells)
+    return build_pad_mesh(
+        outline,
+        thickness,
+        pitch_mm=(d["pad_mesh.cell_x_mm"], d["pad_mesh.cell_y_mm"]),
+        layers=d["mesh.layers"],
+        align_to_mm=grid.positions_mm,
+        alignment_tolerance_mm=None,
+    )
+
+
+def make_bundle(spec: Spec, d: Dimensions, mesh: PadMesh, grid: MarkerGrid) -> Bundle:
+    """The stiffness bundle of this sensor."""
+    gel = spec.material.gel
+    return build_bundle(
+        mesh,
+        Material(gel.youngs_modulus_mpa, gel.poissons_ratio, gel.density_kg_m3),
+        spec.mesh.element,
+        marker_positions_mm=grid.positions_mm,
+        marker_arrays={
+            "row": grid.row,
+            "column": grid.column,
+            "diameter_mm": grid.diameter_mm,
+            "kind": np.asarray(grid.kind),
+        },
+        camera=camera_record(d),
+        spec_hash=spec_hash(spec),
+    )

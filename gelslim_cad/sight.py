@@ -1,0 +1,45 @@
+"""The finger's virtual camera, from its dimensions."""
+
+from __future__ import annotations
+
+import math
+
+from gelslim_cad.dimensions import Dimensions
+from gelslim_optics.virtual_camera import Layer, VirtualCamera
+
+
+def virtual_camera(d: Dimensions) -> VirtualCamera:
+    """The camera of the solved fold, looking through window and gel."""
+    return VirtualCamera.from_fold(
+        camera_mm=(d["camera_pose.x_mm"], 0.0, d["camera_pose.z_mm"]),
+        pitch_rad=math.radians(d["camera_pose.pitch_deg"]),
+        mirror_point_mm=(d["mirror.lower_x_mm"], 0.0, d["mirror.lower_z_mm"]),
+        mirror_angle_rad=math.radians(d["mirror.angle_deg"]),
+        focal_px=d["view.focal_px"],
+        image_width_px=d["camera.image_width_px"],
+        image_height_px=d["camera.image_height_px"],
+        window_bottom_z_mm=d["stack.window_bottom_z_mm"],
+        layers=(
+            Layer(d["design.light_guide.thickness_mm"], d["material.acrylic.refractive_index"]),
+            Layer(d["stack.gel_total_mm"], d["material.gel.refractive_index"]),
+        ),
+    )
+
+
+def camera_record(d: Dimensions) -> dict[str, object]:
+    """The virtual camera as plain values for the bundle; lengths mm, angles as unit vectors."""
+    camera = virtual_camera(d)
+    return {
+        "model": "folded pinhole behind flat layers",
+        "position_mm": camera.position_mm.tolist(),
+        "right": camera.right.tolist(),
+        "down": camera.down.tolist(),
+        "forward": camera.forward.tolist(),
+        "focal_px": camera.focal_px,
+        "image_width_px": camera.image_width_px,
+        "image_height_px": camera.image_height_px,
+        "window_bottom_z_mm": camera.window_bottom_z_mm,
+        "layers": [{"thickness_mm": v.thickness_mm, "index": v.index} for v in camera.layers],
+        "aperture_mm": d["view.aperture_mm"],
+        "focus_mm": d["view.focus_mm"],
+    }
