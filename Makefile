@@ -1,0 +1,47 @@
+# Two commands: `make variant` builds a finger, `make test` tests the project.
+PYTHON ?= python3
+SPEC ?= designs/gelslim2.yaml
+OUT ?= out/$(basename $(notdir $(SPEC)))
+VENV := .venv
+BIN := $(VENV)/bin
+PINS := requirements/constraints.txt
+
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: variant test test-slow lint stability designs pins clean
+
+variant: $(VENV)/.installed
+	$(BIN)/gelslim build "$(SPEC)" -o "$(OUT)"
+
+test: lint $(VENV)/.installed-dev
+	$(BIN)/pytest -n 2 --dist loadfile
+
+test-slow: $(VENV)/.installed-dev
+	$(BIN)/pytest -n 2 --dist loadfile -m slow
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+stability: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.stability.run --count 300
+
+designs: $(VENV)/.installed
+	for spec in designs/*.yaml; do $(BIN)/gelslim build "$$spec" -o "out/$$(basename "$$spec" .yaml)" || exit $$?; done
+
+$(VENV)/.installed: pyproject.toml $(PINS)
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view"
+	touch $@
+
+$(VENV)/.installed-dev: pyproject.toml $(PINS)
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,dev"
+	touch $@ $(VENV)/.installed
+
+pins: $(VENV)/.installed-dev
+	( echo "# Pinned versions for make variant, make test and CI. Renew with: make pins"; \
+	  $(BIN)/pip freeze --exclude-editable | grep -vE '^(pip|setuptools|wheel)==' ) > $(PINS).new
+	mv $(PINS).new $(PINS)
+
+clean:
+	rm -rf $(VENV) out build *.egg-info
