@@ -1,0 +1,108 @@
+"""Boundary representations: clean copies, bytes that travel between processes, digests.
+
+A `Shape` here is anything CadQuery calls one (`cadquery.Shape`), lengths in mm.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import re
+from typing import Any
+
+from gelslim_cad.export.error import ExportError
+
+DIGEST_DECIMALS = 9
+"""Reals are rounded to 1e-9 mm before hashing: Boolean operations sum in the order of memory
+addresses, so the last bits of a coordinate differ from one process to the next."""
+
+_BINARY_MARK = b"\nOpen CASCADE Topology V"
+
+_REAL = re.compile(rb"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+|-0\b")
+_HISTORY_FLAGS = re.compile(rb"^[01]{3}([01]{4})$", re.MULTILINE)
+"""Free, modified and checked say what was done to a shape; what follows says what it is."""
+
+
+def bare_copy(shape: Any) -> Any:
+    """Copy a shape without triangulation, with its placement worked into the geometry.
+
+    OCCT caches a mesh on the shape, so an export that meshed the original would be decided by
+    whoever meshed it first. The copy shares nothing with the original.
+    """
+    import cadquery as cq
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_Transform
+    from OCP.TopLoc import TopLoc_Location
+
+    placement = shape.wrapped.Location()
+    if placement.IsIdentity():
+        return cq.Shape.cast(BRepBuilderAPI_Copy(shape.wrapped, True, False).Shape())
+    unplaced = shape.wrapped.Located(TopLoc_Location())
+    moved = BRepBuilderAPI_Transform(unplaced, placement.Transformation(), True, False)
+    return cq.Shape.cast(moved.Shape())
+
+
+def only_solid(shape: Any, name: str = "shape") -> Any:
+    """Return the one `cadquery.Solid` in a shape.
+
+    Raises:
+        ExportError: the shape holds no solid or several.
+    """
+    solids = shape.Solids()
+    if len(solids) != 1:
+        raise ExportError(
+            f"{name}: holds {len(solids)} solids, a part is exactly 1; "
+            "union touching bodies or make each its own part"
+        )
+    return solids[0]
+
+
+def shape_to_bytes(shape: Any) -> bytes:
+    """Serialise a shape exactly (OCCT binary, no triangulation), e.g. for a worker process."""
+    from OCP.BinTools import BinTools, BinTools_FormatVersion
+
+    stream = io.BytesIO()
+    version = BinTools_FormatVersion.BinTools_FormatVersion_CURRENT
+    BinTools.Write_s(shape.wrapped, stream, False, False, version)
+    return stream.getvalue()
+
+
+def shape_from_bytes(data: bytes) -> Any:
+    """Rebuild the shape written by `shape_to_bytes`.
+
+    Raises:
+        ExportError: the bytes hold no shape.
+    """
+    import cadquery as cq
+    from OCP.BinTools import BinTools
+    from OCP.Standard import Standard_Failure
+    from OCP.TopoDS import TopoDS_Shape
+
+    read = TopoDS_Shape()
+    if data.startswith(_BINARY_MARK):
+        with contextlib.suppress(Standard_Failure):
+            BinTools.Read_s(read, io.BytesIO(data))
+    if read.IsNull():
+        raise ExportError(f"{len(data)} bytes hold no shape; write them with shape_to_bytes")
+    return cq.Shape.cast(read)
+
+
+def shape_digest(shape: Any) -> str:
+    """SHA-256 of a shape's topology and geometry, the same in every process.
+
+    Reals are rounded (`DIGEST_DECIMALS`) and triangulation is left out, so neither the last
+    bits of a Boolean nor an earlier export changes it.
+    """
+    from OCP.BRepTools import BRepTools
+    from OCP.TopTools import TopTools_FormatVersion
+
+    stream = io.BytesIO()
+    version = TopTools_FormatVersion.TopTools_FormatVersion_VERSION_1
+    BRepTools.Write_s(shape.wrapped, stream, False, False, version)
+    text = _HISTORY_FLAGS.sub(rb"\1", stream.getvalue())
+    return hashlib.sha256(_REAL.sub(_rounded, text)).hexdigest()
+
+
+def _rounded(match: re.Match[bytes]) -> bytes:
+    value = round(float(match[0]), DIGEST_DECIMALS) + 0.0
+    return b"%d" % int(value) if value == int(value) else repr(value).encode()
