@@ -75,7 +75,7 @@ def frame_of(normal: Sequence[float] | Vector) -> Frame:
     return Frame(u, np.cross(n, u), n)
 
 
-def contours_of(wires: Sequence[Any], frame: Frame, chord_mm: float = 0.005) -> list[Contour]:
+def contours_of(wires: Sequence[Any], frame: Frame, chord_mm: float = 0.002) -> list[Contour]:
     """Draw closed wires (`cadquery.Wire`) in a frame, sorted so that the order is always one.
 
     Lines and circular arcs stay exact; other curves become chords within `chord_mm`.

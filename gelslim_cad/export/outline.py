@@ -17,7 +17,7 @@ _LAYER_COLOURS = {CUT: 1, ENGRAVE: 5}
 
 
 def outline_dxf_bytes(
-    cut: Any | Sequence[Any], *, engrave: Sequence[Any] = (), chord_mm: float = 0.005
+    cut: Any | Sequence[Any], *, engrave: Sequence[Any] = (), chord_mm: float = 0.002
 ) -> bytes:
     """Draw shapes 1:1 as closed outlines: `cut` on layer CUT, `engrave` on layer ENGRAVE.
 
@@ -47,26 +47,38 @@ def outline_dxf_bytes(
 
 
 def flat_face(solid: Any) -> Any:
-    """The largest planar face of a solid of constant thickness, i.e. its laser-cut outline.
+    """The face whose outline cuts a solid of constant thickness from sheet.
+
+    Of the planar faces with volume = area x thickness (to 1e-6) the one of least thickness.
 
     Raises:
-        ExportError: the solid's volume is not that face's area times the thickness, to 1e-6.
+        ExportError: there is none, or the thickness exceeds the root of the area: such a solid
+            is a bar or a bent sheet, not a flat part.
     """
     planar = [f for f in solid.Faces() if f.geomType() == "PLANE"]
     if not planar:
         raise ExportError("outline: the solid has no planar face; give a flat part or a face")
-    # Rounding lets top and bottom tie; the tie goes to the face on the positive side.
-    face = max(planar, key=lambda f: (round(f.Area(), 6), _side(f)))
-    normal = _normal(face)
-    heights = [float(normal @ v.toTuple()) for v in solid.Vertices()]
-    thickness = max(heights) - min(heights)
-    ratio = solid.Volume() / (face.Area() * thickness) if thickness > 0 else 0.0
-    if abs(ratio - 1) > 1e-6:
+    volume = solid.Volume()
+    sheets = [
+        (thickness, face)
+        for thickness, face in ((_thickness(solid, f), f) for f in planar)
+        if abs(face.Area() * thickness / volume - 1) < 1e-6 and thickness**2 <= face.Area()
+    ]
+    if not sheets:
+        face = max(planar, key=lambda f: float(f.Area()))
+        ratio = volume / (face.Area() * _thickness(solid, face))
         raise ExportError(
             f"outline: volume is {ratio:.6f} x largest face x thickness, must be 1; the solid is "
             "not a flat plate: give the face of its flat blank instead"
         )
-    return face
+    # Rounding lets top and bottom tie; the tie goes to the face on the positive side.
+    return min(sheets, key=lambda s: (round(s[0], 6), -_side(s[1])))[1]
+
+
+def _thickness(solid: Any, face: Any) -> float:
+    normal = _normal(face)
+    heights = [float(normal @ v.toTuple()) for v in solid.Vertices()]
+    return max(heights) - min(heights)
 
 
 def _side(face: Any) -> float:

@@ -77,14 +77,24 @@ def pole_on_face() -> cq.Shape:
     return plate.cut(ball).val()
 
 
-def touching_along_an_edge() -> cq.Shape:
-    """Two cubes that share one edge: valid for OCCT, yet no closed manifold surface."""
-    plate = cq.Workplane("XY").box(4, 4, 2)
-    return (
-        plate.cut(cq.Workplane("XY").rect(2, 2).extrude(9).translate((1, 1, -4)))
-        .cut(cq.Workplane("XY").rect(2, 2).extrude(9).translate((-1, -1, -4)))
-        .val()
-    )
+def tangent_cuts() -> cq.Shape:
+    """A hole that only touches a slot along a line: valid for OCCT, yet no closed manifold."""
+    plate = cq.Workplane("XY").box(12, 12, 4).faces(">Z").workplane().hole(4)
+    return plate.cut(cq.Workplane("XY").box(2, 6, 9).translate((3, 0, 0))).val()
+
+
+def open_box() -> cq.Shape:
+    """A solid whose shell lacks a face."""
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Shell, TopoDS_Solid
+
+    builder, shell, solid = BRep_Builder(), TopoDS_Shell(), TopoDS_Solid()
+    builder.MakeShell(shell)
+    for face in box(4, 4, 4).Faces()[:-1]:
+        builder.Add(shell, face.wrapped)
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell)
+    return cq.Shape.cast(solid)
 
 
 def busy_part() -> cq.Shape:

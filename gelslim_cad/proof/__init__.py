@@ -1,0 +1,1 @@
+"""Proofs of files as written: each is read back by other code and measured against the part."""

@@ -1,0 +1,33 @@
+"""What a proof found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ProofResult:
+    """One check of one file: the measured value, the limit it must keep, and the verdict."""
+
+    file: str
+    check: str
+    value: float
+    limit: float
+    ok: bool
+    detail: str = ""
+
+
+def at_most(file: str, check: str, value: float, limit: float, detail: str = "") -> ProofResult:
+    """A check that `value` does not exceed `limit`; NaN fails."""
+    return ProofResult(file, check, float(value), float(limit), bool(value <= limit), detail)
+
+
+def equal(file: str, check: str, value: float, expected: float, detail: str = "") -> ProofResult:
+    """A check that `value` is exactly `expected`, for counts and truths."""
+    return ProofResult(file, check, float(value), float(expected), value == expected, detail)
+
+
+def failures(results: Iterable[ProofResult]) -> list[ProofResult]:
+    """The results that are not ok, in their order."""
+    return [r for r in results if not r.ok]
