@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     import cadquery as cq
 
-Process = Literal["print", "laser", "cast", "buy", "pcb", "cut"]
-"""How a part comes to be; `print` gives STL and 3MF, `laser` and `cut` give a DXF outline."""
+Process = Literal["print", "laser", "bend", "cast", "buy", "pcb", "cut"]
+"""How a part comes to be: `print` gives STL and 3MF, `laser` and `cut` a DXF outline; `bend` is
+formed from a laser-cut blank, which is a part of its own."""
 
 
 @dataclass(frozen=True)

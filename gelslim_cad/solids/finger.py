@@ -10,7 +10,7 @@ from gelslim_cad.solids.body import body
 from gelslim_cad.solids.camera import camera, camera_clamp
 from gelslim_cad.solids.cover import cover
 from gelslim_cad.solids.gel import gel_pad
-from gelslim_cad.solids.guide import light_guide
+from gelslim_cad.solids.guide import guide_blank, light_guide
 from gelslim_cad.solids.leds import led_boards
 from gelslim_cad.solids.mirror import mirror, mirror_seat
 from gelslim_cad.solids.screws import screws
@@ -34,3 +34,8 @@ def finger_parts(d: Dimensions) -> tuple[Part, ...]:
         adapter(d),
         *screws(d),
     )
+
+
+def blanks(d: Dimensions) -> tuple[Part, ...]:
+    """Flat blanks that parts of the finger are formed from."""
+    return (guide_blank(d),)

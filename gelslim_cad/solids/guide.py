@@ -67,7 +67,7 @@ def light_guide(d: Dimensions) -> Part:
         name="light_guide",
         solid=single(solid, "light_guide"),
         material=f"cast acrylic, {d['design.light_guide.thickness_mm']:g} mm",
-        process="laser",
+        process="bend",
         colour=ACRYLIC,
         explode_mm=(0, 0, 14),
         note="laser-cut blank, anneal, bend hot over a former, polish the leg ends",
@@ -75,12 +75,17 @@ def light_guide(d: Dimensions) -> Part:
     )
 
 
-def guide_blank(d: Dimensions) -> cq.Solid:
+def guide_blank(d: Dimensions) -> Part:
     """Flat blank of the guide before bending, lying on z = 0."""
-    width = d["guide.blank_width_mm"]
-    return cq.Solid.makeBox(
-        d["guide.length_mm"],
-        width,
-        d["design.light_guide.thickness_mm"],
-        cq.Vector(d["guide.proximal_end_x_mm"], -width / 2, 0),
+    width, t = d["guide.blank_width_mm"], d["design.light_guide.thickness_mm"]
+    start = cq.Vector(d["guide.proximal_end_x_mm"], -width / 2, 0)
+    return Part(
+        name="light_guide_blank",
+        solid=cq.Solid.makeBox(d["guide.length_mm"], width, t, start),
+        material=f"cast acrylic, {t:g} mm",
+        process="laser",
+        colour=ACRYLIC,
+        quantity=0,
+        in_assembly=False,
+        note="anneal after cutting, then bend",
     )

@@ -34,6 +34,8 @@ class Loaded(Generic[M]):
     """Each field that the file gives, with its place."""
     sha256: str
     """Of the file's bytes."""
+    text: str
+    """The file's text."""
     path: str
     """The file, as the caller named it."""
     defaulted: tuple[str, ...]
@@ -56,7 +58,9 @@ def read_spec(path: str | os.PathLike[str]) -> LoadedSpec:
     Raises `SpecError` with every problem found: nothing is guessed, nothing is read in part.
     """
     loaded = read_model(path, Spec)
-    return LoadedSpec(loaded.model, loaded.source_map, loaded.sha256, loaded.path, loaded.defaulted)
+    return LoadedSpec(
+        loaded.model, loaded.source_map, loaded.sha256, loaded.text, loaded.path, loaded.defaulted
+    )
 
 
 def read_model(path: str | os.PathLike[str], model: type[M]) -> Loaded[M]:
@@ -79,6 +83,7 @@ def load_source(source: Source, model: type[M]) -> Loaded[M]:
         instance,
         SourceMap(dict(positions(root))),
         source.sha256,
+        source.text,
         source.path,
         tuple(_defaulted(instance)),
     )

@@ -1,0 +1,156 @@
+"""Rules on light guide and LEDs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.checks.rule import Finding, rule
+
+
+@rule(
+    "guide.bend_ratio",
+    title="Bend radius against guide thickness, R/t",
+    parameter="design.light_guide.bend_radius_ratio",
+    why="below 0.5 acrylic cannot be bent; below 1/(n-1) not even collimated light is fully guided",
+    advice="use a larger bend radius; the finger gets wider by twice the difference",
+    unit="",
+)
+def bend_ratio(light_guide_bend_radius_ratio: Any, guide_full_guidance_ratio: Any) -> Finding:
+    """R/t with its two limits."""
+    return Finding(
+        light_guide_bend_radius_ratio, 0.5, least=True, caution=guide_full_guidance_ratio
+    )
+
+
+@rule(
+    "led.fits_mm",
+    title="LED package fits the guide's edge",
+    parameter="design.leds.package_mm",
+    why="light beside the edge is lost and stray",
+    advice="use a smaller LED, a thicker guide, or place the LEDs more exactly",
+)
+def led_fits(
+    leds_package_mm: Any, light_guide_thickness_mm: Any, leds_placement_tolerance_mm: Any
+) -> Finding:
+    """Package against t - 2 placement tolerance."""
+    return Finding(leds_package_mm, light_guide_thickness_mm - 2 * leds_placement_tolerance_mm)
+
+
+@rule(
+    "led.gap_mm",
+    title="Gap between neighbouring LEDs",
+    parameter="design.leds.max_pitch_mm",
+    why="packages must not touch",
+    advice="allow a larger LED pitch or use smaller LEDs",
+)
+def led_gap(led_pitch_mm: Any, leds_package_mm: Any, leds_min_gap_mm: Any) -> Finding:
+    """Pitch less package."""
+    return Finding(led_pitch_mm - leds_package_mm, leds_min_gap_mm, least=True)
+
+
+@rule(
+    "led.pitch_mm",
+    title="LED pitch",
+    parameter="design.leds.max_count",
+    why="the count is capped, so the light gets less even",
+    advice="allow more LEDs",
+)
+def led_pitch(led_pitch_mm: Any, leds_max_pitch_mm: Any) -> Finding:
+    """Pitch against the largest wanted."""
+    return Finding(led_pitch_mm, leds_max_pitch_mm + 1e-9, advisory=True)
+
+
+@rule(
+    "led.on_board_mm",
+    title="LEDs stay on their board",
+    parameter="design.light_guide.end_support_mm",
+    why="the outer packages must lie on the board",
+    advice="support the guide further at its ends, or use a smaller LED pitch",
+)
+def led_on_board(
+    gel_length_mm: Any,
+    led_pitch_mm: Any,
+    leds_package_mm: Any,
+    led_board_length_mm: Any,
+    guide_proximal_end_x_mm: Any,
+    guide_distal_end_x_mm: Any,
+) -> Finding:
+    """Board beyond the outermost LED, at both ends."""
+    middle = (guide_proximal_end_x_mm + guide_distal_end_x_mm) / 2
+    outer = gel_length_mm / 2 - led_pitch_mm / 2 + leds_package_mm / 2
+    room = led_board_length_mm / 2 - np.abs(middle) - outer
+    return Finding(room, 0.0, least=True)
+
+
+@rule(
+    "led.board_width_mm",
+    title="LED package fits its board",
+    parameter="design.leds.package_mm",
+    why="the board is as wide as the channel allows",
+    advice="use a smaller LED or a thicker guide",
+)
+def led_board_width(leds_package_mm: Any, led_board_width_mm: Any) -> Finding:
+    """Package against board width."""
+    return Finding(leds_package_mm, led_board_width_mm)
+
+
+@rule(
+    "guide.stock_mm",
+    title="Acrylic thickness is on sale",
+    parameter="design.light_guide.thickness_mm",
+    why="sheets come in stock thicknesses",
+    advice="choose one of manufacturing.acrylic_stock_mm, or add yours to it",
+)
+def guide_stock(light_guide_thickness_mm: Any, manufacturing_acrylic_stock_mm: Any) -> Finding:
+    """Distance to the nearest stock thickness."""
+    return Finding(_off(light_guide_thickness_mm, manufacturing_acrylic_stock_mm), 0.01)
+
+
+@rule(
+    "mirror.stock_mm",
+    title="Mirror thickness is on sale",
+    parameter="design.mirror.thickness_mm",
+    why="front-surface mirrors come in stock thicknesses",
+    advice="choose one of manufacturing.mirror_stock_mm, or add yours to it",
+)
+def mirror_stock(mirror_thickness_mm: Any, manufacturing_mirror_stock_mm: Any) -> Finding:
+    """Distance to the nearest stock thickness."""
+    return Finding(_off(mirror_thickness_mm, manufacturing_mirror_stock_mm), 0.01)
+
+
+def _off(value: Any, stock: tuple[float, ...]) -> Any:
+    return np.min([np.abs(np.asarray(value) - s) for s in stock], axis=0)
+
+
+@rule(
+    "gel.on_window_mm",
+    title="Gel ends on the flat window",
+    parameter="design.light_guide.side_margin_mm",
+    why="the gel must not reach into the bend, nor the bezel onto the gel",
+    advice="widen the side margin",
+)
+def gel_on_window(light_guide_side_margin_mm: Any) -> Finding:
+    """Flat window beside the gel."""
+    return Finding(light_guide_side_margin_mm, 0.1, least=True, caution=0.3)
+
+
+@rule(
+    "gel.index",
+    title="Light can enter the gel",
+    parameter="material.gel.refractive_index",
+    why="a gel denser than acrylic, or much thinner, changes what light enters",
+    advice="use a silicone of index 1.40 to 1.49",
+    unit="",
+)
+def gel_index(
+    material_gel_refractive_index: Any, material_acrylic_refractive_index: Any
+) -> Finding:
+    """Critical angle of the acrylic-gel face must leave light to enter."""
+    return Finding(
+        material_gel_refractive_index / material_acrylic_refractive_index,
+        0.8,
+        least=True,
+        caution=0.93,
+    )

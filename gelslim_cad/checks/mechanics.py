@@ -1,0 +1,136 @@
+"""Rules on gel mechanics, mesh and the finger's envelope."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.checks.rule import Finding, rule
+
+MOST_NODES = 400_000
+
+
+@rule(
+    "gel.modulus_mpa",
+    title="Gel stiffness is that of a tactile gel",
+    parameter="material.gel.youngs_modulus_mpa",
+    why="above 1 MPa a pad hardly deforms under a grasp",
+    advice="check the unit: tactile gels have 0.05 to 1 MPa",
+    unit="MPa",
+)
+def gel_modulus(material_gel_youngs_modulus_mpa: Any) -> Finding:
+    """E against the stiff end of the range."""
+    return Finding(material_gel_youngs_modulus_mpa, 1.0, advisory=True)
+
+
+@rule(
+    "gel.too_soft_mpa",
+    title="Gel is firm enough to handle",
+    parameter="material.gel.youngs_modulus_mpa",
+    why="below 0.02 MPa a gel tears and creeps",
+    advice="check the unit: tactile gels have 0.05 to 1 MPa",
+    unit="MPa",
+)
+def gel_soft(material_gel_youngs_modulus_mpa: Any) -> Finding:
+    """E against the soft end of the range."""
+    return Finding(material_gel_youngs_modulus_mpa, 0.02, least=True, advisory=True)
+
+
+@rule(
+    "mesh.layers",
+    title="Layers against Poisson's ratio",
+    parameter="mesh.layers",
+    why="one bonded layer locks as Poisson's ratio nears 0.5, whatever the element",
+    advice="use at least two layers (four for a good field) and the bbar element",
+    unit="",
+)
+def mesh_layers(mesh_layers: Any, mesh_element: str, material_gel_poissons_ratio: Any) -> Finding:
+    """Poisson's ratio against what the mesh can carry."""
+    one = np.asarray(mesh_layers) <= 1
+    full = mesh_element == "full"
+    limit = np.where(one, 0.45, 0.48 if full else 0.49995)
+    caution = np.where(one, 0.4, 0.45 if full else 0.4999)
+    return Finding(material_gel_poissons_ratio, limit, caution=caution)
+
+
+@rule(
+    "mesh.alignment_mm",
+    title="Mesh nodes meet the markers",
+    parameter="mesh.nodes_per_marker_pitch",
+    why="where they do not, displacements are interpolated between markers",
+    advice="use nodes_per_marker_pitch instead of cell counts",
+)
+def mesh_alignment(pad_mesh_alignment_mm: Any) -> Finding:
+    """Largest distance of a marker line to a node line."""
+    return Finding(pad_mesh_alignment_mm, 1e-6, advisory=True)
+
+
+@rule(
+    "mesh.aspect",
+    title="Cell aspect ratio",
+    parameter="mesh.layers",
+    why="flat or tall cells cost accuracy and condition",
+    advice="change layers or cell size",
+    unit="",
+)
+def mesh_aspect(
+    pad_mesh_cell_x_mm: Any, pad_mesh_cell_y_mm: Any, pad_mesh_cell_z_mm: Any
+) -> Finding:
+    """Longest over shortest edge of a cell."""
+    edges = np.broadcast_arrays(pad_mesh_cell_x_mm, pad_mesh_cell_y_mm, pad_mesh_cell_z_mm)
+    ratio = np.maximum.reduce(edges) / np.minimum.reduce(edges)
+    return Finding(ratio, 50.0, caution=6.0)
+
+
+@rule(
+    "mesh.size",
+    title="Mesh stays manageable",
+    parameter="mesh.nodes_per_marker_pitch",
+    why="the stiffness matrix takes about 2 kB per node",
+    advice="use fewer cells or layers",
+    unit="nodes",
+)
+def mesh_size(pad_mesh_node_count: Any) -> Finding:
+    """Nodes of the pad."""
+    return Finding(pad_mesh_node_count, MOST_NODES, caution=100_000)
+
+
+@rule(
+    "finger.thickness_mm",
+    title="Finger is thin enough",
+    parameter="design.envelope.max_thickness_mm",
+    why="the envelope of the gripper",
+    advice="see what binds the thickness",
+)
+def thickness(finger_thickness_mm: Any, envelope_max_thickness_mm: Any) -> Finding:
+    """Thickness against its limit."""
+    return _envelope(finger_thickness_mm, envelope_max_thickness_mm)
+
+
+@rule(
+    "finger.width_mm",
+    title="Finger is narrow enough",
+    parameter="design.envelope.max_width_mm",
+    why="the envelope of the gripper",
+    advice="narrow the gel, use a smaller bend radius ratio or thinner acrylic",
+)
+def width(finger_width_mm: Any, envelope_max_width_mm: Any) -> Finding:
+    """Width against its limit."""
+    return _envelope(finger_width_mm, envelope_max_width_mm)
+
+
+@rule(
+    "finger.length_mm",
+    title="Finger is short enough",
+    parameter="design.envelope.max_length_mm",
+    why="the envelope of the gripper",
+    advice="shorten the gel or the tongue, or use a wider field of view",
+)
+def length(finger_length_mm: Any, envelope_max_length_mm: Any) -> Finding:
+    """Length against its limit."""
+    return _envelope(finger_length_mm, envelope_max_length_mm)
+
+
+def _envelope(value: Any, limit: Any) -> Finding:
+    return Finding(value, np.inf if limit is None else limit + 1e-9)

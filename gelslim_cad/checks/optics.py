@@ -1,0 +1,193 @@
+"""Rules on what the camera sees."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.checks.rule import Finding, rule
+
+TOLERANCE = 1e-4
+
+
+@rule(
+    "coverage.along",
+    title="Whole gel in the picture, along the finger",
+    parameter="design.gel.length_mm",
+    why="a part of the gel that is not seen gives no force",
+    advice="shorten the gel, widen the field of view, or allow more thickness",
+    unit="",
+)
+def coverage_along(view_along_use: Any, optics_image_margin: Any) -> Finding:
+    """Gel corners against the image's height."""
+    return Finding(view_along_use, 1 - optics_image_margin + TOLERANCE)
+
+
+@rule(
+    "coverage.across",
+    title="Whole gel in the picture, across the finger",
+    parameter="design.gel.width_mm",
+    why="the near edge of the gel is the tightest",
+    advice="narrow the gel, widen the field of view, or allow more thickness",
+    unit="",
+)
+def coverage_across(view_across_use: Any, optics_image_margin: Any) -> Finding:
+    """Gel corners against the image's width."""
+    return Finding(view_across_use, 1 - optics_image_margin + TOLERANCE)
+
+
+@rule(
+    "focus.travel_mm",
+    title="Lens can be focused on the gel",
+    parameter="camera.lens_travel_mm",
+    why="a fixed-focus lens must be unscrewed by f²/(s - f) from infinity",
+    advice="unscrew the lens that far (a longer thread or a spacer), or use a closer-focusing lens",
+)
+def focus_travel(view_lens_extension_mm: Any, camera_lens_travel_mm: Any) -> Finding:
+    """Needed against possible lens extension."""
+    return Finding(view_lens_extension_mm, camera_lens_travel_mm * (1 + TOLERANCE))
+
+
+@rule(
+    "blur.gel",
+    title="Blur on the gel, in marker diameters",
+    parameter="design.optics.blur_per_diameter",
+    why="markers wash out: 1/3 of a diameter is sharp, 1/2 is the limit",
+    advice="stop the lens down, use larger markers, shorten the gel, or allow more thickness",
+    unit="",
+)
+def blur_gel(view_near_blur_mm: Any, view_far_blur_mm: Any, markers_diameter_mm: Any) -> Finding:
+    """Largest blur on the pad."""
+    worst = np.maximum(view_near_blur_mm, view_far_blur_mm) / markers_diameter_mm
+    return Finding(worst, 0.5, caution=1 / 3 + TOLERANCE)
+
+
+@rule(
+    "blur.limit",
+    title="Blur the design allows",
+    parameter="design.optics.blur_per_diameter",
+    why="the solver was told to keep this",
+    advice="allow more blur, stop the lens down, or use larger markers",
+    unit="mm",
+)
+def blur_limit(view_far_blur_mm: Any, view_blur_limit_mm: Any) -> Finding:
+    """Blur at the far edge against the design's own limit."""
+    return Finding(view_far_blur_mm, view_blur_limit_mm * (1 + TOLERANCE))
+
+
+@rule(
+    "blur.image_px",
+    title="Blur in the picture against the circle of confusion",
+    parameter="camera.f_number",
+    why="fine texture is softer than the sensor could show; markers are judged by blur on the gel",
+    advice="a smaller aperture sharpens texture, at the cost of light",
+)
+def blur_image(view_image_blur_px: Any, camera_circle_of_confusion_px: Any) -> Finding:
+    """Blur at the far edge in the image."""
+    return Finding(view_image_blur_px, camera_circle_of_confusion_px, advisory=True)
+
+
+@rule(
+    "marker.far_px",
+    title="Pixels across a marker at the far edge",
+    parameter="design.optics.min_px_per_marker",
+    why="below about 6 px the centre of a dot gets uncertain",
+    advice="use larger markers, more pixels, a longer lens, or allow more thickness",
+)
+def marker_far(
+    view_marker_across_px: Any, view_marker_along_px: Any, optics_min_px_per_marker: Any
+) -> Finding:
+    """Smaller image axis of a far marker."""
+    least = np.minimum(view_marker_across_px, view_marker_along_px)
+    return Finding(least, optics_min_px_per_marker * (1 - TOLERANCE), least=True)
+
+
+@rule(
+    "view.keystone",
+    title="Keystone",
+    parameter="design.optics.max_keystone",
+    why="marker size and resolution vary by this ratio over the pad",
+    advice="allow more keystone or more thickness",
+    unit="",
+)
+def keystone(view_keystone: Any, optics_max_keystone: Any) -> Finding:
+    """Far over near distance."""
+    return Finding(view_keystone, optics_max_keystone * (1 + TOLERANCE))
+
+
+@rule(
+    "mirror.before_camera_mm",
+    title="Mirror stands before the camera",
+    parameter="design.gel.length_mm",
+    why="a mirror beside or behind the lens cannot fold its view",
+    advice="no such finger exists for this camera and gel; change the gel's length or the lens",
+)
+def mirror_before_camera(mirror_lower_x_mm: Any, camera_pose_front_x_mm: Any) -> Finding:
+    """Gap between the camera's front and the mirror's lower end."""
+    return Finding(mirror_lower_x_mm - camera_pose_front_x_mm, 0.0, least=True)
+
+
+@rule(
+    "fold.feasible",
+    title="Camera, mirror and gel fit each other",
+    parameter="design.envelope",
+    why="every limit of the folded view holds at once",
+    advice="see the rules that fail beside this one and the advice on what binds",
+    unit="",
+)
+def fold_feasible(fold_layout: Any) -> Finding:
+    """Sum of the missed parts of all limits."""
+    missed = [name for name, value in fold_layout.violations.items() if np.any(value > 1e-6)]
+    return Finding(fold_layout.worst(), 1e-6, reason="misses: " + ", ".join(missed))
+
+
+@rule(
+    "led.hidden_mm",
+    title="LEDs are hidden from the lens",
+    parameter="design.light_guide.leg_length_mm",
+    why="direct light from an LED blinds the camera",
+    advice="lengthen the legs, so that the LEDs sit deeper behind the baffle",
+)
+def led_hidden(
+    baffle_top_z_mm: Any,
+    baffle_inner_y_mm: Any,
+    led_y_mm: Any,
+    led_top_z_mm: Any,
+    leds_package_mm: Any,
+    camera_pose_z_mm: Any,
+    camera_lens_diameter_mm: Any,
+) -> Finding:
+    """Baffle above the highest straight line from an LED to the lens."""
+    lens_top = camera_pose_z_mm + camera_lens_diameter_mm / 2
+    far_side = led_y_mm + leds_package_mm / 2
+    share = (far_side - baffle_inner_y_mm) / far_side
+    line = led_top_z_mm + share * (lens_top - led_top_z_mm)
+    return Finding(baffle_top_z_mm - line, 0.0, least=True)
+
+
+@rule(
+    "mirror.between_baffles_mm",
+    title="Mirror fits between the baffles",
+    parameter="design.light_guide.bend_radius_ratio",
+    why="mirror and seat stand between the baffles",
+    advice="use a larger bend radius, a wider side margin, or a smaller mirror border",
+)
+def mirror_between(
+    mirror_width_mm: Any, baffle_inner_y_mm: Any, housing_fit_clearance_mm: Any
+) -> Finding:
+    """Room beside the mirror."""
+    room = baffle_inner_y_mm - mirror_width_mm / 2
+    return Finding(room, 2 * housing_fit_clearance_mm, least=True)
+
+
+@rule(
+    "view.between_baffles_mm",
+    title="View passes between the baffles",
+    parameter="design.light_guide.bend_radius_ratio",
+    why="a baffle in the view shades the gel's side",
+    advice="use a larger bend radius or a wider side margin",
+)
+def view_between(baffle_inner_y_mm: Any, gel_width_mm: Any) -> Finding:
+    """Baffles outside the gel's width, above which the view lies."""
+    return Finding(baffle_inner_y_mm - gel_width_mm / 2, 0.0, least=True)

@@ -1,0 +1,81 @@
+"""Design rules: pure functions of named spec fields and dimensions, as the dimensions are."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from gelslim_cad.dimensions.registry import unit_of
+
+Status = Literal["pass", "warn", "fail"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """A rule applied to a design.
+
+    `margin` is how far the value is from its limit, in the rule's unit; negative when missed.
+    """
+
+    id: str
+    title: str
+    value: Any
+    limit: Any
+    unit: str
+    margin: float | None
+    status: Status
+    reason: str
+    parameter: str
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a rule finds; every field a number or an array (n,) over designs.
+
+    The rule holds where `value` <= `limit` (or >= for a `least` rule). Where it does not, it
+    fails; where it holds but `value` passes `caution`, or the rule only advises, it warns.
+    """
+
+    value: Any
+    limit: Any
+    least: bool = False
+    caution: Any = None
+    advisory: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A registered rule."""
+
+    id: str
+    title: str
+    parameter: str
+    why: str
+    advice: str
+    unit: str
+    inputs: tuple[str, ...]
+    judge: Callable[..., Finding]
+
+
+RULES: dict[str, Rule] = {}
+"""All rules by id, in the order of definition."""
+
+
+def rule(
+    rule_id: str, *, title: str, parameter: str, why: str, advice: str, unit: str | None = None
+) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
+    """Register a rule; `parameter` is the spec path to change when it does not hold."""
+
+    def register(judge: Callable[..., Finding]) -> Callable[..., Finding]:
+        if rule_id in RULES:
+            raise ValueError(f"rule {rule_id} is defined twice")
+        inputs = tuple(inspect.signature(judge).parameters)
+        shown = unit_of(rule_id) if unit is None else unit
+        RULES[rule_id] = Rule(rule_id, title, parameter, why, advice, shown, inputs, judge)
+        return judge
+
+    return register

@@ -1,0 +1,308 @@
+"""Rules on walls, fits, fasteners and the joint to the gripper."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.dimensions.housing import COVER_TAB_MM
+from gelslim_cad.fasteners import SCREWS
+
+THINNEST_WALL_MM = {"sla": 0.6, "fdm": 0.8, "sls": 0.7}
+"""Thinnest wall that survives handling: two fdm lines, resin and powder by experience."""
+SMALLEST_GAP_MM = {"sla": 0.1, "fdm": 0.15, "sls": 0.15}
+SCREW_EDGE_MM = 2.6
+
+
+@rule(
+    "wall.thinnest_mm",
+    title="Thinnest wall",
+    parameter="design.housing.side_wall_mm",
+    why="thinner walls break or do not print in this process",
+    advice="thicken side wall, back wall, baffle or ledge, whichever is the thinnest",
+)
+def wall(
+    housing_side_wall_mm: Any,
+    housing_back_wall_mm: Any,
+    housing_baffle_mm: Any,
+    housing_ledge_mm: Any,
+    manufacturing_print_process: str,
+) -> Finding:
+    """Smallest of the four wall thicknesses."""
+    thinnest = np.minimum.reduce(
+        np.broadcast_arrays(
+            housing_side_wall_mm, housing_back_wall_mm, housing_baffle_mm, housing_ledge_mm
+        )
+    )
+    return Finding(thinnest, THINNEST_WALL_MM[manufacturing_print_process], least=True)
+
+
+@rule(
+    "fit.clearance_mm",
+    title="Fit clearance against printing accuracy",
+    parameter="design.housing.fit_clearance_mm",
+    why="parts printed this exactly jam with less",
+    advice="widen the clearance or print more exactly",
+)
+def fit(
+    housing_fit_clearance_mm: Any,
+    manufacturing_print_tolerance_mm: Any,
+    manufacturing_print_process: str,
+) -> Finding:
+    """Clearance against tolerance and process."""
+    least = SMALLEST_GAP_MM[manufacturing_print_process]
+    return Finding(
+        housing_fit_clearance_mm,
+        np.maximum(manufacturing_print_tolerance_mm, 0.05),
+        least=True,
+        caution=least,
+    )
+
+
+@rule(
+    "bezel.thickness_mm",
+    title="Bezel holds its countersunk screws",
+    parameter="design.housing.gel_proud_mm",
+    why="the head must sink into the plate between acrylic and outside",
+    advice="let the gel stand less proud, use a thicker gel, or a smaller screw",
+)
+def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
+    """Plate against head height less the exposed rim."""
+    size = SCREWS[housing_screw]
+    cone = (size.countersunk_head_mm - size.clearance_mm) / 2
+    return Finding(bezel_thickness_mm, cone + 0.2, least=True, caution=size.countersunk_height_mm)
+
+
+@rule(
+    "cover.thickness_mm",
+    title="Back cover holds its countersunk screws",
+    parameter="design.housing.back_wall_mm",
+    why="the head must sink into the cover",
+    advice="thicken the back wall or use a smaller screw",
+)
+def cover_thickness(housing_back_wall_mm: Any, housing_screw: str) -> Finding:
+    """Cover against head height."""
+    size = SCREWS[housing_screw]
+    return Finding(housing_back_wall_mm, size.countersunk_height_mm - 1e-9, least=True)
+
+
+@rule(
+    "gel.proud_mm",
+    title="Gel stands above the bezel",
+    parameter="design.housing.gel_proud_mm",
+    why="the gel must touch the object before the bezel does",
+    advice="let the gel stand at least 0.2 mm proud",
+)
+def gel_proud(housing_gel_proud_mm: Any) -> Finding:
+    """Height over the bezel."""
+    return Finding(housing_gel_proud_mm, 0.0, least=True, caution=0.2)
+
+
+@rule(
+    "screw.wall_mm",
+    title="Screw to wall",
+    parameter="design.housing.tip_wall_mm",
+    why="a pilot hole too near an edge splits the wall",
+    advice="lengthen the tip wall or use a smaller screw",
+)
+def screw_wall(housing_tip_wall_mm: Any, housing_screw: str) -> Finding:
+    """Plastic beside the pilot hole in the tip block, and under the head."""
+    size = SCREWS[housing_screw]
+    beside = (housing_tip_wall_mm - size.countersunk_head_mm) / 2
+    return Finding(beside, 0.3, least=True)
+
+
+@rule(
+    "screw.apart_mm",
+    title="Bezel screws stand apart",
+    parameter="design.gel.width_mm",
+    why="two screws side by side need room for their heads and for the gel's window",
+    advice="widen the gel or use a smaller screw",
+)
+def screw_apart(finger_width_mm: Any, housing_side_wall_mm: Any, housing_screw: str) -> Finding:
+    """Distance of the two screws, less the heads."""
+    apart = finger_width_mm - 2 * (housing_side_wall_mm + SCREW_EDGE_MM)
+    return Finding(apart - SCREWS[housing_screw].countersunk_head_mm, 1.0, least=True)
+
+
+@rule(
+    "corner.screw_mm",
+    title="Tip corners leave room for the screws",
+    parameter="design.housing.corner_radius_mm",
+    why="a rounded corner cuts into the screw head's seat",
+    advice="use a smaller corner radius, a longer tip wall or a smaller screw",
+)
+def corner_screw(
+    housing_corner_radius_mm: Any,
+    housing_tip_wall_mm: Any,
+    housing_side_wall_mm: Any,
+    housing_screw: str,
+) -> Finding:
+    """Material between the head and the rounded corner."""
+    dx = housing_corner_radius_mm - housing_tip_wall_mm / 2
+    dy = housing_corner_radius_mm - housing_side_wall_mm - SCREW_EDGE_MM
+    inside = np.where(
+        (dx > 0) & (dy > 0),
+        housing_corner_radius_mm - np.hypot(dx, dy),
+        np.minimum(housing_tip_wall_mm / 2, housing_side_wall_mm + SCREW_EDGE_MM),
+    )
+    return Finding(inside - SCREWS[housing_screw].countersunk_head_mm / 2, 0.2, least=True)
+
+
+@rule(
+    "precompression.tolerance_mm",
+    title="Pre-compression exceeds the tolerance stack",
+    parameter="design.housing.precompression_mm",
+    why="stock acrylic differs by up to 10 % and the print by its tolerance; a loose window tears",
+    advice="compress more, with a thicker shim",
+)
+def precompression_tolerance(
+    housing_precompression_mm: Any,
+    manufacturing_acrylic_tolerance_ratio: Any,
+    light_guide_thickness_mm: Any,
+    manufacturing_print_tolerance_mm: Any,
+) -> Finding:
+    """Compression against acrylic and print tolerances, both at their worst."""
+    stack = (
+        manufacturing_acrylic_tolerance_ratio * light_guide_thickness_mm
+        + manufacturing_print_tolerance_mm
+    )
+    return Finding(housing_precompression_mm, stack, least=True)
+
+
+@rule(
+    "precompression.shim_mm",
+    title="Shims keep some thickness",
+    parameter="design.housing.shim_thickness_mm",
+    why="an elastic sheet cannot be pressed to less than about 40 %",
+    advice="use thicker shims or compress less",
+)
+def precompression_shim(shim_compressed_mm: Any, housing_shim_thickness_mm: Any) -> Finding:
+    """Compressed thickness of the shim."""
+    return Finding(shim_compressed_mm, 0.4 * housing_shim_thickness_mm, least=True)
+
+
+@rule(
+    "clamp.beside_channel_mm",
+    title="Camera clamp clears the LED channels",
+    parameter="design.light_guide.bend_radius_ratio",
+    why="the clamp stands between the walls that close the channels, or behind them",
+    advice="use a larger bend radius, a smaller camera, or a longer gel",
+)
+def clamp_beside(
+    clamp_width_mm: Any,
+    baffle_inner_y_mm: Any,
+    camera_pose_front_x_mm: Any,
+    guide_proximal_end_x_mm: Any,
+    housing_fit_clearance_mm: Any,
+) -> Finding:
+    """Gap beside the clamp, or in front of it."""
+    beside = baffle_inner_y_mm - clamp_width_mm / 2
+    before = guide_proximal_end_x_mm - housing_fit_clearance_mm - 1.2 - camera_pose_front_x_mm
+    return Finding(np.maximum(beside, before), 0.15, least=True)
+
+
+@rule(
+    "mount.bolt_mm",
+    title="Mount tongues are wide enough for their bolts",
+    parameter="design.mount.bolt",
+    why="a tongue needs 1.5 mm of material on both sides of its hole",
+    advice="use a smaller bolt or a narrower cable",
+)
+def mount_bolt(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
+    """Tongue width less the hole."""
+    width = tongue_outer_y_mm - tongue_inner_y_mm
+    return Finding(width - SCREWS[mount_bolt].clearance_mm, 3.0, least=True)
+
+
+@rule(
+    "mount.head_mm",
+    title="Bolt heads stay inside the mount block",
+    parameter="design.mount.bolt",
+    why="the sunk head must not break out at the side",
+    advice="use a smaller bolt",
+)
+def mount_head(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
+    """Half the tongue and side wall against half the head."""
+    half = (tongue_outer_y_mm - tongue_inner_y_mm) / 2
+    return Finding(half - SCREWS[mount_bolt].cap_head_mm / 2, 0.0, least=True)
+
+
+@rule(
+    "mount.block_mm",
+    title="Mount block is strong enough around its slots",
+    parameter="design.mount.tongue_thickness_mm",
+    why="above and below the tongue 2 mm of plastic must take the bolt's load",
+    advice="use a thinner tongue",
+)
+def mount_block(
+    finger_thickness_mm: Any,
+    housing_gel_proud_mm: Any,
+    mount_tongue_thickness_mm: Any,
+    housing_fit_clearance_mm: Any,
+) -> Finding:
+    """Material above the slot."""
+    height = finger_thickness_mm - housing_gel_proud_mm
+    land = (height - mount_tongue_thickness_mm) / 2 - housing_fit_clearance_mm
+    return Finding(land, 2.0, least=True)
+
+
+@rule(
+    "mount.cover_screw_mm",
+    title="Cover screws hold under the tongue slots",
+    parameter="design.mount.tongue_thickness_mm",
+    why="the pilot hole ends below the slot",
+    advice="use a thinner tongue",
+)
+def mount_cover_screw(
+    tongue_z_mm: Any,
+    mount_tongue_thickness_mm: Any,
+    housing_fit_clearance_mm: Any,
+    cover_top_z_mm: Any,
+) -> Finding:
+    """Depth of the pilot hole."""
+    slot = tongue_z_mm - mount_tongue_thickness_mm / 2 - housing_fit_clearance_mm
+    return Finding(slot - cover_top_z_mm - 0.6, 1.5, least=True)
+
+
+@rule(
+    "mount.tongue_mm",
+    title="Tongue reaches past its bolt",
+    parameter="design.mount.tongue_length_mm",
+    why="the bolt's hole needs 1.2 mm of tongue beyond it",
+    advice="lengthen the tongue or use a smaller bolt",
+)
+def mount_tongue(mount_tongue_length_mm: Any, mount_bolt: str) -> Finding:
+    """Tongue beyond the hole."""
+    size = SCREWS[mount_bolt]
+    centre = size.cap_head_mm / 2 + 1.2
+    return Finding(mount_tongue_length_mm - centre - size.clearance_mm / 2, 1.2, least=True)
+
+
+@rule(
+    "cable.bend_mm",
+    title="Room for the cable's bend",
+    parameter="camera.cable_bend_radius_mm",
+    why="a sharper bend breaks the flat cable",
+    advice="the chamber follows the bend radius; report this as a fault",
+)
+def cable_bend(
+    camera_pose_rear_x_mm: Any, chamber_rear_x_mm: Any, camera_cable_bend_radius_mm: Any
+) -> Finding:
+    """Chamber behind the camera."""
+    room = camera_pose_rear_x_mm - chamber_rear_x_mm
+    return Finding(room, camera_cable_bend_radius_mm, least=True)
+
+
+@rule(
+    "cable.slot_mm",
+    title="Cable passes between the tongues",
+    parameter="camera.cable_width_mm",
+    why="the cable leaves through the middle of the mount",
+    advice="use a narrower cable or a wider finger",
+)
+def cable_slot(camera_cable_width_mm: Any, tongue_outer_y_mm: Any) -> Finding:
+    """Cable against the mount's width."""
+    return Finding(camera_cable_width_mm / 2 + COVER_TAB_MM, tongue_outer_y_mm)
