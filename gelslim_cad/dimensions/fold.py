@@ -147,14 +147,16 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
 
     horizontal = np.max([c.horizontal(tilt) for c in corners], axis=0)
     vertical = np.tan(np.maximum(highest - tilt, tilt - lowest))
-    blur = p.aperture_mm * (z_far - z_near) / (2 * z_near)
+    # An axis tilted back makes the far edge the nearer one: limits hold whichever way it leans.
+    least, most = np.minimum(z_near, z_far), np.maximum(z_near, z_far)
+    blur = p.aperture_mm * (most - least) / (2 * least)
     focus = 2 * z_near * z_far / (z_near + z_far)
     travel = np.where(
         focus >= p.focus_nearest_mm,
         0.0,
         p.focal_length_mm**2 / np.maximum(focus - p.focal_length_mm, 1e-3),
     )
-    px = p.focal_px * p.marker_diameter_mm / z_far * np.minimum(1.0, apparent / z_far)
+    px = p.focal_px * p.marker_diameter_mm / most * np.minimum(1.0, apparent / most)
     view_edge = [x - (vx + shallowest * (z - vz)) + p.clearance_mm for x, z in housing]
     behind_mirror = [
         p.clearance_mm - ((x - upper_x) * -sa + (z - upper_z) * ca) for x, z in housing
@@ -168,7 +170,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         "field of view across": horizontal / p.half_horizontal_tan - 1,
         "blur": blur / p.blur_limit_mm - 1,
         "pixels per marker": p.min_px_per_marker / px - 1,
-        "keystone": z_far / z_near / p.max_keystone - 1,
+        "keystone": most / least / p.max_keystone - 1,
         "lens travel": (travel - p.lens_travel_mm) / np.maximum(p.lens_travel_mm, 0.1),
         "air gap": 2.0 - air,
         "mirror below window": np.maximum(-down, vz - lower_z) / 10,

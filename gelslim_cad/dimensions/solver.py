@@ -28,7 +28,8 @@ LENGTH_WEIGHT = 0.002
 
 def objective(candidates: Fold) -> Array:
     """Depth in mm; among equals the smaller keystone, then the shorter finger."""
-    keystone = candidates.far_distance_mm / candidates.near_distance_mm
+    ratio = candidates.far_distance_mm / candidates.near_distance_mm
+    keystone = np.maximum(ratio, 1 / ratio)
     tie = KEYSTONE_WEIGHT_MM * (keystone - 1) - LENGTH_WEIGHT * candidates.camera_rear_x_mm
     missed = candidates.worst()
     return np.where(missed > 1e-9, INFEASIBLE_MM * (1 + missed), candidates.depth_mm + tie)

@@ -1,0 +1,35 @@
+"""Specs for the tests of dimensions: the shipped designs with fields changed by dotted path."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.spec import Spec
+from gelslim_cad.spec.reader import read_spec
+
+DESIGNS = Path(__file__).parents[2] / "designs"
+
+
+@cache
+def shipped(name: str) -> Spec:
+    return read_spec(DESIGNS / f"{name}.yaml").spec
+
+
+def changed(spec: Spec, changes: dict[str, Any]) -> Spec:
+    """`spec` with leaf fields replaced by dotted path, checked anew."""
+    data = spec.model_dump()
+    for path, value in changes.items():
+        *blocks, name = path.split(".")
+        block = data
+        for key in blocks:
+            block = block[key]
+        assert name in block, path
+        block[name] = value
+    return Spec(**data)
+
+
+def mini20(changes: dict[str, Any] | None = None) -> Dimensions:
+    return derive(changed(shipped("mini20"), changes or {}))

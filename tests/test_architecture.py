@@ -1,0 +1,132 @@
+"""Imports run one way: numerics below, spec, dimensions, solids, output; heavy libraries late."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("gelslim_cad", "gelslim_optics", "ifem_export")
+SOURCES = sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py"))
+CAD_LIBRARIES = ("cadquery", "OCP", "vtk", "vtkmodules", "pyvista")
+
+FORBIDDEN = {
+    "ifem_export": ("gelslim_cad", "gelslim_optics", *CAD_LIBRARIES),
+    "gelslim_optics": ("gelslim_cad", "ifem_export", *CAD_LIBRARIES),
+    "gelslim_cad.spec": tuple(
+        f"gelslim_cad.{part}"
+        for part in ("dimensions", "solids", "build", "checks", "report", "export", "cli")
+    )
+    + CAD_LIBRARIES,
+    "gelslim_cad.dimensions": tuple(
+        f"gelslim_cad.{part}" for part in ("solids", "build", "checks", "report", "export", "cli")
+    )
+    + CAD_LIBRARIES,
+    "gelslim_cad.solids": ("gelslim_cad.build", "gelslim_cad.cli", "gelslim_cad.report"),
+    "gelslim_cad.report": ("cadquery", "OCP"),
+}
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def typing_only(node: ast.AST) -> bool:
+    """Whether a statement is `if TYPE_CHECKING:`, which never runs."""
+    return isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+
+
+def imported(tree: ast.AST, package: str) -> Iterator[str]:
+    """Absolute names of all modules imported, inside functions too."""
+    todo: list[ast.AST] = [tree]
+    while todo:
+        node = todo.pop()
+        if typing_only(node):
+            todo += node.orelse  # type: ignore[attr-defined]
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                above = package.split(".")[: len(package.split(".")) - node.level + 1]
+                base = ".".join([*above, base]).rstrip(".")
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        todo += ast.iter_child_nodes(node)
+
+
+def within(module: str, package: str) -> bool:
+    return module == package or module.startswith(package + ".")
+
+
+def offences(path: Path) -> list[str]:
+    name = module_name(path)
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    names = set(imported(ast.parse(path.read_text(encoding="utf-8")), package))
+    return [
+        f"{name} imports {target}"
+        for lower, banned in FORBIDDEN.items()
+        if within(name, lower)
+        for target in sorted(names)
+        if any(within(target, b) for b in banned)
+    ]
+
+
+def test_sources_are_found() -> None:
+    found = {module_name(p) for p in SOURCES}
+    for layer in FORBIDDEN:
+        assert any(within(name, layer) for name in found), layer
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_imports_run_one_way(package: str) -> None:
+    mine = [p for p in SOURCES if within(module_name(p), package)]
+    assert [line for p in mine for line in offences(p)] == []
+
+
+def test_the_walk_sees_imports_in_functions_and_relative_ones() -> None:
+    code = """
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    import unseen
+def f():
+    import cadquery as cq
+    from ..solids import body
+    from . import fold
+"""
+    names = set(imported(ast.parse(code), "gelslim_cad.dimensions"))
+    assert {"cadquery", "gelslim_cad.solids.body", "gelslim_cad.dimensions.fold"} <= names
+    assert "unseen" not in names
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "gelslim_cad.spec.reader",
+        "gelslim_cad.dimensions",
+        "gelslim_cad.sight",
+        "gelslim_optics.virtual_camera",
+        "ifem_export.bundle_io",
+    ],
+)
+def test_light_modules_load_no_cad(module: str) -> None:
+    code = (
+        f"import sys, {module}; "
+        f"print(sorted(m for m in {CAD_LIBRARIES!r} + ('matplotlib',) if m in sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_no_module_is_longer_than_350_lines() -> None:
+    lengths = {module_name(p): len(p.read_text(encoding="utf-8").splitlines()) for p in SOURCES}
+    assert {name: n for name, n in lengths.items() if n > 350} == {}
