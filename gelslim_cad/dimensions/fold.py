@@ -53,7 +53,7 @@ class FoldProblem:
     def __len__(self) -> int:
         return len(self.gel_length_mm)
 
-    def rows(self, chosen: slice) -> FoldProblem:
+    def rows(self, chosen: slice | NDArray[np.intp]) -> FoldProblem:
         """The designs in `chosen`."""
         return FoldProblem(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})
 

@@ -1,7 +1,8 @@
 """The thinnest finger that lets the camera see the gel: a deterministic search over folds.
 
 Three unknowns (mean ray angle, used part of the field of view, mirror angle) are searched on a
-coarse grid and then on ever smaller grids around the best candidates. Infeasible candidates rank
+coarse grid and then on ever smaller grids around the best candidate of each band of ray angles:
+steep and upright views are separate valleys, joined by infeasible folds. Infeasible candidates rank
 by how far they miss, so that slivers of feasible designs are found and a hopeless design ends at
 its least bad fold, which the design rules then report.
 """
@@ -18,9 +19,10 @@ LOWER = np.array([np.radians(-12.0), 0.25, np.radians(12.0)])
 UPPER = np.array([np.radians(58.0), 1.0, np.radians(50.0)])
 COARSE = (18, 10, 20)
 FINE = 5
-SHRINK = 0.55
-LEVELS = 18
-CHUNK = 128
+SHRINK = 0.7
+LEVELS = 26
+STARTS = 6
+CHUNK = 64
 INFEASIBLE_MM = 1000.0
 KEYSTONE_WEIGHT_MM = 0.02
 LENGTH_WEIGHT = 0.002
@@ -45,20 +47,30 @@ def solve_fold(problem: FoldProblem) -> Fold:
 
 
 def _solve_chunk(problem: FoldProblem) -> Fold:
-    count = len(problem)
-    axes = [np.linspace(lo, hi, n) for lo, hi, n in zip(LOWER, UPPER, COARSE, strict=True)]
-    best = _best(problem, *(np.broadcast_to(axis, (count, len(axis))) for axis in axes))
-    width = (UPPER - LOWER) / (np.array(COARSE) - 1)
+    count, width = len(problem), (UPPER - LOWER) / (np.array(COARSE) - 1)
+    mids, spreads, mirrors = (
+        np.linspace(lo, hi, n) for lo, hi, n in zip(LOWER, UPPER, COARSE, strict=True)
+    )
+    spread = np.broadcast_to(spreads, (count, len(spreads)))
+    mirror = np.broadcast_to(mirrors, (count, len(mirrors)))
+    starts = []
+    for band in np.array_split(mids, STARTS):
+        mid = np.broadcast_to(band, (count, len(band)))
+        starts.append(_best(problem, mid, spread, mirror))
+    best = [np.concatenate(values) for values in zip(*starts, strict=True)]
+    repeated = problem.rows(np.tile(np.arange(count), STARTS))
     ticks = np.linspace(-1.0, 1.0, FINE)
     for _ in range(LEVELS):
         around = [
             np.clip(b[:, None] + ticks * w, lo, hi)
             for b, w, lo, hi in zip(best, width, LOWER, UPPER, strict=True)
         ]
-        best = _best(problem, *around)
+        best = _best(repeated, *around)
         width = width * SHRINK
-    mid, spread, mirror = (b[:, None, None] for b in best)
-    return _squeeze(fold(problem, mid, spread, mirror))
+    ends = objective(fold(repeated, *(b[:, None, None] for b in best))).reshape(STARTS, count)
+    winner = np.argmin(ends, axis=0) * count + np.arange(count)
+    chosen = [b[winner][:, None, None] for b in best]
+    return _squeeze(fold(problem, *chosen))
 
 
 def _best(problem: FoldProblem, mid: Array, spread: Array, mirror: Array) -> list[Array]:
