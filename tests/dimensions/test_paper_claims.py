@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from fold_samples import mini20, shipped
 
@@ -35,13 +37,13 @@ def test_a_stricter_limit_never_gives_a_thinner_finger(
     assert all(bool(d.feasible().all()) for d in found)
     thickness = [d["finger.thickness_mm"] for d in found]
     # The search resolves 0.02 mm.
-    assert all(b <= a + 0.02 for a, b in zip(thickness, thickness[1:], strict=False))
+    assert all(b <= a + 0.02 for a, b in pairwise(thickness))
     assert thickness[0] > thickness[-1] + 1.0
 
 
 def test_thinner_means_more_keystone_and_more_depth_of_field() -> None:
     found = [mini20({"design.optics.blur_per_diameter": b}) for b in (0.15, 0.25, 1 / 3, 0.5)]
-    for thick, thin in zip(found, found[1:], strict=False):
+    for thick, thin in pairwise(found):
         assert thin["finger.thickness_mm"] < thick["finger.thickness_mm"]
         assert thin["view.keystone"] > thick["view.keystone"]
         assert thin["view.depth_range_mm"] > thick["view.depth_range_mm"]

@@ -1,0 +1,91 @@
+"""Fingers for the tests of solids: the shipped designs and random ones from fixed seeds."""
+
+from __future__ import annotations
+
+import random
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from gelslim_cad.checks import check
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.part import Part
+from gelslim_cad.spec import Spec
+from gelslim_cad.spec.reader import read_spec
+
+DESIGNS = sorted((Path(__file__).parents[2] / "designs").glob("*.yaml"))
+RANDOM = 6
+
+
+def random_spec(seed: int) -> Spec:
+    r = random.Random(seed)
+    side = r.uniform(10, 45)
+    module = r.uniform(5, 12)
+    camera: dict[str, Any] = {
+        "image_width_px": 640,
+        "image_height_px": 480,
+        "sensor_width_mm": 3.6288,
+        "sensor_height_mm": 2.7216,
+        "focal_length_mm": r.uniform(2.0, 3.6),
+        "f_number": r.uniform(2.8, 5.6),
+        "module_width_mm": module,
+        "module_height_mm": r.uniform(5, 12),
+        "module_depth_mm": r.uniform(3, 6),
+        "lens_diameter_mm": module * r.uniform(0.4, 0.8),
+        "lens_height_mm": r.uniform(0, 3),
+        "lens_travel_mm": 2.0,
+    }
+    design: dict[str, Any] = {
+        "gel": {
+            "length_mm": side,
+            "width_mm": min(45.0, max(10.0, side * r.uniform(0.8, 1.3))),
+            "thickness_mm": r.uniform(1.2, 4),
+            "corner_radius_mm": r.uniform(0, 4),
+        },
+        "light_guide": {
+            "thickness_mm": r.uniform(1.5, 5),
+            "bend_radius_ratio": r.uniform(0.8, 4),
+        },
+        "optics": {"blur_per_diameter": 1.0, "min_px_per_marker": 2.0, "max_keystone": 3.0},
+        "mirror": {"thickness_mm": r.uniform(0.7, 2)},
+        "housing": {"back_wall_mm": r.uniform(1.2, 3), "side_wall_mm": r.uniform(1.2, 3)},
+    }
+    return Spec(
+        format="gelslim-spec/1",
+        name=f"random{seed}",
+        camera=camera,  # type: ignore[arg-type]
+        design=design,  # type: ignore[arg-type]
+    )
+
+
+def screws_refused(d: Dimensions) -> list[str]:
+    """Failed rules on plates, blocks and holes of the screws."""
+    about = ("bezel.", "cover.", "screw.", "corner.", "mount.")
+    return [c.id for c in check(d) if c.status == "fail" and c.id.startswith(about)]
+
+
+@cache
+def fingers() -> dict[str, Dimensions]:
+    """Dimensions by name; of the random specs the first `RANDOM` that can be assembled.
+
+    Left out are those without a feasible fold and those whose screws a design rule refuses.
+    """
+    found = {path.stem: derive(read_spec(path).spec) for path in DESIGNS}
+    seed = 0
+    while len(found) < len(DESIGNS) + RANDOM:
+        d = derive(random_spec(seed))
+        if bool(d.feasible().all()) and not screws_refused(d):
+            found[f"random{seed}"] = d
+        seed += 1
+    return found
+
+
+@cache
+def parts_of(name: str) -> tuple[Part, ...]:
+    from gelslim_cad.solids.finger import finger_parts
+
+    return finger_parts(fingers()[name])
+
+
+def part(name: str, wanted: str) -> Part:
+    return next(p for p in parts_of(name) if p.name == wanted)
