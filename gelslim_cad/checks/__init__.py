@@ -1,6 +1,16 @@
 """Design rules: value, limit, margin, reason, and the parameter to change."""
 
 from gelslim_cad.checks.apply import check, check_batch
+from gelslim_cad.checks.gelslim1 import GelSlim1Fold, gelslim1_closed_form, gelslim1_length_mm
 from gelslim_cad.checks.rule import RULES, Check, Finding
 
-__all__ = ["RULES", "Check", "Finding", "check", "check_batch"]
+__all__ = [
+    "RULES",
+    "Check",
+    "Finding",
+    "GelSlim1Fold",
+    "check",
+    "check_batch",
+    "gelslim1_closed_form",
+    "gelslim1_length_mm",
+]

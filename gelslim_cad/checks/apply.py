@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.checks import guide, making, mechanics, optics, structure  # noqa: F401
-from gelslim_cad.checks.rule import RULES, Check, Finding, Rule, Status
+from gelslim_cad.checks.rule import GROUPS, RULES, Check, Finding, Rule, Status
 from gelslim_cad.dimensions import Dimensions
 
 
 def check(d: Dimensions) -> tuple[Check, ...]:
-    """All rules on one design, in the order of definition."""
-    return tuple(_check(entry, d) for entry in RULES.values())
+    """All rules on one design, group by group in the order of definition."""
+    order = list(GROUPS.values())
+    ordered = sorted(RULES.values(), key=lambda entry: order.index(entry.group))
+    return tuple(_check(entry, d) for entry in ordered)
 
 
 def check_batch(d: Dimensions) -> Mapping[str, NDArray[np.bool_]]:
@@ -33,9 +35,15 @@ def _find(entry: Rule, d: Dimensions) -> Finding:
 
 
 def _missed(found: Finding) -> Any:
-    value, limit = np.asarray(found.value), np.asarray(found.limit)
-    # Written so that a NaN misses.
-    return ~(value >= limit) if found.least else ~(value <= limit)
+    return _passed(found, found.limit)
+
+
+def _passed(found: Finding, limit: Any) -> Any:
+    """Where the value is beyond `limit` by more than the tolerance; NaN always is."""
+    value, limit = np.asarray(found.value), np.asarray(limit)
+    if found.least:
+        return ~(value >= limit - found.tolerance)
+    return ~(value <= limit + found.tolerance)
 
 
 def _check(entry: Rule, d: Dimensions) -> Check:
@@ -46,17 +54,17 @@ def _check(entry: Rule, d: Dimensions) -> Check:
     status: Status = "pass"
     if missed:
         status = "warn" if found.advisory else "fail"
-    elif found.caution is not None:
-        caution = _number(found.caution)
-        if (value < caution) if found.least else (value > caution):
-            status, shown = "warn", caution
-    margin = value - shown if found.least else shown - value
-    words = "at least" if found.least else "at most"
-    reason = f"{value:.4g} {entry.unit}".rstrip() + f", should be {words} {shown:.4g}: {entry.why}"
-    if found.reason and missed:
-        reason = f"{found.reason}; {entry.why}"
+    elif found.caution is not None and bool(np.all(_passed(found, found.caution))):
+        status, shown = "warn", _number(found.caution)
     good = status == "pass"
     unlimited = not np.isfinite(shown)
+    margin = value - shown if found.least else shown - value
+    # Within the tolerance a value is at its limit, not beyond it.
+    margin = max(margin, 0.0) if good else margin
+    words = "at least" if found.least else "at most"
+    reason = f"{value:.4g} {entry.unit}".rstrip() + f", should be {words} {shown:.4g}: {entry.why}"
+    if found.reason is not None and not good:
+        reason = f"{found.reason()}; {entry.why}"
     return Check(
         id=entry.id,
         title=entry.title,
@@ -68,6 +76,8 @@ def _check(entry: Rule, d: Dimensions) -> Check:
         reason=entry.why if good else reason,
         parameter=entry.parameter,
         advice="" if good else entry.advice,
+        sense="min" if found.least else "max",
+        group=entry.group,
     )
 
 

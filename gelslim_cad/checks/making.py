@@ -38,7 +38,7 @@ def overhang(
 )
 def mould_cure(manufacturing_mould_process: str) -> Finding:
     """1 where the mould inhibits the cure."""
-    return Finding(1.0 if manufacturing_mould_process == "sla" else 0.0, 0.5, advisory=True)
+    return Finding(1.0 if manufacturing_mould_process == "sla" else 0.0, 0.0, advisory=True)
 
 
 @rule(
@@ -88,7 +88,7 @@ def crown(gel_crown_height_mm: Any, gel_length_mm: Any, gel_width_mm: Any) -> Fi
 )
 def marker_pitch(markers_pitch_mm: Any, markers_diameter_mm: Any) -> Finding:
     """Pitch over diameter."""
-    return Finding(markers_pitch_mm / markers_diameter_mm, 2.0 - 1e-9, least=True)
+    return Finding(markers_pitch_mm / markers_diameter_mm, 2.0, least=True, tolerance=1e-9)
 
 
 @rule(
@@ -136,7 +136,34 @@ def marker_inside(
 ) -> Finding:
     """Gel beyond the outermost dots; dots that cross a rounded corner are left out."""
     beyond = np.minimum(gel_length_mm - marker_grid_span_x_mm, gel_width_mm - marker_grid_span_y_mm)
-    return Finding(beyond / 2 - markers_diameter_mm / 2, -1e-9, least=True, caution=0.1)
+    return Finding(
+        beyond / 2 - markers_diameter_mm / 2, 0.0, least=True, caution=0.1, tolerance=1e-9
+    )
+
+
+@rule(
+    "marker.corner_mm",
+    title="Corner markers lie inside the rounded corners",
+    parameter="design.gel.corner_radius_mm",
+    why="dots that cross the rounded corner are left out of the print",
+    advice="use a smaller corner radius, or a wider edge margin",
+)
+def marker_corner(
+    gel_length_mm: Any,
+    gel_width_mm: Any,
+    gel_corner_radius_mm: Any,
+    marker_grid_span_x_mm: Any,
+    marker_grid_span_y_mm: Any,
+    markers_diameter_mm: Any,
+) -> Finding:
+    """Gel beyond the dot in the lattice's corner, along the corner's radius."""
+    to_x = (gel_length_mm - marker_grid_span_x_mm) / 2
+    to_y = (gel_width_mm - marker_grid_span_y_mm) / 2
+    dx, dy = gel_corner_radius_mm - to_x, gel_corner_radius_mm - to_y
+    rounded = gel_corner_radius_mm - np.hypot(np.maximum(dx, 0), np.maximum(dy, 0))
+    beyond = np.where((dx > 0) & (dy > 0), rounded, np.minimum(to_x, to_y))
+    room = beyond - markers_diameter_mm / 2
+    return Finding(room, 0.0, least=True, advisory=True, tolerance=1e-9)
 
 
 @rule(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.spec.material import STIFF_GEL_MPA
 
 MOST_NODES = 400_000
 
@@ -15,13 +16,14 @@ MOST_NODES = 400_000
     "gel.modulus_mpa",
     title="Gel stiffness is that of a tactile gel",
     parameter="material.gel.youngs_modulus_mpa",
-    why="above 1 MPa a pad hardly deforms under a grasp",
+    why="above 1 MPa a pad hardly deforms under a grasp, and no tactile gel is above 5 MPa",
     advice="check the unit: tactile gels have 0.05 to 1 MPa",
     unit="MPa",
 )
-def gel_modulus(material_gel_youngs_modulus_mpa: Any) -> Finding:
-    """E against the stiff end of the range."""
-    return Finding(material_gel_youngs_modulus_mpa, 1.0, advisory=True)
+def gel_modulus(material_gel_youngs_modulus_mpa: Any, material_allow_stiff_gel: bool) -> Finding:
+    """E against the stiff end of the range, unless the spec insists."""
+    limit = np.inf if material_allow_stiff_gel else STIFF_GEL_MPA
+    return Finding(material_gel_youngs_modulus_mpa, limit, caution=1.0)
 
 
 @rule(
@@ -63,7 +65,7 @@ def mesh_layers(mesh_layers: Any, mesh_element: str, material_gel_poissons_ratio
 )
 def mesh_alignment(pad_mesh_alignment_mm: Any) -> Finding:
     """Largest distance of a marker line to a node line."""
-    return Finding(pad_mesh_alignment_mm, 1e-6, advisory=True)
+    return Finding(pad_mesh_alignment_mm, 0.0, advisory=True, tolerance=1e-6)
 
 
 @rule(
@@ -80,7 +82,7 @@ def mesh_aspect(
     """Longest over shortest edge of a cell."""
     edges = np.broadcast_arrays(pad_mesh_cell_x_mm, pad_mesh_cell_y_mm, pad_mesh_cell_z_mm)
     ratio = np.maximum.reduce(edges) / np.minimum.reduce(edges)
-    return Finding(ratio, 50.0, caution=6.0)
+    return Finding(ratio, 50.0, caution=5.0)
 
 
 @rule(
@@ -133,4 +135,4 @@ def length(finger_length_mm: Any, envelope_max_length_mm: Any) -> Finding:
 
 
 def _envelope(value: Any, limit: Any) -> Finding:
-    return Finding(value, np.inf if limit is None else limit + 1e-9)
+    return Finding(value, np.inf if limit is None else limit, tolerance=1e-9)

@@ -9,6 +9,8 @@ import numpy as np
 from gelslim_cad.checks.rule import Finding, rule
 
 TOLERANCE = 1e-4
+"""Of limits that the solver drives the design to."""
+TOLERANCE_OF_FOLD = 1e-6
 
 
 @rule(
@@ -21,7 +23,7 @@ TOLERANCE = 1e-4
 )
 def coverage_along(view_along_use: Any, optics_image_margin: Any) -> Finding:
     """Gel corners against the image's height."""
-    return Finding(view_along_use, 1 - optics_image_margin + TOLERANCE)
+    return Finding(view_along_use, 1 - optics_image_margin, tolerance=TOLERANCE)
 
 
 @rule(
@@ -34,7 +36,7 @@ def coverage_along(view_along_use: Any, optics_image_margin: Any) -> Finding:
 )
 def coverage_across(view_across_use: Any, optics_image_margin: Any) -> Finding:
     """Gel corners against the image's width."""
-    return Finding(view_across_use, 1 - optics_image_margin + TOLERANCE)
+    return Finding(view_across_use, 1 - optics_image_margin, tolerance=TOLERANCE)
 
 
 @rule(
@@ -46,7 +48,17 @@ def coverage_across(view_across_use: Any, optics_image_margin: Any) -> Finding:
 )
 def focus_travel(view_lens_extension_mm: Any, camera_lens_travel_mm: Any) -> Finding:
     """Needed against possible lens extension."""
-    return Finding(view_lens_extension_mm, camera_lens_travel_mm * (1 + TOLERANCE))
+
+    def reason() -> str:
+        needed, there = float(view_lens_extension_mm), float(camera_lens_travel_mm)
+        return (
+            f"to focus on the gel the lens must be unscrewed by {needed:.2f} mm and its thread "
+            f"allows {there:.2f} mm, {needed - there:.2f} mm too little"
+        )
+
+    return Finding(
+        view_lens_extension_mm, camera_lens_travel_mm, tolerance=TOLERANCE, reason=reason
+    )
 
 
 @rule(
@@ -60,7 +72,7 @@ def focus_travel(view_lens_extension_mm: Any, camera_lens_travel_mm: Any) -> Fin
 def blur_gel(view_near_blur_mm: Any, view_far_blur_mm: Any, markers_diameter_mm: Any) -> Finding:
     """Largest blur on the pad."""
     worst = np.maximum(view_near_blur_mm, view_far_blur_mm) / markers_diameter_mm
-    return Finding(worst, 0.5, caution=1 / 3 + TOLERANCE)
+    return Finding(worst, 0.5, caution=1 / 3, tolerance=TOLERANCE)
 
 
 @rule(
@@ -71,9 +83,10 @@ def blur_gel(view_near_blur_mm: Any, view_far_blur_mm: Any, markers_diameter_mm:
     advice="allow more blur, stop the lens down, or use larger markers",
     unit="mm",
 )
-def blur_limit(view_far_blur_mm: Any, view_blur_limit_mm: Any) -> Finding:
-    """Blur at the far edge against the design's own limit."""
-    return Finding(view_far_blur_mm, view_blur_limit_mm * (1 + TOLERANCE))
+def blur_limit(view_near_blur_mm: Any, view_far_blur_mm: Any, view_blur_limit_mm: Any) -> Finding:
+    """Largest blur on the pad against the design's own limit."""
+    worst = np.maximum(view_near_blur_mm, view_far_blur_mm)
+    return Finding(worst, view_blur_limit_mm, tolerance=TOLERANCE * view_blur_limit_mm)
 
 
 @rule(
@@ -100,7 +113,8 @@ def marker_far(
 ) -> Finding:
     """Smaller image axis of a far marker."""
     least = np.minimum(view_marker_across_px, view_marker_along_px)
-    return Finding(least, optics_min_px_per_marker * (1 - TOLERANCE), least=True)
+    slack = TOLERANCE * optics_min_px_per_marker
+    return Finding(least, optics_min_px_per_marker, least=True, tolerance=slack)
 
 
 @rule(
@@ -112,8 +126,9 @@ def marker_far(
     unit="",
 )
 def keystone(view_keystone: Any, optics_max_keystone: Any) -> Finding:
-    """Far over near distance."""
-    return Finding(view_keystone, optics_max_keystone * (1 + TOLERANCE))
+    """Far over near distance, or its inverse where the axis leans back."""
+    ratio = np.maximum(view_keystone, 1 / np.asarray(view_keystone))
+    return Finding(ratio, optics_max_keystone, tolerance=TOLERANCE)
 
 
 @rule(
@@ -131,15 +146,20 @@ def mirror_before_camera(mirror_lower_x_mm: Any, camera_pose_front_x_mm: Any) ->
 @rule(
     "fold.feasible",
     title="Camera, mirror and gel fit each other",
-    parameter="design.envelope",
-    why="every limit of the folded view holds at once",
+    parameter="design.gel.length_mm",
+    why="every limit of the folded view must hold at once",
     advice="see the rules that fail beside this one and the advice on what binds",
     unit="",
 )
 def fold_feasible(fold_layout: Any) -> Finding:
     """Sum of the missed parts of all limits."""
-    missed = [name for name, value in fold_layout.violations.items() if np.any(value > 1e-6)]
-    return Finding(fold_layout.worst(), 1e-6, reason="misses: " + ", ".join(missed))
+
+    def reason() -> str:
+        missed = {n: float(np.max(v)) for n, v in fold_layout.violations.items()}
+        words = [f"{n} by {v:.1%}" for n, v in missed.items() if v > TOLERANCE_OF_FOLD]
+        return "no fold keeps every limit; the least bad one misses " + ", ".join(words)
+
+    return Finding(fold_layout.worst(), 0.0, tolerance=TOLERANCE_OF_FOLD, reason=reason)
 
 
 @rule(

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from gelslim_cad.dimensions.registry import unit_of
 
 Status = Literal["pass", "warn", "fail"]
+Sense = Literal["max", "min"]
 
 
 @dataclass(frozen=True)
@@ -29,14 +30,18 @@ class Check:
     reason: str
     parameter: str
     advice: str = ""
+    sense: Sense | Literal[""] = ""
+    """On which side of the limit good values lie; empty: either, see the margin."""
+    group: str = ""
 
 
 @dataclass(frozen=True)
 class Finding:
     """What a rule finds; every field a number or an array (n,) over designs.
 
-    The rule holds where `value` <= `limit` (or >= for a `least` rule). Where it does not, it
-    fails; where it holds but `value` passes `caution`, or the rule only advises, it warns.
+    The rule holds where `value` <= `limit` (or >= for a `least` rule), within `tolerance`.
+    Where it does not, it fails; where it holds but `value` passes `caution`, or the rule only
+    advises, it warns. `reason` says more of a single design that does not pass.
     """
 
     value: Any
@@ -44,7 +49,8 @@ class Finding:
     least: bool = False
     caution: Any = None
     advisory: bool = False
-    reason: str = ""
+    tolerance: Any = 0.0
+    reason: Callable[[], str] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,20 @@ class Rule:
     inputs: tuple[str, ...]
     judge: Callable[..., Finding]
 
+    @property
+    def group(self) -> str:
+        """Title of the group of rules it belongs to."""
+        return GROUPS.get(self.judge.__module__.rpartition(".")[2], "Other")
+
+
+GROUPS = {
+    "optics": "Camera and view",
+    "guide": "Light guide and LEDs",
+    "structure": "Walls, fits and mount",
+    "making": "Printing, casting and marking",
+    "mechanics": "Gel, mesh and envelope",
+}
+"""Titles of the groups by the module that defines their rules, in the order they are shown."""
 
 RULES: dict[str, Rule] = {}
 """All rules by id, in the order of definition."""

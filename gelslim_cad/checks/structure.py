@@ -10,8 +10,12 @@ from gelslim_cad.checks.rule import Finding, rule
 from gelslim_cad.dimensions.housing import COVER_TAB_MM
 from gelslim_cad.fasteners import SCREWS
 
-THINNEST_WALL_MM = {"sla": 0.6, "fdm": 0.8, "sls": 0.7}
-"""Thinnest wall that survives handling: two fdm lines, resin and powder by experience."""
+THINNEST_WALL_MM = {
+    "sla": (0.6, "thinner cured resin warps on its supports and cracks when a screw is driven"),
+    "fdm": (0.8, "two lines of a 0.4 mm nozzle; a single line has no bond across the layer"),
+    "sls": (0.7, "thinner sintered walls do not survive depowdering"),
+}
+"""Thinnest wall per process, and why. Starting values for a careful shop."""
 SMALLEST_GAP_MM = {"sla": 0.1, "fdm": 0.15, "sls": 0.15}
 SCREW_EDGE_MM = 2.6
 
@@ -36,7 +40,12 @@ def wall(
             housing_side_wall_mm, housing_back_wall_mm, housing_baffle_mm, housing_ledge_mm
         )
     )
-    return Finding(thinnest, THINNEST_WALL_MM[manufacturing_print_process], least=True)
+    limit, why = THINNEST_WALL_MM[manufacturing_print_process]
+
+    def reason() -> str:
+        return f"{float(thinnest):.2g} mm, {manufacturing_print_process} needs {limit:g} mm: {why}"
+
+    return Finding(thinnest, limit, least=True, reason=reason)
 
 
 @rule(
@@ -85,7 +94,7 @@ def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
 def cover_thickness(housing_back_wall_mm: Any, housing_screw: str) -> Finding:
     """Cover against head height."""
     size = SCREWS[housing_screw]
-    return Finding(housing_back_wall_mm, size.countersunk_height_mm - 1e-9, least=True)
+    return Finding(housing_back_wall_mm, size.countersunk_height_mm, least=True, tolerance=1e-9)
 
 
 @rule(

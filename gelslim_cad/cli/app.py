@@ -1,0 +1,51 @@
+"""The application: its commands and options."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from gelslim_cad import __version__
+from gelslim_cad.cli.build import build
+from gelslim_cad.cli.bundle import bundle
+from gelslim_cad.cli.check import check
+from gelslim_cad.cli.derive import derive
+from gelslim_cad.cli.explain import explain
+from gelslim_cad.cli.markers import markers
+from gelslim_cad.cli.new import new
+from gelslim_cad.cli.schema import schema
+
+EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
+
+app = typer.Typer(
+    name="gelslim",
+    help="From one YAML spec to a GelSlim-type tactile finger: CAD, marker print, stiffness, "
+    "report.",
+    epilog=EPILOG,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"gelslim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Options before any command."""
+
+
+for _command in (new, check, derive, explain, build, bundle, markers, schema):
+    app.command()(_command)

@@ -1,0 +1,113 @@
+"""`gelslim build`: the whole finger."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim_cad.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from gelslim_cad.build import BuildResult
+
+
+def build(
+    spec: SpecFile,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME if left out.")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option("-j", "--jobs", min=1, max=256, help="Processes; all processors if left out."),
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Build every file of the finger: CAD, print, mould, laser, markers, bundle, report.
+
+    Only what changed is made again. Nothing is written when a design rule fails (status 1).
+    """
+    from gelslim_cad.build import BuildRefusedError, build_variant
+    from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.cli.check import print_checks
+    from gelslim_cad.cli.status import RULE_FAILED
+    from gelslim_cad.spec.reader import read_spec
+
+    started = time.monotonic()
+    folder = out or Path("out") / read_spec(spec).spec.name
+    try:
+        with _progress(quiet=as_json) as tell:
+            result = build_variant(spec, folder, jobs=jobs, progress=tell)
+    except BuildRefusedError as refused:
+        failed = [c for c in refused.checks if c.status == "fail"]
+        if as_json:
+            failures = [asdict(c) for c in failed]
+            print_json({"ok": False, "message": str(refused), "failed": failures})
+        elif failed:
+            print_checks(failed, brief=True)
+            print(f"{str(refused).splitlines()[0]}. `gelslim check {spec}` says what would help.")
+        else:
+            print(refused, file=sys.stderr)
+        return RULE_FAILED
+    if as_json:
+        print_json(_record(result))
+    else:
+        _report(result, time.monotonic() - started)
+    return 0
+
+
+def _record(result: BuildResult) -> dict[str, Any]:
+    return {
+        "ok": True,
+        "folder": str(result.folder),
+        "up_to_date": result.up_to_date,
+        "rebuilt": result.rebuilt,
+        "files": result.files,
+        "warnings": [asdict(c) for c in result.checks if c.status == "warn"],
+        "binding": result.binding,
+    }
+
+
+def _report(result: BuildResult, seconds: float) -> None:
+    from gelslim_cad.cli.answer import say
+    from gelslim_cad.cli.check import print_checks
+
+    warnings = [c for c in result.checks if c.status == "warn"]
+    if result.up_to_date:
+        print(f"Up to date: {len(result.files)} files in {result.folder} ({seconds:.1f} s)")
+    else:
+        print_checks(warnings, brief=True)
+        if result.binding:
+            say(result.binding[0])
+        print(f"Built {len(result.files)} files in {result.folder} ({seconds:.1f} s)")
+    for name, purpose in (("report.html", "look here first"), ("BUILD.md", "how to make it")):
+        if name in result.files:
+            print(f"  {result.folder / name}  {purpose}")
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[str, int, int], None] | None]:
+    """A progress bar on a terminal's standard error, nothing elsewhere."""
+    from rich.console import Console
+
+    screen = Console(stderr=True, highlight=False)
+    if quiet or not screen.is_terminal:
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=screen, transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+
+        def tell(text: str, done: int, total: int) -> None:
+            bar.update(task, description=text, completed=done, total=total)
+
+        yield tell

@@ -1,0 +1,130 @@
+"""What to print and which status to return when a command cannot do its work."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+
+import typer
+
+from gelslim_cad.cli.status import BAD_INPUT, FAULT, INTERRUPTED, RULE_FAILED
+
+# typer brings its own click from 0.20 on and uses the installed one before: ask typer for it.
+_USAGE_ERROR = typer.BadParameter.__mro__[1]
+_COMMAND_ERROR = typer.BadParameter.__mro__[2]
+
+CAD_MODULES = {
+    "OCP", "cadquery", "trimesh", "manifold3d", "lxml", "networkx", "ezdxf", "reportlab",
+    "gerber_writer", "matplotlib",
+}  # fmt: skip
+VIEW_MODULES = {"pyvista", "vtk", "vtkmodules"}
+
+
+class CommandError(Exception):
+    """A command refuses: the message says what, why and what to do."""
+
+    def __init__(self, message: str, status: int = BAD_INPUT) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+def explain_failure(error: BaseException, as_json: bool) -> int:
+    """Print what happened and return the exit status. Never raises, never prints a traceback.
+
+    With GELSLIM_DEBUG set, the traceback of an unexpected error follows.
+    """
+    if isinstance(error, _USAGE_ERROR) and not as_json:
+        _show_usage(error)
+        return BAD_INPUT
+    status, message = _judge(error)
+    if as_json:
+        print(_as_json(error, message, status))
+    else:
+        print(message, file=sys.stderr)
+    if status == FAULT and os.environ.get("GELSLIM_DEBUG"):
+        traceback.print_exception(error, file=sys.stderr)
+    return status
+
+
+def _show_usage(error: BaseException) -> None:
+    text = _first_line(error)
+    if text.startswith("Usage:"):
+        print(text, file=sys.stderr)
+        return
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "gelslim"
+    usage = f"{context.get_usage()}\n" if context is not None else ""
+    print(f"{usage}{path}: {text}\nTry `{path} --help`.", file=sys.stderr)
+
+
+def _first_line(error: BaseException) -> str:
+    text: str = error.format_message() if hasattr(error, "format_message") else str(error)
+    return text.strip() or type(error).__name__
+
+
+def _judge(error: BaseException) -> tuple[int, str]:
+    """Exit status and message."""
+    name = type(error).__name__
+    if isinstance(error, KeyboardInterrupt) or name == "Abort":
+        return INTERRUPTED, "Interrupted; nothing half-written is left."
+    if isinstance(error, CommandError):
+        return error.status, str(error)
+    if name == "BuildRefusedError":
+        return RULE_FAILED, str(error)
+    if isinstance(error, _COMMAND_ERROR):
+        return BAD_INPUT, f"gelslim: {_first_line(error)}"
+    if name == "SpecError" or _of_ifem(error):
+        return BAD_INPUT, str(error)
+    if isinstance(error, ImportError):
+        return _missing(error)
+    if isinstance(error, OSError):
+        return BAD_INPUT, f"gelslim: {_os_message(error)}"
+    if isinstance(error, MemoryError):
+        return BAD_INPUT, "gelslim: not enough memory; use fewer mesh cells or fewer --jobs"
+    return FAULT, (
+        f"gelslim: unexpected {name}: {_one_line(str(error))}\n"
+        "This is a fault of gelslim, not of your spec. Please report it with the spec; "
+        "GELSLIM_DEBUG=1 shows where it happened."
+    )
+
+
+def _of_ifem(error: BaseException) -> bool:
+    return any(c.__module__ == "ifem_export.errors" for c in type(error).__mro__)
+
+
+def _missing(error: ImportError) -> tuple[int, str]:
+    top = (error.name or "").partition(".")[0]
+    extra = "cad" if top in CAD_MODULES else "view" if top in VIEW_MODULES else ""
+    if extra and isinstance(error, ModuleNotFoundError):
+        return BAD_INPUT, (
+            f"gelslim: this command needs {top}, which is not installed; "
+            f"run: pip install 'gelslim-cad[{extra}]'"
+        )
+    if extra or ".so" in str(error):
+        return BAD_INPUT, (
+            f"gelslim: {top or 'a library'} cannot load ({_one_line(str(error))}); "
+            "on Debian or Ubuntu: apt-get install libgl1 libx11-6 libxrender1 libegl1"
+        )
+    return FAULT, f"gelslim: a module is missing ({_one_line(str(error))}); install gelslim again"
+
+
+def _os_message(error: OSError) -> str:
+    # The project's own output errors are whole sentences; the system's name a file and a reason.
+    if error.strerror is None:
+        return str(error)
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror.lower()}; check the path, its permissions and free space"
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())[:300]
+
+
+def _as_json(error: BaseException, message: str, status: int) -> str:
+    own = getattr(error, "to_json", None)
+    if own is not None:
+        return str(own())
+    kinds = {RULE_FAILED: "design rule failed", BAD_INPUT: "bad input", INTERRUPTED: "interrupted"}
+    return json.dumps({"error": kinds.get(status, "internal error"), "message": message}, indent=2)

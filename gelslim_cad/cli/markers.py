@@ -1,0 +1,59 @@
+"""`gelslim markers`: the marker print alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gelslim_cad.cli.options import AsJson, Force, SpecFile
+
+
+def markers(
+    spec: SpecFile,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME/markers if left out.")
+    ] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> int:
+    """Write the marker print alone: SVG, DXF, PDF, Gerber, CSV and stencil."""
+    from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.cli.output import require_pad_rules, written
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.markers.nodes import nearest_nodes
+    from gelslim_cad.markers.outline import Outline
+    from gelslim_cad.markers.process import MARKING_PROCESSES
+    from gelslim_cad.markers.write import write_marker_files
+    from gelslim_cad.pad import marker_grid, pad_mesh, pad_outline
+    from gelslim_cad.spec.reader import read_spec
+
+    loaded = read_spec(spec)
+    d = derive(loaded.spec)
+    require_pad_rules(d, "gelslim markers", force)
+    grid = marker_grid(d)
+    mesh, _ = pad_mesh(d, grid)
+    nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
+    gel = pad_outline(d)
+    outline = Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
+    folder = out or Path("out") / loaded.spec.name / "markers"
+    paths = write_marker_files(folder, grid, nodes, outline)
+    process = MARKING_PROCESSES[loaded.spec.manufacturing.marking_process]
+    if as_json:
+        rows, columns = grid.lattice_shape
+        print_json(
+            {
+                "folder": str(folder),
+                "files": [p.name for p in paths],
+                "rows": rows,
+                "columns": columns,
+                "dots": len(grid),
+                "for_process": process.name,
+                "send": process.files,
+            }
+        )
+    else:
+        print(f"{written(folder, paths)}: {len(grid)} dots.")
+        print(f"{process.title}: send {', '.join(process.files)}.")
+    return 0

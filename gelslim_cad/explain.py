@@ -1,0 +1,151 @@
+"""How a value comes about: the chain of formulas with numbers, back to the lines of the spec."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from gelslim_cad.checks import RULES, check
+from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.registry import REGISTRY, unit_of
+from gelslim_cad.spec import Spec
+from gelslim_cad.spec.fields import field_at
+from gelslim_cad.spec.reader import LoadedSpec
+
+Kind = Literal["dimension", "field", "solver", "rule"]
+AT_WORK = 0.004
+"""A limit closer than this part of its scale is said to be at work."""
+
+
+class UnknownNameError(ValueError):
+    """No dimension, rule or spec field has the name; the message suggests the closest."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value and what it was computed from.
+
+    A node that occurs twice is written out the first time; then `repeated` is set and `inputs`
+    is empty. `origin` is where a spec field was given: `file:line`, or `default`.
+    """
+
+    name: str
+    kind: Kind
+    value: Any
+    unit: str
+    meaning: str
+    formula: str = ""
+    source: str = ""
+    origin: str = ""
+    note: str = ""
+    repeated: bool = False
+    inputs: tuple[Node, ...] = ()
+
+
+def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
+    """The tree under the dimension, rule or spec field `name`.
+
+    Raises UnknownNameError with the closest names.
+    """
+    tracer = _Tracer(loaded, d)
+    if name in tracer.dimensions or name in d.given:
+        return tracer.node(name)
+    if name in RULES:
+        return tracer.rule(name)
+    if f"design.{name}" in d.given:
+        return tracer.node(f"design.{name}")
+    known = dict.fromkeys((*d.values, *d.given, *RULES))
+    raise UnknownNameError(_unknown(name, tuple(known)))
+
+
+def explained_lines(node: Node, indent: int = 0) -> Iterable[str]:
+    """The tree as plain lines, two spaces of indentation per level."""
+    value = "" if node.value is None else f" = {node.value} {node.unit}".rstrip()
+    detail = node.origin or node.formula
+    tail = "  (see above)" if node.repeated else f"  {detail}" if detail else ""
+    yield f"{'  ' * indent}{node.name}{value}{tail}"
+    for child in node.inputs:
+        yield from explained_lines(child, indent + 1)
+
+
+class _Tracer:
+    """Walks from a value to its inputs, each only once."""
+
+    def __init__(self, loaded: LoadedSpec, d: Dimensions) -> None:
+        self.loaded = loaded
+        self.d = d
+        self.dimensions = {entry.name for entry in REGISTRY.values()}
+        self.seen: set[str] = set()
+
+    def node(self, name: str) -> Node:
+        if name not in self.dimensions:
+            return self._field(name)
+        entry = definition(name)
+        kind: Kind = "solver" if entry.internal else "dimension"
+        value = None if entry.internal else self.d[name]
+        first = name not in self.seen
+        self.seen.add(name)
+        return Node(
+            name,
+            kind,
+            value,
+            entry.unit,
+            entry.title,
+            formula=entry.formula,
+            source=entry.source,
+            note=_limits_at_work(self.d.fold) if entry.internal else "",
+            repeated=not first,
+            inputs=self._inputs(entry.inputs) if first else (),
+        )
+
+    def rule(self, name: str) -> Node:
+        entry = RULES[name]
+        result = next(c for c in check(self.d) if c.id == name)
+        limit = "" if result.limit is None else f", limit {result.limit:.4g} {result.unit}".rstrip()
+        return Node(
+            name,
+            "rule",
+            result.value,
+            result.unit,
+            entry.title,
+            formula=f"{entry.title}: {result.status}{limit}",
+            note=entry.why,
+            inputs=self._inputs(entry.inputs),
+        )
+
+    def _inputs(self, parameters: tuple[str, ...]) -> tuple[Node, ...]:
+        return tuple(self.node(self.d.argument(p)[0]) for p in parameters)
+
+    def _field(self, path: str) -> Node:
+        place = self.loaded.source_map.get(path)
+        origin = "default" if place is None else f"{self.loaded.path}:{place.line}"
+        described = field_at(Spec, path)
+        return Node(
+            path,
+            "field",
+            self.d.given[path],
+            unit_of(path),
+            described.description if described else "",
+            origin=origin,
+        )
+
+
+def _limits_at_work(fold: Fold) -> str:
+    missed = [n for n, v in fold.violations.items() if float(v.flat[0]) > 1e-6]
+    if missed:
+        return "no fold keeps every limit; missed: " + ", ".join(missed)
+    active = [n for n, v in fold.violations.items() if float(v.flat[0]) > -AT_WORK]
+    return "limits at work: " + (", ".join(active) or "none")
+
+
+def _unknown(name: str, known: tuple[str, ...]) -> str:
+    close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+    last = name.rsplit(".", 1)[-1]
+    close += [k for k in known if k.rsplit(".", 1)[-1] == last and k not in close][:3]
+    hint = (
+        f"did you mean {' or '.join(close)}?" if close else "`gelslim derive` lists all dimensions"
+    )
+    return f"no dimension, rule or spec field is called {name}; {hint}"
