@@ -1,0 +1,89 @@
+"""Tables, instructions and report of a build."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from gelslim_cad.build.bom import BomLine
+from gelslim_cad.build.instructions import build_guide
+from gelslim_cad.build.manifest import FileEntry
+from gelslim_cad.build.page import pictures, report_data
+from gelslim_cad.build.plain_json import checks_json, json_bytes, plain
+from gelslim_cad.casting import cast_gel
+from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.report import render_report
+
+if TYPE_CHECKING:
+    from gelslim_cad.build.stages import Plan, Stages
+
+Documents = dict[str, tuple[bytes, str]]
+
+
+def data_documents(stages: Stages, plan: Plan, bom: tuple[BomLine, ...]) -> Documents:
+    """Spec copy, dimensions.json, checks.json and BUILD.md."""
+    d = stages.dimensions
+    batch = cast_gel(d).weighable()
+    return {
+        "spec.yaml": (stages.loaded.text.encode(), "the spec this was built from"),
+        "dimensions.json": (
+            json_bytes(dimensions_content(stages, d)),
+            "dependent dimensions with formulas and inputs",
+        ),
+        "checks.json": (checks_json(plan.checks), "design rules with margins"),
+        "BUILD.md": (
+            build_guide(d, stages.grid, batch, bom, stages.name),
+            "how to make and assemble it",
+        ),
+    }
+
+
+def dimensions_content(stages: Stages, d: Dimensions) -> dict[str, Any]:
+    """Every dependent dimension with unit, formula, source and inputs."""
+    return {
+        "format": "gelslim-dimensions/1",
+        "name": stages.name,
+        "spec_hash": stages.spec_hash,
+        "binding": list(stages.binding),
+        "dimensions": {
+            name: {
+                "value": value,
+                "unit": definition(name).unit,
+                "meaning": definition(name).title,
+                "formula": definition(name).formula,
+                "source": definition(name).source,
+                "inputs": {
+                    n: plain(v)
+                    for n, v in d.inputs(name)
+                    if isinstance(v, (int, float, str, tuple)) or v is None
+                },
+            }
+            for name, value in d.values.items()
+        },
+    }
+
+
+def report_document(
+    stages: Stages,
+    plan: Plan,
+    bom: tuple[BomLine, ...],
+    contents: Mapping[str, bytes],
+    files: Mapping[str, FileEntry],
+    missing: str,
+) -> tuple[bytes, str]:
+    """The report page; `missing` says why there are no pictures, where there are none."""
+    shown = {path: data for path, data in contents.items() if path.startswith("pictures/")}
+    data = report_data(
+        stages.name,
+        stages.loaded.text,
+        stages.spec_hash,
+        stages.dimensions,
+        stages.grid,
+        plan.checks,
+        stages.binding,
+        contents.get(f"{stages.name}.glb", b""),
+        pictures(shown, missing),
+        files,
+        bom,
+    )
+    return render_report(data), "report with 3D viewer, offline"

@@ -1,0 +1,151 @@
+"""The report's content, gathered from the parts of a build."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from gelslim_cad.build.bom import BomLine
+from gelslim_cad.build.camera_view import view_of_markers
+from gelslim_cad.build.fingerprint import versions
+from gelslim_cad.build.manifest import FileEntry
+from gelslim_cad.checks import Check
+from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.report import (
+    BomRow,
+    DimensionRow,
+    FileRow,
+    Note,
+    Picture,
+    ReportData,
+    RuleRow,
+)
+from ifem_export.marker_grid import MarkerGrid
+
+PICTURES = {
+    "pictures/whole.png": ("The finger", "Assembled, seen from the tip."),
+    "pictures/exploded.png": ("Exploded", "Every part on its way into the finger."),
+    "pictures/section.png": ("Section", "Cut along the mid-plane: camera, mirror, window, gel."),
+    "pictures/section_across.png": ("Section across", "Light guide, LED channels and baffles."),
+}
+
+
+def dimension_rows(d: Dimensions) -> tuple[DimensionRow, ...]:
+    """Every dependent dimension with its formula and inputs."""
+    rows = []
+    for name, value in d.values.items():
+        entry = definition(name)
+        inputs = tuple((n, v) for n, v in d.inputs(name) if isinstance(v, (int, float, str)))
+        rows.append(
+            DimensionRow(
+                name=name,
+                value=value,
+                unit=entry.unit,
+                formula=entry.formula,
+                inputs=inputs,
+                source=entry.source,
+                group=name.split(".")[0],
+            )
+        )
+    return tuple(rows)
+
+
+def rule_rows(checks: Iterable[Check]) -> tuple[RuleRow, ...]:
+    """The design rules as the report lists them."""
+    return tuple(
+        RuleRow(
+            id=c.id,
+            title=c.title,
+            value=c.value,
+            limit=c.limit,
+            unit=c.unit,
+            margin=c.margin,
+            status=c.status,
+            reason=f"{c.reason} {c.advice}".strip(),
+            parameter=c.parameter,
+        )
+        for c in checks
+    )
+
+
+def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
+    """The numbers a reader looks for first."""
+    return (
+        ("Thickness", f"{d['finger.thickness_mm']:.2f} mm"),
+        ("Width", f"{d['finger.width_mm']:.2f} mm"),
+        ("Length", f"{d['finger.length_mm']:.2f} mm"),
+        (
+            "Gel",
+            f"{d['design.gel.length_mm']:g} × {d['design.gel.width_mm']:g} × "
+            f"{d['stack.gel_total_mm']:g} mm",
+        ),
+        ("Keystone", f"{d['view.keystone']:.3f}"),
+        ("Largest blur", f"{d['view.far_blur_mm']:.3f} mm"),
+        ("Marker, far edge", f"{d['view.marker_along_px']:.1f} px"),
+    )
+
+
+def pictures(files: Mapping[str, bytes], problem: str) -> tuple[Picture, ...]:
+    """Rendered pictures; where one is missing the report says why."""
+    return tuple(
+        Picture(title, caption, files.get(path, b""), "" if path in files else problem)
+        for path, (title, caption) in PICTURES.items()
+    )
+
+
+def light_note(d: Dimensions) -> Note:
+    """What closed forms say about the light guide."""
+    n, ratio = d["material.acrylic.refractive_index"], d["design.light_guide.bend_radius_ratio"]
+    needed = d["guide.full_guidance_ratio"]
+    bare = 1 / (math.sqrt(n * n - 1) - 1) if n * n > 2 else math.inf
+    held = "is" if ratio >= needed else "is not"
+    return Note(
+        "Light guide",
+        f"R/t = {ratio:g}. Collimated light {held} fully guided (needs {needed:.2f}); a bare LED "
+        f"would need {bare:.2f}, so part of its light leaves through the bends. Brightness is not "
+        "claimed here.",
+    )
+
+
+def report_data(
+    name: str,
+    spec_text: str,
+    spec_hash: str,
+    d: Dimensions,
+    grid: MarkerGrid,
+    checks: tuple[Check, ...],
+    binding: tuple[str, ...],
+    glb: bytes,
+    shown: tuple[Picture, ...],
+    files: Mapping[str, FileEntry],
+    bom: tuple[BomLine, ...],
+) -> ReportData:
+    """Everything the report shows, as plain values."""
+    return ReportData(
+        name=name,
+        spec_text=spec_text,
+        spec_hash=spec_hash,
+        headline=headline(d),
+        dimensions=dimension_rows(d),
+        rules=rule_rows(checks),
+        binding=binding,
+        glb=glb,
+        pictures=shown,
+        camera_view=view_of_markers(d, grid),
+        files=tuple(
+            FileRow(path, e.size_bytes, e.sha256, e.purpose) for path, e in sorted(files.items())
+        ),
+        bom=tuple(
+            BomRow(
+                b.name + (" (tooling)" if b.tooling else ""),
+                b.quantity,
+                b.material,
+                b.process,
+                b.mass_g,
+                b.note,
+            )
+            for b in bom
+        ),
+        notes=(light_note(d),),
+        versions=versions(),
+    )

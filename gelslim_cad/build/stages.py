@@ -1,0 +1,149 @@
+"""What a build consists of: dimensions, rules, parts, units of work and documents."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from gelslim_cad.binding import binding_sentences
+from gelslim_cad.build.bom import bill_of_materials, bom_csv
+from gelslim_cad.build.manifest import FileEntry
+from gelslim_cad.build.work import PackedPart, Unit
+from gelslim_cad.checks import Check, check
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh, pad_outline, spec_hash
+from gelslim_cad.part import Part
+from gelslim_cad.spec.reader import LoadedSpec
+from ifem_export.marker_grid import MarkerGrid
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Parts, what is to be written of them, and all design rules, those on solids among them."""
+
+    finger: tuple[Part, ...]
+    tooling: tuple[Part, ...]
+    units: tuple[Unit, ...]
+    checks: tuple[Check, ...]
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The cheap beginning of a build: spec, dimensions, grid, rules."""
+
+    loaded: LoadedSpec
+    dimensions: Dimensions
+    grid: MarkerGrid
+    checks: tuple[Check, ...]
+    binding: tuple[str, ...]
+    spec_hash: str
+
+    @classmethod
+    def prepare(cls, loaded: LoadedSpec) -> Stages:
+        """Derive and check; no CAD yet."""
+        d = derive(loaded.spec)
+        return cls(
+            loaded,
+            d,
+            marker_grid(d),
+            check(d),
+            binding_sentences(loaded.spec, d),
+            spec_hash(loaded.spec),
+        )
+
+    @property
+    def name(self) -> str:
+        """The finger's name."""
+        return self.loaded.spec.name
+
+    def plan(self) -> Plan:
+        """Make the solids, check them and lay out the work. Loads the CAD kernel."""
+        from gelslim_cad.build.solid_checks import check_solids
+        from gelslim_cad.solids.finger import blanks, finger_parts
+        from gelslim_cad.solids.tooling import tooling_parts
+
+        finger = finger_parts(self.dimensions)
+        tooling = (*blanks(self.dimensions), *tooling_parts(self.dimensions, self.grid))
+        checks = (*self.checks, *check_solids(self.dimensions, finger))
+        return Plan(finger, tooling, self._units(finger, tooling), checks)
+
+    def _units(self, finger: tuple[Part, ...], tooling: tuple[Part, ...]) -> tuple[Unit, ...]:
+        packed = {p.name: PackedPart.of(p) for p in (*finger, *tooling)}
+        whole = tuple(packed[p.name] for p in finger)
+        named = (("name", self.name),)
+        units = [
+            Unit("assembly", "assembly", whole, named, cost=8),
+            Unit("glb", "glb", whole, named, cost=6),
+            Unit("pictures", "pictures", whole, cost=20),
+            self._mould_unit(packed["gel_pad"]),
+        ]
+        units += [
+            Unit(f"part {p.name}", "part", (packed[p.name],), cost=len(packed[p.name].shape) / 1e5)
+            for p in (*finger, *tooling)
+            if "instance" not in p.tags
+        ]
+        return tuple(units)
+
+    def _mould_unit(self, gel: PackedPart) -> Unit:
+        """The cavity against the gel: the mould must be the gel grown by the shrinkage."""
+        from gelslim_cad.solids.tooling import cavity_solid
+
+        cavity = replace(gel.unpacked(), name="cavity", solid=cavity_solid(self.dimensions))
+        scale = 1 / (1 - self.dimensions["manufacturing.gel_shrinkage_percent"] / 100)
+        return Unit("mould cavity", "mould", (PackedPart.of(cavity), gel), (("scale", scale),))
+
+    def documents(
+        self,
+        plan: Plan,
+        contents: Mapping[str, bytes],
+        files: Mapping[str, FileEntry],
+        missing: str = "",
+    ) -> dict[str, tuple[bytes, str]]:
+        """Everything that is quick to write: markers, bundle, tables, instructions, report."""
+        from gelslim_cad.build.documents import data_documents, report_document
+
+        made = self._marker_files() | self._bundle_files()
+        parts = (*plan.finger, *plan.tooling)
+        bom = bill_of_materials(parts, self.loaded.spec.material.gel.density_kg_m3)
+        made |= data_documents(self, plan, bom)
+        made["BOM.csv"] = (bom_csv(bom), "bill of materials")
+        listed = {**files, **_entries(made)}
+        made["report.html"] = report_document(self, plan, bom, contents, listed, missing)
+        return made
+
+    def _marker_files(self) -> dict[str, tuple[bytes, str]]:
+        from gelslim_cad.markers.nodes import nearest_nodes
+        from gelslim_cad.markers.outline import Outline
+        from gelslim_cad.markers.write import render_marker_files
+
+        outline, (mesh, _) = pad_outline(self.dimensions), pad_mesh(self.dimensions, self.grid)
+        surface = mesh.surface
+        nodes = nearest_nodes(self.grid.positions_mm, mesh.nodes_mm[surface], surface)
+        shape = Outline.rounded_rectangle(
+            outline.length_mm, outline.width_mm, outline.corner_radius_mm
+        )
+        rendered = render_marker_files(self.grid, nodes, shape)
+        return {f"markers/{n}": (data, "marker print, 1:1") for n, data in rendered.items()}
+
+    def _bundle_files(self) -> dict[str, tuple[bytes, str]]:
+        from ifem_export.bundle_io import load_bundle, write_bundle
+        from ifem_export.vtu import write_vtu
+
+        mesh, _ = pad_mesh(self.dimensions, self.grid)
+        with tempfile.TemporaryDirectory(prefix="gelslim-") as scratch:
+            folder = Path(scratch) / "bundle"
+            write_bundle(folder, make_bundle(self.loaded.spec, self.dimensions, mesh, self.grid))
+            load_bundle(folder, verify=True)
+            write_vtu(folder / "pad.vtu", mesh)
+            return {
+                f"bundle/{p.name}": (p.read_bytes(), "stiffness bundle")
+                for p in sorted(folder.iterdir())
+            }
+
+
+def _entries(made: Mapping[str, tuple[bytes, str]]) -> dict[str, FileEntry]:
+    from gelslim_cad.build.manifest import entry
+
+    return {path: entry(data, purpose, "documents") for path, (data, purpose) in made.items()}

@@ -1,0 +1,186 @@
+"""One variant, from its spec to its folder."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gelslim_cad.build.fingerprint import code_hash, combined, versions
+from gelslim_cad.build.folder import locked, recover, staged
+from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
+from gelslim_cad.build.work import Unit, Written, run
+from gelslim_cad.checks import Check
+
+if TYPE_CHECKING:
+    from gelslim_cad.build.stages import Stages
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, steps done and steps in all."""
+
+
+class BuildRefusedError(Exception):
+    """A design rule fails, or a written file does not stand up to its proof."""
+
+    def __init__(self, checks: tuple[Check, ...], message: str) -> None:
+        super().__init__(message)
+        self.checks = checks
+
+
+@dataclass(frozen=True)
+class BuildResult:
+    """What a build did."""
+
+    folder: Path
+    files: tuple[str, ...]
+    rebuilt: tuple[str, ...]
+    """Units of work that were done; the others were taken over."""
+    checks: tuple[Check, ...]
+    binding: tuple[str, ...]
+    up_to_date: bool = False
+
+
+def build_variant(
+    spec_path: str | os.PathLike[str],
+    out_dir: str | os.PathLike[str],
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> BuildResult:
+    """Build every file of a spec into `out_dir`, replacing an earlier build of it whole.
+
+    `jobs` is the number of worker processes (default: the processors, at most 4); it does not
+    change a byte. Raises SpecError for a bad spec, BuildRefusedError when a rule or a proof fails,
+    OutputError when the folder cannot be written.
+    """
+    from gelslim_cad.build.stages import Stages
+    from gelslim_cad.spec.reader import read_spec
+
+    loaded = read_spec(spec_path)
+    target = Path(os.path.abspath(out_dir))
+    tell = progress or (lambda text, done, total: None)
+    with locked(target):
+        recover(target)
+        stages = Stages.prepare(loaded)
+        previous = read_manifest(target)
+        key = combined(code_hash(), stages.spec_hash, loaded.sha256)
+        if previous and previous.key == key and intact(target, previous, list(previous.files)):
+            return BuildResult(
+                target, tuple(previous.files), (), stages.checks, stages.binding, up_to_date=True
+            )
+        failed = tuple(c for c in stages.checks if c.status == "fail")
+        if failed:
+            raise BuildRefusedError(stages.checks, _refusal(loaded.spec.name, failed))
+        return _build(stages, target, previous, key, jobs or min(4, os.cpu_count() or 1), tell)
+
+
+def _build(
+    stages: Stages, target: Path, previous: Manifest | None, key: str, jobs: int, tell: Progress
+) -> BuildResult:
+    tell("solids", 0, 1)
+    plan = stages.plan()
+    failed = tuple(c for c in plan.checks if c.status == "fail")
+    if failed:
+        raise BuildRefusedError(plan.checks, _refusal(stages.name, failed))
+    keys = {unit.name: unit.key() for unit in plan.units}
+    reused = _reusable(previous, target, keys)
+    todo = [u for u in plan.units if u.name not in reused]
+    written = _run_all(todo, jobs, tell)
+    bad = [p for w in written.values() for p in w.proofs if not p["ok"]]
+    if bad:
+        lines = "; ".join(f"{p['file']}: {p['check']} {p['detail']}" for p in bad)
+        raise BuildRefusedError(
+            plan.checks, f"{stages.name}: a written file fails its proof: {lines}"
+        )
+    note = " ".join(w.note for w in written.values() if w.note)
+    with staged(target) as folder:
+        files: dict[str, FileEntry] = {}
+        proofs = list(_kept_proofs(previous, reused))
+        contents: dict[str, bytes] = {}
+        for name in keys:
+            if name in reused and previous is not None:
+                for path in reused[name]:
+                    contents[path] = (target / path).read_bytes()
+                    files[path] = previous.files[path]
+                continue
+            for path, data in written[name].files.items():
+                contents[path] = data
+                files[path] = entry(data, written[name].purposes[path], name)
+            proofs += [{**p, "unit": name} for p in written[name].proofs]
+        for path, (data, purpose) in stages.documents(plan, contents, files, note).items():
+            contents[path] = data
+            files[path] = entry(data, purpose, "documents")
+        for path, data in contents.items():
+            place = folder / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+        # A unit that could not be done here is tried again by the next build.
+        done = {n: k for n, k in keys.items() if n not in written or not written[n].note}
+        manifest = Manifest(
+            stages.name,
+            stages.spec_hash,
+            key if done == keys else "",
+            dict(versions()),
+            done,
+            files,
+            tuple(proofs),
+        )
+        (folder / NAME).write_bytes(manifest.to_json())
+    return BuildResult(
+        target, (*sorted(files), NAME), tuple(u.name for u in todo), plan.checks, stages.binding
+    )
+
+
+def _reusable(
+    previous: Manifest | None, target: Path, keys: dict[str, str]
+) -> dict[str, list[str]]:
+    """Units whose inputs are those of the last build and whose files are intact."""
+    if previous is None:
+        return {}
+    by_unit: dict[str, list[str]] = {}
+    for path, e in previous.files.items():
+        by_unit.setdefault(e.unit, []).append(path)
+    return {
+        name: by_unit.get(name, [])
+        for name, key in keys.items()
+        if previous.units.get(name) == key and intact(target, previous, by_unit.get(name, []))
+    }
+
+
+def _kept_proofs(
+    previous: Manifest | None, reused: dict[str, list[str]]
+) -> list[dict[str, object]]:
+    if previous is None:
+        return []
+    return [dict(p) for p in previous.proofs if p.get("unit") in reused]
+
+
+def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
+    """Run units, the dearest first, in worker processes; results by name."""
+    queue = sorted(todo, key=lambda u: -u.cost)
+    results: dict[str, Written] = {}
+    if jobs <= 1 or len(queue) <= 1:
+        for done, unit in enumerate(queue):
+            tell(unit.name, done, len(queue))
+            results[unit.name] = run(unit)
+        return results
+    # Forked workers start with the CAD kernel loaded; elsewhere each worker loads its own.
+    method = "fork" if sys.platform.startswith("linux") else "spawn"
+    context = multiprocessing.get_context(method)
+    with ProcessPoolExecutor(min(jobs, len(queue)), mp_context=context) as pool:
+        futures = [(unit, pool.submit(run, unit)) for unit in queue]
+        for done, (unit, future) in enumerate(futures):
+            tell(unit.name, done, len(queue))
+            results[unit.name] = future.result()
+    return results
+
+
+def _refusal(name: str, failed: tuple[Check, ...]) -> str:
+    lines = [f"{name}: {len(failed)} design rule(s) fail; nothing was built"]
+    lines += [f"  {c.id}: {c.reason} {c.advice} ({c.parameter})" for c in failed]
+    return "\n".join(lines)

@@ -1,0 +1,94 @@
+"""Units of work: what is written together, from inputs that a key sums up.
+
+A unit whose key is that of the last build is not done again: its files are taken over. Units run
+in worker processes, so they carry shapes as bytes and nothing else that is heavy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from gelslim_cad.build.fingerprint import code_hash, combined
+from gelslim_cad.part import Part
+
+Files = dict[str, bytes]
+VOLUME_TOLERANCE = 2e-4
+"""Meshes for printing keep the volume this well: finer than the proof asks, for smooth arcs."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a unit wrote and what was proved of it."""
+
+    files: Files
+    purposes: dict[str, str]
+    proofs: tuple[dict[str, Any], ...] = ()
+    note: str = ""
+    """Why a file could not be made, where that is no fault of the design."""
+
+
+@dataclass(frozen=True)
+class PackedPart:
+    """A part whose solid is bytes, to cross process borders."""
+
+    part: Part
+    shape: bytes
+
+    @classmethod
+    def of(cls, part: Part) -> PackedPart:
+        """Pack a part."""
+        from gelslim_cad.export.brep import shape_to_bytes
+
+        return cls(replace(part, solid=None), shape_to_bytes(part.solid))
+
+    def unpacked(self) -> Part:
+        """The part with its solid again."""
+        from gelslim_cad.export.brep import only_solid, shape_from_bytes
+
+        return replace(self.part, solid=only_solid(shape_from_bytes(self.shape)))
+
+    def key(self) -> str:
+        """Key of shape and description."""
+        p = self.part
+        description = (
+            p.name,
+            p.material,
+            p.process,
+            p.colour,
+            p.quantity,
+            p.explode_mm,
+            p.print_rotation_deg,
+            p.note,
+            p.in_assembly,
+            sorted(p.tags),
+        )
+        return combined(self.shape, repr(description))
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit of work, picklable: a name, the kind of work, its inputs and their key."""
+
+    name: str
+    kind: str
+    parts: tuple[PackedPart, ...] = ()
+    options: tuple[tuple[str, Any], ...] = ()
+    content: str = ""
+    """Key of inputs that are not parts."""
+    cost: float = field(default=1.0, compare=False)
+
+    def key(self) -> str:
+        """Key of everything that shapes the unit's files."""
+        return combined(
+            code_hash(), self.kind, repr(self.options), self.content, *(p.key() for p in self.parts)
+        )
+
+
+def run(unit: Unit) -> Written:
+    """Do a unit of work in this process. Raises ExportError and its kin when a file fails."""
+    from gelslim_cad.build import writers
+
+    work = getattr(writers, f"write_{unit.kind}")
+    written: Written = work(tuple(p.unpacked() for p in unit.parts), **dict(unit.options))
+    return written

@@ -1,0 +1,138 @@
+"""The kinds of units of work: each writes some files of some parts and proves them as written."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
+from gelslim_cad.part import Part
+
+SECTION_MM = 0.013
+"""Off the mid-plane, so that no section runs along a face."""
+GLB_LINEAR_MM = 0.1
+GLB_ANGULAR_DEG = 20.0
+
+Proofs = list[Any]
+
+
+def write_part(parts: Sequence[Part]) -> Written:
+    """STEP of one part; print meshes and laser outline where its process calls for them."""
+    from gelslim_cad.export.step import step_bytes
+    from gelslim_cad.proof.step import prove_step
+
+    (part,) = parts
+    folder = "mould" if "mould" in part.tags else "step"
+    files: Files = {f"{folder}/{part.name}.step": step_bytes(part)}
+    purposes = {f"{folder}/{part.name}.step": "exact solid, AP242"}
+    provers: dict[str, Callable[[Path], Proofs]] = {".step": lambda path: prove_step(path, part)}
+    if part.process == "print":
+        provers |= _meshes(part, files, purposes)
+    if part.process in ("laser", "cut"):
+        provers |= _outline(part, files, purposes)
+    proofs = _on_disk(files, lambda path: provers[path.suffix](path))
+    return Written(files, purposes, proofs)
+
+
+def write_assembly(parts: Sequence[Part], name: str) -> Written:
+    """STEP of the whole finger with names and colours."""
+    from gelslim_cad.export.step import step_bytes
+    from gelslim_cad.proof.step import prove_step
+
+    path = f"step/{name}_assembly.step"
+    files = {path: step_bytes(parts, name=name)}
+    proofs = _on_disk(files, lambda written: prove_step(written, parts))
+    return Written(files, {path: "assembly with names and colours, AP242"}, proofs)
+
+
+def write_glb(parts: Sequence[Part], name: str) -> Written:
+    """GLB of the whole finger, for viewers and for the report."""
+    from gelslim_cad.export.glb import glb_bytes
+    from gelslim_cad.proof.mesh import prove_glb
+
+    path = f"{name}.glb"
+    files = {path: glb_bytes(parts, linear_mm=GLB_LINEAR_MM, angular_deg=GLB_ANGULAR_DEG)}
+    proofs = _on_disk(files, lambda written: prove_glb(written, parts))
+    return Written(files, {path: "coloured mesh of the assembly, metres"}, proofs)
+
+
+def write_pictures(parts: Sequence[Part]) -> Written:
+    """Whole, exploded and two sectioned pictures; none where nothing can be rendered."""
+    from gelslim_cad.export.mesh import tessellate
+    from gelslim_cad.report import pictures
+
+    meshes = []
+    for part in parts:
+        mesh = tessellate(part.solid, 0.05, 12.0)
+        meshes.append((part.name, mesh.vertices_mm, mesh.faces, part.colour, part.explode_mm))
+    try:
+        files = {
+            "pictures/whole.png": pictures.picture_whole(meshes),
+            "pictures/exploded.png": pictures.picture_exploded(meshes),
+            "pictures/section.png": pictures.picture_section(meshes, "y", SECTION_MM),
+            "pictures/section_across.png": pictures.picture_section(meshes, "x", SECTION_MM),
+        }
+    except pictures.PictureError as error:
+        return Written({}, {}, note=str(error))
+    return Written(files, dict.fromkeys(files, "picture"))
+
+
+def write_mould(parts: Sequence[Part], scale: float) -> Written:
+    """No file: proves that the mould's cavity is the gel grown by the shrinkage."""
+    from gelslim_cad.proof.mould import prove_mould
+
+    cavity, gel = parts
+    results = prove_mould(cavity.solid, gel.solid, scale)
+    return Written({}, {}, tuple(asdict(r) for r in results))
+
+
+def _meshes(
+    part: Part, files: Files, purposes: dict[str, str]
+) -> dict[str, Callable[[Path], Proofs]]:
+    from gelslim_cad.export.orient import print_mesh
+    from gelslim_cad.export.stl import stl_bytes
+    from gelslim_cad.export.tessellation import mesh_for
+    from gelslim_cad.export.threemf import NamedMesh, threemf_bytes
+    from gelslim_cad.proof.mesh import prove_3mf, prove_stl
+
+    mesh, rung = mesh_for(part.solid, VOLUME_TOLERANCE)
+    laid = print_mesh(mesh, part.print_rotation_deg)
+    stem = f"{'mould' if 'mould' in part.tags else 'print'}/{part.name}"
+    named = NamedMesh(part.name, laid, part.material, part.colour)
+    files[f"{stem}.stl"] = stl_bytes(laid)
+    files[f"{stem}.3mf"] = threemf_bytes(named)
+    purposes[f"{stem}.stl"] = f"print orientation, mm, {rung.triangles} triangles"
+    purposes[f"{stem}.3mf"] = "print orientation, with unit and colour"
+    volume = float(part.solid.Volume())
+    return {
+        ".stl": lambda path: prove_stl(path, volume),
+        ".3mf": lambda path: prove_3mf(path, {part.name: volume}),
+    }
+
+
+def _outline(
+    part: Part, files: Files, purposes: dict[str, str]
+) -> dict[str, Callable[[Path], Proofs]]:
+    from gelslim_cad.export.outline import flat_face, outline_dxf_bytes
+    from gelslim_cad.proof.outline import prove_dxf
+
+    path = f"laser/{part.name}.dxf"
+    files[path] = outline_dxf_bytes(part.solid)
+    purposes[path] = f"cutting outline, R2010, mm; {part.material}"
+    area = float(flat_face(part.solid).Area())
+    return {".dxf": lambda written: prove_dxf(written, area)}
+
+
+def _on_disk(files: Files, prove: Callable[[Path], Proofs]) -> tuple[dict[str, Any], ...]:
+    """Write the files to a scratch folder, read each back and prove it there."""
+    results: Proofs = []
+    with tempfile.TemporaryDirectory(prefix="gelslim-") as scratch:
+        for path, data in files.items():
+            target = Path(scratch) / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+            results += prove(target)
+    return tuple(asdict(r) for r in results)
