@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions, derive_batch
+from gelslim_cad.relaxation import Relaxation, given, ladders, relaxations
 from gelslim_cad.spec import Spec
 
 ACTIVE = 0.004
 LEAST_SAVING_MM = 0.05
 SENTENCES_AT_MOST = 6
-
-
-@dataclass(frozen=True)
-class Relaxation:
-    """One way to give way: which spec field changes, to what, and in words."""
-
-    path: str
-    value: float
-    words: str
 
 
 SETTERS = {
@@ -45,61 +37,12 @@ LIMITS = {
 }
 
 
-def relaxations(spec: Spec) -> tuple[Relaxation, ...]:
-    """The steps that are tried, each within the spec's legal range."""
-    c, g, o = spec.camera, spec.design, spec.design.optics
-    diameter = g.markers.diameter_mm
-    more_blur = o.blur_per_diameter + 0.1 / diameter
-    return (
-        Relaxation(
-            "design.optics.blur_per_diameter", min(2.0, more_blur), "allowing 0.1 mm more blur"
-        ),
-        Relaxation(
-            "camera.f_number", min(64.0, c.f_number * math.sqrt(2)), "one stop less aperture"
-        ),
-        Relaxation(
-            "design.optics.min_px_per_marker",
-            max(1.0, o.min_px_per_marker - 1),
-            "one pixel less per marker",
-        ),
-        Relaxation(
-            "design.optics.max_keystone", min(5.0, o.max_keystone + 0.2), "0.2 more keystone"
-        ),
-        Relaxation("camera.lens_travel_mm", c.lens_travel_mm + 0.2, "0.2 mm more lens travel"),
-        Relaxation(
-            "camera.module_height_mm",
-            max(1.0, c.module_height_mm - 1),
-            "a camera housing 1 mm lower",
-        ),
-        Relaxation("design.gel.length_mm", max(5.0, g.gel.length_mm - 2), "a gel 2 mm shorter"),
-        Relaxation("design.gel.width_mm", max(5.0, g.gel.width_mm - 2), "a gel 2 mm narrower"),
-        Relaxation(
-            "design.gel.thickness_mm",
-            max(0.3, g.gel.thickness_mm - 0.5),
-            "a gel 0.5 mm thinner",
-        ),
-        Relaxation(
-            "design.light_guide.bend_radius_ratio",
-            max(0.1, g.light_guide.bend_radius_ratio - 0.5),
-            "a bend radius ratio smaller by 0.5",
-        ),
-        Relaxation(
-            "design.housing.back_wall_mm",
-            max(0.4, g.housing.back_wall_mm - 0.2),
-            "a back wall 0.2 mm thinner",
-        ),
-        Relaxation(
-            "design.mirror.border_mm", max(0.0, g.mirror.border_mm - 0.3), "0.3 mm less border"
-        ),
-    )
-
-
 def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
     """Plain sentences: what sets the thickness, what gives, and what would make it fit."""
     steps = relaxations(spec)
-    tried = _try(spec, [(s,) for s in steps])
     if not bool(np.all(d.feasible())):
         return _infeasible(spec, d, steps)
+    tried = _try(spec, [(s,) for s in steps])
     thickness = float(d["finger.thickness_mm"])
     return (
         _what_binds(d, thickness),
@@ -108,19 +51,19 @@ def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
     )
 
 
-def _try(spec: Spec, sets: list[tuple[Relaxation, ...]]) -> tuple[Any, Any]:
+def _try(spec: Spec, sets: Sequence[tuple[Relaxation, ...]]) -> tuple[Any, Any]:
     """Thickness and feasibility of the spec under each set of relaxations, in one batch."""
     paths = {s.path for chosen in sets for s in chosen}
-    given = spec.model_dump()
-    columns = {}
-    for path in sorted(paths):
-        here: Any = given
-        for name in path.split("."):
-            here = here[name]
-        columns[path] = np.array(
-            [next((s.value for s in chosen if s.path == path), here) for chosen in sets],
+    columns = {
+        path: np.array(
+            [
+                next((s.value for s in chosen if s.path == path), given(spec, path))
+                for chosen in sets
+            ],
             dtype=float,
         )
+        for path in sorted(paths)
+    }
     batch = derive_batch(spec, columns)
     return batch["finger.thickness_mm"], batch.feasible()
 
@@ -162,11 +105,13 @@ def _savings(
 
 def _too_thick(spec: Spec, steps: tuple[Relaxation, ...], thickness: float) -> tuple[str, ...]:
     limit = spec.design.envelope.max_thickness_mm
-    if limit is None or thickness <= limit:
+    if limit is None or thickness <= limit + 1e-9:
         return ()
-    start = f"The envelope allows {limit:g} mm; {thickness - limit:.2f} mm must be saved."
-    found = _first_that_fits(spec, steps, limit)
-    return (f"{start} {found}",)
+    start = (
+        f"design.envelope.max_thickness_mm allows {limit:g} mm; "
+        f"{thickness - limit:.2f} mm must be saved."
+    )
+    return (start, *_what_fits(spec, steps, limit))
 
 
 def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
@@ -174,39 +119,55 @@ def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tup
         ((float(np.reshape(v, -1)[0]), n) for n, v in d.fold.violations.items()), reverse=True
     )
     names = [LIMITS.get(n, n) for v, n in missed if v > 1e-6]
-    text = f"No finger of this gel and camera keeps every limit; missed: {_list(names)}."
     limit = spec.design.envelope.max_thickness_mm
-    return (text, _first_that_fits(spec, steps, math.inf if limit is None else limit))
-
-
-def _first_that_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> str:
-    """The fewest steps, at most two, that make the design feasible and thin enough."""
-    for size in (1, 2):
-        sets = [
-            chosen
-            for chosen in _combinations(steps, size)
-            if len({s.path for s in chosen}) == len(chosen)
-        ]
-        thickness, feasible = _try(spec, sets)
-        fits = [
-            (float(t), chosen)
-            for t, ok, chosen in zip(thickness, feasible, sets, strict=True)
-            if ok and t <= limit
-        ]
-        if fits:
-            best, chosen = min(fits, key=lambda f: f[0])
-            words = _list([s.words for s in chosen])
-            return f"It would fit with {words}: {best:.2f} mm."
+    within = "" if limit is None else f", let alone within {limit:g} mm"
+    text = f"No finger of this gel and camera keeps every limit{within}; missed: {_list(names)}."
+    if limit is None:
+        return (text, *_what_fits(spec, steps, math.inf))
+    thicker = "In a thicker finger it would fit with"
     return (
-        "No one or two of the usual steps make it fit: use a smaller gel, a camera with a wider "
-        "field of view and a smaller aperture, or allow a thicker finger."
+        text,
+        *_what_fits(spec, steps, limit),
+        *(s.replace("It would fit with", thicker) for s in _what_fits(spec, steps, math.inf)),
     )
 
 
-def _combinations(steps: tuple[Relaxation, ...], size: int) -> list[tuple[Relaxation, ...]]:
-    if size == 1:
-        return [(s,) for s in steps]
-    return [(a, b) for i, a in enumerate(steps) for b in steps[i + 1 :]]
+def _what_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> tuple[str, ...]:
+    """What makes the design feasible and thin enough: one step, one field, or two steps."""
+    rungs = ladders(spec)
+    sets = [(s,) for s in steps] + [(s,) for ladder in rungs for s in ladder]
+    fits = _fitting(spec, sets, limit)
+    single = [(fits[(s,)], s.words) for s in steps if (s,) in fits]
+    if single:
+        best, words = min(single)
+        return (f"It would fit with {words}: {best:.2f} mm.",)
+    alone = [next((s for s in ladder if (s,) in fits), None) for ladder in rungs]
+    ways = [f"{s.words} ({fits[(s,)]:.2f} mm)" for s in alone if s is not None]
+    if ways:
+        return (f"It would fit with {' or with '.join(ways)}.",)
+    pairs = [(a, b) for i, a in enumerate(steps) for b in steps[i + 1 :]]
+    fits = _fitting(spec, pairs, limit)
+    if fits:
+        chosen = min(fits, key=lambda c: fits[c])
+        return (f"It would fit with {_list([s.words for s in chosen])}: {fits[chosen]:.2f} mm.",)
+    return (
+        "No one field alone and no two of the usual steps make it fit: use a smaller gel and "
+        "a camera with a wider field of view or a smaller aperture, or allow a thicker finger.",
+    )
+
+
+def _fitting(
+    spec: Spec, sets: Sequence[tuple[Relaxation, ...]], limit: float
+) -> dict[tuple[Relaxation, ...], float]:
+    """Those sets of relaxations that fit, each with the thickness it gives."""
+    if not sets:
+        return {}
+    thickness, feasible = _try(spec, sets)
+    return {
+        chosen: float(t)
+        for chosen, t, ok in zip(sets, thickness, feasible, strict=True)
+        if ok and t <= limit + 1e-9
+    }
 
 
 def _list(words: list[str]) -> str:

@@ -103,7 +103,7 @@ def mesh_size(pad_mesh_node_count: Any) -> Finding:
     title="Finger is thin enough",
     parameter="design.envelope.max_thickness_mm",
     why="the envelope of the gripper",
-    advice="see what binds the thickness",
+    advice="relax what binds the thickness, as `gelslim check` lists it, or allow more",
 )
 def thickness(finger_thickness_mm: Any, envelope_max_thickness_mm: Any) -> Finding:
     """Thickness against its limit."""

@@ -94,7 +94,7 @@ def blur_limit(view_near_blur_mm: Any, view_far_blur_mm: Any, view_blur_limit_mm
     title="Blur in the picture against the circle of confusion",
     parameter="camera.f_number",
     why="fine texture is softer than the sensor could show; markers are judged by blur on the gel",
-    advice="a smaller aperture sharpens texture, at the cost of light",
+    advice="stop the lens down for sharper texture, at the cost of light",
 )
 def blur_image(view_image_blur_px: Any, camera_circle_of_confusion_px: Any) -> Finding:
     """Blur at the far edge in the image."""
@@ -178,11 +178,16 @@ def led_hidden(
     camera_pose_z_mm: Any,
     camera_lens_diameter_mm: Any,
 ) -> Finding:
-    """Baffle above the highest straight line from an LED to the lens."""
-    lens_top = camera_pose_z_mm + camera_lens_diameter_mm / 2
-    far_side = led_y_mm + leds_package_mm / 2
-    share = (far_side - baffle_inner_y_mm) / far_side
-    line = led_top_z_mm + share * (lens_top - led_top_z_mm)
+    """Baffle above the highest straight line from an LED to the square around the lens."""
+    radius, half = camera_lens_diameter_mm / 2, leds_package_mm / 2
+    rise = camera_pose_z_mm + radius - led_top_z_mm
+    # Of lines that rise the steepest is the highest, of lines that fall the flattest.
+    shares = [
+        (led_y_mm + side * half - baffle_inner_y_mm) / (led_y_mm + side * half - end * radius)
+        for side in (-1, 1)
+        for end in (-1, 1)
+    ]
+    line = led_top_z_mm + np.max([share * rise for share in shares], axis=0)
     return Finding(baffle_top_z_mm - line, 0.0, least=True)
 
 

@@ -40,7 +40,7 @@ def number(value: Any, unit: str = "") -> str:
     if isinstance(value, tuple | list):
         return ", ".join(number(v) for v in value) + (f" {unit}" if unit else "")
     size = abs(float(value))
-    if size < 1e-9:
+    if size < 1e-6:
         size, value = 0.0, 0.0
     if size == math.floor(size) and size < 1e7:
         text = f"{value:.0f}"

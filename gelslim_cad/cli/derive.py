@@ -21,6 +21,8 @@ TITLES = {
     "marker_grid": "Marker grid",
     "pad_mesh": "Pad mesh",
 }
+HOUSING = "Housing"
+FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
 
 
 def derive(spec: SpecFile, as_json: AsJson = False) -> int:
@@ -75,15 +77,16 @@ def _print_table(d: Dimensions) -> None:
     from gelslim_cad.dimensions import definition
 
     screen = console()
-    order = list(TITLES)
 
-    def rank(name: str) -> tuple[int, str]:
-        group = name.partition(".")[0]
-        return (order.index(group) if group in TITLES else len(order), group)
+    def title(name: str) -> str:
+        return TITLES.get(name.partition(".")[0], HOUSING)
 
+    order = [*TITLES.values(), HOUSING]
+    names_in_order = [*FIRST, *(n for n in d.values if n not in FIRST)]
     # sorted is stable: within a group the order of definition stays.
-    for group, names in groupby(sorted(d.values, key=rank), lambda n: n.partition(".")[0]):
-        screen.print(TITLES.get(group, group.capitalize()), style="bold")
+    ordered = sorted(names_in_order, key=lambda n: order.index(title(n)))
+    for group, names in groupby(ordered, title):
+        screen.print(group, style="bold")
         table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
         table.add_column(no_wrap=True, min_width=27)
         table.add_column(justify="right", no_wrap=True, min_width=10)

@@ -1,0 +1,140 @@
+"""What binds the thickness: every saving and every way out is true when the design is solved."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from rule_samples import shipped, varied
+
+from gelslim_cad.binding import binding_sentences
+from gelslim_cad.dimensions import derive
+from gelslim_cad.relaxation import ladders, relaxations
+from gelslim_cad.spec import Spec
+
+
+def sentences(spec: Spec) -> tuple[str, ...]:
+    return binding_sentences(spec, derive(spec))
+
+
+@pytest.mark.parametrize("name", ["mini20", "gelslim2"])
+def test_each_saving_is_what_solving_again_gives(name: str) -> None:
+    spec = shipped(name)
+    thickness = derive(spec)["finger.thickness_mm"]
+    found = sentences(spec)
+    assert f"{thickness:.2f} mm is set by" in found[0]
+    by_words = {s.words[0].upper() + s.words[1:]: s for s in relaxations(spec)}
+    savings = [re.fullmatch(r"(.*) saves (\d+\.\d\d) mm of thickness\.", s) for s in found[1:]]
+    assert len(savings) >= 3
+    stated = []
+    for match in savings:
+        assert match is not None
+        step = by_words[match[1]]
+        again = derive(varied(spec, {step.path: step.value}))["finger.thickness_mm"]
+        assert float(match[2]) == pytest.approx(thickness - again, abs=0.006)
+        stated.append(float(match[2]))
+    assert stated == sorted(stated, reverse=True)
+
+
+def test_blur_at_the_far_edge_binds_the_smallest_finger() -> None:
+    found = sentences(shipped("mini20"))
+    assert "blur at the far edge" in found[0]
+    assert any(s.startswith("Allowing 0.1 mm more blur saves") for s in found)
+    loose = varied(shipped("mini20"), {"design.optics.blur_per_diameter": 2.0})
+    assert "blur" not in sentences(loose)[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"design.light_guide.leg_length_mm": 12.0}, "light guide"),
+        ({"camera.module_height_mm": 16.0, "camera.module_width_mm": 16.0}, "camera housing"),
+    ],
+)
+def test_what_sets_the_depth_is_named(changes: dict[str, float], word: str) -> None:
+    spec = varied(shipped("mini20"), changes)
+    d = derive(spec)
+    depths = {
+        "mirror": d["finger.mirror_depth_mm"],
+        "camera housing": d["finger.camera_depth_mm"],
+        "light guide": d["guide.stack_mm"],
+    }
+    assert max(depths, key=lambda k: depths[k]) == word
+    assert word in sentences(spec)[0].split(";")[0]
+
+
+def ways_out(text: str) -> list[tuple[str, float]]:
+    """Words and thickness of each way out in a sentence such as `It would fit with ...`."""
+    listed = re.findall(r"with ((?:(?! or with ).)*?) \((\d+\.\d\d) mm\)", text)
+    single = re.fullmatch(r".*it would fit with (.*): (\d+\.\d\d) mm\.", text, re.IGNORECASE)
+    return [(w, float(t)) for w, t in listed] or ([(single[1], float(single[2]))] if single else [])
+
+
+def solved(spec: Spec, words: str) -> tuple[float, bool]:
+    steps = [*relaxations(spec), *(s for ladder in ladders(spec) for s in ladder)]
+    chosen = {s.path: s.value for s in steps if s.words in words.split(" and ")}
+    assert chosen, words
+    d = derive(varied(spec, chosen))
+    return d["finger.thickness_mm"], bool(d.feasible().all())
+
+
+@pytest.mark.parametrize("limit", [17.5, 17.0, 16.0])
+def test_a_finger_too_thick_is_told_what_makes_it_fit(limit: float) -> None:
+    spec = varied(shipped("mini20"), {"design.envelope.max_thickness_mm": limit})
+    found = sentences(spec)
+    missing = derive(spec)["finger.thickness_mm"] - limit
+    told = next(s for s in found if s.startswith("design.envelope.max_thickness_mm"))
+    assert f"{missing:.2f} mm must be saved" in told
+    ways = ways_out(found[-1])
+    assert ways
+    for words, stated in ways:
+        thickness, feasible = solved(spec, words)
+        assert feasible
+        assert thickness <= limit + 1e-9
+        assert thickness == pytest.approx(stated, abs=0.006)
+
+
+def test_a_50_mm_gel_in_18_mm_is_refused_with_the_limit_and_a_way_out() -> None:
+    changes = {"design.gel.length_mm": 50.0, "design.gel.width_mm": 25.0}
+    spec = varied(shipped("mini20"), changes)
+    found = sentences(spec)
+    assert "within 18 mm" in found[0]
+    assert "missed: the pixels per marker at the far edge" in found[0]
+    within = next(s for s in found if s.startswith("It would fit with"))
+    for words, _ in ways_out(within):
+        thickness, feasible = solved(spec, words)
+        assert feasible
+        assert thickness <= 18.0
+    thicker = next(s for s in found if s.startswith("In a thicker finger"))
+    for words, _ in ways_out(thicker):
+        thickness, feasible = solved(spec, words)
+        assert feasible
+        assert thickness > 18.0
+
+
+def test_a_hopeless_design_is_told_so() -> None:
+    hopeless = {
+        "design.gel.length_mm": 120.0,
+        "design.gel.width_mm": 120.0,
+        "design.envelope.max_thickness_mm": 10.0,
+    }
+    found = sentences(varied(shipped("mini20"), hopeless))
+    assert found[0].startswith("No finger")
+    assert "use a smaller gel" in found[-1]
+
+
+def test_suggested_steps_are_legal_specs() -> None:
+    for name in ("mini20", "gelslim2"):
+        spec = shipped(name)
+        steps = [*relaxations(spec), *(s for ladder in ladders(spec) for s in ladder)]
+        assert len({s.words for s in steps}) == len(steps)
+        for step in steps:
+            varied(spec, {step.path: step.value})
+
+
+def test_a_gel_full_of_given_markers_is_not_told_to_shrink() -> None:
+    full = {"design.markers.rows": 17, "design.markers.pitch_mm": 1.2}
+    spec = varied(shipped("mini20"), full)
+    paths = {s.path for s in relaxations(spec)}
+    assert "design.gel.length_mm" not in paths
+    assert "design.gel.width_mm" in paths
