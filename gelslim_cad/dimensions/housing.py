@@ -146,16 +146,40 @@ def cover_top_z_mm(finger_thickness_mm: Any, housing_back_wall_mm: Any) -> Any:
     return housing_back_wall_mm - finger_thickness_mm
 
 
-@dimension("chamber.rear_x_mm", formula="camera rear - clamp bar - cable bend radius - fit")
+@dimension(
+    "clamp.rear_x_mm", formula="rearmost of the clamp's bar, at its foot on the cover or at its top"
+)
+def clamp_rear_x_mm(
+    camera_pose_x_mm: Any,
+    camera_pose_z_mm: Any,
+    camera_pose_pitch_deg: Any,
+    camera_lens_height_mm: Any,
+    camera_module_depth_mm: Any,
+    camera_module_height_mm: Any,
+    housing_fit_clearance_mm: Any,
+    cover_top_z_mm: Any,
+) -> Any:
+    """Rearmost point of the camera clamp, which is pitched with the camera."""
+    pitch = np.radians(camera_pose_pitch_deg)
+    back = camera_lens_height_mm + camera_module_depth_mm + housing_fit_clearance_mm + CLAMP_BAR_MM
+    foot = (cover_top_z_mm - camera_pose_z_mm - back * np.sin(pitch)) / np.cos(pitch)
+    ends = (foot, camera_module_height_mm / 2)
+    reach = np.minimum(*(b * np.sin(pitch) for b in ends))
+    return camera_pose_x_mm - back * np.cos(pitch) + reach
+
+
+@dimension("chamber.rear_x_mm", formula="rear of clamp and camera - cable bend radius - fit")
 def chamber_rear_x_mm(
     camera_pose_rear_x_mm: Any,
+    clamp_rear_x_mm: Any,
     bezel_proximal_x_mm: Any,
     camera_cable_bend_radius_mm: Any,
     housing_fit_clearance_mm: Any,
 ) -> Any:
     """Rear wall of the camera chamber."""
-    behind = camera_cable_bend_radius_mm + CLAMP_BAR_MM + housing_fit_clearance_mm
-    return np.minimum(camera_pose_rear_x_mm - behind, bezel_proximal_x_mm - 1.0)
+    rear = np.minimum(camera_pose_rear_x_mm, clamp_rear_x_mm)
+    behind = camera_cable_bend_radius_mm + housing_fit_clearance_mm
+    return np.minimum(rear - behind, bezel_proximal_x_mm - 1.0)
 
 
 @dimension("mount.length_mm", formula="max(tongue + fit + wall, bolt head + 2.4 + gap + cover tab)")

@@ -18,14 +18,6 @@ NAMES = list(fingers())
 each_finger = pytest.mark.parametrize("name", NAMES)
 
 
-def with_known_fault(name: str) -> object:
-    """`name`, marked where the camera clamp is known to cut into the body."""
-    if name != "random6":
-        return name
-    fault = "camera clamp and body share 34 mm3; no design rule notices"
-    return pytest.param(name, marks=pytest.mark.xfail(strict=True, reason=fault))
-
-
 def span(parts: list[Part], axis: str) -> tuple[float, float]:
     boxes = [p.solid.BoundingBox(1e-6) for p in parts]
     return (
@@ -44,7 +36,7 @@ def test_every_part_is_one_valid_solid_with_a_name_of_its_own(name: str) -> None
         assert p.solid.Volume() > 0, p.name
 
 
-@pytest.mark.parametrize("name", [with_known_fault(name) for name in NAMES])
+@each_finger
 def test_no_two_parts_take_up_the_same_space(name: str) -> None:
     assert interferences(parts_of(name)) == []
 
