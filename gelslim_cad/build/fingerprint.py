@@ -20,6 +20,8 @@ LIBRARIES = (
     "trimesh",
     "vtk",
 )
+NO_SHAPE = frozenset({"__pycache__", "cli"})
+"""Folders that shape no file of a build."""
 SUFFIXES = frozenset({".py", ".js", ".css", ".html", ".json"})
 
 
@@ -42,7 +44,7 @@ def code_hash() -> str:
     for package in PACKAGES:
         root = Path(str(resources.files(package)))
         for path in sorted(root.rglob("*")):
-            if path.suffix in SUFFIXES and "__pycache__" not in path.parts:
+            if path.suffix in SUFFIXES and NO_SHAPE.isdisjoint(path.relative_to(root).parts):
                 digest.update(path.relative_to(root).as_posix().encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()

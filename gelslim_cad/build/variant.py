@@ -128,7 +128,7 @@ def _build(
             dict(versions()),
             done,
             files,
-            tuple(proofs),
+            tuple(sorted(proofs, key=lambda p: (str(p["unit"]), str(p["file"])))),
         )
         (folder / NAME).write_bytes(manifest.to_json())
     return BuildResult(
