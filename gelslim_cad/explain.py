@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from gelslim_cad.checks import RULES, check
+from gelslim_cad.checks.rule import Rule
 from gelslim_cad.dimensions import Dimensions, definition
 from gelslim_cad.dimensions.fold import Fold
-from gelslim_cad.dimensions.registry import REGISTRY, unit_of
+from gelslim_cad.dimensions.registry import REGISTRY, Dimension, unit_of
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.fields import field_at
 from gelslim_cad.spec.reader import LoadedSpec
@@ -51,12 +52,13 @@ def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
     Raises UnknownNameError with the closest names.
     """
     tracer = _Tracer(loaded, d)
-    if name in tracer.dimensions or name in d.given:
+    if name in tracer.dimensions:
         return tracer.node(name)
     if name in RULES:
         return tracer.rule(name)
-    if f"design.{name}" in d.given:
-        return tracer.node(f"design.{name}")
+    for path in (name, f"design.{name}"):
+        if path in d.given:
+            return replace(tracer.node(path), note=_used_by(d, path))
     known = dict.fromkeys((*d.values, *d.given, *RULES))
     raise UnknownNameError(_unknown(name, tuple(known)))
 
@@ -131,6 +133,17 @@ class _Tracer:
             described.description if described else "",
             origin=origin,
         )
+
+
+def _used_by(d: Dimensions, path: str) -> str:
+    """Which dimensions and rules take the field directly."""
+    entries: tuple[Dimension | Rule, ...] = (*REGISTRY.values(), *RULES.values())
+    users = [
+        entry.id if isinstance(entry, Rule) else entry.name
+        for entry in entries
+        if path in (d.argument(p)[0] for p in entry.inputs)
+    ]
+    return "Used by: " + (", ".join(dict.fromkeys(users)) or "the files only")
 
 
 def _limits_at_work(fold: Fold) -> str:

@@ -47,7 +47,7 @@ def number(value: Any, unit: str = "") -> str:
     elif size >= 100:
         text = f"{value:.1f}"
     elif size >= 1:
-        text = f"{value:.2f}"
+        text = f"{value:.2f}".rstrip("0").rstrip(".")
     else:
         text = f"{value:.3g}"
     gap = "" if unit in ("", "°", "%") else " "
@@ -58,12 +58,15 @@ def console() -> Console:
     """A console on standard output: colours only on a terminal, at most `WIDEST` wide."""
     from rich.console import Console
 
-    screen = Console(highlight=False, markup=False, emoji=False)
-    return (
-        screen
-        if screen.width <= WIDEST
-        else Console(highlight=False, markup=False, emoji=False, width=WIDEST)
-    )
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:
+            # rich would exit with 1, which here says that a design rule fails.
+            raise BrokenPipeError
+
+    screen = Screen(highlight=False, markup=False, emoji=False)
+    if screen.width > WIDEST:
+        screen.width = WIDEST
+    return screen
 
 
 def say(text: str, style: str = "") -> None:

@@ -9,6 +9,7 @@ import typer
 from gelslim_cad import __version__
 from gelslim_cad.cli.build import build
 from gelslim_cad.cli.bundle import bundle
+from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
 from gelslim_cad.cli.explain import explain
@@ -48,4 +49,4 @@ def _options(
 
 
 for _command in (new, check, derive, explain, build, bundle, markers, schema):
-    app.command()(_command)
+    app.command()(carried(_command))

@@ -26,13 +26,20 @@ def build(
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option("-j", "--jobs", min=1, max=256, help="Processes; all processors if left out."),
+        typer.Option(
+            "-j",
+            "--jobs",
+            min=1,
+            max=256,
+            help="Processes; one per processor, at most 4, if left out.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Build every file of the finger: CAD, print, mould, laser, markers, bundle, report.
+    """Build every file of the finger.
 
-    Only what changed is made again. Nothing is written when a design rule fails (status 1).
+    CAD, print, mould, laser, markers, bundle, report. Only what changed is made again. Nothing is
+    written when a design rule fails (status 1).
     """
     from gelslim_cad.build import BuildRefusedError, build_variant
     from gelslim_cad.cli.answer import print_json
@@ -80,16 +87,19 @@ def _report(result: BuildResult, seconds: float) -> None:
     from gelslim_cad.cli.check import print_checks
 
     warnings = [c for c in result.checks if c.status == "warn"]
+    here = Path.cwd()
+    folder = result.folder
+    shown = folder.relative_to(here) if folder.is_relative_to(here) else folder
     if result.up_to_date:
-        print(f"Up to date: {len(result.files)} files in {result.folder} ({seconds:.1f} s)")
+        print(f"Up to date: {len(result.files)} files in {shown} ({seconds:.1f} s)")
     else:
         print_checks(warnings, brief=True)
         if result.binding:
             say(result.binding[0])
-        print(f"Built {len(result.files)} files in {result.folder} ({seconds:.1f} s)")
+        print(f"Built {len(result.files)} files in {shown} ({seconds:.1f} s)")
     for name, purpose in (("report.html", "look here first"), ("BUILD.md", "how to make it")):
         if name in result.files:
-            print(f"  {result.folder / name}  {purpose}")
+            print(f"  {shown / name}  {purpose}")
 
 
 @contextmanager

@@ -13,12 +13,15 @@ from gelslim_cad.cli.options import AsJson, Force, SpecFile
 def bundle(
     spec: SpecFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME/bundle if left out.")
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-bundle if left out.")
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> int:
-    """Write the stiffness bundle alone: pad mesh, stiffness matrix, markers and camera."""
+    """Write the stiffness bundle alone.
+
+    Pad mesh, stiffness matrix, markers and camera, as `build` writes them.
+    """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.output import require_pad_rules, written
     from gelslim_cad.dimensions import derive
@@ -31,7 +34,7 @@ def bundle(
     require_pad_rules(d, "gelslim bundle", force)
     grid = marker_grid(d)
     mesh, _ = pad_mesh(d, grid)
-    folder = out or Path("out") / loaded.spec.name / "bundle"
+    folder = out or Path("out") / f"{loaded.spec.name}-bundle"
     write_bundle(folder, make_bundle(loaded.spec, d, mesh, grid))
     files = sorted(p.name for p in folder.iterdir())
     elements, nodes = mesh.n_elements, mesh.n_nodes

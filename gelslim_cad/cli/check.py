@@ -25,9 +25,9 @@ def check(
     as_json: AsJson = False,
     brief: Annotated[bool, typer.Option("--brief", help="Leave out the rules that hold.")] = False,
 ) -> int:
-    """Check the design rules, and say what binds the thickness.
+    """Check the design rules and say what binds.
 
-    Takes no CAD and well under a second. Exit status 1 when a rule fails.
+    Makes no CAD and takes about a second. Exit status 1 when a rule fails.
     """
     from gelslim_cad.binding import binding_sentences
     from gelslim_cad.checks import check as apply_rules

@@ -26,7 +26,10 @@ FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
 
 
 def derive(spec: SpecFile, as_json: AsJson = False) -> int:
-    """Print every dependent dimension; `gelslim explain` tells how one comes about."""
+    """Print every dependent dimension.
+
+    `gelslim explain` tells how one comes about.
+    """
     from gelslim_cad.cli.answer import print_json, say
     from gelslim_cad.dimensions import derive as derive_dimensions
     from gelslim_cad.spec.reader import read_spec

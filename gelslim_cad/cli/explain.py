@@ -27,7 +27,10 @@ def explain(
     ],
     as_json: AsJson = False,
 ) -> int:
-    """Print how a value comes about: formulas with numbers, back to the lines of the spec."""
+    """Print how a value comes about.
+
+    Formulas with numbers, back to the lines of the spec.
+    """
     from gelslim_cad.cli.answer import console, print_json
     from gelslim_cad.cli.failure import CommandError
     from gelslim_cad.dimensions import derive
@@ -56,7 +59,11 @@ def _record(node: Node) -> dict[str, Any]:
 def _tree(node: Node) -> Tree:
     from rich.tree import Tree
 
-    tree = Tree(_label(node), guide_style="dim")
+    label = _label(node)
+    label.append(f"\n{node.meaning.rstrip('.')}.", style="not bold")
+    if node.kind == "field" and node.note:
+        label.append(f"\n{node.note}", style="not bold")
+    tree = Tree(label, guide_style="dim")
     _grow(tree, node)
     return tree
 

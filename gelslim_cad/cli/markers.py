@@ -13,12 +13,15 @@ from gelslim_cad.cli.options import AsJson, Force, SpecFile
 def markers(
     spec: SpecFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME/markers if left out.")
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-markers if left out.")
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> int:
-    """Write the marker print alone: SVG, DXF, PDF, Gerber, CSV and stencil."""
+    """Write the marker print alone.
+
+    SVG, DXF, PDF, Gerber, CSV and stencil, as `build` writes them.
+    """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.output import require_pad_rules, written
     from gelslim_cad.dimensions import derive
@@ -37,7 +40,7 @@ def markers(
     nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
     gel = pad_outline(d)
     outline = Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
-    folder = out or Path("out") / loaded.spec.name / "markers"
+    folder = out or Path("out") / f"{loaded.spec.name}-markers"
     paths = write_marker_files(folder, grid, nodes, outline)
     process = MARKING_PROCESSES[loaded.spec.manufacturing.marking_process]
     if as_json:

@@ -17,7 +17,10 @@ def new(
     width: Annotated[float, typer.Option(help="Gel width across the finger, mm.")] = 22.0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> int:
-    """Write a commented spec to start from: the camera filled in, every default shown."""
+    """Write a commented spec to start from.
+
+    The Raspberry Pi spy camera is filled in and every default shown.
+    """
     from gelslim_cad.cli.failure import CommandError
     from gelslim_cad.cli.output import replace_file
     from gelslim_cad.spec.starter import starter_text

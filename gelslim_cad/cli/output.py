@@ -17,8 +17,11 @@ PAD_RULES = ("gel.", "mesh.", "marker.")
 
 def replace_file(target: Path, data: bytes) -> None:
     """Write `data` to `target` in one step; folders above it are made. Raises OSError."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, part = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)

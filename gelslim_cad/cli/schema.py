@@ -13,7 +13,10 @@ def schema(
         Path | None, typer.Option("-o", "--out", help="Write to this file instead.")
     ] = None,
 ) -> int:
-    """Print the JSON Schema of the spec, by which editors check and complete the YAML."""
+    """Print the JSON Schema of the spec.
+
+    Editors check and complete the YAML by it.
+    """
     from gelslim_cad.spec.schema import schema_text
 
     text = schema_text()

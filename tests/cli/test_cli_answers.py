@@ -1,0 +1,162 @@
+"""What the commands answer, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cli_samples import MINI20, altered, too_long
+
+from gelslim_cad.checks import RULES, check
+from gelslim_cad.cli import main
+from gelslim_cad.cli.answer import number, plain
+from gelslim_cad.dimensions import derive
+from gelslim_cad.spec.reader import read_spec
+
+
+def answered(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> Any:
+    assert main([*arguments, "--json"]) == status
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return json.loads(captured.out)
+
+
+def test_check_as_json_holds_every_rule(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = answered(capsys, "check", str(MINI20))
+    assert answer["ok"] is True
+    assert answer["name"] == "mini20"
+    truth = {c.id: c for c in check(derive(read_spec(MINI20).spec))}
+    assert {c["id"] for c in answer["checks"]} == set(truth)
+    for entry in answer["checks"]:
+        assert entry["value"] == pytest.approx(truth[entry["id"]].value, rel=1e-9, abs=1e-9)
+        assert entry["status"] == truth[entry["id"]].status
+    assert answer["binding"][0].startswith("Thickness ")
+
+
+def test_check_puts_failures_first_and_says_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(too_long(tmp_path))]) == 1
+    shown = capsys.readouterr().out
+    marks = re.findall(r"^(FAIL|warn|ok) ", shown, re.MULTILINE)
+    assert marks == sorted(marks, key=("FAIL", "warn", "ok").index)
+    failed = {c.id for c in check(derive(read_spec(too_long(tmp_path)).spec)) if c.status == "fail"}
+    assert failed
+    for rule in failed:
+        assert f"({rule})" in shown
+    joined = " ".join(shown.split())
+    assert "Change design.optics.min_px_per_marker." in joined
+    assert "It would fit with a gel" in joined
+    assert f"{len(failed)} of {len(RULES)} design rules fail" in joined
+
+
+def test_check_brief_leaves_out_what_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(MINI20), "--brief"]) == 0
+    shown = capsys.readouterr().out
+    assert "rules that hold" not in shown
+    assert f"all {len(RULES)} design rules hold" in shown
+
+
+def test_a_failing_check_as_json_keeps_its_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = answered(capsys, "check", str(too_long(tmp_path)), status=1)
+    assert answer["ok"] is False
+    assert any(c["status"] == "fail" and c["advice"] for c in answer["checks"])
+
+
+def test_derive_shows_every_dimension(capsys: pytest.CaptureFixture[str]) -> None:
+    d = derive(read_spec(MINI20).spec)
+    assert main(["derive", str(MINI20)]) == 0
+    shown = capsys.readouterr().out
+    names = re.findall(r"^  ([a-z_]+\.[a-z_0-9]+) ", shown, re.MULTILINE)
+    assert sorted(names) == sorted(d.values)
+    assert f"{d['finger.thickness_mm']:.2f} mm" in shown
+    answer = answered(capsys, "derive", str(MINI20))
+    assert answer["feasible"] is True
+    assert set(answer["dimensions"]) == set(d.values)
+    thickness = answer["dimensions"]["finger.thickness_mm"]
+    assert thickness["value"] == d["finger.thickness_mm"]
+    assert thickness["unit"] == "mm"
+    parts = ("design.housing.back_wall_mm", "finger.depth_mm", "stack.gel_total_mm")
+    assert set(parts) < set(thickness["inputs"])
+    assert sum(thickness["inputs"].values()) == pytest.approx(thickness["value"])
+
+
+def test_derive_says_when_no_finger_fits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["derive", str(too_long(tmp_path))]) == 0
+    assert "No finger keeps every limit" in capsys.readouterr().out
+    assert answered(capsys, "derive", str(too_long(tmp_path)))["feasible"] is False
+
+
+def test_explain_ends_at_the_lines_of_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = altered(tmp_path, "f_number: 2.9", "f_number: 2.8", name="mine.yaml")
+    monkeypatch.chdir(tmp_path)
+    assert main(["explain", "mine.yaml", "view.aperture_mm"]) == 0
+    shown = capsys.readouterr().out
+    lines = path.read_text(encoding="utf-8").splitlines()
+    line = next(i for i, text in enumerate(lines, 1) if "f_number" in text)
+    assert f"camera.f_number = 2.8  mine.yaml:{line}" in shown
+    assert "view.aperture_mm = 1.29 mm" in shown
+    assert "f / N" in shown
+
+
+def test_explain_as_json_nests_inputs(capsys: pytest.CaptureFixture[str]) -> None:
+    answer = answered(capsys, "explain", str(MINI20), "finger.thickness_mm")
+    names = [child["name"] for child in answer["inputs"]]
+    assert names == [n for n, _ in derive(read_spec(MINI20).spec).inputs("finger.thickness_mm")]
+    assert answer["inputs"][0]["origin"] == "default"
+
+
+@pytest.mark.parametrize("name", ["finger.thicknes_mm", "thickness_mm", "view.keystones"])
+def test_explain_suggests_the_closest_name(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", str(MINI20), name]) == 2
+    error = capsys.readouterr().err
+    assert "did you mean" in error
+    wanted = "view.keystone" if "keystone" in name else "finger.thickness_mm"
+    assert wanted in error
+    suggested = re.findall(r"[a-z_]+\.[a-z_.]+", error.split("did you mean")[1])
+    assert len(suggested) == len(set(suggested))
+
+
+def test_schema_prints_what_the_repository_holds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["schema"]) == 0
+    shown = capsys.readouterr().out
+    assert json.loads(shown)["properties"]["design"]
+    target = tmp_path / "a" / "schema.json"
+    assert main(["schema", "-o", str(target)]) == 0
+    assert target.read_text(encoding="utf-8") == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (17.7918, "mm", "17.79 mm"),
+        (1.2, "mm", "1.2 mm"),
+        (1200.0, "mm", "1200 mm"),
+        (634.92, "px", "634.9 px"),
+        (0.00567, "mm", "0.00567 mm"),
+        (2.04e-7, "mm", "0 mm"),
+        (-4.5, "mm", "-4.5 mm"),
+        (53.4962, "°", "53.5°"),
+        (-0.0, "", "0"),
+        (None, "mm", "none"),
+        (True, "", "true"),
+        ((1.0, 2.5), "mm", "1, 2.5 mm"),
+    ],
+)
+def test_numbers_for_people(value: Any, unit: str, text: str) -> None:
+    assert number(value, unit) == text
+
+
+def test_json_never_holds_nan() -> None:
+    assert plain({"a": (float("nan"), float("inf"), 1.0)}) == {"a": [None, None, 1.0]}

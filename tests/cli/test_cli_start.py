@@ -1,0 +1,129 @@
+"""Starting the command line: light, helpful, and readable on any terminal."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+from cli_samples import MINI20, ROOT, fresh
+
+from gelslim_cad import __version__
+from gelslim_cad.cli import main
+
+HEAVY = (
+    "numpy", "scipy", "numba", "cadquery", "OCP", "vtk", "vtkmodules", "pyvista", "matplotlib",
+    "trimesh", "ezdxf", "reportlab", "pydantic", "ruamel",
+)  # fmt: skip
+COMMANDS = ("new", "check", "derive", "explain", "build", "bundle", "markers", "schema")
+CAD = tuple(m for m in HEAVY if m not in ("numpy", "pydantic", "ruamel"))
+
+
+def loaded_by(arguments: list[str], watched: tuple[str, ...]) -> set[str]:
+    """Which watched modules a fresh process has loaded after running a command."""
+    code = (
+        "import sys\nfrom gelslim_cad.cli import main\n"
+        f"status = main({arguments!r})\n"
+        f"print('LOADED', *(m for m in {watched!r} if m in sys.modules))\nsys.exit(status)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["build", "--help"]])
+def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
+    # For ranges of numbers typer may use pydantic by itself.
+    heavy = HEAVY if len(arguments) == 1 else tuple(m for m in HEAVY if m != "pydantic")
+    assert loaded_by(arguments, heavy) == set()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["check", str(MINI20)], ["derive", str(MINI20)], ["explain", str(MINI20), "led.y_mm"]],
+    ids=lambda a: a[0],
+)
+def test_commands_without_cad_load_no_cad_and_no_compiled_code(arguments: list[str]) -> None:
+    assert loaded_by(arguments, CAD) == set()
+
+
+def test_help_names_every_command_in_whole_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    shown = capsys.readouterr().out
+    listed = {
+        line.split()[0]: line for line in shown.partition("Commands:")[2].splitlines() if line
+    }
+    for command in COMMANDS:
+        assert listed[command].rstrip().endswith(".")
+        assert "..." not in listed[command]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert f"Usage: gelslim {command}" in shown
+    assert max(len(line) for line in shown.splitlines()) <= 100
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"gelslim {__version__}\n"
+
+
+def test_no_command_shows_help_and_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    assert capsys.readouterr().err.startswith("Usage: gelslim")
+
+
+def test_module_and_script_are_the_same_program() -> None:
+    assert fresh("--version").stdout == f"gelslim {__version__}\n"
+    script = ROOT / ".venv" / "bin" / "gelslim"
+    if script.exists():
+        done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
+        assert done.stdout == f"gelslim {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check", str(MINI20)),
+        ("derive", str(MINI20)),
+        ("explain", str(MINI20), "finger.thickness_mm"),
+    ],
+    ids=lambda a: a[0],
+)
+def test_pipes_get_80_columns_without_colour(arguments: tuple[str, ...]) -> None:
+    done = fresh(*arguments)
+    assert done.returncode == 0
+    assert "\x1b" not in done.stdout
+    assert max(len(line.rstrip()) for line in done.stdout.splitlines()) <= 80
+
+
+def test_an_ascii_terminal_gets_signs_spelled_out() -> None:
+    done = fresh("check", str(MINI20), PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.returncode == 0
+    assert done.stdout.isascii()
+    assert ">= 0.35 mm" in done.stdout
+    assert "?" not in done.stdout
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("arguments", [("derive", str(MINI20)), ("schema",)], ids=lambda a: a[0])
+def test_a_closed_pipe_ends_quietly(arguments: tuple[str, ...]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "gelslim_cad", *arguments],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    os.close(writer)
+    assert done.returncode == 141
+    assert done.stderr == ""
