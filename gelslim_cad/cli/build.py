@@ -111,13 +111,22 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, int, int], None] | None]:
     if quiet or not screen.is_terminal:
         yield None
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+    )
 
-    columns = (BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=screen, transient=True) as bar:
-        task = bar.add_task("starting", total=None)
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
+    # No refreshing thread: the build forks its workers.
+    with Progress(
+        *columns, TimeElapsedColumn(), console=screen, transient=True, auto_refresh=False
+    ) as bar:
+        task = bar.add_task("starting", total=1)
 
         def tell(text: str, done: int, total: int) -> None:
-            bar.update(task, description=text, completed=done, total=total)
+            bar.update(task, description=text, completed=done, total=total, refresh=True)
 
         yield tell
