@@ -181,7 +181,11 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         )
         / 10,
         "mirror before camera": (lower_end_x * -1 + cx + p.clearance_mm) / 10,
-        "camera clear of ledge": np.max(under_ledge, axis=0) / 10,
+        "camera clear of ledge": np.maximum(
+            np.max(under_ledge, axis=0),
+            p.clearance_mm - _outside_camera(p, ledge_x - cx, ledge_z - cz, pitch),
+        )
+        / 10,
     }
     return Fold(
         near_ray_rad=near,
@@ -232,6 +236,15 @@ def _corner(p: FoldProblem, x: Array, vx: Array, air: Array) -> _Corner:
     heights = [air, p.guide_thickness_mm, p.gel_total_mm]
     slope = ray_slope(reach, heights, [1.0, p.guide_index, p.gel_index])
     return _Corner(slope * along / reach, slope * across / reach)
+
+
+def _outside_camera(p: FoldProblem, dx: Array, dz: Array, pitch: Array) -> Array:
+    """How far a point before or above the camera is outside housing and lens barrel."""
+    c, s = np.cos(pitch), np.sin(pitch)
+    ahead, above = dx * c - dz * s, dx * s + dz * c
+    housing = np.maximum(ahead + p.lens_height_mm, above - p.module_height_mm / 2)
+    barrel = np.maximum(ahead, above - p.lens_diameter_mm / 2)
+    return np.minimum(housing, barrel)
 
 
 def _housing_corners(
