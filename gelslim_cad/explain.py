@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -61,16 +60,6 @@ def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
             return replace(tracer.node(path), note=_used_by(d, path))
     known = dict.fromkeys((*d.values, *d.given, *RULES))
     raise UnknownNameError(_unknown(name, tuple(known)))
-
-
-def explained_lines(node: Node, indent: int = 0) -> Iterable[str]:
-    """The tree as plain lines, two spaces of indentation per level."""
-    value = "" if node.value is None else f" = {node.value} {node.unit}".rstrip()
-    detail = node.origin or node.formula
-    tail = "  (see above)" if node.repeated else f"  {detail}" if detail else ""
-    yield f"{'  ' * indent}{node.name}{value}{tail}"
-    for child in node.inputs:
-        yield from explained_lines(child, indent + 1)
 
 
 class _Tracer:

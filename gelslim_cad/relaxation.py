@@ -86,6 +86,13 @@ def ladders(spec: Spec) -> tuple[tuple[Relaxation, ...], ...]:
             for b in blurs
         ],
     ]
+    pixels = [v for v in (5.0, 4.0, 3.0) if v < o.min_px_per_marker]
+    found.append(
+        [
+            Relaxation("design.optics.min_px_per_marker", v, f"only {v:g} px per marker")
+            for v in pixels
+        ]
+    )
     if c.horizontal_fov_deg is None and c.vertical_fov_deg is None:
         focal = [c.focal_length_mm * part for part in (0.85, 0.7, 0.55)]
         found.append(

@@ -10,7 +10,7 @@ from cli_samples import MINI20
 
 from gelslim_cad.checks import RULES
 from gelslim_cad.dimensions import definition, derive
-from gelslim_cad.explain import Node, UnknownNameError, explain, explained_lines
+from gelslim_cad.explain import Node, UnknownNameError, explain
 from gelslim_cad.spec.reader import read_spec
 
 LOADED = read_spec(MINI20)
@@ -86,14 +86,6 @@ def test_a_field_names_its_users_and_may_leave_out_design() -> None:
     assert "led.fits_mm" in node.note
     unused = explain(LOADED, DIMENSIONS, "camera.frame_rate_hz")
     assert unused.note == "Used by: the files only"
-
-
-def test_plain_lines_are_indented_by_depth() -> None:
-    lines = list(explained_lines(explain(LOADED, DIMENSIONS, "led.pitch_mm")))
-    assert lines[0].startswith("led.pitch_mm = 5.0 mm")
-    assert lines[1].startswith("  design.gel.length_mm = 20.0 mm")
-    assert lines[2].startswith("  led.count = 4.0")
-    assert lines[3].startswith("    design.gel.length_mm")
 
 
 @pytest.mark.parametrize(
