@@ -1,0 +1,128 @@
+"""Random legal specs from a seed, across the whole range that the models allow.
+
+Three kinds are mixed. A plausible spec varies a design that can be built: a good share of them
+reaches CAD. An edged spec is a plausible one with a few fields drawn anew from their whole legal
+range, limits themselves included. A wild spec draws every field from its whole range, so most are
+refused by the rules, and none may end in anything but a reason.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+
+from gelslim_cad.spec import Spec
+
+from .plausible import plausible, short
+from .ranges import LEAVES, anywhere
+
+Kind = Literal["plausible", "edged", "wild"]
+KINDS: tuple[Kind, ...] = ("plausible", "edged", "wild")
+SHARES = (0.5, 0.35, 0.15)
+MOST_TRIES = 400
+STIFF_GEL_MPA = 5.0
+
+
+Values = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A random legal spec; `text` is its file."""
+
+    seed: int
+    index: int
+    kind: Kind
+    spec: Spec
+    text: str
+
+
+def sample(seed: int, index: int) -> Sample:
+    """Spec `index` of the sequence of `seed`; the same on every machine."""
+    rng = np.random.default_rng([seed, index])
+    kind: Kind = KINDS[int(rng.choice(len(KINDS), p=SHARES))]
+    for _ in range(MOST_TRIES):
+        values = _wild(rng) if kind == "wild" else plausible(rng)
+        if kind == "edged":
+            _edge(rng, values)
+        text = as_text(f"s{seed}-{index}", values)
+        try:
+            spec = Spec.model_validate_json(text)
+        except ValidationError:
+            continue
+        return Sample(seed, index, kind, spec, text)
+    raise AssertionError(f"no legal spec drawn for seed {seed}, index {index}")
+
+
+def as_text(name: str, values: Values) -> str:
+    """The spec as a file: JSON is YAML."""
+    data: dict[str, Any] = {"format": "gelslim-spec/1", "name": name}
+    for path, value in values.items():
+        if value is None:
+            continue
+        *blocks, key = path.split(".")
+        block = data
+        for part in blocks:
+            block = block.setdefault(part, {})
+        block[key] = value
+    return json.dumps(data, indent=1, ensure_ascii=False)
+
+
+def _edge(rng: np.random.Generator, values: Values) -> None:
+    """Draw a few fields anew from their whole range."""
+    for path in rng.choice(list(LEAVES), size=int(rng.integers(1, 4)), replace=False):
+        values[str(path)] = anywhere(rng, LEAVES[str(path)])
+    ratio = values["camera.image_height_px"] / values["camera.image_width_px"]
+    values["camera.sensor_height_mm"] = short(values["camera.sensor_width_mm"] * ratio, 8)
+    _both_cell_counts(values, 17)
+
+
+def _both_cell_counts(values: Values, count: int) -> None:
+    if (values["mesh.cells_along"] is None) != (values["mesh.cells_across"] is None):
+        values["mesh.cells_along"] = values["mesh.cells_across"] = count
+
+
+def _wild(rng: np.random.Generator) -> Values:
+    values = {path: anywhere(rng, leaf) for path, leaf in LEAVES.items()}
+    _agree_camera(rng, values)
+    length, width = values["design.gel.length_mm"], values["design.gel.width_mm"]
+    radius = min(length, width) / 2
+    if values["design.gel.corner_radius_mm"] > radius:
+        values["design.gel.corner_radius_mm"] = float(rng.choice([radius, radius / 3]))
+    diameter, pitch = values["design.markers.diameter_mm"], values["design.markers.pitch_mm"]
+    if diameter >= pitch:
+        diameter = values["design.markers.diameter_mm"] = short(pitch * rng.uniform(0.3, 0.95))
+    for path, side in (("design.markers.rows", length), ("design.markers.columns", width)):
+        most = int((side - diameter) / pitch)
+        if values[path] is not None:
+            values[path] = min(values[path], most) if most >= 5 else None
+    _both_cell_counts(values, int(rng.integers(1, 401)))
+    if values["material.gel.youngs_modulus_mpa"] > STIFF_GEL_MPA:
+        values["material.allow_stiff_gel"] = True
+    return values
+
+
+def _agree_camera(rng: np.random.Generator, values: Values) -> None:
+    """Make pixels square, the lens narrower than its module and fields of view true."""
+    height, width = sorted((values["camera.image_width_px"], values["camera.image_height_px"]))
+    height = max(height, math.ceil(width / 100))
+    least = 0.31 * width / height
+    sensor = short(math.exp(rng.uniform(math.log(least), math.log(40))), 6)
+    values |= {
+        "camera.image_width_px": width,
+        "camera.image_height_px": height,
+        "camera.sensor_width_mm": sensor,
+        "camera.sensor_height_mm": short(sensor * height / width, 8),
+    }
+    lens = values["camera.lens_diameter_mm"]
+    values["camera.lens_diameter_mm"] = min(lens, values["camera.module_width_mm"])
+    for axis, side in (("horizontal", "width"), ("vertical", "height")):
+        half = values[f"camera.sensor_{side}_mm"] / 2 / values["camera.focal_length_mm"]
+        angle = short(math.degrees(2 * math.atan(half)) * rng.uniform(0.96, 1.04))
+        given = 1 < angle < 170 and rng.random() < 0.4
+        values[f"camera.{axis}_fov_deg"] = angle if given else None
