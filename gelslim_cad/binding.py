@@ -29,7 +29,7 @@ LIMITS = {
     "pixels per marker": "the pixels per marker at the far edge",
     "keystone": "the keystone limit",
     "lens travel": "how far the lens can be unscrewed",
-    "camera below window": "the camera housing, which must stay under the window",
+    "camera below window": "the room for the camera under the window",
     "camera beside view": "the camera housing beside the view",
     "camera clear of mirror": "the gap between camera and mirror",
     "mirror before camera": "the gap between camera and mirror",
