@@ -1,0 +1,215 @@
+"""Cross-section of a light guide: segments and arcs, each with the media on its two sides.
+
+The plane is (y, z): y across the finger, z out of the gel. The same profile is certified, traced
+and extruded to the CAD solid. A face that two bodies share is one edge with (left, right) media,
+never two coincident ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+Point = tuple[float, float]
+CLOSED_MM = 1e-9
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Straight edge from `start` to `end`."""
+
+    start: Point
+    end: Point
+
+    @property
+    def length_mm(self) -> float:
+        """Distance of the ends."""
+        return math.dist(self.start, self.end)
+
+    def at(self, part: float) -> Point:
+        """Point at `part` (0 to 1) of the way."""
+        (a, b), (c, d) = self.start, self.end
+        return (a + part * (c - a), b + part * (d - b))
+
+    def mapped(self, move: Callable[[Point], Point], mirrored: bool) -> Segment:
+        """The edge under a similarity map of the plane."""
+        return Segment(move(self.start), move(self.end))
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Circular edge about `centre` from `start` through `sweep_rad` (> 0: counter-clockwise)."""
+
+    centre: Point
+    radius_mm: float
+    start_rad: float
+    sweep_rad: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.radius_mm) and self.radius_mm > 0):
+            raise ValueError(f"arc radius_mm = {self.radius_mm!r}: must be a finite length > 0")
+        if not 0 < abs(self.sweep_rad) <= 2 * math.pi:
+            raise ValueError(f"arc sweep_rad = {self.sweep_rad!r}: must be in ±(0, 2π]")
+
+    @property
+    def start(self) -> Point:
+        """First point."""
+        return self.at(0.0)
+
+    @property
+    def end(self) -> Point:
+        """Last point."""
+        return self.at(1.0)
+
+    @property
+    def length_mm(self) -> float:
+        """Length along the arc."""
+        return self.radius_mm * abs(self.sweep_rad)
+
+    def at(self, part: float) -> Point:
+        """Point at `part` (0 to 1) of the way."""
+        angle = self.start_rad + part * self.sweep_rad
+        y, z = self.centre
+        return (y + self.radius_mm * math.cos(angle), z + self.radius_mm * math.sin(angle))
+
+    def mapped(self, move: Callable[[Point], Point], mirrored: bool) -> Arc:
+        """The edge under a similarity map of the plane."""
+        centre, start = move(self.centre), move(self.start)
+        angle = math.atan2(start[1] - centre[1], start[0] - centre[0])
+        sweep = -self.sweep_rad if mirrored else self.sweep_rad
+        return Arc(centre, math.dist(centre, start), angle, sweep)
+
+
+@dataclass(frozen=True)
+class Edge:
+    """An edge with the names of the media on its left and right, looking along it."""
+
+    name: str
+    curve: Segment | Arc
+    left: str
+    right: str
+
+    def reversed(self) -> Edge:
+        """The same face, run the other way: its media change sides."""
+        c = self.curve
+        if isinstance(c, Segment):
+            turned: Segment | Arc = Segment(c.end, c.start)
+        else:
+            turned = Arc(c.centre, c.radius_mm, c.start_rad + c.sweep_rad, -c.sweep_rad)
+        return Edge(self.name, turned, self.right, self.left)
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Two concentric arcs that bound the guide: inner radius R, thickness t = outer - R."""
+
+    centre: Point
+    inner_radius_mm: float
+    outer_radius_mm: float
+    sweep_rad: float
+
+    @property
+    def thickness_mm(self) -> float:
+        """t."""
+        return self.outer_radius_mm - self.inner_radius_mm
+
+    @property
+    def ratio(self) -> float:
+        """R / t."""
+        return self.inner_radius_mm / self.thickness_mm
+
+
+@dataclass(frozen=True)
+class GuideProfile:
+    """All edges of a cross-section; media are names, their indices belong to the scene."""
+
+    edges: tuple[Edge, ...]
+
+    def __post_init__(self) -> None:
+        for edge in self.edges:
+            if edge.left == edge.right:
+                raise ValueError(f"edge {edge.name} has {edge.left} on both sides")
+            if not edge.curve.length_mm > CLOSED_MM:
+                raise ValueError(f"edge {edge.name} has no length")
+
+    def edge(self, name: str) -> Edge:
+        """The edge of a name; KeyError when there is none."""
+        for edge in self.edges:
+            if edge.name == name:
+                return edge
+        raise KeyError(f"the profile has no edge called {name}")
+
+    def outline(self, medium: str) -> tuple[Edge, ...]:
+        """Edges around `medium`, end to start, with the medium on their left (counter-clockwise).
+
+        Raises ValueError where they do not form one closed loop.
+        """
+        free = [e if e.left == medium else e.reversed() for e in self.edges if touches(e, medium)]
+        if not free:
+            raise ValueError(f"the profile holds no {medium}")
+        loop = [free.pop(0)]
+        while free:
+            end = loop[-1].curve.end
+            following = [e for e in free if math.dist(e.curve.start, end) <= CLOSED_MM]
+            if not following:
+                raise ValueError(f"the outline of {medium} is open after edge {loop[-1].name}")
+            free.remove(following[0])
+            loop.append(following[0])
+        if math.dist(loop[-1].curve.end, loop[0].curve.start) > CLOSED_MM:
+            raise ValueError(f"the outline of {medium} is open after edge {loop[-1].name}")
+        return tuple(loop)
+
+    def area_mm2(self, medium: str) -> float:
+        """Area of a medium's region, arcs exact (Green's theorem)."""
+        return sum(_swept(edge.curve) for edge in self.outline(medium))
+
+    def bends(self, medium: str = "acrylic") -> tuple[Bend, ...]:
+        """Pairs of concentric arcs of equal sweep about `medium`, in the order of the edges."""
+        arcs = [
+            (e, e.curve if e.left == medium else e.reversed().curve)
+            for e in self.edges
+            if touches(e, medium) and isinstance(e.curve, Arc)
+        ]
+        outer = [c for _, c in arcs if isinstance(c, Arc) and c.sweep_rad > 0]
+        inner = [c for _, c in arcs if isinstance(c, Arc) and c.sweep_rad < 0]
+        return tuple(
+            Bend(o.centre, i.radius_mm, o.radius_mm, o.sweep_rad)
+            for o in outer
+            for i in inner
+            if math.dist(o.centre, i.centre) <= 1e-6 * o.radius_mm
+            and abs(o.sweep_rad + i.sweep_rad) <= 1e-6
+            and i.radius_mm < o.radius_mm
+        )
+
+    def moved(self, dy_mm: float, dz_mm: float) -> GuideProfile:
+        """The profile shifted."""
+        return self._mapped(lambda p: (p[0] + dy_mm, p[1] + dz_mm), mirrored=False)
+
+    def scaled(self, factor: float) -> GuideProfile:
+        """The profile grown about the origin."""
+        return self._mapped(lambda p: (p[0] * factor, p[1] * factor), mirrored=False)
+
+    def reflected(self) -> GuideProfile:
+        """The profile with y reversed; media change sides as the plane is mirrored."""
+        turned = self._mapped(lambda p: (-p[0], p[1]), mirrored=True)
+        return GuideProfile(tuple(replace(e, left=e.right, right=e.left) for e in turned.edges))
+
+    def _mapped(self, move: Callable[[Point], Point], mirrored: bool) -> GuideProfile:
+        return GuideProfile(
+            tuple(replace(e, curve=e.curve.mapped(move, mirrored)) for e in self.edges)
+        )
+
+
+def touches(edge: Edge, medium: str) -> bool:
+    """Whether a medium lies on one side of the edge."""
+    return medium in (edge.left, edge.right)
+
+
+def _swept(curve: Segment | Arc) -> float:
+    """½ ∮ (y dz - z dy) along one edge."""
+    (a, b), (c, d) = curve.start, curve.end
+    if isinstance(curve, Segment):
+        return (a * d - b * c) / 2
+    (y, z), r = curve.centre, curve.radius_mm
+    return (y * (d - b) - z * (c - a) + r * r * curve.sweep_rad) / 2
