@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from gelslim_cad.binding import binding_sentences
@@ -31,11 +32,10 @@ class Plan:
 
 @dataclass(frozen=True)
 class Stages:
-    """The cheap beginning of a build: spec, dimensions, grid, rules."""
+    """The cheap beginning of a build: spec, dimensions, rules."""
 
     loaded: LoadedSpec
     dimensions: Dimensions
-    grid: MarkerGrid
     checks: tuple[Check, ...]
     binding: tuple[str, ...]
     spec_hash: str
@@ -47,11 +47,15 @@ class Stages:
         return cls(
             loaded,
             d,
-            marker_grid(d),
             check(d),
             binding_sentences(loaded.spec, d),
             spec_hash(loaded.spec),
         )
+
+    @cached_property
+    def grid(self) -> MarkerGrid:
+        """The marker grid; made on demand, as a design that breaks a rule may have none."""
+        return marker_grid(self.dimensions)
 
     @property
     def name(self) -> str:

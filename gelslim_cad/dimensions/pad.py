@@ -9,7 +9,7 @@ import numpy as np
 from gelslim_cad.dimensions.registry import dimension
 
 
-@dimension("marker_grid.rows", formula="given, or ⌊(L - 2 margin - d) / pitch⌋ + 1")
+@dimension("marker_grid.rows", formula="given, or ⌊(L - 2 margin - d) / pitch⌋ + 1, not below 0")
 def marker_grid_rows(
     markers_rows: Any,
     gel_length_mm: Any,
@@ -23,7 +23,7 @@ def marker_grid_rows(
     return _fill(gel_length_mm, markers_edge_margin_mm, markers_diameter_mm, markers_pitch_mm)
 
 
-@dimension("marker_grid.columns", formula="given, or ⌊(W - 2 margin - d) / pitch⌋ + 1")
+@dimension("marker_grid.columns", formula="given, or ⌊(W - 2 margin - d) / pitch⌋ + 1, not below 0")
 def marker_grid_columns(
     markers_columns: Any,
     gel_width_mm: Any,
@@ -38,19 +38,20 @@ def marker_grid_columns(
 
 
 def _fill(side_mm: Any, margin_mm: Any, diameter_mm: Any, pitch_mm: Any) -> Any:
-    return np.floor((side_mm - 2 * margin_mm - diameter_mm) / pitch_mm + 1e-9) + 1
+    whole = np.floor((side_mm - 2 * margin_mm - diameter_mm) / pitch_mm + 1e-9) + 1
+    return np.maximum(whole, 0.0)
 
 
 @dimension("marker_grid.span_x_mm", formula="(rows - 1) pitch")
 def marker_grid_span_x_mm(marker_grid_rows: Any, markers_pitch_mm: Any) -> Any:
     """Lattice size along the finger, centre to centre."""
-    return (marker_grid_rows - 1) * markers_pitch_mm
+    return np.maximum(marker_grid_rows - 1, 0) * markers_pitch_mm
 
 
 @dimension("marker_grid.span_y_mm", formula="(columns - 1) pitch")
 def marker_grid_span_y_mm(marker_grid_columns: Any, markers_pitch_mm: Any) -> Any:
     """Lattice size across the finger, centre to centre."""
-    return (marker_grid_columns - 1) * markers_pitch_mm
+    return np.maximum(marker_grid_columns - 1, 0) * markers_pitch_mm
 
 
 @dimension("pad_mesh.cells_x", formula="given, or 2⌈L / 2h⌉ with the parity of the lattice")
