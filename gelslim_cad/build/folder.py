@@ -58,7 +58,7 @@ def staged(target: Path) -> Iterator[Path]:
 
     Raises OutputError when `target` is a file or a folder that no build made.
     """
-    _require_ours(target)
+    require_ours(target)
     staging = target.with_name(f".{target.name}.building")
     try:
         shutil.rmtree(staging, ignore_errors=True)
@@ -76,7 +76,8 @@ def staged(target: Path) -> Iterator[Path]:
         shutil.rmtree(staging, ignore_errors=True)
 
 
-def _require_ours(target: Path) -> None:
+def require_ours(target: Path) -> None:
+    """Raise OutputError when `target` is a file or a folder that no build made."""
     if not target.exists():
         return
     if not target.is_dir():

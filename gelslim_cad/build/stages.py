@@ -64,13 +64,18 @@ class Stages:
 
     def plan(self) -> Plan:
         """Make the solids, check them and lay out the work. Loads the CAD kernel."""
+        from gelslim_cad.build.mould_checks import check_mould
         from gelslim_cad.build.solid_checks import check_solids
         from gelslim_cad.solids.finger import blanks, finger_parts
         from gelslim_cad.solids.tooling import tooling_parts
 
         finger = finger_parts(self.dimensions)
         tooling = (*blanks(self.dimensions), *tooling_parts(self.dimensions, self.grid))
-        checks = (*self.checks, *check_solids(self.dimensions, finger))
+        checks = (
+            *self.checks,
+            *check_solids(self.dimensions, finger),
+            *check_mould(self.dimensions),
+        )
         return Plan(finger, tooling, self._units(finger, tooling), checks)
 
     def _units(self, finger: tuple[Part, ...], tooling: tuple[Part, ...]) -> tuple[Unit, ...]:

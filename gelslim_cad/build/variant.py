@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gelslim_cad.build.fingerprint import code_hash, combined, versions
-from gelslim_cad.build.folder import locked, recover, staged
+from gelslim_cad.build.folder import locked, recover, require_ours, staged
 from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
 from gelslim_cad.build.work import Unit, Written, run
 from gelslim_cad.checks import Check
@@ -66,12 +66,13 @@ def build_variant(
     tell = progress or (lambda text, done, total: None)
     with locked(target):
         recover(target)
+        require_ours(target)
         stages = Stages.prepare(loaded)
         previous = read_manifest(target)
         key = combined(code_hash(), stages.spec_hash, loaded.sha256)
         if previous and previous.key == key and intact(target, previous, list(previous.files)):
             return BuildResult(
-                target, tuple(previous.files), (), stages.checks, stages.binding, up_to_date=True
+                target, (*previous.files, NAME), (), stages.checks, stages.binding, up_to_date=True
             )
         failed = tuple(c for c in stages.checks if c.status == "fail")
         if failed:
@@ -182,5 +183,5 @@ def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
 
 def _refusal(name: str, failed: tuple[Check, ...]) -> str:
     lines = [f"{name}: {len(failed)} design rule(s) fail; nothing was built"]
-    lines += [f"  {c.id}: {c.reason} {c.advice} ({c.parameter})" for c in failed]
+    lines += [f"  {c.id}: {c.reason}. {c.advice} ({c.parameter})" for c in failed]
     return "\n".join(lines)

@@ -78,10 +78,10 @@ def fit(
     advice="let the gel stand less proud, use a thicker gel, or a smaller screw",
 )
 def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
-    """Plate against head height less the exposed rim."""
+    """Plate against the head's cone, which is 90° down to the thread's core."""
     size = SCREWS[housing_screw]
-    cone = (size.countersunk_head_mm - size.clearance_mm) / 2
-    return Finding(bezel_thickness_mm, cone + 0.2, least=True, caution=size.countersunk_height_mm)
+    cone = (size.countersunk_head_mm - size.pilot_mm) / 2
+    return Finding(bezel_thickness_mm, cone, least=True, caution=size.countersunk_height_mm)
 
 
 @rule(

@@ -61,10 +61,12 @@ def guide_leg_end_z_mm(
     return stack_window_bottom_z_mm - guide_inner_radius_mm - light_guide_leg_length_mm
 
 
-@dimension("guide.distal_end_x_mm", formula="L/2 + 0.2 + end support")
-def guide_distal_end_x_mm(gel_length_mm: Any, light_guide_end_support_mm: Any) -> Any:
-    """Tip end of the guide."""
-    return gel_length_mm / 2 + 0.2 + light_guide_end_support_mm
+@dimension("guide.distal_end_x_mm", formula="tip ledge + end support, or the mirror's rear edge")
+def guide_distal_end_x_mm(
+    ledge_distal_x_mm: Any, light_guide_end_support_mm: Any, mirror_rear_x_mm: Any
+) -> Any:
+    """Tip end of the guide; the tip block begins a fit behind it, and the mirror stays inside."""
+    return np.maximum(ledge_distal_x_mm + light_guide_end_support_mm, mirror_rear_x_mm)
 
 
 @dimension("guide.proximal_end_x_mm", formula="ledge edge - end support")

@@ -41,6 +41,24 @@ def ledge_edge_x_mm(fold_layout: Fold) -> Any:
     return fold_layout.ledge_edge_x_mm
 
 
+@dimension(
+    "ledge.distal_x_mm",
+    formula="L/2 + 0.2, or the mirror's rear edge + fit where it reaches up to the ledge",
+)
+def ledge_distal_x_mm(
+    gel_length_mm: Any,
+    mirror_rear_x_mm: Any,
+    mirror_upper_z_mm: Any,
+    stack_window_bottom_z_mm: Any,
+    ledge_depth_mm: Any,
+    housing_fit_clearance_mm: Any,
+) -> Any:
+    """Edge of the ledge under the window's tip end."""
+    beside = mirror_upper_z_mm > stack_window_bottom_z_mm - ledge_depth_mm - housing_fit_clearance_mm
+    clear = np.where(beside, mirror_rear_x_mm + housing_fit_clearance_mm, -np.inf)
+    return np.maximum(gel_length_mm / 2 + 0.2, clear)
+
+
 @dimension("channel.inner_y_mm", formula="flat width / 2 + R - fit")
 def channel_inner_y_mm(
     guide_flat_width_mm: Any, guide_inner_radius_mm: Any, housing_fit_clearance_mm: Any

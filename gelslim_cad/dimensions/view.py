@@ -218,7 +218,7 @@ def view_near_blur_mm(view_aperture_mm: Any, view_focus_mm: Any, view_near_dista
 
 @dimension("view.far_blur_mm", formula="A (Zf - s) / s", source=FOLD)
 def view_far_blur_mm(view_aperture_mm: Any, view_focus_mm: Any, view_far_distance_mm: Any) -> Any:
-    """Blur on the gel at the far edge, the largest on the pad."""
+    """Blur on the gel at the far edge."""
     return view_aperture_mm * np.abs(view_far_distance_mm - view_focus_mm) / view_focus_mm
 
 
@@ -232,29 +232,41 @@ def view_image_blur_px(
     view_far_distance_mm: Any,
     view_pixel_pitch_mm: Any,
 ) -> Any:
-    """Blur diameter in the image at the far edge."""
+    """Blur diameter in the image at the far edge; at the best focus the near edge has the same."""
     f, s, z = camera_focal_length_mm, view_focus_mm, view_far_distance_mm
     return (
         view_aperture_mm * f * np.abs(z - s) / (z * np.maximum(s - f, 1e-3)) / view_pixel_pitch_mm
     )
 
 
-@dimension("view.marker_across_px", formula="f_px d / Zf", source=FOLD)
+@dimension("view.marker_across_px", formula="f_px d / max(Zn, Zf)", source=FOLD)
 def view_marker_across_px(
-    view_focal_px: Any, markers_diameter_mm: Any, view_far_distance_mm: Any
+    view_focal_px: Any,
+    markers_diameter_mm: Any,
+    view_near_distance_mm: Any,
+    view_far_distance_mm: Any,
 ) -> Any:
-    """Width of a far marker in the image."""
-    return view_focal_px * markers_diameter_mm / view_far_distance_mm
+    """Width in the image of the marker that is farthest from the camera."""
+    farthest = np.maximum(view_near_distance_mm, view_far_distance_mm)
+    return view_focal_px * markers_diameter_mm / farthest
 
 
 @dimension(
-    "view.marker_along_px", formula="f_px d D / Zf², D = height above the plane", source=FOLD
+    "view.marker_along_px",
+    formula="f_px d D / max(Zn, Zf)², D = apparent height above the gel's plane",
+    source=FOLD,
 )
-def view_marker_along_px(fold_layout: Fold, view_marker_across_px: Any) -> Any:
-    """Height of a far marker in the image, foreshortened."""
-    apparent = fold_layout.far_distance_mm * np.cos(fold_layout.far_ray_rad)
-    apparent = apparent / np.cos(fold_layout.far_ray_rad - fold_layout.tilt_rad)
-    return view_marker_across_px * np.minimum(1.0, apparent / fold_layout.far_distance_mm)
+def view_marker_along_px(
+    fold_layout: Fold,
+    view_near_distance_mm: Any,
+    view_far_distance_mm: Any,
+    view_marker_across_px: Any,
+) -> Any:
+    """Height in the image of the marker that is farthest from the camera, foreshortened."""
+    height = fold_layout.far_distance_mm * np.cos(fold_layout.far_ray_rad)
+    height = height / np.cos(fold_layout.far_ray_rad - fold_layout.tilt_rad)
+    farthest = np.maximum(view_near_distance_mm, view_far_distance_mm)
+    return view_marker_across_px * np.minimum(1.0, height / farthest)
 
 
 @dimension("view.across_use", formula="largest image x of the gel / half image", source=FOLD)
@@ -335,6 +347,14 @@ def mirror_length_mm(
 ) -> Any:
     """Mirror length along its slope."""
     return np.hypot(mirror_upper_x_mm - mirror_lower_x_mm, mirror_upper_z_mm - mirror_lower_z_mm)
+
+
+@dimension("mirror.rear_x_mm", formula="upper end + t sin α", source=FOLD)
+def mirror_rear_x_mm(
+    mirror_upper_x_mm: Any, mirror_thickness_mm: Any, mirror_angle_deg: Any
+) -> Any:
+    """Upper edge of the mirror's back, its point nearest the tip."""
+    return mirror_upper_x_mm + mirror_thickness_mm * np.sin(np.radians(mirror_angle_deg))
 
 
 @dimension("mirror.width_mm", formula="2 (widest corner ray at the mirror + border)", source=FOLD)

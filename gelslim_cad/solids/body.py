@@ -91,7 +91,7 @@ def _inner_walls(d: Dimensions, at: Layout) -> list[cq.Shape]:
     baffle_y = (d["baffle.inner_y_mm"], d["channel.inner_y_mm"])
     return [
         box((at.beam_x_mm, d["ledge.edge_x_mm"]), (-flat, flat), ledge_z),
-        box((d["design.gel.length_mm"] / 2 + 0.2, end + FAR_MM / 2), (-flat, flat), ledge_z),
+        box((d["ledge.distal_x_mm"], end + FAR_MM / 2), (-flat, flat), ledge_z),
         box((at.beam_x_mm, start), (-wall, wall), (window - low, window + FAR_MM / 2)),
         *pair((start - WEB_MM, start), (baffle_y[0], wall), web_z),
         *pair((start - WEB_MM / 2, end + FAR_MM / 2), baffle_y, (cover, d["baffle.top_z_mm"])),

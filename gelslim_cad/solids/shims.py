@@ -17,7 +17,7 @@ def shims(d: Dimensions) -> tuple[Part, Part]:
     half = d["guide.flat_width_mm"] / 2 - SIDE_GAP_MM
     spans = {
         "proximal": (d["guide.proximal_end_x_mm"], d["ledge.edge_x_mm"]),
-        "tip": (d["design.gel.length_mm"] / 2 + 0.2, d["guide.distal_end_x_mm"]),
+        "tip": (d["ledge.distal_x_mm"], d["guide.distal_end_x_mm"]),
     }
     first, second = (
         Part(
