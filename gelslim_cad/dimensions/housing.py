@@ -54,8 +54,9 @@ def ledge_distal_x_mm(
     housing_fit_clearance_mm: Any,
 ) -> Any:
     """Edge of the ledge under the window's tip end."""
-    beside = mirror_upper_z_mm > stack_window_bottom_z_mm - ledge_depth_mm - housing_fit_clearance_mm
-    clear = np.where(beside, mirror_rear_x_mm + housing_fit_clearance_mm, -np.inf)
+    fit = housing_fit_clearance_mm
+    beside = mirror_upper_z_mm > stack_window_bottom_z_mm - ledge_depth_mm - fit
+    clear = np.where(beside, mirror_rear_x_mm + fit, -np.inf)
     return np.maximum(gel_length_mm / 2 + 0.2, clear)
 
 
