@@ -13,6 +13,7 @@ from gelslim_cad.fasteners import SCREWS
 CLAMP_CHEEK_MM = 3.5
 CLAMP_BAR_MM = 1.5
 COVER_TAB_MM = 4.0
+"""Least; a larger screw needs its head and 0.4 mm of cover on both sides."""
 BEAM_MM = 2.0
 MOUNT_WALL_MM = 1.5
 
@@ -201,15 +202,21 @@ def chamber_rear_x_mm(
     return np.minimum(rear - behind, bezel_proximal_x_mm - 1.0)
 
 
+@dimension("cover.tab_mm", formula="max(4, screw head + 0.8)")
+def cover_tab_mm(housing_screw: str) -> Any:
+    """How far the cover reaches under the mount block, where it is screwed to it."""
+    return np.maximum(COVER_TAB_MM, SCREWS[housing_screw].countersunk_head_mm + 0.8)
+
+
 @dimension("mount.length_mm", formula="max(tongue + fit + wall, bolt head + 2.4 + gap + cover tab)")
 def mount_length_mm(
-    mount_tongue_length_mm: Any, housing_fit_clearance_mm: Any, mount_bolt: str
+    mount_tongue_length_mm: Any, housing_fit_clearance_mm: Any, mount_bolt: str, cover_tab_mm: Any
 ) -> Any:
     """Solid block behind the camera chamber that takes the tongues."""
     head_mm = SCREWS[mount_bolt].cap_head_mm
     return np.maximum(
         mount_tongue_length_mm + housing_fit_clearance_mm + MOUNT_WALL_MM,
-        head_mm + 2.4 + 0.8 + COVER_TAB_MM,
+        head_mm + 2.4 + 0.8 + cover_tab_mm,
     )
 
 

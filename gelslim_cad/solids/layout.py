@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.dimensions.housing import BEAM_MM, COVER_TAB_MM
+from gelslim_cad.dimensions.housing import BEAM_MM
 from gelslim_cad.fasteners import SCREWS, ScrewSize, stock_length_mm
 
 SCREW_EDGE_MM = 2.6
@@ -77,7 +77,7 @@ class Layout:
     @property
     def cover_x_mm(self) -> float:
         """Gripper end of the back cover, under the mount block."""
-        return float(self.d["chamber.rear_x_mm"]) - COVER_TAB_MM
+        return float(self.d["chamber.rear_x_mm"]) - self.d["cover.tab_mm"]
 
     @property
     def screw_y_mm(self) -> float:
@@ -123,7 +123,7 @@ class Layout:
         tip_x = d["finger.tip_x_mm"] - d["design.housing.tip_wall_mm"] / 2
         block = d["stack.gel_bottom_z_mm"] - d["cover.top_z_mm"]
         deep = min(6.0, (block - 1.0) / 2)
-        tab_x = d["chamber.rear_x_mm"] - COVER_TAB_MM / 2
+        tab_x = d["chamber.rear_x_mm"] - d["cover.tab_mm"] / 2
         land = min(6.0, self.slot_z_mm[0] - d["cover.top_z_mm"] - 0.6)
         return tuple(
             Hole(x, s * y, self.back_z_mm, 1, plate, depth)
