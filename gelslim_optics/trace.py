@@ -33,7 +33,7 @@ class TraceOptions:
     Weight below `cut`, or past `most_faces` faces, is booked as truncated.
     """
 
-    split: float = 1e-3
+    split: float = 1e-2
     cut: float = 1e-6
     most_faces: int = 10_000
     bins: tuple[int, int] = (40, 40)
@@ -156,9 +156,7 @@ def _job(scene: LightScene, source: Source, options: TraceOptions) -> _Job:
         medium=number[start],
         first_edge=int(np.flatnonzero(geometry.facts[:, OWNER] == names.index(source.edge))[0]),
         middle=middle,
-        limits=np.array(
-            [options.split, options.cut, options.most_faces, math.ceil(1 / options.split) + 4]
-        ),
+        limits=np.array([options.split, options.cut, options.most_faces]),
         bins=options.bins,
         edges=len(names),
     )
@@ -190,6 +188,8 @@ def _run(
 
     sums, heat = np.zeros(columns(job.edges)), np.zeros(job.bins)
     trail = np.zeros((0, 5)) if trail is None else trail
+    # Branches wait with at least the split weight each, of a whole of 1.
+    depth = math.ceil(1 / job.limits[0]) + 4
     written = trace_block(
         *job.geometry,
         job.index,
@@ -200,6 +200,10 @@ def _run(
         key,
         first_ray,
         job.limits,
+        np.empty(7),
+        np.empty((depth, 7)),
+        np.empty((depth, 4), dtype=np.int64),
+        np.empty(depth, dtype=np.uint64),
         sums,
         heat,
         trail,

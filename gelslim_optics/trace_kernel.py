@@ -8,13 +8,21 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from gelslim_optics.trace_crossing import AIR, NOTHING, gel_plane, next_edge, side_medium
+from gelslim_optics.trace_crossing import AIR, COMPILED, NOTHING, gel_plane, next_edge, side_medium
+from gelslim_optics.trace_face import (
+    MIX_A,
+    STEP,
+    fresnel,
+    map_arrival,
+    normal_at,
+    scramble,
+    turn_back,
+    uniform,
+)
 from gelslim_optics.trace_geometry import (
     ABSORBED,
-    ARRIVED,
     CORNERS,
     CROSSINGS,
-    ELEVATION,
     ENDS,
     ENDS_STOPPED,
     ENTERED_GEL,
@@ -26,126 +34,14 @@ from gelslim_optics.trace_geometry import (
     OWNER,
     PER_EDGE,
     PRESENCE,
-    SLOPE,
     TRUNCATED,
 )
 
 # Faces that are no edge of the profile: end of the guide, end of the gel.
 END, GEL_END = -2, -3
-STEP = np.uint64(0x9E3779B97F4A7C15)
-MIX_A = np.uint64(0xBF58476D1CE4E5B9)
-MIX_B = np.uint64(0x94D049BB133111EB)
-S11, S27, S30, S31 = np.uint64(11), np.uint64(27), np.uint64(30), np.uint64(31)
-FOUR, ONE = np.uint64(4), np.uint64(1)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def scramble(z: Any) -> Any:
-    """Finaliser of splitmix64 (Steele, Lea, Flood 2014)."""
-    z = (z ^ (z >> S30)) * MIX_A
-    z = (z ^ (z >> S27)) * MIX_B
-    return z ^ (z >> S31)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def uniform(path: Any, bounce: Any, slot: Any) -> float:
-    """Number in [0, 1), a pure function of the path's key, the bounce and the slot."""
-    z = path + STEP * (FOUR * np.uint64(bounce) + np.uint64(slot) + ONE)
-    return float(scramble(z) >> S11) * 2.0**-53
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def fresnel(n1: float, n2: float, cosine: float) -> Any:
-    """Reflectance of unpolarised light and cosine behind the face; (1, 0) in total reflection."""
-    if n1 == n2:
-        return 0.0, cosine
-    ratio = n1 / n2
-    square = 1.0 - ratio * ratio * (1.0 - cosine * cosine)
-    if square <= 0.0:
-        return 1.0, 0.0
-    behind = math.sqrt(square)
-    rs = (n1 * cosine - n2 * behind) / (n1 * cosine + n2 * behind)
-    rp = (n1 * behind - n2 * cosine) / (n1 * behind + n2 * cosine)
-    return 0.5 * (rs * rs + rp * rp), behind
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def normal_at(shape: Any, e: int, y: float, z: float) -> Any:
-    """Unit normal of an edge (y, z), to its right."""
-    if shape[e, 7] == 0.0:
-        return shape[e, 4], shape[e, 5]
-    size = shape[e, 7] * shape[e, 6]
-    return (y - shape[e, 4]) / size, (z - shape[e, 5]) / size
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def map_arrival(
-    shape: Any,
-    box: Any,
-    e: int,
-    ray: Any,
-    w: float,
-    cosine: float,
-    ny: float,
-    nz: float,
-    sums: Any,
-    heat: Any,
-) -> None:
-    """Record the flux w that reaches the mapped face at the ray's place."""
-    x, y, z, dy, dz = ray[0], ray[1], ray[2], ray[4], ray[5]
-    ay, az, by, bz = shape[e, 0], shape[e, 1], shape[e, 2], shape[e, 3]
-    if shape[e, 7] == 0.0:
-        ty, tz = by - ay, bz - az
-        part = ((y - ay) * ty + (z - az) * tz) / (ty * ty + tz * tz)
-    else:
-        cy, cz = shape[e, 4], shape[e, 5]
-        py, pz, qy, qz = ay - cy, az - cz, by - cy, bz - cz
-        ry, rz = y - cy, z - cz
-        whole = abs(math.atan2(py * qz - pz * qy, py * qy + pz * qz))
-        part = abs(math.atan2(py * rz - pz * ry, py * ry + pz * rz)) / whole
-    if ay > by:
-        part = 1.0 - part
-    nx, ns = heat.shape
-    i = int(nx * (x - box[2]) / (box[3] - box[2]))
-    j = int(ns * part)
-    heat[min(max(i, 0), nx - 1), min(max(j, 0), ns - 1)] += w
-    sums[ARRIVED] += w
-    sums[ELEVATION] += w * math.asin(min(1.0, cosine))
-    # Normal to the right of the face; y grows along (|nz|, -ny sign nz).
-    up = -nz if nz < 0 else nz
-    ty, tz = up, -ny if nz > 0 else ny
-    sums[SLOPE] -= w * (dy * ty + dz * tz) / max(cosine, 1e-12)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stop_on(
-    coats: Any, coat: int, ray: Any, path: Any, bounce: int, normal: Any, cosine: float
-) -> float:
-    """Turn the ray at an opaque surface; returns the reflectance."""
-    reflectance = coats[coat, 1]
-    if reflectance == 0.0:
-        return 0.0
-    nx, ny, nz = normal
-    if coats[coat, 2] > 0.0:
-        deep2 = uniform(path, bounce, 1)
-        turn = 2 * math.pi * uniform(path, bounce, 2)
-        deep, wide = math.sqrt(deep2), math.sqrt(1.0 - deep2)
-        a, b = wide * math.cos(turn), wide * math.sin(turn)
-        # (tx, ty, tz) and (ux, uy, uz) span the face.
-        if nx != 0.0:
-            tx, ty, tz, ux, uy, uz = 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
-        else:
-            tx, ty, tz, ux, uy, uz = 1.0, 0.0, 0.0, 0.0, -nz, ny
-        ray[3] = a * tx + b * ux - deep * nx
-        ray[4] = a * ty + b * uy - deep * ny
-        ray[5] = a * tz + b * uz - deep * nz
-        return reflectance
-    for i in range(3):
-        ray[3 + i] -= 2 * cosine * normal[i]
-    return reflectance
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**COMPILED)
 def trace_block(
     shape: Any,
     facts: Any,
@@ -161,21 +57,22 @@ def trace_block(
     key: Any,
     first_ray: int,
     limits: Any,
+    ray: Any,
+    stack: Any,
+    notes: Any,
+    seeds: Any,
     sums: Any,
     heat: Any,
     trail: Any,
 ) -> int:
     """Trace rays (n, 8) into `sums` and `heat`; returns the number of rows written to `trail`.
 
-    `limits`: smallest weight split at a face, weight cut off, most faces met, capacity of the
-    stack. `trail` rows: ray, branch, x, y, z; none are written where it is empty.
+    `limits`: smallest weight split at a face, weight cut off, most faces met. `ray` (7),
+    `stack` (d, 7), `notes` (d, 4) and `seeds` (d) are room to work in. `trail` rows: ray, branch,
+    x, y, z; none are written where it is empty.
     """
     split, cut, most = limits[0], limits[1], int(limits[2])
-    depth = int(limits[3])
-    stack = np.empty((depth, 7))
-    notes = np.empty((depth, 4), dtype=np.int64)
-    seeds = np.empty(depth, dtype=np.uint64)
-    ray = np.empty(7)
+    depth = stack.shape[0]
     edges = (sums.shape[0] - PER_EDGE) // 3
     leaked, stopped, returned = PER_EDGE, PER_EDGE + edges, PER_EDGE + 2 * edges
     outside, gel, face = marks[0], marks[1], marks[2]
@@ -281,7 +178,7 @@ def trace_block(
                 if coats[beyond, 0] > 0.0:
                     if e >= 0 and facts[e, OWNER] == face:
                         map_arrival(shape, box, e, ray, w, cosine, normal[1], normal[2], sums, heat)
-                    kept = w * stop_on(coats, beyond, ray, path, bounce, normal, cosine)
+                    kept = w * turn_back(coats, beyond, ray, path, bounce, normal, cosine)
                     if e in (END, GEL_END):
                         sums[ENDS_STOPPED] += w - kept
                     else:
@@ -330,7 +227,7 @@ def trace_block(
                         stack[top, 6] = reflected
                         notes[top, 0], notes[top, 1] = e, now
                         notes[top, 2], notes[top, 3] = left, bounce
-                        seeds[top] = scramble(path + STEP * np.uint64(bounce))
+                        seeds[top] = scramble((path ^ MIX_A) + STEP * np.uint64(bounce))
                         top += 1
                     for i in range(3):
                         ray[3 + i] = ratio * ray[3 + i] + turn * normal[i]
@@ -353,7 +250,7 @@ def trace_block(
     return written
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**COMPILED)
 def note(trail: Any, written: int, ray_number: int, branch: int, ray: Any) -> int:
     """Write a point of a ray's path where there is room."""
     if written < trail.shape[0]:
@@ -365,7 +262,7 @@ def note(trail: Any, written: int, ray_number: int, branch: int, ray: Any) -> in
     return written
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**COMPILED)
 def book_leak(sums: Any, left: int, leaked: int, facts: Any, w: float) -> None:
     """Flux that left for good, by the face it last left a solid through."""
     if left >= 0:
