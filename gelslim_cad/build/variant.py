@@ -171,6 +171,7 @@ def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
             results[unit.name] = run(unit)
         return results
     # Forked workers start with the CAD kernel loaded; elsewhere each worker loads its own.
+    # Booleans run on kernel threads that a fork loses: units only write and read files.
     method = "fork" if sys.platform.startswith("linux") else "spawn"
     context = multiprocessing.get_context(method)
     with ProcessPoolExecutor(min(jobs, len(queue)), mp_context=context) as pool:

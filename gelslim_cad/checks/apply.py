@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.checks import guide, making, mechanics, optics, structure  # noqa: F401
+from gelslim_cad.checks import guide, making, mechanics, mount, optics, structure  # noqa: F401
 from gelslim_cad.checks.rule import GROUPS, RULES, Check, Finding, Rule, Status
 from gelslim_cad.dimensions import Dimensions
 

@@ -75,7 +75,8 @@ class Rule:
 GROUPS = {
     "optics": "Camera and view",
     "guide": "Light guide and LEDs",
-    "structure": "Walls, fits and mount",
+    "structure": "Walls, fits and screws",
+    "mount": "Mount and cable",
     "making": "Printing, casting and marking",
     "mechanics": "Gel, mesh and envelope",
 }

@@ -1,4 +1,4 @@
-"""Rules on walls, fits, fasteners and the joint to the gripper."""
+"""Rules on walls, fits and fasteners."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
-from gelslim_cad.dimensions.housing import COVER_TAB_MM
-from gelslim_cad.fasteners import SCREWS
+from gelslim_cad.fasteners import LENGTHS_MM, SCREWS
 
 THINNEST_WALL_MM = {
     "sla": (0.6, "thinner cured resin warps on its supports and cracks when a screw is driven"),
@@ -214,104 +213,37 @@ def clamp_beside(
 
 
 @rule(
-    "mount.bolt_mm",
-    title="Mount tongues are wide enough for their bolts",
-    parameter="design.mount.bolt",
-    why="a tongue needs 1.5 mm of material on both sides of its hole",
-    advice="use a smaller bolt or a narrower cable",
+    "screw.shortest_mm",
+    title="Shortest screws do not come through",
+    parameter="design.light_guide.thickness_mm",
+    why="countersunk screws are sold from 3 mm on; a longer one than its hole hits what is behind",
+    advice="use a thicker guide, bezel (thicker gel) or back wall, or a thinner tongue",
 )
-def mount_bolt(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
-    """Tongue width less the hole."""
-    width = tongue_outer_y_mm - tongue_inner_y_mm
-    return Finding(width - SCREWS[mount_bolt].clearance_mm, 3.0, least=True)
-
-
-@rule(
-    "mount.head_mm",
-    title="Bolt heads stay inside the mount block",
-    parameter="design.mount.bolt",
-    why="the sunk head must not break out at the side",
-    advice="use a smaller bolt",
-)
-def mount_head(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
-    """Half the tongue and side wall against half the head."""
-    half = (tongue_outer_y_mm - tongue_inner_y_mm) / 2
-    return Finding(half - SCREWS[mount_bolt].cap_head_mm / 2, 0.0, least=True)
-
-
-@rule(
-    "mount.block_mm",
-    title="Mount block is strong enough around its slots",
-    parameter="design.mount.tongue_thickness_mm",
-    why="above and below the tongue 2 mm of plastic must take the bolt's load",
-    advice="use a thinner tongue",
-)
-def mount_block(
-    finger_thickness_mm: Any,
-    housing_gel_proud_mm: Any,
-    mount_tongue_thickness_mm: Any,
-    housing_fit_clearance_mm: Any,
-) -> Finding:
-    """Material above the slot."""
-    height = finger_thickness_mm - housing_gel_proud_mm
-    land = (height - mount_tongue_thickness_mm) / 2 - housing_fit_clearance_mm
-    return Finding(land, 2.0, least=True)
-
-
-@rule(
-    "mount.cover_screw_mm",
-    title="Cover screws hold under the tongue slots",
-    parameter="design.mount.tongue_thickness_mm",
-    why="the pilot hole ends below the slot",
-    advice="use a thinner tongue",
-)
-def mount_cover_screw(
+def screw_shortest(
+    bezel_thickness_mm: Any,
+    light_guide_thickness_mm: Any,
+    housing_back_wall_mm: Any,
     tongue_z_mm: Any,
     mount_tongue_thickness_mm: Any,
     housing_fit_clearance_mm: Any,
     cover_top_z_mm: Any,
 ) -> Finding:
-    """Depth of the pilot hole."""
+    """Depth of plate and hole: bezel and roof, cover and mount block."""
     slot = tongue_z_mm - mount_tongue_thickness_mm / 2 - housing_fit_clearance_mm
-    return Finding(slot - cover_top_z_mm - 0.6, 1.5, least=True)
+    under_slot = housing_back_wall_mm + slot - cover_top_z_mm - 0.6
+    room = np.minimum(bezel_thickness_mm + light_guide_thickness_mm, under_slot)
+    return Finding(room, LENGTHS_MM[0], least=True)
 
 
 @rule(
-    "mount.tongue_mm",
-    title="Tongue reaches past its bolt",
-    parameter="design.mount.tongue_length_mm",
-    why="the bolt's hole needs 1.2 mm of tongue beyond it",
-    advice="lengthen the tongue or use a smaller bolt",
+    "clamp.before_seat_mm",
+    title="Camera clamp stands clear of the mirror's seat",
+    parameter="design.optics.clearance_mm",
+    why="clamp and seat are screwed to the same cover",
+    advice="give the view more clearance, lengthen the gel, or use a camera with a shorter lens",
 )
-def mount_tongue(mount_tongue_length_mm: Any, mount_bolt: str) -> Finding:
-    """Tongue beyond the hole."""
-    size = SCREWS[mount_bolt]
-    centre = size.cap_head_mm / 2 + 1.2
-    return Finding(mount_tongue_length_mm - centre - size.clearance_mm / 2, 1.2, least=True)
-
-
-@rule(
-    "cable.bend_mm",
-    title="Room for the cable's bend",
-    parameter="camera.cable_bend_radius_mm",
-    why="a sharper bend breaks the flat cable",
-    advice="the chamber follows the bend radius; report this as a fault",
-)
-def cable_bend(
-    camera_pose_rear_x_mm: Any, chamber_rear_x_mm: Any, camera_cable_bend_radius_mm: Any
+def clamp_before_seat(
+    mirror_seat_x_mm: Any, clamp_front_x_mm: Any, housing_fit_clearance_mm: Any
 ) -> Finding:
-    """Chamber behind the camera."""
-    room = camera_pose_rear_x_mm - chamber_rear_x_mm
-    return Finding(room, camera_cable_bend_radius_mm, least=True)
-
-
-@rule(
-    "cable.slot_mm",
-    title="Cable passes between the tongues",
-    parameter="camera.cable_width_mm",
-    why="the cable leaves through the middle of the mount",
-    advice="use a narrower cable or a wider finger",
-)
-def cable_slot(camera_cable_width_mm: Any, tongue_outer_y_mm: Any) -> Finding:
-    """Cable against the mount's width."""
-    return Finding(camera_cable_width_mm / 2 + COVER_TAB_MM, tongue_outer_y_mm)
+    """Gap between the clamp's lips and the seat's stop."""
+    return Finding(mirror_seat_x_mm - clamp_front_x_mm, housing_fit_clearance_mm, least=True)

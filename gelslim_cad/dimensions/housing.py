@@ -12,8 +12,12 @@ from gelslim_cad.fasteners import SCREWS
 
 CLAMP_CHEEK_MM = 3.5
 CLAMP_BAR_MM = 1.5
+CLAMP_LIP_MM = 1.2
+SEAT_STOP_MM = 1.0
 COVER_TAB_MM = 4.0
 """Least; a larger screw needs its head and 0.4 mm of cover on both sides."""
+TONGUE_ROOM_MM = 4.0
+"""Least from the cable to the outside of a tongue: 1.5 mm of gap and 2.5 mm of tongue."""
 BEAM_MM = 2.0
 MOUNT_WALL_MM = 1.5
 
@@ -186,6 +190,34 @@ def clamp_rear_x_mm(
     ends = (foot, camera_module_height_mm / 2)
     reach = np.minimum(*(b * np.sin(pitch) for b in ends))
     return camera_pose_x_mm - back * np.cos(pitch) + reach
+
+
+@dimension(
+    "clamp.front_x_mm", formula="foremost of the clamp's lips between the cover and the mirror"
+)
+def clamp_front_x_mm(
+    camera_pose_x_mm: Any,
+    camera_pose_z_mm: Any,
+    camera_pose_pitch_deg: Any,
+    camera_lens_height_mm: Any,
+    housing_fit_clearance_mm: Any,
+    cover_top_z_mm: Any,
+    mirror_lower_z_mm: Any,
+) -> Any:
+    """Foremost point of the camera clamp beside the mirror's seat."""
+    pitch = np.radians(camera_pose_pitch_deg)
+    lip = np.minimum(CLAMP_LIP_MM, camera_lens_height_mm - housing_fit_clearance_mm - 0.2)
+    front = housing_fit_clearance_mm + np.maximum(lip, 0.0) - camera_lens_height_mm
+    ends = (cover_top_z_mm, mirror_lower_z_mm)
+    rise = [(z - camera_pose_z_mm + front * np.sin(pitch)) / np.cos(pitch) for z in ends]
+    reach = np.maximum(*(r * np.sin(pitch) for r in rise))
+    return camera_pose_x_mm + front * np.cos(pitch) + reach
+
+
+@dimension("mirror.seat_x_mm", formula="mirror's lower end - stop")
+def mirror_seat_x_mm(mirror_lower_x_mm: Any) -> Any:
+    """Gripper end of the mirror's seat."""
+    return mirror_lower_x_mm - SEAT_STOP_MM
 
 
 @dimension("chamber.rear_x_mm", formula="rear of clamp and camera - cable bend radius - fit")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.dimensions.housing import CLAMP_BAR_MM, CLAMP_CHEEK_MM
+from gelslim_cad.dimensions.housing import CLAMP_BAR_MM, CLAMP_CHEEK_MM, CLAMP_LIP_MM
 from gelslim_cad.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import CAMERA, CLAMP, PRINTED
 from gelslim_cad.solids.shapes import Point2, box, pair, rod, single, subtract, union
 
 FAR_MM = 200.0
-LIP_MM = 1.2
 SCREW_DEPTH_MM = 5.0
 
 
@@ -68,7 +67,7 @@ def camera_clamp(d: Dimensions) -> Part:
         *pair((rear - CLAMP_BAR_MM, face), (inner, outer), (-FAR_MM, high)),
         box((rear - CLAMP_BAR_MM, rear), (-outer, outer), (-FAR_MM, 0)),
     ]
-    lip = min(LIP_MM, -face - fit - 0.2)
+    lip = min(CLAMP_LIP_MM, -face - fit - 0.2)
     if lip > 0.4 and lens + fit < inner - 0.4:
         pieces += pair((face - 0.1, face + fit + lip), (inner, outer), (-FAR_MM, lens))
         pieces += pair((face + fit, face + fit + lip), (lens + fit, inner + 0.1), (-FAR_MM, lens))

@@ -10,7 +10,6 @@ from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import MIRROR, PRINTED, SEAT
 from gelslim_cad.solids.shapes import Point2, prism_across, rod, single, subtract
 
-STOP_MM = 1.0
 SUNK_SHARE = 0.4
 SCREW_DEPTH_MM = 5.0
 
@@ -41,8 +40,8 @@ def mirror(d: Dimensions) -> Part:
 
 def seat_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
     """x from, x to and half width of the seat on the cover."""
-    low, _, _, high_back = _face(d)
-    return low[0] - STOP_MM, high_back[0], d["mirror.width_mm"] / 2
+    _, _, _, high_back = _face(d)
+    return d["mirror.seat_x_mm"], high_back[0], d["mirror.width_mm"] / 2
 
 
 def sunk_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:

@@ -130,6 +130,8 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
     "clamp.beside_channel_mm": [
         ({"=clamp.width_mm": 40.0, "=camera_pose.front_x_mm": -11.0}, "fail"),
     ],
+    "clamp.before_seat_mm": [({"=clamp.front_x_mm": -5.0}, "fail")],
+    "screw.shortest_mm": [({"design.light_guide.thickness_mm": 1.5}, "fail")],
     "mount.bolt_mm": [({"camera.cable_width_mm": 25.0}, "fail")],
     "mount.head_mm": [({"camera.cable_width_mm": 25.0}, "fail")],
     "mount.block_mm": [({"design.mount.tongue_thickness_mm": 14.0}, "fail")],
@@ -182,7 +184,7 @@ def test_rules_come_by_group_and_name_a_parameter_of_the_spec() -> None:
     found = check(smallest())
     groups = [c.group for c in found]
     runs = [g for i, g in enumerate(groups) if i == 0 or groups[i - 1] != g]
-    assert len(runs) == len(set(runs)) == 5
+    assert len(runs) == len(set(runs)) == 6
     assert {c.id for c in found} == set(RULES)
     unknown = {c.id: c.parameter for c in found if c.parameter not in smallest().given}
     assert unknown == {}
