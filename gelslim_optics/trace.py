@@ -16,7 +16,7 @@ from gelslim_optics.light_points import Sampling, point_batches
 from gelslim_optics.light_result import LightResult
 from gelslim_optics.light_scene import LightScene
 from gelslim_optics.light_source import Source
-from gelslim_optics.trace_geometry import OWNER, TraceGeometry, columns, pack
+from gelslim_optics.trace_geometry import OWNER, TraceGeometry, columns, face_names, pack
 
 Array = NDArray[np.float64]
 # Sums are kept per block and added in order, so that neither batches nor threads change a bit.
@@ -88,7 +88,8 @@ def trace_light(
     if sampling == "sobol":
         each = 1 << (each - 1).bit_length()
     batch = max(1, batch_rays // BLOCK_RAYS) * BLOCK_RAYS
-    width = columns(len(scene.profile.edges))
+    faces = face_names(scene)
+    width = columns(len(faces))
     tallies = np.zeros((len(scene.sources), replicates, width))
     maps = np.zeros((len(scene.sources), replicates, *options.bins))
     with ThreadPoolExecutor(threads) as pool:
@@ -107,7 +108,7 @@ def trace_light(
     return LightResult(
         colours=tuple(source.colour for source in scene.sources),
         shares=tuple(source.power / power for source in scene.sources),
-        edges=tuple(edge.name for edge in scene.profile.edges),
+        edges=faces,
         face=scene.face,
         rays=each * replicates * len(scene.sources),
         tallies=tallies / each,
@@ -147,7 +148,7 @@ def _job(scene: LightScene, source: Source, options: TraceOptions) -> _Job:
     for name, medium in scene.media.items():
         index[number[name]] = medium.index_for(source.colour, source.wavelength_um)
         absorption[number[name]] = medium.absorption_per_mm
-    names = [edge.name for edge in scene.profile.edges]
+    names = face_names(scene)
     start = launch_medium(scene, source)
     return _Job(
         geometry=geometry,

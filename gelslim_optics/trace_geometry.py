@@ -23,7 +23,7 @@ class TraceGeometry(NamedTuple):
     `shape` (e, 8): start and end (y, z), equal to the last bit where edges join, which makes the
     corners tight; then an arc's centre, radius and sense ±1, or a segment's unit normal to its
     right and two zeros. `facts` (e, 6):
-    media left and right, where present along x, number of the profile's edge, whether light ends
+    media left and right, where present along x, number of the edge's name, whether light ends
     behind it, and a number shared by pieces of one circle (-1 for segments). `near` (m, 1 + e):
     count and list of the edges that bound a medium; all of them for air, medium 0. `coats`
     (m, 3): opaque, reflectance, diffuse. `box`: x0, x1 of the guide and of the gel, and the size
@@ -43,22 +43,33 @@ def pack(scene: LightScene) -> tuple[TraceGeometry, dict[str, int], tuple[float,
     names = [AIR, *(m for m in scene.media if m != AIR), *scene.surfaces]
     number = {name: i for i, name in enumerate(names)}
     middle, extent = _box(scene)
-    pieces = [(i, p) for i, edge in enumerate(scene.profile.edges) for p in _pieces(edge)]
+    faces = face_names(scene)
+    pieces = [(faces.index(e.name), p) for e in scene.profile.edges for p in _pieces(e)]
     shape, circle = _shapes([p for _, p in pieces], middle)
     facts = [
         (number[p.left], number[p.right], _presence(scene, p), i, p.name in scene.feet, circle[k])
         for k, (i, p) in enumerate(pieces)
     ]
-    face = [i for i, e in enumerate(scene.profile.edges) if e.name == scene.face]
     geometry = TraceGeometry(
         shape=shape,
         facts=np.array(facts, dtype=np.int64),
         near=_near(facts, len(names)),
         coats=np.array([_coat(scene, name) for name in names], dtype=float),
         box=np.array([*scene.x_mm, *scene.gel_x_mm, CORNER_PART * extent], dtype=float),
-        marks=np.array([number[scene.ends], number.get(GEL, NONE), face[0] if face else NONE]),
+        marks=np.array(
+            [
+                number[scene.ends],
+                number.get(GEL, NONE),
+                faces.index(scene.face) if scene.face in faces else NONE,
+            ]
+        ),
     )
     return geometry, number, middle
+
+
+def face_names(scene: LightScene) -> tuple[str, ...]:
+    """Names of the profile's edges, each once, in order: what flux is booked to."""
+    return tuple(dict.fromkeys(edge.name for edge in scene.profile.edges))
 
 
 def _box(scene: LightScene) -> tuple[tuple[float, float], float]:

@@ -165,6 +165,12 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
     before_mirror = [x - lower_end_x + p.clearance_mm for x, _ in housing]
     ledge_x = ledge_edge - p.ledge_reach_mm
     under_ledge = [np.minimum(x - ledge_x, z - ledge_z + p.clearance_mm) for x, z in housing]
+    # The view from the camera to the mirror's upper end passes below ledge and beam.
+    climb = (upper_z - cz) / (upper_x - cx)
+    in_view = [
+        np.where(x > cx, cz + climb * (x - cx), -np.inf) + p.clearance_mm - ledge_z
+        for x in (ledge_edge, ledge_x)
+    ]
     violations = {
         "field of view along": vertical / p.half_vertical_tan - 1,
         "field of view across": horizontal / p.half_horizontal_tan - 1,
@@ -180,6 +186,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
             np.max(behind_mirror, axis=0), np.max(before_mirror, axis=0)
         )
         / 10,
+        "view below ledge": np.maximum(in_view[0], in_view[1]) / 10,
         "mirror before camera": (lower_end_x * -1 + cx + p.clearance_mm) / 10,
         "camera clear of ledge": np.maximum(
             np.max(under_ledge, axis=0),
