@@ -8,60 +8,54 @@
 
 from __future__ import annotations
 
-import math
-
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.guide_section import guide_profile
 from gelslim_cad.part import Part
 from gelslim_cad.solids.materials import ACRYLIC
 from gelslim_cad.solids.shapes import single
+from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Point, Segment
 
 
-def profile_wire(d: Dimensions, x_mm: float) -> cq.Wire:
-    """Cross-section of the guide in the plane x = x_mm, arcs exact."""
-    top, bottom = d["stack.gel_bottom_z_mm"], d["stack.window_bottom_z_mm"]
-    flat, foot = d["guide.flat_width_mm"] / 2, d["guide.leg_end_z_mm"]
-    inner, outer = d["guide.inner_radius_mm"], d["guide.outer_radius_mm"]
-    centre = bottom - inner
+def profile_wire(profile: GuideProfile, x_mm: float) -> cq.Wire:
+    """Outline of the profile's acrylic in the plane x = x_mm, arcs exact."""
 
-    def at(y: float, z: float) -> cq.Vector:
-        return cq.Vector(x_mm, y, z)
+    def at(point: Point) -> cq.Vector:
+        return cq.Vector(x_mm, *point)
 
-    def bend(side: int, radius: float) -> tuple[cq.Vector, cq.Vector, cq.Vector]:
-        """Flat end, middle and leg end of a bend."""
-        half = radius * math.sqrt(0.5)
-        return (
-            at(side * flat, centre + radius),
-            at(side * (flat + half), centre + half),
-            at(side * (flat + radius), centre),
-        )
+    def edge(curve: Segment | Arc) -> cq.Edge:
+        if isinstance(curve, Segment):
+            return cq.Edge.makeLine(at(curve.start), at(curve.end))
+        return cq.Edge.makeThreePointArc(at(curve.start), at(curve.at(0.5)), at(curve.end))
 
-    arc, line = cq.Edge.makeThreePointArc, cq.Edge.makeLine
-    right_out, right_in, left_out, left_in = (
-        bend(side, radius) for side in (1, -1) for radius in (outer, inner)
-    )
-    feet = [at(y, foot) for y in (flat + outer, flat + inner, -flat - outer, -flat - inner)]
-    edges = [
-        line(at(-flat, top), at(flat, top)),
-        arc(*right_out),
-        line(right_out[2], feet[0]),
-        line(feet[0], feet[1]),
-        line(feet[1], right_in[2]),
-        arc(*reversed(right_in)),
-        line(at(flat, bottom), at(-flat, bottom)),
-        arc(*left_in),
-        line(left_in[2], feet[3]),
-        line(feet[3], feet[2]),
-        line(feet[2], left_out[2]),
-        arc(*reversed(left_out)),
-    ]
-    return cq.Wire.assembleEdges(edges)
+    return cq.Wire.assembleEdges([edge(e.curve) for e in joined(profile.outline("acrylic"))])
+
+
+def joined(outline: tuple[Edge, ...]) -> list[Edge]:
+    """The outline with straight runs in one: what lies beside the acrylic does not cut its face."""
+    merged: list[Edge] = []
+    for edge in outline:
+        last = merged[-1] if merged else None
+        if last is not None and _in_line(last.curve, edge.curve):
+            run = Segment(last.curve.start, edge.curve.end)
+            merged[-1] = Edge(last.name, run, last.left, last.right)
+        else:
+            merged.append(edge)
+    return merged
+
+
+def _in_line(first: Segment | Arc, second: Segment | Arc) -> bool:
+    if not (isinstance(first, Segment) and isinstance(second, Segment)):
+        return False
+    (a, b), (c, d), (_, _), (e, f) = first.start, first.end, second.start, second.end
+    cross = (c - a) * (f - d) - (d - b) * (e - c)
+    return abs(cross) < 1e-9 * first.length_mm * second.length_mm
 
 
 def light_guide(d: Dimensions) -> Part:
     """The guide over its whole length."""
-    wire = profile_wire(d, d["guide.proximal_end_x_mm"])
+    wire = profile_wire(guide_profile(d), d["guide.proximal_end_x_mm"])
     solid = cq.Solid.extrudeLinear(wire, [], cq.Vector(d["guide.length_mm"], 0, 0))
     return Part(
         name="light_guide",
