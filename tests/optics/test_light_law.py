@@ -1,0 +1,72 @@
+"""Angular laws and launches against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gelslim_optics.light_law import Dome, Lambertian, MeasuredLaw
+from gelslim_optics.light_points import point_batches
+from gelslim_optics.light_source import EdgeLaunch, LedRow
+
+U = (np.arange(100_000) + 0.5) / 100_000
+
+
+def test_lambertian_moments() -> None:
+    cosine = Lambertian().cosine(U)
+    assert np.mean(cosine) == pytest.approx(2 / 3, abs=1e-6)
+    assert np.mean(cosine**2) == pytest.approx(1 / 2, abs=1e-6)
+
+
+def test_dome_of_90_degrees_is_lambertian_and_narrow_ones_end() -> None:
+    assert np.allclose(Dome(90.0, 1.0).cosine(U), Lambertian().cosine(U), atol=1e-12)
+    narrow = Dome(20.0, 3.0).cosine(U)
+    assert narrow.min() >= math.cos(math.radians(20.0))
+    # Mean cosine for intensity cos³ within 20°.
+    c = math.cos(math.radians(20.0))
+    assert np.mean(narrow) == pytest.approx((1 - c**5) / 5 / ((1 - c**4) / 4), abs=1e-7)
+
+
+def test_a_measured_law_of_cosines_is_lambertian() -> None:
+    angles = np.linspace(0, 90, 181)
+    law = MeasuredLaw(tuple(angles), tuple(np.cos(np.radians(angles))))
+    assert np.allclose(law.cosine(U), Lambertian().cosine(U), atol=2e-4)
+    ring = MeasuredLaw((0.0, 30.0, 31.0, 40.0, 41.0), (0.0, 0.0, 1.0, 1.0, 0.0))
+    angle = np.degrees(np.arccos(ring.cosine(U)))
+    assert angle.min() > 29.9
+    assert angle.max() < 41.1
+
+
+@pytest.mark.parametrize(
+    ("angles", "values"),
+    [((0.0,), (1.0,)), ((5.0, 10.0), (1.0, 1.0)), ((0.0, 95.0), (1.0, 1.0)), ((0.0, 9.0), (0, 0))],
+)
+def test_bad_tables_are_refused(angles: tuple, values: tuple) -> None:
+    with pytest.raises(ValueError, match=r"angle|intensity|intensities"):
+        MeasuredLaw(angles, values)
+
+
+def test_bad_sources_are_refused() -> None:
+    with pytest.raises(ValueError, match="no LED"):
+        LedRow("foot_left", ())
+    with pytest.raises(ValueError, match="size_mm"):
+        LedRow("foot_left", (0.0,), size_mm=0.0)
+    with pytest.raises(ValueError, match="half_angle_deg"):
+        Dome(0.0)
+    with pytest.raises(ValueError, match="na"):
+        EdgeLaunch("foot_left", na=-1.0)
+
+
+def test_pieces_of_a_batch_join_up_and_replicates_differ() -> None:
+    for sampling in ("sobol", "random"):
+        whole, split, other = (
+            np.concatenate(
+                list(point_batches(4096, b, seed=1, replicate=r, source=0, sampling=sampling))
+            )
+            for b, r in ((4096, 0), (512, 0), (4096, 1))
+        )
+        assert np.array_equal(whole, split)
+        assert not np.array_equal(whole, other)
+        assert whole.shape == (4096, 4)
