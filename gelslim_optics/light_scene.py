@@ -75,7 +75,10 @@ class LightScene:
     The gel covers `gel_x_mm` only, within `x_mm`: elsewhere the bonded face meets air and the
     gel's other faces are absent. `ends` names what the faces x = x0, x1 meet (air, or a
     surface). Light that crosses an edge of `feet` into the air ends there (LED board): it is
-    `returned`. `face` is the edge whose arriving light is mapped and counted as delivered.
+    `returned`. Light that leaves elsewhere goes on in the air: it may meet a mirror, enter again
+    or reach the gel's sides; once it meets nothing more, the back of a coat, or a foot from
+    outside, it has leaked, through the edge by which it last left a solid. `face` is the edge
+    whose arriving light is mapped and counted as delivered.
 
     Raises ValueError for extents out of order and media the scene does not describe.
     """

@@ -33,7 +33,7 @@ class TraceOptions:
     Weight below `cut`, or past `most_faces` faces, is booked as truncated.
     """
 
-    split: float = 1e-2
+    split: float = 5e-2
     cut: float = 1e-6
     most_faces: int = 10_000
     bins: tuple[int, int] = (40, 40)

@@ -7,6 +7,7 @@ import math
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
 from gelslim_optics.guide_shapes import (
     CurvedGuide,
+    Fit,
     GelSection,
     MirrorGuide,
     curved_profile,
@@ -98,11 +99,11 @@ def bend_scene(
     )
 
 
-def led_rows(pad_mm: float, **options: float) -> tuple[Source, ...]:
+def led_rows(pad_mm: float, gap_mm: float) -> tuple[Source, ...]:
     places = tuple(pad_mm * (i + 0.5) / 4 - pad_mm / 2 for i in range(4))
     return (
-        LedRow("foot_left", places, colour="red", **options),
-        LedRow("foot_right", places, colour="green", **options),
+        LedRow("foot_left", places, gap_mm=gap_mm, colour="red"),
+        LedRow("foot_right", places, gap_mm=gap_mm, colour="green"),
     )
 
 
@@ -120,7 +121,7 @@ def finger(
     """A guide 2 mm thick with LEDs of that size at both feet; curved, or with a mirror."""
     gel = GelSection(pad_mm * gel_part, 2.0, crown_mm)
     if mirror:
-        fit = "glued" if mirror == "glued" else "air_gap"
+        fit: Fit = "glued" if mirror == "glued" else "air_gap"
         profile = mirror_profile(MirrorGuide(pad_mm, 2.0, leg_mm, fit), gel)
     else:
         profile = curved_profile(CurvedGuide(pad_mm, 2.0, 2.0 * ratio, leg_mm), gel)

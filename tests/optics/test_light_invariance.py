@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -98,8 +100,8 @@ def test_the_two_sides_of_a_symmetric_finger_agree() -> None:
 def test_batches_and_threads_never_change_a_bit() -> None:
     scene = finger(1.5)
     first = trace_light(scene, 1 << 16, replicates=2)
-    for options in ({"batch_rays": 4096}, {"batch_rays": 5000}, {"threads": 3}, {"threads": 8}):
-        other = trace_light(scene, 1 << 16, replicates=2, **options)
+    for threads, batch in ((1, 4096), (1, 5000), (3, 1 << 16), (8, 8192)):
+        other = trace_light(scene, 1 << 16, replicates=2, threads=threads, batch_rays=batch)
         assert np.array_equal(first.tallies, other.tallies)
         assert np.array_equal(first.maps, other.maps)
 
@@ -129,3 +131,8 @@ def test_sobol_beats_chance() -> None:
         runs = [trace_light(scene, 1 << 15, seed=s, sampling=sampling) for s in range(6)]
         errors[sampling] = np.mean([r.ledger()["delivered"].standard_error for r in runs])
     assert errors["sobol"] < errors["random"] / 4
+
+
+def test_the_compiler_is_loaded_only_to_trace() -> None:
+    code = "import sys, gelslim_optics.trace as t; sys.exit('numba' in sys.modules or t is None)"
+    subprocess.run([sys.executable, "-c", code], check=True)
