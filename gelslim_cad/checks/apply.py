@@ -22,11 +22,12 @@ def check(d: Dimensions) -> tuple[Check, ...]:
 
 def check_batch(d: Dimensions) -> Mapping[str, NDArray[np.bool_]]:
     """For each rule, where (n,) it fails, for the n designs of a batch."""
+    count = np.size(d["finger.thickness_mm"])
     failed = {}
     for entry in RULES.values():
         found = _find(entry, d)
-        missed = _missed(found)
-        failed[entry.id] = np.asarray(missed & (not found.advisory))
+        missed = np.ravel(_missed(found) & (not found.advisory))
+        failed[entry.id] = np.broadcast_to(missed, (count,))
     return failed
 
 

@@ -9,6 +9,8 @@ its least bad fold, which the design rules then report.
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 
 import numpy as np
@@ -23,6 +25,8 @@ SHRINK = 0.7
 LEVELS = 26
 STARTS = 6
 CHUNK = 64
+COMPILED_FROM = 200
+"""Designs from which loading the compiled search pays."""
 INFEASIBLE_MM = 1000.0
 KEYSTONE_WEIGHT_MM = 0.02
 LENGTH_WEIGHT = 0.002
@@ -38,12 +42,28 @@ def objective(candidates: Fold) -> Array:
 
 
 def solve_fold(problem: FoldProblem) -> Fold:
-    """Best fold per design, every field (n,); infeasible designs keep violations > 0."""
+    """Best fold per design, every field (n,); infeasible designs keep violations > 0.
+
+    Batches are searched by the compiled twin of the same search, on all processors.
+    """
+    if len(problem) >= COMPILED_FROM:
+        return _solve_compiled(problem)
     parts = [
         _solve_chunk(problem.rows(slice(start, start + CHUNK)))
         for start in range(0, len(problem), CHUNK)
     ]
     return _concatenate(parts)
+
+
+def _solve_compiled(problem: FoldProblem) -> Fold:
+    from gelslim_cad.dimensions.fold_search import search
+
+    jobs = os.cpu_count() or 1
+    cuts = np.array_split(np.arange(len(problem)), min(jobs * 4, len(problem)))
+    with ThreadPoolExecutor(jobs) as pool:
+        found = list(pool.map(search, (problem.rows(cut) for cut in cuts)))
+    chosen = [np.concatenate(axis)[:, None, None] for axis in zip(*found, strict=True)]
+    return _squeeze(fold(problem, *chosen))
 
 
 def _solve_chunk(problem: FoldProblem) -> Fold:
