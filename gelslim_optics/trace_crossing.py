@@ -5,7 +5,7 @@ sign of one number per corner, the same for both edges that meet there, so no ra
 them. No distance is compared with a tolerance, save in naming a corner that rounding missed.
 
 `trace_kernel` is compiled with these functions inside it and its cached code is only renewed when
-its own file changes: touch that file after editing this one.
+its own file changes: remove the cached code (`__pycache__/*.nb*`) after editing this one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 from numba import njit
 
-from gelslim_optics.trace_geometry import BONDED, CIRCLE, GEL_ONLY, PRESENCE
+from gelslim_optics.trace_geometry import BONDED, CIRCLE, CORNER_PART, GEL_ONLY, PRESENCE
 
 AIR = 0
 NOTHING = -1
@@ -25,12 +25,12 @@ COMPILED = {
     "cache": True,
     "nogil": True,
     "error_model": "numpy",
-    "forceinline": True,
     "_nrt": False,
 }
+INLINED = {**COMPILED, "forceinline": True}
 
 
-@njit(**COMPILED)
+@njit(**INLINED)
 def crossings(
     shape: Any, facts: Any, e: int, last: int, y: float, z: float, dy: float, dz: float
 ) -> Any:
@@ -70,7 +70,7 @@ def crossings(
     return 2, (-root - along) / s2, not leaves, (root - along) / s2, leaves
 
 
-@njit(**COMPILED)
+@njit(**INLINED)
 def side_medium(facts: Any, box: Any, gel: int, e: int, right: bool, x: float) -> int:
     """Medium on one side of an edge at x; beside the gel the bonded face meets air."""
     medium = facts[e, 1 if right else 0]
@@ -79,7 +79,52 @@ def side_medium(facts: Any, box: Any, gel: int, e: int, right: bool, x: float) -
     return medium
 
 
+@njit(**INLINED)
+def edge_normal(shape: Any, e: int, y: float, z: float) -> Any:
+    """Unit normal of an edge (y, z) at a place on it, to its right."""
+    if shape[e, 7] == 0.0:
+        return shape[e, 4], shape[e, 5]
+    size = shape[e, 7] * shape[e, 6]
+    return (y - shape[e, 4]) / size, (z - shape[e, 5]) / size
+
+
 @njit(**COMPILED)
+def corner_exit(
+    shape: Any,
+    facts: Any,
+    near: Any,
+    corner_mm: float,
+    medium: int,
+    last: int,
+    y: float,
+    z: float,
+    dy: float,
+    dz: float,
+) -> Any:
+    """Other face at the corner the ray stands on, if it heads out there: (edge, left to right).
+
+    A ray that stands on a corner may pass both of its faces on the outside.
+    """
+    found, found_way, steepest = NOTHING, False, 0.0
+    for k in range(near[medium, 0]):
+        e = near[medium, 1 + k]
+        if e == last:
+            continue
+        at_start = max(abs(shape[e, 0] - y), abs(shape[e, 1] - z)) <= corner_mm
+        at_end = max(abs(shape[e, 2] - y), abs(shape[e, 3] - z)) <= corner_mm
+        if not (at_start or at_end):
+            continue
+        ny, nz = edge_normal(shape, e, y, z)
+        outward = dy * ny + dz * nz
+        way = facts[e, 0] == medium
+        if not way:
+            outward = -outward
+        if outward > steepest:
+            found, found_way, steepest = e, way, outward
+    return found, found_way
+
+
+@njit(**INLINED)
 def next_edge(
     shape: Any,
     facts: Any,
@@ -129,11 +174,22 @@ def next_edge(
         return out, out_t, out_way, 0
     if wrong_t == FAR and medium == AIR:
         return NOTHING, FAR, False, 0
-    # The nearest face is met from its wrong side: rounding put the ray past a corner.
+    # The nearest face is met from its wrong side: rounding put the ray past a corner. Ahead, the
+    # ray passes the tip of an inward corner; behind, it stands on one; or it runs along a face.
+    if out != NOTHING and out_t - wrong_t <= box[4]:
+        return out, out_t, out_way, 1
     if back_t > -box[4]:
         return back, 0.0, back_way, 1
-    if wrong_t < box[4] and (out != NOTHING or medium == AIR):
-        return out, out_t, out_way, 1
+    e, way = corner_exit(shape, facts, near, box[4], medium, last, y, z, dy, dz)
+    if e != NOTHING:
+        return e, 0.0, way, 1
+    if out != NOTHING or medium == AIR:
+        runs_along = False
+        if last >= 0:
+            ny, nz = edge_normal(shape, last, y, z)
+            runs_along = abs(dy * ny + dz * nz) <= CORNER_PART
+        if wrong_t <= box[4] or runs_along:
+            return out, out_t, out_way, 1
     return NOTHING, FAR, False, 2
 
 

@@ -52,15 +52,6 @@ def fresnel(n1: float, n2: float, cosine: float) -> Any:
 
 
 @njit(**COMPILED)
-def normal_at(shape: Any, e: int, y: float, z: float) -> Any:
-    """Unit normal of an edge (y, z), to its right."""
-    if shape[e, 7] == 0.0:
-        return shape[e, 4], shape[e, 5]
-    size = shape[e, 7] * shape[e, 6]
-    return (y - shape[e, 4]) / size, (z - shape[e, 5]) / size
-
-
-@njit(**COMPILED)
 def map_arrival(
     shape: Any,
     box: Any,

@@ -8,13 +8,20 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from gelslim_optics.trace_crossing import AIR, COMPILED, NOTHING, gel_plane, next_edge, side_medium
+from gelslim_optics.trace_crossing import (
+    AIR,
+    COMPILED,
+    NOTHING,
+    edge_normal,
+    gel_plane,
+    next_edge,
+    side_medium,
+)
 from gelslim_optics.trace_face import (
     MIX_A,
     STEP,
     fresnel,
     map_arrival,
-    normal_at,
     scramble,
     turn_back,
     uniform,
@@ -161,7 +168,7 @@ def trace_block(
                 if e < 0:
                     normal = (1.0 if dx > 0 else -1.0, 0.0, 0.0)
                 else:
-                    ny, nz = normal_at(shape, e, ray[1], ray[2])
+                    ny, nz = edge_normal(shape, e, ray[1], ray[2])
                     normal = (0.0, ny, nz) if way else (0.0, -ny, -nz)
                 cosine = max(ray[3] * normal[0] + ray[4] * normal[1] + ray[5] * normal[2], 0.0)
                 if (
