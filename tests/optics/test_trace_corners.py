@@ -52,6 +52,6 @@ def test_rays_started_on_corners_of_the_foot() -> None:
     ]
     sums, _, _ = _run(job, np.array(starts), np.uint64(3), 0)
     assert sums[LOST] == 0
-    # Half of them head out through the neighbouring wall at once.
-    assert sums[CORNERS] > 400
+    # Half head out through the neighbouring wall at once; at one of the ends by signs alone.
+    assert sums[CORNERS] == 250
     assert sums[: ENDS_STOPPED + 1].sum() + sums[PER_EDGE:].sum() == pytest.approx(1000, abs=1e-9)
