@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,25 +18,13 @@ from gelslim_cad.build import BuildRefusedError, build_variant
 from gelslim_cad.build import variant as variant_module
 from gelslim_cad.build.folder import OutputError
 
+Digests = Callable[[Path], dict[str, str]]
 SPEC = Path(__file__).parents[2] / "designs" / "mini20.yaml"
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("out") / "mini20"
-    build_variant(SPEC, folder, jobs=1)
-    return folder
-
-
-def digests(folder: Path) -> dict[str, str]:
-    return {
-        p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in sorted(folder.rglob("*"))
-        if p.is_file()
-    }
-
-
-def test_all_kinds_of_files_are_there_and_listed_with_their_hash(built: Path) -> None:
+def test_all_kinds_of_files_are_there_and_listed_with_their_hash(
+    built: Path, digests: Digests
+) -> None:
     found = digests(built)
     manifest = json.loads((built / "manifest.json").read_text())
     assert {p: e["sha256"] for p, e in manifest["files"].items()} == {
@@ -84,7 +73,7 @@ def test_checks_on_the_solids_are_among_the_rules(built: Path) -> None:
     assert rules["assembly.interference"]["status"] == "pass"
 
 
-def test_nothing_is_done_again_when_nothing_changed(built: Path) -> None:
+def test_nothing_is_done_again_when_nothing_changed(built: Path, digests: Digests) -> None:
     before = digests(built)
     result = build_variant(SPEC, built, jobs=1)
     assert result.up_to_date
@@ -93,8 +82,6 @@ def test_nothing_is_done_again_when_nothing_changed(built: Path) -> None:
 
 
 def test_only_what_changed_is_done_again(built: Path, tmp_path: Path) -> None:
-    import shutil
-
     copy = tmp_path / "mini20"
     shutil.copytree(built, copy)
     spec = tmp_path / "changed.yaml"
@@ -105,9 +92,7 @@ def test_only_what_changed_is_done_again(built: Path, tmp_path: Path) -> None:
     assert "part body" not in result.rebuilt
 
 
-def test_a_damaged_file_is_made_again(built: Path, tmp_path: Path) -> None:
-    import shutil
-
+def test_a_damaged_file_is_made_again(built: Path, tmp_path: Path, digests: Digests) -> None:
     copy = tmp_path / "mini20"
     shutil.copytree(built, copy)
     (copy / "step" / "mirror.step").write_bytes(b"damaged")
@@ -117,7 +102,9 @@ def test_a_damaged_file_is_made_again(built: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_fresh_process_writes_the_same_bytes(built: Path, tmp_path: Path) -> None:
+def test_a_fresh_process_writes_the_same_bytes(
+    built: Path, tmp_path: Path, digests: Digests
+) -> None:
     target = tmp_path / "again"
     code = (
         "from gelslim_cad.build import build_variant; import sys;"
@@ -130,7 +117,9 @@ def test_a_fresh_process_writes_the_same_bytes(built: Path, tmp_path: Path) -> N
     assert digests(target) == digests(built)
 
 
-def test_a_failing_rule_refuses_and_leaves_the_old_output(built: Path, tmp_path: Path) -> None:
+def test_a_failing_rule_refuses_and_leaves_the_old_output(
+    built: Path, tmp_path: Path, digests: Digests
+) -> None:
     before = digests(built)
     spec = tmp_path / "thin.yaml"
     spec.write_text(SPEC.read_text().replace("max_thickness_mm: 18", "max_thickness_mm: 12"))
@@ -140,7 +129,7 @@ def test_a_failing_rule_refuses_and_leaves_the_old_output(built: Path, tmp_path:
 
 
 def test_a_build_that_dies_leaves_the_old_output(
-    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, digests: Digests
 ) -> None:
     before = digests(built)
     spec = tmp_path / "changed.yaml"
