@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from gelslim_cad.dimensions import guide, housing, pad, placement, view  # noqa: F401  (registers)
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension
+from gelslim_cad.dimensions.solver import threads
 from gelslim_cad.spec import Spec
 
 SHORT_BLOCK = "design."
@@ -134,10 +135,14 @@ def derive(spec: Spec) -> Dimensions:
     return Dimensions(values, given, fold)
 
 
-def derive_batch(spec: Spec, overrides: Mapping[str, Any]) -> Dimensions:
+def derive_batch(
+    spec: Spec, overrides: Mapping[str, Any], *, jobs: int | None = None
+) -> Dimensions:
     """Dimensions of n designs at once: `overrides` maps spec paths to arrays (n,).
 
-    Raises KeyError for a path that the spec lacks. Values are not checked against the spec's
+    `jobs` threads search the folds of large batches (none: one per processor); the number never
+    changes a value. Raises KeyError for a path that the spec lacks and ValueError for `jobs` below
+    1. Values are not checked against the spec's
     ranges: draw them from within.
     """
     given: dict[str, Any] = dict(leaves(spec))
@@ -145,7 +150,8 @@ def derive_batch(spec: Spec, overrides: Mapping[str, Any]) -> Dimensions:
         if path not in given:
             raise KeyError(f"no spec field is called {path}")
         given[path] = np.asarray(value)
-    computed = _evaluate(given)
+    with threads(jobs):
+        computed = _evaluate(given)
     fold = computed.pop("fold.layout")
     count = max((np.size(v) for v in overrides.values()), default=1)
     values = {name: np.broadcast_to(value, (count,)) for name, value in computed.items()}

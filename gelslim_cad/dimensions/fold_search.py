@@ -1,7 +1,8 @@
-"""The search of `solver` compiled, for batches of designs: same candidates, same order, same score.
+"""The search of `solver` compiled, for batches of designs: same grids, same score, same winners.
 
-`fold.fold` is the reference; here candidates are scored one by one, and two ray angles that
-cannot win are left before the mirror is turned. Importing this module loads numba.
+`fold.fold` is the reference. Candidates are scored one by one against the best so far and left as
+soon as they cannot beat it: missed limits only add up, and a part of the depth bounds the whole.
+Importing this module loads numba.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from gelslim_cad.dimensions.fold import FoldProblem
 Array = NDArray[np.float64]
 NEWTON_STEPS = 40
 FEASIBLE = 1e-9
+LAST_STEP = 1e-8
+"""Newton's error after a step of this part of the slope is its square, below rounding."""
 
 
 def search(problem: FoldProblem) -> tuple[Array, Array, Array]:
@@ -44,13 +47,13 @@ def scores(problem: FoldProblem, mid: Array, spread: Array, mirror: Array) -> Ar
     weights = (solver.INFEASIBLE_MM, solver.KEYSTONE_WEIGHT_MM, solver.LENGTH_WEIGHT)
     return np.array(
         [
-            _mirror_score(row, _view(row, m, s), a, weights)
+            _mirror_score(row, _view(row, m, s), math.cos(a), math.sin(a), np.inf, weights)
             for row, m, s, a in zip(rows, mid, spread, mirror, strict=True)
         ]
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _search_all(rows, axes, bands, box, levels, weights):  # type: ignore[no-untyped-def]
     found = np.empty((len(rows), 3))
     for k in range(len(rows)):
@@ -58,7 +61,7 @@ def _search_all(rows, axes, bands, box, levels, weights):  # type: ignore[no-unt
     return found
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _search_one(row, axes, bands, box, levels, weights):  # type: ignore[no-untyped-def]
     """Best candidate of one design: each band's best, refined by itself."""
     lower, upper, first_width, ticks = box
@@ -67,39 +70,43 @@ def _search_one(row, axes, bands, box, levels, weights):  # type: ignore[no-unty
     for count in bands:
         band = (axes[0][begin : begin + count], axes[1], axes[2])
         begin += count
-        at, score = _grid(row, band, weights)
+        at, score = np.array([band[0][0], band[1][0], band[2][0]]), np.inf
+        score = _grid(row, band, at, score, weights)
         width = first_width.copy()
         for _ in range(levels[0]):
             near = np.empty((3, len(ticks)))
             for a in range(3):
                 for t in range(len(ticks)):
                     near[a, t] = min(max(at[a] + ticks[t] * width[a], lower[a]), upper[a])
-            at, score = _grid(row, (near[0], near[1], near[2]), weights)
+            score = _grid(row, (near[0], near[1], near[2]), at, score, weights)
             width *= levels[1]
         if score < best:
             winner, best = at, score
     return winner
 
 
-@njit(cache=True, nogil=True)
-def _grid(row, axes, weights):  # type: ignore[no-untyped-def]
-    """First best candidate of a grid, in the order of its axes."""
-    at, best = np.array([axes[0][0], axes[1][0], axes[2][0]]), np.inf
+@njit(cache=True, nogil=True, error_model="numpy")
+def _grid(row, axes, at, known, weights):  # type: ignore[no-untyped-def]
+    """Best score of a grid that holds a candidate of score `known`; `at` moves to the first best.
+
+    Equals are scored to the end: the first of them wins, as in the reference.
+    """
+    best = np.inf
+    cosines, sines = np.cos(axes[2]), np.sin(axes[2])
     for mid in axes[0]:
         for spread in axes[1]:
             view = _view(row, mid, spread)
-            missed = view[-1]
-            if missed > FEASIBLE and weights[0] * (1 + missed) >= best:
+            if _worse(view[-1], min(known, best), weights):
                 continue
-            for mirror in axes[2]:
-                score = _mirror_score(row, view, mirror, weights)
+            for k in range(len(axes[2])):
+                score = _mirror_score(row, view, cosines[k], sines[k], min(known, best), weights)
                 if score < best:
                     best = score
-                    at[0], at[1], at[2] = mid, spread, mirror
-    return at, best
+                    at[0], at[1], at[2] = mid, spread, axes[2][k]
+    return min(known, best)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _view(p, mid, spread):  # type: ignore[no-untyped-def]
     """What the two ray angles fix; last, how far its limits are missed."""
     length, width, gel, n_gel, guide, n_guide, tan_h, tan_v = p[:8]
@@ -117,10 +124,9 @@ def _view(p, mid, spread):  # type: ignore[no-untyped-def]
     lowest, highest = math.atan(shallowest), math.atan(steepest)
     tilt = min(max(0.0, highest - half), lowest + half)
     apparent = air + guide / n_guide + gel / n_gel
-    z_near = apparent / math.cos(near) * math.cos(near - tilt)
-    z_far = apparent / math.cos(far) * math.cos(far - tilt)
-    least, most = min(z_near, z_far), max(z_near, z_far)
     st, ct = math.sin(tilt), math.cos(tilt)
+    z_near, z_far = apparent * (ct + sn * st), apparent * (ct + sf * st)
+    least, most = min(z_near, z_far), max(z_near, z_far)
     horizontal = max(ny / (nx * st + ct), fy / (fx * st + ct))
     vertical = math.tan(max(highest - tilt, tilt - lowest))
     focus = 2 * z_near * z_far / (z_near + z_far)
@@ -131,15 +137,14 @@ def _view(p, mid, spread):  # type: ignore[no-untyped-def]
     missed += max(blur / p[24] - 1, 0.0) + max(p[25] / px - 1, 0.0)
     missed += max(most / least / p[26] - 1, 0.0) + max(2.0 - air, 0.0)
     missed += max((travel - travel_mm) / max(travel_mm, 0.1), 0.0)
-    return vx, air, shallowest, steepest, tilt, most / least, missed
+    return vx, air, shallowest, steepest, ct, st, most / least, missed
 
 
-@njit(cache=True, nogil=True)
-def _mirror_score(p, view, mirror, weights):  # type: ignore[no-untyped-def]
-    """`solver.objective` of one candidate."""
-    vx, air, shallowest, steepest, tilt, keystone, missed = view
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mirror_score(p, view, ca, sa, known, weights):  # type: ignore[no-untyped-def]
+    """`solver.objective` of one candidate; inf once it is certain to be above `known`."""
+    vx, air, shallowest, steepest, ct, st, keystone, missed = view
     gap, border = p[19], p[18]
-    ca, sa = math.cos(mirror), math.sin(mirror)
     window = -(p[4] + p[2])
     vz = window - air
     upper_z = window - gap - border * sa
@@ -148,11 +153,19 @@ def _mirror_score(p, view, mirror, weights):  # type: ignore[no-untyped-def]
     lower_x, lower_z = upper_x - down * ca, upper_z - down * sa
     away = (vx - upper_x) * -sa + (vz - upper_z) * ca
     cx, cz = vx + 2 * away * sa, vz - 2 * away * ca
-    pitch = math.pi / 2 - 2 * mirror - tilt
-    c, s = math.cos(pitch), math.sin(pitch)
+    lower_end = lower_x - border * ca
+    missed += max(max(-down, vz - lower_z) / 10, 0.0)
+    missed += max((cx + gap - lower_end) / 10, 0.0)
+    mirror_depth = window - (lower_z - border * sa - p[17] * ca)
+    depth, tie = max(mirror_depth, window - cz + gap, p[22]), weights[1] * (keystone - 1)
+    # The barrel's front is about the pinhole: the housing is no higher and no farther ahead.
+    if depth + tie - weights[2] * cx > known or _worse(missed, known, weights):
+        return np.inf
+    # Pitch = 90 deg - 2 mirror - tilt.
+    s2, c2 = 2 * sa * ca, ca * ca - sa * sa
+    c, s = s2 * ct + c2 * st, c2 * ct - s2 * st
     half, radius, face = p[13] / 2, p[15] / 2, -p[16]
     rear = face - p[14]
-    lower_end = lower_x - border * ca
     ledge_z = window - p[20]
     ledge = min(-p[0] / 2 - 0.2, vx + shallowest * (ledge_z - vz) - gap)
     ledge_x = ledge - p[21]
@@ -167,9 +180,10 @@ def _mirror_score(p, view, mirror, weights):  # type: ignore[no-untyped-def]
         behind = max(behind, gap - ((x - upper_x) * -sa + (z - upper_z) * ca))
         before = max(before, x - lower_end + gap)
         under = max(under, min(x - ledge_x, z - ledge_z + gap))
-    missed += max(max(-down, vz - lower_z) / 10, 0.0)
     missed += max((top - window + gap) / 10, 0.0) + max(beside / 10, 0.0)
-    missed += max(min(behind, before) / 10, 0.0) + max((cx + gap - lower_end) / 10, 0.0)
+    missed += max(min(behind, before) / 10, 0.0)
+    if _worse(missed, known, weights):
+        return np.inf
     outside = _outside(ledge_x - cx, ledge_z - cz, c, s, p[16], half, radius)
     missed += max(max(under, gap - outside) / 10, 0.0)
     climb, seen = (upper_z - cz) / (upper_x - cx), -np.inf
@@ -179,38 +193,42 @@ def _mirror_score(p, view, mirror, weights):  # type: ignore[no-untyped-def]
     missed += max((seen + gap - ledge_z) / 10, 0.0)
     if missed > FEASIBLE:
         return weights[0] * (1 + missed)
-    mirror_depth = window - (lower_z - border * sa - p[17] * ca)
-    depth = max(mirror_depth, window - bottom + gap, p[22])
-    return depth + weights[1] * (keystone - 1) - weights[2] * back
+    return max(depth, window - bottom + gap) + tie - weights[2] * back
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _worse(missed, known, weights):  # type: ignore[no-untyped-def]
+    return missed > FEASIBLE and weights[0] * (1 + missed) > known
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _outside(dx, dz, c, s, lens_height, half, radius):  # type: ignore[no-untyped-def]
     ahead, above = dx * c - dz * s, dx * s + dz * c
     return min(max(ahead + lens_height, above - half), max(ahead, above - radius))
 
 
-@njit(cache=True, nogil=True)
-def _reach(slope, guide, n_guide, gel, n_gel):  # type: ignore[no-untyped-def]
-    s2 = slope * slope / (1 + slope * slope)
-    reach = guide * math.sqrt(s2 / (n_guide**2 - s2)) + gel * math.sqrt(s2 / (n_gel**2 - s2))
-    return math.copysign(reach, slope)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _reach(t, guide, n_guide, gel, n_gel):  # type: ignore[no-untyped-def]
+    """`refraction.lateral_reach`; h s / sqrt(n² - s²) is h t / sqrt(n² + (n² - 1) t²)."""
+    guided = math.sqrt(n_guide**2 + (n_guide**2 - 1) * t * t)
+    return guide * t / guided + gel * t / math.sqrt(n_gel**2 + (n_gel**2 - 1) * t * t)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _corner(along, across, air, guide, n_guide, gel, n_gel):  # type: ignore[no-untyped-def]
-    """Slopes along and across of the ray to a corner, by the Newton of `refraction.ray_slope`."""
-    reach = math.hypot(along, across)
-    t = reach / (air + guide + gel)
+    """Slopes along and across of the ray to a corner, by the Newton of `refraction.ray_slope`.
+
+    Started from the paraxial slope: the reach is concave, so that one, too, is below the root.
+    """
+    reach = math.sqrt(along * along + across * across)
+    g2, p2 = n_guide * n_guide, n_gel * n_gel
+    t = reach / (air + guide / n_guide + gel / n_gel)
     for _ in range(NEWTON_STEPS):
-        u = 1 + t * t
-        s2 = t * t / u
-        g2, p2 = n_guide * n_guide - s2, n_gel * n_gel - s2
-        g, q = math.sqrt(g2), math.sqrt(p2)
-        value = air * t + (guide / g + gel / q) * math.sqrt(s2) - reach
-        bend = guide * n_guide * n_guide / (g2 * g) + gel * n_gel * n_gel / (p2 * q)
-        step = -value / (air + bend / (u * math.sqrt(u)))
-        t = max(t + step, 0.0)
-        if abs(step) <= 1e-14 * (1 + t):
+        g, p = g2 + (g2 - 1) * t * t, p2 + (p2 - 1) * t * t
+        over_g, over_p = guide / (g * math.sqrt(g)), gel / (p * math.sqrt(p))
+        short = reach - t * (air + over_g * g + over_p * p)
+        step = short / (air + over_g * g2 + over_p * p2)
+        t += step
+        if abs(step) <= LAST_STEP * (1 + t):
             break
     return t * along / reach, t * across / reach

@@ -10,7 +10,9 @@ its least bad fold, which the design rules then report.
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import fields
 
 import numpy as np
@@ -27,9 +29,28 @@ STARTS = 6
 CHUNK = 64
 COMPILED_FROM = 200
 """Designs from which loading the compiled search pays."""
+PIECE = 64
+"""Designs that a thread searches at a time."""
 INFEASIBLE_MM = 1000.0
 KEYSTONE_WEIGHT_MM = 0.02
 LENGTH_WEIGHT = 0.002
+
+_JOBS: ContextVar[int | None] = ContextVar("fold search threads", default=None)
+
+
+@contextmanager
+def threads(jobs: int | None) -> Iterator[None]:
+    """Let `solve_fold` use `jobs` threads for batches; None: as many as there are processors.
+
+    Raises ValueError for less than one. The number never changes a result.
+    """
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs is {jobs}; give 1 or more, or none for all processors")
+    token = _JOBS.set(jobs)
+    try:
+        yield
+    finally:
+        _JOBS.reset(token)
 
 
 def objective(candidates: Fold) -> Array:
@@ -44,7 +65,8 @@ def objective(candidates: Fold) -> Array:
 def solve_fold(problem: FoldProblem) -> Fold:
     """Best fold per design, every field (n,); infeasible designs keep violations > 0.
 
-    Batches are searched by the compiled twin of the same search, on all processors.
+    Batches of COMPILED_FROM designs or more are searched by the compiled twin of the same search,
+    in threads (see `threads`); smaller ones start none.
     """
     if len(problem) >= COMPILED_FROM:
         return _solve_compiled(problem)
@@ -56,14 +78,26 @@ def solve_fold(problem: FoldProblem) -> Fold:
 
 
 def _solve_compiled(problem: FoldProblem) -> Fold:
+    from concurrent.futures import ThreadPoolExecutor
+
     from gelslim_cad.dimensions.fold_search import search
 
-    jobs = os.cpu_count() or 1
-    cuts = np.array_split(np.arange(len(problem)), min(jobs * 4, len(problem)))
-    with ThreadPoolExecutor(jobs) as pool:
-        found = list(pool.map(search, (problem.rows(cut) for cut in cuts)))
+    pieces = [problem.rows(slice(start, start + PIECE)) for start in range(0, len(problem), PIECE)]
+    jobs = min(_JOBS.get() or _processors(), len(pieces))
+    if jobs == 1:
+        found = [search(piece) for piece in pieces]
+    else:
+        with ThreadPoolExecutor(jobs) as pool:
+            found = list(pool.map(search, pieces))
     chosen = [np.concatenate(axis)[:, None, None] for axis in zip(*found, strict=True)]
     return _squeeze(fold(problem, *chosen))
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _solve_chunk(problem: FoldProblem) -> Fold:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fold_samples import shipped
 
-from gelslim_cad.dimensions import derive_batch, fold_search, solver
+from gelslim_cad.dimensions import Dimensions, derive_batch, fold_search, solver
 from gelslim_cad.dimensions import view as view_module
 from gelslim_cad.dimensions.fold import Fold, FoldProblem, fold
 
@@ -35,8 +34,13 @@ def problem() -> FoldProblem:
     rng = np.random.default_rng(5)
     asked: list[FoldProblem] = []
     original = view_module.solve_fold
+
+    def spy(p: FoldProblem) -> Fold:
+        asked.append(p)
+        return original(p)
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(view_module, "solve_fold", lambda p: asked.append(p) or original(p))
+        patch.setattr(view_module, "solve_fold", spy)
         derive_batch(shipped("mini20"), {path: rng.uniform(*s, COUNT) for path, s in SPANS.items()})
     return asked[0]
 
@@ -70,19 +74,52 @@ def test_folds_are_those_of_the_reference(
     np.testing.assert_allclose(compiled.depth_mm[good], reference.depth_mm[good], atol=1e-6)
 
 
-def test_threads_do_not_change_a_bit(problem: FoldProblem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solver.os, "cpu_count", lambda: 1)
-    one = solved(problem, monkeypatch, 1)
-    monkeypatch.setattr(solver.os, "cpu_count", lambda: 3)
-    three = solved(problem, monkeypatch, 1)
-    for f in fields(Fold):
-        if f.name != "violations":
-            assert np.array_equal(getattr(one, f.name), getattr(three, f.name)), f.name
+def batch(count: int, jobs: int | None) -> Dimensions:
+    rng = np.random.default_rng(6)
+    overrides = {path: rng.uniform(*span, count) for path, span in SPANS.items()}
+    return derive_batch(shipped("mini20"), overrides, jobs=jobs)
+
+
+def test_jobs_do_not_change_a_bit() -> None:
+    count = solver.COMPILED_FROM + 37
+    one = batch(count, 1)
+    for jobs in (2, 3, None):
+        other = batch(count, jobs)
+        for name, value in one.values.items():
+            assert np.array_equal(value, other[name]), name
+        for name, missed in one.fold.violations.items():
+            assert np.array_equal(missed, other.fold.violations[name]), name
+    assert 0.1 < np.mean(one.feasible()) < 0.9
+
+
+class Refused:
+    def __init__(self, *_: object) -> None:
+        raise AssertionError("a thread pool was started")
+
+
+def test_small_batches_and_one_job_start_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("concurrent.futures.ThreadPoolExecutor", Refused)
+    batch(COUNT, 2)
+    batch(solver.COMPILED_FROM, 1)
+    with pytest.raises(AssertionError, match="thread pool"):
+        batch(solver.COMPILED_FROM, 2)
+
+
+def test_jobs_below_one_are_refused() -> None:
+    with pytest.raises(ValueError, match="jobs is 0"):
+        batch(2, 0)
+
+
+def test_an_interrupted_batch_leaves_the_next_one_its_threads() -> None:
+    with pytest.raises(RuntimeError), solver.threads(1):
+        raise RuntimeError
+    assert solver._JOBS.get() is None
 
 
 def test_single_designs_do_not_load_the_compiler() -> None:
     code = (
-        "import sys; from fold_samples import mini20; mini20();"
+        "import sys; from fold_samples import mini20; from gelslim_cad.checks import check;"
+        "check(mini20());"
         "assert 'numba' not in sys.modules and 'cadquery' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parent)
