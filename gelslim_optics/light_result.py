@@ -66,10 +66,12 @@ class LightResult:
     def replicates(self, entry: str, colour: str | None = None) -> Array:
         """One value per replicate of a ledger entry, as a share of the emitted flux.
 
-        `colour` restricts to the sources of that colour (and their flux). Raises KeyError for an
-        entry that the ledger lacks.
+        Beside the ledger's entries: `arrived` (at the gel's face, again after each reflection
+        there) and `entered_gel` (net through the bonded face). `colour` restricts to the sources
+        of that colour (and their flux). Raises KeyError for an unknown entry.
         """
-        places = self._columns()
+        extra = {"arrived": column.ARRIVED, "entered_gel": column.ENTERED_GEL}
+        places = {**self._columns(), **extra}
         if entry not in places:
             raise KeyError(f"the ledger has no entry {entry!r}; it has {', '.join(places)}")
         return self._sum(colour)[:, places[entry]]

@@ -1,0 +1,121 @@
+"""Profiles: closed outlines, exact areas, one shared face, mirror images."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide_shapes import (
+    CurvedGuide,
+    GelSection,
+    MirrorGuide,
+    curved_profile,
+    mirror_profile,
+)
+
+GEL = GelSection(20.0, 2.0)
+SHAPES = {
+    "curved": curved_profile(CurvedGuide(22, 2, 6, 3), GEL),
+    "crowned": curved_profile(CurvedGuide(22, 2, 6, 3), GelSection(20, 2, 0.8)),
+    "flush": curved_profile(CurvedGuide(20, 2.5, 3, 1), GEL),
+    "open": curved_profile(CurvedGuide(22, 2, 6, 3, bend_rad=math.radians(60)), GEL),
+    "closed": curved_profile(CurvedGuide(30, 2, 6, 3, bend_rad=math.radians(120)), GEL),
+    "tapered": curved_profile(CurvedGuide(22, 2, 6, 3, foot_thickness_mm=3.0), GEL),
+    "glued": mirror_profile(MirrorGuide(22, 2, 3), GEL),
+    "air_gap": mirror_profile(MirrorGuide(22, 2, 3, "air_gap"), GEL),
+    "bare": curved_profile(CurvedGuide(22, 2, 6, 3)),
+}
+
+
+def polygon_area(profile: GuideProfile, medium: str, steps: int = 4000) -> float:
+    points = np.array(
+        [e.curve.at(k / steps) for e in profile.outline(medium) for k in range(steps)]
+    )
+    y, z = points.T
+    return float(0.5 * np.sum(y * np.roll(z, -1) - z * np.roll(y, -1)))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_outlines_close_counter_clockwise_with_their_exact_area(name: str) -> None:
+    profile = SHAPES[name]
+    for medium in ("acrylic",) if name == "bare" else ("acrylic", "gel"):
+        area = profile.area_mm2(medium)
+        assert area > 0
+        assert area == pytest.approx(polygon_area(profile, medium), rel=1e-6)
+
+
+def test_area_of_the_curved_guide_is_that_of_its_pieces() -> None:
+    expected = 22 * 2 + 2 * (math.pi / 4 * (8**2 - 6**2) + 3 * 2)
+    assert SHAPES["curved"].area_mm2("acrylic") == pytest.approx(expected, rel=1e-14)
+
+
+def test_guide_and_gel_share_one_face() -> None:
+    for name in ("curved", "glued", "crowned"):
+        faces = [e for e in SHAPES[name].edges if {e.left, e.right} == {"acrylic", "gel"}]
+        assert len(faces) == 1
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_profiles_are_their_own_mirror_image(name: str) -> None:
+    profile = SHAPES[name]
+    turned = profile.reflected()
+    assert turned.area_mm2("acrylic") == pytest.approx(profile.area_mm2("acrylic"), rel=1e-12)
+
+    def ends(p: GuideProfile) -> np.ndarray:
+        found = [(*e.curve.at(0.5), e.curve.length_mm) for e in p.edges]
+        return np.array(sorted((round(a, 9), round(b, 9), round(c, 9)) for a, b, c in found))
+
+    np.testing.assert_allclose(ends(turned), ends(profile), atol=1e-8)
+
+
+def test_bends_survive_a_metre_of_travel() -> None:
+    (first, second) = SHAPES["curved"].moved(1000.0, 1000.0).bends()
+    for bend in (first, second):
+        assert bend.ratio == pytest.approx(3.0, rel=1e-12)
+        assert bend.sweep_rad == pytest.approx(math.pi / 2)
+    assert SHAPES["glued"].bends() == ()
+
+
+def test_a_gap_is_named() -> None:
+    loose = GuideProfile(
+        (
+            Edge("floor", Segment((0, 0), (1, 0)), "acrylic", "air"),
+            Edge("wall", Segment((1, 0.1), (0, 0)), "acrylic", "air"),
+        )
+    )
+    with pytest.raises(ValueError, match="open after edge floor"):
+        loose.outline("acrylic")
+    with pytest.raises(ValueError, match="no gel"):
+        loose.outline("gel")
+    with pytest.raises(KeyError, match="ceiling"):
+        loose.edge("ceiling")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: CurvedGuide(22, 2, 0.0, 3), "inner_radius_mm = 0"),
+        (lambda: CurvedGuide(22, -2, 6, 3), "thickness_mm = -2"),
+        (lambda: CurvedGuide(22, 2, math.nan, 3), "inner_radius_mm = nan"),
+        (lambda: CurvedGuide(22, 2, 6, 3, bend_rad=3.0), "at most 150"),
+        (lambda: CurvedGuide(22, 2, 1, 3, foot_thickness_mm=5.0), "foot reaches"),
+        (lambda: CurvedGuide(18, 2, 6, 3), "exceeds the flat window"),
+    ],
+)
+def test_impossible_guides_are_refused(make: object, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        curved_profile(make(), GEL)  # type: ignore[operator]
+
+
+def test_edges_need_two_media_and_a_length() -> None:
+    with pytest.raises(ValueError, match="both sides"):
+        GuideProfile((Edge("a", Segment((0, 0), (1, 0)), "air", "air"),))
+    with pytest.raises(ValueError, match="no length"):
+        GuideProfile((Edge("a", Segment((0, 0), (0, 0)), "acrylic", "air"),))
+    with pytest.raises(ValueError, match="radius_mm"):
+        Arc((0, 0), 0.0, 0.0, 1.0)
+    with pytest.raises(ValueError, match="sweep_rad"):
+        Arc((0, 0), 1.0, 0.0, 0.0)
