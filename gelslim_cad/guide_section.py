@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.lookup import Lookup
 from gelslim_optics.guide_profile import GuideProfile
 from gelslim_optics.guide_shapes import CurvedGuide, GelSection, MirrorGuide, curved_profile
 
 
-def gel_section(d: Dimensions) -> GelSection:
+def gel_section(d: Lookup) -> GelSection:
     """The pad in the plane x = 0, in the sensor frame's y and z."""
     gel = GelShape.of(d)
     rise = -float(gel.surface_z_mm(0.0, gel.width_mm / 2))
     return GelSection(gel.width_mm, gel.thickness_mm - rise, rise)
 
 
-def curved_guide(d: Dimensions) -> CurvedGuide:
+def curved_guide(d: Lookup) -> CurvedGuide:
     """The finger's own guide."""
     return CurvedGuide(
         flat_width_mm=d["guide.flat_width_mm"],
@@ -26,16 +26,19 @@ def curved_guide(d: Dimensions) -> CurvedGuide:
     )
 
 
-def guide_profile(d: Dimensions) -> GuideProfile:
+def guide_profile(d: Lookup) -> GuideProfile:
     """Edges of guide and gel, exact arcs, (y, z) of the sensor frame."""
     return curved_profile(curved_guide(d), gel_section(d))
 
 
-def straight_guide(d: Dimensions) -> MirrorGuide:
-    """A guide of the GelSlim 1 type in the same place: LEDs at the same depth, no bends."""
+def straight_guide(d: Lookup) -> MirrorGuide:
+    """A guide of the GelSlim 1 type for the same gel: as long a leg, a mirror for each bend.
+
+    Without a bend its LEDs sit higher by R, which is to its favour.
+    """
     return MirrorGuide(
         flat_width_mm=d["guide.flat_width_mm"],
         thickness_mm=d["design.light_guide.thickness_mm"],
-        leg_mm=d["guide.inner_radius_mm"] + d["design.light_guide.leg_length_mm"],
+        leg_mm=d["design.light_guide.leg_length_mm"],
         window_top_z_mm=d["stack.gel_bottom_z_mm"],
     )

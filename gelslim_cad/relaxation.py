@@ -53,11 +53,7 @@ def relaxations(spec: Spec) -> tuple[Relaxation, ...]:
             "a gel 0.5 mm thinner",
         ),
         *_thinner_acrylic(spec),
-        Relaxation(
-            "design.light_guide.bend_radius_ratio",
-            max(0.5, g.light_guide.bend_radius_ratio - 0.5),
-            "a bend radius ratio smaller by 0.5",
-        ),
+        *_tighter_bend(spec),
         Relaxation(
             "design.housing.back_wall_mm",
             max(0.4, g.housing.back_wall_mm - 0.2),
@@ -99,6 +95,13 @@ def ladders(spec: Spec) -> tuple[tuple[Relaxation, ...], ...]:
             [Relaxation("camera.focal_length_mm", v, f"a lens of f = {v:.2g} mm") for v in focal]
         )
     return tuple(_legal(spec, steps) for steps in found)
+
+
+def _tighter_bend(spec: Spec) -> Iterable[Relaxation]:
+    ratio = spec.design.light_guide.bend_radius_ratio
+    if ratio != "auto":
+        path, words = "design.light_guide.bend_radius_ratio", "a bend radius ratio smaller by 0.5"
+        yield Relaxation(path, max(0.5, ratio - 0.5), words)
 
 
 def _thinner_acrylic(spec: Spec) -> Iterable[Relaxation]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from gelslim_cad.build.bom import BomLine
 from gelslim_cad.build.instructions import build_guide
+from gelslim_cad.build.light_writer import LIGHT_JSON
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.build.page import pictures, report_data
 from gelslim_cad.build.plain_json import checks_json, json_bytes, plain
@@ -85,5 +86,6 @@ def report_document(
         pictures(shown, missing),
         files,
         bom,
+        contents.get(LIGHT_JSON, b""),
     )
     return render_report(data), "report with 3D viewer, offline"

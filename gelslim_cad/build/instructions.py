@@ -68,7 +68,7 @@ def _laser(d: Dimensions) -> str:
         f"stock may differ by {100 * d['manufacturing.acrylic_tolerance_ratio']:g} %.\n"
         "2. Anneal (80 °C, 1 h per 3 mm, slow cooling), or the edge crazes when glued.\n"
         f"3. Bend both sides by 90° over a former of radius {r:.2f} mm (R/t = "
-        f"{d['design.light_guide.bend_radius_ratio']:g}) at about 160 °C; legs "
+        f"{d['guide.bend_ratio']:g}) at about 160 °C; legs "
         f"{d['design.light_guide.leg_length_mm']:g} mm long, outer width "
         f"{d['guide.outer_width_mm']:.2f} mm.\n"
         "4. Polish the ends of the legs: light enters there.\n"

@@ -14,6 +14,7 @@ from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.build.work import PackedPart, Unit
 from gelslim_cad.checks import Check, check
 from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.light.inputs import light_inputs
 from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh, pad_outline, spec_hash
 from gelslim_cad.part import Part
 from gelslim_cad.spec.reader import LoadedSpec
@@ -87,6 +88,7 @@ class Stages:
             Unit("glb", "glb", whole, named, cost=6),
             Unit("pictures", "pictures", whole, cost=20),
             self._mould_unit(packed["gel_pad"]),
+            Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
         ]
         units += [
             Unit(f"part {p.name}", "part", (packed[p.name],), cost=len(packed[p.name].shape) / 1e5)

@@ -18,11 +18,9 @@ from gelslim_cad.checks.rule import Finding, rule
     advice="use a larger bend radius; the finger gets wider by twice the difference",
     unit="",
 )
-def bend_ratio(light_guide_bend_radius_ratio: Any, guide_full_guidance_ratio: Any) -> Finding:
+def bend_ratio(guide_bend_ratio: Any, guide_full_guidance_ratio: Any) -> Finding:
     """R/t with its two limits."""
-    return Finding(
-        light_guide_bend_radius_ratio, 0.5, least=True, caution=guide_full_guidance_ratio
-    )
+    return Finding(guide_bend_ratio, 0.5, least=True, caution=guide_full_guidance_ratio)
 
 
 @rule(

@@ -13,6 +13,7 @@ from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
 from gelslim_cad.cli.explain import explain
+from gelslim_cad.cli.light import light
 from gelslim_cad.cli.markers import markers
 from gelslim_cad.cli.new import new
 from gelslim_cad.cli.schema import schema
@@ -48,5 +49,5 @@ def _options(
     """Options before any command."""
 
 
-for _command in (new, check, derive, explain, build, bundle, markers, schema):
+for _command in (new, check, derive, explain, build, bundle, markers, light, schema):
     app.command()(carried(_command))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from gelslim_cad.dimensions import guide, housing, pad, placement, view  # noqa: F401  (registers)
+from gelslim_cad.dimensions import bend, guide, housing, pad, placement, view  # noqa: F401  (registers)
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension
 from gelslim_cad.dimensions.solver import threads

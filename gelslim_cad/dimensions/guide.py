@@ -30,9 +30,9 @@ def stack_window_bottom_z_mm(stack_gel_total_mm: Any, light_guide_thickness_mm: 
 
 
 @dimension("guide.inner_radius_mm", formula="R = (R/t) t", source=GUIDE)
-def guide_inner_radius_mm(light_guide_bend_radius_ratio: Any, light_guide_thickness_mm: Any) -> Any:
+def guide_inner_radius_mm(guide_bend_ratio: Any, light_guide_thickness_mm: Any) -> Any:
     """Inner radius of the bends."""
-    return light_guide_bend_radius_ratio * light_guide_thickness_mm
+    return guide_bend_ratio * light_guide_thickness_mm
 
 
 @dimension("guide.outer_radius_mm", formula="R + t", source=GUIDE)

@@ -71,6 +71,15 @@ class Camera(Block):
     frame_rate_hz: float = Field(
         default=90.0, gt=0, le=5000, description="Highest frame rate at this image size"
     )
+    quantum_efficiency: float = Field(
+        default=0.3, gt=0, le=1, description="Electrons per photon, colour filter included"
+    )
+    full_well_e_um2: float = Field(
+        default=2200.0, gt=0, le=1e5, description="Full well per µm² of sensor, in electrons"
+    )
+    lens_transmission: float = Field(
+        default=0.9, gt=0, le=1, description="Part of the light that the lens passes"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Camera:

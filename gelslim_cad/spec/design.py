@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import itertools
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -41,8 +42,10 @@ class LightGuide(Block):
     thickness_mm: float = Field(
         default=2.5, ge=0.5, le=10, description="Acrylic thickness t of window, bends and legs"
     )
-    bend_radius_ratio: float = Field(
-        default=2.1, ge=0.1, le=20, description="Inner bend radius over thickness, R/t"
+    bend_radius_ratio: Annotated[float, Field(ge=0.1, le=20)] | Literal["auto"] = Field(
+        default=2.1,
+        description="Inner bend radius over thickness, R/t; auto: the brightest that "
+        "envelope.max_width_mm leaves room for",
     )
     leg_length_mm: float = Field(
         default=1.0, ge=0.2, le=30, description="Straight leg between bend and LED"
@@ -72,6 +75,47 @@ class Leds(Block):
         default=0.15, ge=0, le=2, description="Placement error of an LED on its board"
     )
     board_thickness_mm: float = Field(default=0.8, ge=0.2, le=5, description="LED board thickness")
+    radiant_flux_mw: float = Field(
+        default=20.0, gt=0, le=10000, description="Radiant flux of one LED at its drive current"
+    )
+    red_wavelength_nm: float = Field(
+        default=625.0, ge=560, le=760, description="Wavelength of the red LEDs"
+    )
+    green_wavelength_nm: float = Field(
+        default=525.0, ge=480, le=580, description="Wavelength of the green LEDs"
+    )
+    emission: Literal["lambertian", "dome", "table"] = Field(
+        default="lambertian",
+        description="How the LED's light spreads: bare die, lens dome, or a data-sheet table",
+    )
+    dome_half_angle_deg: float = Field(
+        default=60.0, ge=1, le=90, description="Half angle beyond which a dome sends no light"
+    )
+    emission_angle_deg: tuple[float, ...] = Field(
+        default=(),
+        max_length=200,
+        description="Angles of the table, rising from 0 to at most 90; emission: table needs it",
+    )
+    emission_intensity: tuple[float, ...] = Field(
+        default=(), max_length=200, description="Relative intensity at each angle of the table"
+    )
+
+    @model_validator(mode="after")
+    def _table(self) -> Leds:
+        if self.emission != "table":
+            return self
+        angles, values = self.emission_angle_deg, self.emission_intensity
+        if len(angles) < 2 or len(angles) != len(values):
+            raise ValueError(
+                "emission: table needs emission_angle_deg and emission_intensity, two or more "
+                f"values each and as many; they hold {len(angles)} and {len(values)}"
+            )
+        rising = all(a < b for a, b in itertools.pairwise(angles))
+        if angles[0] != 0 or angles[-1] > 90 or not rising:
+            raise ValueError("emission_angle_deg must start at 0, rise, and end at 90 or below")
+        if min(values) < 0 or max(values) <= 0:
+            raise ValueError("emission_intensity must be >= 0 and not all zero")
+        return self
 
 
 class Markers(Block):

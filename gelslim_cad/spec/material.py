@@ -17,6 +17,9 @@ class GelMaterial(Block):
     poissons_ratio: float = Field(default=0.3223, ge=0, lt=0.5, description="Poisson's ratio")
     density_kg_m3: float = Field(default=1020.0, ge=200, le=4000, description="Density")
     refractive_index: float = Field(default=1.41, ge=1, le=2, description="Refractive index")
+    coat_reflectance: float = Field(
+        default=0.5, ge=0, le=0.98, description="Part of the light that the painted coat scatters"
+    )
     mix_ratio_a: float = Field(default=15.0, gt=0, le=1000, description="Parts A by mass")
     mix_ratio_b: float = Field(default=1.0, gt=0, le=1000, description="Parts B by mass")
 

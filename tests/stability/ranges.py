@@ -30,6 +30,8 @@ class Leaf:
     low_open: bool = False
     high_open: bool = False
     choices: tuple[str, ...] = ()
+    word: str = ""
+    """A word allowed instead of a number."""
 
 
 def _constraints(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
@@ -45,9 +47,10 @@ def _constraints(annotation: Any, metadata: list[Any]) -> Iterator[Any]:
 
 
 def _plain(annotation: Any) -> Any:
-    """The annotation without None and `Annotated`."""
+    """The annotation without None, words such as "auto", and `Annotated`."""
     if get_origin(annotation) in (Union, types.UnionType):
-        (annotation,) = [a for a in get_args(annotation) if a is not type(None)]
+        members = [a for a in get_args(annotation) if a is not type(None)]
+        (annotation,) = [a for a in members if get_origin(a) is not Literal]
     return getattr(annotation, "__origin__", annotation) if _annotated(annotation) else annotation
 
 
@@ -81,7 +84,11 @@ def _leaf(path: str, field: FieldInfo) -> Leaf:
     assert low is not None, f"{path} has no lower limit"
     assert high is not None, f"{path} has no upper limit"
     name: Literal["int", "float"] = "int" if kind is int else "float"
-    return Leaf(path, name, default, required, optional, low, high, low_open, high_open)
+    words = [get_args(a)[0] for a in get_args(field.annotation) if get_origin(a) is Literal]
+    word = words[0] if words else ""
+    return Leaf(
+        path, name, default, required, optional, low, high, low_open, high_open, word=word
+    )
 
 
 def _leaves(model: type[BaseModel], prefix: str = "") -> Iterator[Leaf]:
@@ -129,6 +136,8 @@ def anywhere(rng: np.random.Generator, leaf: Leaf) -> Any:
         return sorted({short(10 ** rng.uniform(-1, 1)) for _ in range(count)})
     if leaf.optional and rng.random() < 0.5:
         return None
+    if leaf.word and rng.random() < 0.1:
+        return leaf.word
     return _number(rng, leaf)
 
 

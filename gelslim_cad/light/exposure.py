@@ -1,0 +1,70 @@
+"""Exposure that the traced light allows, and whether light or readout sets the frame rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from gelslim_cad.lookup import Lookup
+from gelslim_optics.light_result import LightResult
+
+PLANCK_J_S = 6.62607015e-34
+LIGHT_M_S = 2.99792458e8
+WELL_SHARE = 0.5
+"""Part of the full well that the mean of the picture fills: bright spots keep a stop of room."""
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Exposure of one colour with a guide, and the frame rate it allows."""
+
+    colour: str
+    irradiance_uw_mm2: float
+    exposure_ms: float
+    frame_rate_hz: float
+    limit: Literal["readout", "exposure"]
+
+    def sentence(self) -> str:
+        """In words."""
+        why = "readout sets it" if self.limit == "readout" else "light sets it"
+        return (
+            f"{self.colour}: {self.exposure_ms:.2f} ms of exposure fill half the well, "
+            f"{self.frame_rate_hz:.0f} frames per second, {why}"
+        )
+
+
+def exposure(d: Lookup, light: LightResult, colour: str) -> Exposure:
+    """Exposure that fills half of the sensor's full well at the mean irradiance of the coat.
+
+    The coat scatters the part ρ evenly; its radiance falls by n_gel² on the way into air and by
+    two reflections at the window: L = T ρ E / (π n²). The lens puts π τ L / (4 N²) on the sensor
+    (distant object; no vignetting). Light of other colours than the sensor's filter is not
+    counted.
+    """
+    watts = d["design.leds.radiant_flux_mw"] / 1000 * d["led.count"]
+    bins = light.irradiance(colour)
+    arriving = watts * float(bins.mean())
+    radiance = _to_air(d) * d["material.gel.coat_reflectance"] * arriving / math.pi
+    on_sensor = math.pi * d["camera.lens_transmission"] * radiance / (4 * d["camera.f_number"] ** 2)
+    photon_j = PLANCK_J_S * LIGHT_M_S / (d[f"design.leds.{colour}_wavelength_nm"] * 1e-9)
+    electrons = on_sensor * 1e-6 / photon_j * d["camera.quantum_efficiency"]
+    needed = WELL_SHARE * d["camera.full_well_e_um2"]
+    seconds = needed / electrons if electrons > 0 else math.inf
+    readout = d["camera.frame_rate_hz"]
+    rate = min(readout, 1 / seconds)
+    return Exposure(
+        colour,
+        arriving * 1e6,
+        seconds * 1000,
+        rate,
+        "readout" if seconds <= 1 / readout else "exposure",
+    )
+
+
+def _to_air(d: Lookup) -> float:
+    """Share of the coat's radiance that gets into the air: Fresnel over n², near the normal."""
+    gel, acrylic = d["material.gel.refractive_index"], d["material.acrylic.refractive_index"]
+    first = 1 - ((gel - acrylic) / (gel + acrylic)) ** 2
+    second = 1 - ((acrylic - 1) / (acrylic + 1)) ** 2
+    return float(first * second / gel**2)

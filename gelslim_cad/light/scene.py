@@ -1,0 +1,101 @@
+"""This finger's guide, LEDs, gel and coat as a scene for the tracer."""
+
+from __future__ import annotations
+
+import math
+
+from gelslim_cad.lookup import Lookup
+from gelslim_optics.guide_profile import GuideProfile
+from gelslim_optics.light_law import AngularLaw, Dome, Lambertian, MeasuredLaw
+from gelslim_optics.light_scene import PMMA_SELLMEIER, LightScene, Medium, Surface
+from gelslim_optics.light_source import LedRow
+
+MIRROR_REFLECTANCE = 0.9
+"""Aluminium on acrylic, unprotected; silver reaches 0.95."""
+PMMA_REFERENCE_UM = 0.590
+OPEN_FACES = ("leg_top", "window_end")
+"""Faces of the air-gap guide whose light goes on to its mirror."""
+
+
+def light_scene(d: Lookup, profile: GuideProfile) -> LightScene:
+    """The profile extruded over the guide's length, with the finger's own LEDs and materials.
+
+    Body, baffles and bezel are black: light that leaves the acrylic or the gel is gone, except
+    between leg and window of a guide with an air-gap mirror.
+    """
+    half = d["design.gel.length_mm"] / 2
+    return LightScene(
+        profile,
+        (d["guide.proximal_end_x_mm"], d["guide.distal_end_x_mm"]),
+        (-half, half),
+        led_rows(d),
+        media(d),
+        {
+            "paint": Surface(d["material.gel.coat_reflectance"], diffuse=True),
+            "mirror": Surface(MIRROR_REFLECTANCE),
+        },
+        feet=dark_faces(profile),
+    )
+
+
+def led_rows(d: Lookup) -> tuple[LedRow, LedRow]:
+    """Red LEDs under the left leg, green under the right one."""
+    count, pitch = round(d["led.count"]), d["led.pitch_mm"]
+    places = tuple((i + 0.5 - count / 2) * pitch for i in range(count))
+    size, gap, law = (
+        d["design.leds.package_mm"],
+        d["design.housing.fit_clearance_mm"],
+        angular_law(d),
+    )
+    return (
+        LedRow("foot_left", places, size, gap, law, "red"),
+        LedRow("foot_right", places, size, gap, law, "green"),
+    )
+
+
+def angular_law(d: Lookup) -> AngularLaw:
+    """How an LED's light spreads."""
+    emission = d["design.leds.emission"]
+    if emission == "table":
+        angles, values = d["design.leds.emission_angle_deg"], d["design.leds.emission_intensity"]
+        return MeasuredLaw(tuple(angles), tuple(values))
+    return Lambertian() if emission == "lambertian" else Dome(d["design.leds.dome_half_angle_deg"])
+
+
+def launched_na(d: Lookup) -> float:
+    """Numerical aperture of the LEDs' light: 1 for a bare die, the sine of the widest angle."""
+    law = angular_law(d)
+    if isinstance(law, Dome):
+        return math.sin(math.radians(law.half_angle_deg))
+    if isinstance(law, MeasuredLaw):
+        lit = [v > 0 for v in law.intensity]
+        spans = zip(law.angle_deg[1:], lit, lit[1:], strict=False)
+        return math.sin(math.radians(max(a for a, here, ahead in spans if here or ahead)))
+    return 1.0
+
+
+def media(d: Lookup) -> dict[str, Medium]:
+    """Air, acrylic (window and legs) and gel; acrylic with the dispersion of PMMA."""
+    n, gel = d["material.acrylic.refractive_index"], d["material.gel.refractive_index"]
+    red, green = (
+        n + _pmma(d[f"design.leds.{colour}_wavelength_nm"] / 1000) - _pmma(PMMA_REFERENCE_UM)
+        for colour in ("red", "green")
+    )
+    acrylic = Medium(n, d["material.acrylic.absorption_per_m"] / 1000, max(red, 1), max(green, 1))
+    return {"air": Medium(1.0), "acrylic": acrylic, "leg": acrylic, "gel": Medium(gel)}
+
+
+def dark_faces(profile: GuideProfile) -> tuple[str, ...]:
+    """Faces towards the black inside of the finger, where light that leaves ends."""
+    return tuple(
+        edge.name
+        for edge in profile.edges
+        if "air" in (edge.left, edge.right)
+        and "mirror" not in (edge.left, edge.right)
+        and not edge.name.startswith(OPEN_FACES)
+    )
+
+
+def _pmma(wavelength_um: float) -> float:
+    b, c = PMMA_SELLMEIER
+    return math.sqrt(1 + b * wavelength_um**2 / (wavelength_um**2 - c))
