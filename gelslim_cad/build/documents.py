@@ -87,5 +87,6 @@ def report_document(
         files,
         bom,
         contents.get(LIGHT_JSON, b""),
+        shown,
     )
     return render_report(data), "report with 3D viewer, offline"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 from gelslim_cad.build.bom import BomLine
 from gelslim_cad.build.camera_view import view_of_markers
@@ -27,6 +28,8 @@ PICTURES = {
     "pictures/exploded.png": ("Exploded", "Every part on its way into the finger."),
     "pictures/section.png": ("Section", "Cut along the mid-plane: camera, mirror, window, gel."),
     "pictures/section_across.png": ("Section across", "Light guide, LED channels and baffles."),
+}
+LIGHT_PICTURES = {
     "pictures/light_paths.png": ("Light paths", "From both LED rows, traced through the guide."),
     "pictures/irradiance.png": ("Light on the gel", "Red and green on the gel's coat."),
     "pictures/light_ratio.png": (
@@ -67,8 +70,9 @@ def rule_rows(checks: Iterable[Check]) -> tuple[RuleRow, ...]:
             unit=c.unit,
             margin=c.margin,
             status=c.status,
-            reason=f"{c.reason} {c.advice}".strip(),
+            reason=". ".join(filter(None, (c.reason, c.advice))),
             parameter=c.parameter,
+            sense=c.sense,
         )
         for c in checks
     )
@@ -91,11 +95,13 @@ def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
     )
 
 
-def pictures(files: Mapping[str, bytes], problem: str) -> tuple[Picture, ...]:
+def pictures(
+    files: Mapping[str, bytes], problem: str, wanted: Mapping[str, tuple[str, str]] = PICTURES
+) -> tuple[Picture, ...]:
     """Rendered pictures; where one is missing the report says why."""
     return tuple(
         Picture(title, caption, files.get(path, b""), "" if path in files else problem)
-        for path, (title, caption) in PICTURES.items()
+        for path, (title, caption) in wanted.items()
     )
 
 
@@ -125,8 +131,10 @@ def report_data(
     files: Mapping[str, FileEntry],
     bom: tuple[BomLine, ...],
     light: bytes = b"",
+    drawn: Mapping[str, bytes] = MappingProxyType({}),
 ) -> ReportData:
-    """Everything the report shows, as plain values; `light` is the build's light.json."""
+    """Everything the report shows, as plain values; `light` is the build's light.json,
+    `drawn` its pictures by path."""
     return ReportData(
         name=name,
         spec_text=spec_text,
@@ -152,6 +160,7 @@ def report_data(
             )
             for b in bom
         ),
-        notes=light_notes(light) if light else (),
+        light=pictures(drawn, "", LIGHT_PICTURES) if light else (),
+        light_notes=light_notes(light) if light else (),
         versions=versions(),
     )

@@ -22,7 +22,7 @@ RAY_COLOURS = {"red": "#d0342c", "green": "#1c9a3d"}
 
 def paths_png(d: Lookup, seed: int = 3) -> bytes:
     """Cross-section with light paths from both LED rows."""
-    figure, axes = _figure(9.0, 4.2)
+    figure, axes = _figure(9.0, 3.2)
     profile = guide_profile(d)
     for medium, colour in (("acrylic", ACRYLIC), ("gel", GEL)):
         outline = outline_points(profile, medium)

@@ -181,6 +181,9 @@ class ReportData:
     files: tuple[FileRow, ...] = ()
     bom: tuple[BomRow, ...] = ()
     notes: tuple[Note, ...] = ()
+    light: tuple[Picture, ...] = ()
+    """Pictures of the light, each as wide as the page."""
+    light_notes: tuple[Note, ...] = ()
     versions: tuple[tuple[str, str], ...] = field(default=())
 
     @property

@@ -67,6 +67,7 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
             "What the camera sees",
             camera_view(view) if view else '<p class="card empty">No markers were projected.</p>',
         ),
+        *_light(data),
         ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),
         ("files", "Files", tables.files(data.files)),
         ("bom", "Bill of materials", tables.bom(data.bom)),
@@ -107,7 +108,15 @@ def _model(glb: bytes) -> str:
     return f'<script type="application/octet-stream" id="model">{encoded}</script>'
 
 
-def _pictures(pictures: tuple[Picture, ...]) -> str:
+def _light(data: ReportData) -> list[tuple[str, str, str]]:
+    if not (data.light or data.light_notes):
+        return []
+    said = tables.notes(data.light_notes) if data.light_notes else ""
+    shown = _pictures(data.light, "pictures wide") if data.light else ""
+    return [("light", "How the gel is lit", said + shown)]
+
+
+def _pictures(pictures: tuple[Picture, ...], look: str = "pictures") -> str:
     if not pictures:
         return '<p class="card empty">No pictures were made.</p>'
     shown = []
@@ -121,7 +130,7 @@ def _pictures(pictures: tuple[Picture, ...]) -> str:
             f'<figure class="card">{body}<figcaption><strong>{text(picture.title)}</strong>'
             f"{text(picture.caption)}</figcaption></figure>"
         )
-    return f'<div class="pictures">{"".join(shown)}</div>'
+    return f'<div class="{look}">{"".join(shown)}</div>'
 
 
 def _image(picture: Picture) -> str:

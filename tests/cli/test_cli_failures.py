@@ -13,7 +13,7 @@ from cli_samples import MINI20, altered, fresh, too_long
 from gelslim_cad.cli import main
 from gelslim_cad.spec import reader
 
-TAKES_SPEC = ("check", "derive", "build", "bundle", "markers")
+TAKES_SPEC = ("check", "derive", "build", "bundle", "markers", "light")
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
