@@ -6,8 +6,11 @@ import hashlib
 import json
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.markers.nodes import nearest_nodes
+from gelslim_cad.markers.outline import Outline
 from gelslim_cad.sight import camera_record
 from gelslim_cad.spec import Spec
 from ifem_export.bundle import Bundle, build_bundle
@@ -58,6 +61,14 @@ def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
         align_to_mm=grid.positions_mm,
         alignment_tolerance_mm=None,
     )
+
+
+def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NDArray[np.int64], Outline]:
+    """What the marker files need beside the grid: nearest surface node per dot, gel outline."""
+    mesh, _ = pad_mesh(d, grid)
+    nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
+    gel = pad_outline(d)
+    return nodes, Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
 
 
 def make_bundle(spec: Spec, d: Dimensions, mesh: PadMesh, grid: MarkerGrid) -> Bundle:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_optics.refraction import ray_slope
+from gelslim_optics.back_projection import Outside, Surface, backproject
+from gelslim_optics.camera_rays import air_slopes, as_points, rays_on_axes, slope_derivatives
+from gelslim_optics.camera_record import camera_from_record, camera_to_record
+from gelslim_optics.homography import Homography, fit_homography
+from gelslim_optics.layer import Layer, LayerStack
+from gelslim_optics.lens_distortion import LensDistortion
+from gelslim_optics.view_quality import Keystone, blur_map, keystone
+
+__all__ = ["Layer", "VirtualCamera", "reflect_direction", "reflect_point"]
 
 Vector = NDArray[np.float64]
 
@@ -25,19 +35,13 @@ def reflect_direction(direction: ArrayLike, normal: ArrayLike) -> Vector:
 
 
 @dataclass(frozen=True)
-class Layer:
-    """A flat layer above the air: thickness and refractive index, camera side first."""
-
-    thickness_mm: float
-    index: float
-
-
-@dataclass(frozen=True)
 class VirtualCamera:
     """Pinhole behind flat layers, in the sensor frame; image axes in the OpenCV sense.
 
     `position_mm` (3,) is the pinhole's mirror image below the window; `right`, `down` and
-    `forward` (3,) are the mirrored camera axes (left-handed: the fold flips the image).
+    `forward` (3,) are the mirrored camera axes (left-handed: the fold flips the image); `lens`
+    is the real lens' distortion, none for an ideal one.
+    Raises ValueError for values that make no camera.
     """
 
     position_mm: Vector
@@ -49,6 +53,25 @@ class VirtualCamera:
     image_height_px: int
     window_bottom_z_mm: float
     layers: tuple[Layer, ...]
+    lens: LensDistortion | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("position_mm", "right", "down", "forward"):
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != (3,) or not np.isfinite(value).all():
+                raise ValueError(f"the camera's {name} must be three finite numbers, not {value}")
+            object.__setattr__(self, name, value)
+        axes = np.array([self.right, self.down, self.forward])
+        if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-6:
+            raise ValueError("right, down and forward must be unit vectors at right angles")
+        for name in ("focal_px", "image_width_px", "image_height_px"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise ValueError(f"the camera's {name} = {getattr(self, name)} must be positive")
+        if not (np.isfinite(self.air_height_mm) and self.air_height_mm > 0):
+            raise ValueError(
+                f"the virtual pinhole at z = {self.position_mm[2]:g} mm must lie below the "
+                f"window's lower face at {self.window_bottom_z_mm:g} mm"
+            )
 
     @classmethod
     def from_fold(
@@ -63,6 +86,7 @@ class VirtualCamera:
         image_height_px: int,
         window_bottom_z_mm: float,
         layers: tuple[Layer, ...],
+        lens: LensDistortion | None = None,
     ) -> VirtualCamera:
         """Fold a camera that looks along +x, pitched down by `pitch_rad`, at a mirror.
 
@@ -84,6 +108,7 @@ class VirtualCamera:
             image_height_px=image_height_px,
             window_bottom_z_mm=window_bottom_z_mm,
             layers=layers,
+            lens=lens,
         )
 
     @property
@@ -91,68 +116,122 @@ class VirtualCamera:
         """Height of the air between virtual pinhole and window."""
         return float(self.window_bottom_z_mm - self.position_mm[2])
 
-    def air_directions(self, points_mm: Vector) -> Vector:
-        """Unit directions (n, 3), in air, of the rays that end at `points_mm` (n, 3)."""
-        lateral = points_mm[:, :2] - self.position_mm[:2]
-        reach = np.hypot(lateral[:, 0], lateral[:, 1])
-        depth = points_mm[:, 2] - self.window_bottom_z_mm
-        heights: list[ArrayLike] = [self.air_height_mm]
-        indices: list[ArrayLike] = [1.0]
-        below = np.zeros(len(points_mm))
-        for k, layer in enumerate(self.layers):
-            last = k == len(self.layers) - 1
-            heights.append(depth - below if last else layer.thickness_mm)
-            indices.append(layer.index)
-            below = below + layer.thickness_mm
-        slope = ray_slope(reach, heights, indices)
-        safe = np.where(reach > 0, reach, 1.0)
-        planar = lateral * (slope / safe)[:, None]
-        directions = np.column_stack([planar, np.ones(len(points_mm))])
+    @cached_property
+    def axes(self) -> Vector:
+        """Right, down and forward as rows (3, 3)."""
+        return np.array([self.right, self.down, self.forward])
+
+    @property
+    def principal_px(self) -> Vector:
+        """Where the axis meets the image (2,): its middle, pixel centres at integers."""
+        return np.array([(self.image_width_px - 1) / 2, (self.image_height_px - 1) / 2])
+
+    @cached_property
+    def stack(self) -> LayerStack:
+        """The media above the virtual pinhole, air first."""
+        return LayerStack.above(float(self.position_mm[2]), self.window_bottom_z_mm, self.layers)
+
+    def air_directions(self, points_mm: ArrayLike) -> Vector:
+        """Unit directions (n, 3), in air, of the rays that end at `points_mm` (n, 3).
+
+        Raises ValueError for points not above the virtual pinhole.
+        """
+        points = as_points(points_mm)
+        directions = np.column_stack([air_slopes(self, points), np.ones(len(points))])
         unit: Vector = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         return unit
 
     def project(self, points_mm: ArrayLike) -> Vector:
         """Image positions (n, 2) in px of points (n, 3) in or on the gel, exactly refracted.
 
-        Pixel centres are at integer coordinates; the axis meets the middle of the image.
+        Pixel centres are at integer coordinates; the axis meets the middle of the image. Points
+        outside the picture have positions too; points that are not finite have NaN.
+        Raises ValueError for points behind the camera or beyond the lens distortion's domain.
         """
-        points = np.atleast_2d(np.asarray(points_mm, dtype=float))
-        d = self.air_directions(points)
-        depth = d @ self.forward
-        u = self.focal_px * (d @ self.right) / depth + (self.image_width_px - 1) / 2
-        v = self.focal_px * (d @ self.down) / depth + (self.image_height_px - 1) / 2
-        return np.column_stack([u, v])
+        image = self._undistorted(rays_on_axes(self, as_points(points_mm)))
+        if self.lens is not None:
+            image = self.lens.distort(image)
+        pixels: Vector = self.focal_px * image + self.principal_px
+        return pixels
+
+    def backproject(
+        self,
+        pixels: ArrayLike,
+        surface: Surface = 0.0,
+        *,
+        z_range_mm: tuple[float, float] | None = None,
+        outside: Outside = "raise",
+    ) -> Vector:
+        """Points (n, 3) of a plane z or a height field seen at pixels (n, 2); inverse of `project`.
+
+        See `back_projection.backproject`.
+        """
+        return backproject(self, pixels, surface, z_range_mm=z_range_mm, outside=outside)
 
     def apparent_distance_mm(self, points_mm: ArrayLike) -> Vector:
         """Distance (n,) along the axis of the points' images seen from air.
 
         The layers shorten a length h to h/n for rays near the normal (paraxial).
         """
-        points = np.atleast_2d(np.asarray(points_mm, dtype=float))
+        points = as_points(points_mm)
         d = self.air_directions(points)
-        height = points[:, 2] - self.window_bottom_z_mm
-        apparent = np.full(len(points), self.air_height_mm)
-        for k, layer in enumerate(self.layers):
-            last = k == len(self.layers) - 1
-            apparent += (height if last else layer.thickness_mm) / layer.index
-            height = height - layer.thickness_mm
+        heights = self.stack.crossed_mm(points[:, 2])
+        apparent = sum(h / n for h, n in zip(heights, self.stack.indices, strict=True))
         distance: Vector = apparent / d[:, 2] * (d @ self.forward)
         return distance
 
-    def jacobian(self, points_mm: ArrayLike, step_mm: float = 1e-4) -> Vector:
-        """Image motion (n, 2, 2) in px/mm per motion of the point along x and y."""
-        points = np.atleast_2d(np.asarray(points_mm, dtype=float))
-        columns = []
-        for axis in range(2):
-            shift = np.zeros(3)
-            shift[axis] = step_mm
-            columns.append(
-                (self.project(points + shift) - self.project(points - shift)) / (2 * step_mm)
-            )
-        return np.stack(columns, axis=2)
+    def jacobian(self, points_mm: ArrayLike) -> Vector:
+        """Image motion (n, 2, 2) in px/mm per motion of the point along x and y, analytic."""
+        return self.jacobian_3d(points_mm)[:, :, :2]
+
+    def jacobian_3d(self, points_mm: ArrayLike) -> Vector:
+        """Image motion (n, 2, 3) in px/mm per motion of the point along x, y and z, analytic."""
+        planar, change = slope_derivatives(self, as_points(points_mm))
+        rays = planar @ self.axes[:, :2].T + self.axes[:, 2]
+        moved = np.einsum("ij,njk->nik", self.axes[:, :2], change)
+        image = self._undistorted(rays)
+        motion = (moved[:, :2] - image[:, :, None] * moved[:, 2:]) / rays[:, 2, None, None]
+        if self.lens is not None:
+            motion = self.lens.jacobian(image) @ motion
+        in_px: Vector = self.focal_px * motion
+        return in_px
 
     def blur_on_gel_mm(self, points_mm: ArrayLike, aperture_mm: float, focus_mm: float) -> Vector:
         """Blur diameter (n,) seen on the gel: A |Z-s| / s for aperture A = f/N focused at s."""
         distance = self.apparent_distance_mm(points_mm)
         blur: Vector = aperture_mm * np.abs(distance - focus_mm) / focus_mm
         return blur
+
+    def blur_map(
+        self, x_mm: ArrayLike, y_mm: ArrayLike, aperture_mm: float, focus_mm: float, z_mm: float = 0
+    ) -> Vector:
+        """Blur diameter (len(y), len(x)) in mm on a grid; see `view_quality.blur_map`."""
+        return blur_map(self, x_mm, y_mm, aperture_mm, focus_mm, z_mm)
+
+    def keystone(self, x_mm: ArrayLike, y_mm: ArrayLike, z_mm: float = 0.0) -> Keystone:
+        """Range of the picture's scale over a grid on the pad; see `view_quality.keystone`."""
+        return keystone(self, x_mm, y_mm, z_mm)
+
+    def homography(self, x_mm: ArrayLike, y_mm: ArrayLike, z_mm: float = 0.0) -> Homography:
+        """The plane-to-image homography nearest to `project`, with what it leaves, in px."""
+        return fit_homography(self, x_mm, y_mm, z_mm)
+
+    def to_record(self) -> dict[str, object]:
+        """Plain values for a file; lengths mm, axes as unit vectors."""
+        return camera_to_record(self)
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, object]) -> VirtualCamera:
+        """Inverse of `to_record`; other keys are ignored. Raises ValueError for a bad record."""
+        return cls(**camera_from_record(record))
+
+    def _undistorted(self, rays: Vector) -> Vector:
+        """Ideal image (n, 2), in focal lengths, of rays (n, 3) on the camera's axes."""
+        behind = rays[:, 2] <= 0
+        if behind.any():
+            raise ValueError(
+                f"{int(behind.sum())} of {len(rays)} points lie behind the camera's image plane "
+                "and have no image"
+            )
+        image: Vector = rays[:, :2] / rays[:, 2:]
+        return image

@@ -15,7 +15,7 @@ from gelslim_cad.build.work import PackedPart, Unit
 from gelslim_cad.checks import Check, check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.light.inputs import light_inputs
-from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh, pad_outline, spec_hash
+from gelslim_cad.pad import make_bundle, marker_grid, marker_print, pad_mesh, spec_hash
 from gelslim_cad.part import Part
 from gelslim_cad.spec.reader import LoadedSpec
 from ifem_export.marker_grid import MarkerGrid
@@ -125,17 +125,9 @@ class Stages:
         return made
 
     def _marker_files(self) -> dict[str, tuple[bytes, str]]:
-        from gelslim_cad.markers.nodes import nearest_nodes
-        from gelslim_cad.markers.outline import Outline
         from gelslim_cad.markers.write import render_marker_files
 
-        outline, (mesh, _) = pad_outline(self.dimensions), pad_mesh(self.dimensions, self.grid)
-        surface = mesh.surface
-        nodes = nearest_nodes(self.grid.positions_mm, mesh.nodes_mm[surface], surface)
-        shape = Outline.rounded_rectangle(
-            outline.length_mm, outline.width_mm, outline.corner_radius_mm
-        )
-        rendered = render_marker_files(self.grid, nodes, shape)
+        rendered = render_marker_files(self.grid, *marker_print(self.dimensions, self.grid))
         return {f"markers/{n}": (data, "marker print, 1:1") for n, data in rendered.items()}
 
     def _bundle_files(self) -> dict[str, tuple[bytes, str]]:

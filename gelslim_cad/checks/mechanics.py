@@ -44,7 +44,7 @@ def gel_soft(material_gel_youngs_modulus_mpa: Any) -> Finding:
     title="Layers against Poisson's ratio",
     parameter="mesh.layers",
     why="one bonded layer locks as Poisson's ratio nears 0.5, whatever the element",
-    advice="use at least two layers (four for a good field) and the bbar element",
+    advice="use at least two layers (four for a good field) and the bbar or incompatible element",
     unit="",
 )
 def mesh_layers(mesh_layers: Any, mesh_element: str, material_gel_poissons_ratio: Any) -> Finding:

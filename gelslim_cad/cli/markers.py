@@ -25,21 +25,16 @@ def markers(
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.output import require_pad_rules, written
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.markers.nodes import nearest_nodes
-    from gelslim_cad.markers.outline import Outline
     from gelslim_cad.markers.process import MARKING_PROCESSES
     from gelslim_cad.markers.write import write_marker_files
-    from gelslim_cad.pad import marker_grid, pad_mesh, pad_outline
+    from gelslim_cad.pad import marker_grid, marker_print
     from gelslim_cad.spec.reader import read_spec
 
     loaded = read_spec(spec)
     d = derive(loaded.spec)
     require_pad_rules(d, "gelslim markers", force)
     grid = marker_grid(d)
-    mesh, _ = pad_mesh(d, grid)
-    nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
-    gel = pad_outline(d)
-    outline = Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
+    nodes, outline = marker_print(d, grid)
     folder = out or Path("out") / f"{loaded.spec.name}-markers"
     paths = write_marker_files(folder, grid, nodes, outline)
     process = MARKING_PROCESSES[loaded.spec.manufacturing.marking_process]

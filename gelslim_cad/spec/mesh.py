@@ -27,8 +27,10 @@ class Mesh(Block):
         default=None, description="Cells across the finger, instead of nodes_per_marker_pitch"
     )
     layers: int = Field(default=1, ge=1, le=32, description="Cell layers through the thickness")
-    element: Literal["full", "bbar"] = Field(
-        default="bbar", description="Hex-8 integration: full 2×2×2 or B-bar (mean dilatation)"
+    element: Literal["full", "bbar", "incompatible"] = Field(
+        default="bbar",
+        description="Hex-8 element: full 2×2×2 integration, B-bar (mean dilatation) or "
+        "incompatible modes (best in bending)",
     )
 
     @model_validator(mode="after")

@@ -73,8 +73,20 @@ def test_numbers_are_those_of_yaml_1_2(written, value):
             "write 2",
         ),
         ("mesh:\n  layers: 2.5", 15, "mesh.layers", "must be a whole number", "whole number"),
-        ("mesh:\n  element: ful", 15, "mesh.element", "must be full or bbar", "did you mean full?"),
-        ("mesh:\n  element: no", 15, "mesh.element", "must be full or bbar", "write full or bbar"),
+        (
+            "mesh:\n  element: ful",
+            15,
+            "mesh.element",
+            "must be full, bbar or incompatible",
+            "did you mean full?",
+        ),
+        (
+            "mesh:\n  element: no",
+            15,
+            "mesh.element",
+            "must be full, bbar or incompatible",
+            "write full, bbar or incompatible",
+        ),
         (
             "manufacturing:\n  print_process: SLA",
             15,
