@@ -1,0 +1,127 @@
+"""Brown–Conrady distortion: against its definition, its inverse and the edge of its domain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelslim_optics.lens_distortion import LensDistortion
+
+LENSES = [
+    LensDistortion(),
+    LensDistortion(k1=-0.32, k2=0.11, p1=8e-4, p2=-5e-4, k3=-0.018),
+    LensDistortion(k1=-0.2),
+    LensDistortion(k1=0.15, k2=-0.05),
+    LensDistortion(p1=0.01, p2=0.02),
+]
+
+
+def disc(radius: float, count: int, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    rho = radius * np.sqrt(rng.random(count))
+    angle = rng.uniform(0, 2 * np.pi, count)
+    return np.column_stack([rho * np.cos(angle), rho * np.sin(angle)])
+
+
+def test_hand_worked_point() -> None:
+    # ρ² = 0.25, f = 1 - 0.3/4 + 0.1/16 + 0.02/64 = 0.9315625
+    lens = LensDistortion(k1=-0.3, k2=0.1, p1=0.001, p2=0.002, k3=0.02)
+    x = 0.3 * 0.9315625 + 2 * 0.001 * 0.12 + 0.002 * (0.25 + 0.18)
+    y = 0.4 * 0.9315625 + 0.001 * (0.25 + 0.32) + 2 * 0.002 * 0.12
+    np.testing.assert_allclose(lens.distort([[0.3, 0.4]]), [[x, y]], rtol=1e-15)
+
+
+def test_agrees_with_opencv() -> None:
+    cv2 = pytest.importorskip("cv2")
+    points = disc(0.6, 50)
+    for lens in LENSES:
+        coefficients = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
+        objects = np.column_stack([points, np.ones(50)])
+        theirs, _ = cv2.projectPoints(objects, np.zeros(3), np.zeros(3), np.eye(3), coefficients)
+        np.testing.assert_allclose(lens.distort(points), theirs[:, 0], atol=1e-14)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_inverse_finds_every_point_of_the_monotone_disc(lens: LensDistortion) -> None:
+    radius = min(lens.monotone_radius, 3.0)
+    points = np.vstack([disc(0.999 * radius, 4000), np.zeros((1, 2)), disc(1e-9, 20)])
+    back = lens.undistort(lens.distort(points))
+    slack = np.linalg.cond(lens.jacobian(points))
+    assert np.all(np.hypot(*(back - points).T) < 1e-14 * slack)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_jacobian_is_the_derivative(lens: LensDistortion) -> None:
+    points = disc(0.5, 60, seed=1)
+    h = 1e-3
+    for axis in range(2):
+        e = h * np.eye(2)[axis]
+        d = lens.distort
+        fourth = (d(points - 2 * e) - 8 * d(points - e) + 8 * d(points + e) - d(points + 2 * e)) / (
+            12 * h
+        )
+        np.testing.assert_allclose(lens.jacobian(points)[:, :, axis], fourth, atol=1e-10)
+
+
+def test_monotone_radius_of_one_coefficient_is_the_closed_form() -> None:
+    # (ρ + k1 ρ³)' = 0 at ρ = 1/sqrt(-3 k1)
+    assert LensDistortion(k1=-0.2).monotone_radius == pytest.approx(1 / np.sqrt(0.6), rel=1e-12)
+    assert LensDistortion(k1=0.2).monotone_radius == np.inf
+    assert LensDistortion().monotone_radius == np.inf
+    # Decentring alone: 6 |p| ρ = 1
+    assert LensDistortion(p1=0.03, p2=0.04).monotone_radius == pytest.approx(1 / 0.3, rel=1e-12)
+
+
+def test_the_jacobian_keeps_its_sign_in_the_disc_and_loses_it_just_beyond() -> None:
+    rng = np.random.default_rng(2)
+    lost = 0
+    for _ in range(40):
+        k1, k2, k3 = rng.normal(0, 0.3, 3)
+        p1, p2 = rng.normal(0, 0.02, 2)
+        lens = LensDistortion(k1, k2, p1, p2, k3)
+        radius = lens.monotone_radius
+        if not np.isfinite(radius):
+            continue
+        inside = np.vstack([disc(0.999999 * radius, 2000), radius * 0.999999 * _circle(720)])
+        assert np.linalg.eigvalsh(lens.jacobian(inside)).min() > 0
+        radial = LensDistortion(k1, k2, k3=k3)
+        if np.isfinite(radial.monotone_radius):
+            ring = 1.0001 * radial.monotone_radius * _circle(8)
+            lost += np.linalg.det(radial.jacobian(ring)).max() < 0
+    assert lost > 20
+
+
+def _circle(count: int) -> np.ndarray:
+    angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def test_points_beyond_the_fold_are_refused_both_ways() -> None:
+    lens = LensDistortion(k1=-0.2)
+    edge = lens.monotone_radius
+    image = edge * (1 - 0.2 * edge**2)
+    assert np.isfinite(lens.undistort([[0.9999 * image, 0.0]])).all()
+    with pytest.raises(ValueError, match="monotone"):
+        lens.distort([[1.001 * edge, 0.0], [0.1, 0.1]])
+    with pytest.raises(ValueError, match=r"1 of 2 points.*monotone"):
+        lens.undistort([[1.001 * image, 0.0], [0.1, 0.1]])
+    with pytest.raises(ValueError, match="monotone"):
+        LENSES[1].undistort(30.0 * _circle(4))
+
+
+def test_missing_points_stay_missing() -> None:
+    lens = LENSES[1]
+    there_and_back = lens.undistort(lens.distort([[0.1, 0.2], [np.nan, 0.0]]))
+    np.testing.assert_allclose(there_and_back[0], [0.1, 0.2], rtol=1e-14)
+    assert np.isnan(there_and_back[1]).all()
+
+
+def test_record_round_trip_and_refusals() -> None:
+    for lens in LENSES:
+        assert LensDistortion.from_record(lens.to_record()) == lens
+    assert LensDistortion.from_record({"k1": -1}) == LensDistortion(k1=-1.0)
+    for record in ({"k4": 0.1}, {"k1": "0.1"}, {"p1": None}, {"k1": True}):
+        with pytest.raises(ValueError, match="lens distortion"):
+            LensDistortion.from_record(record)
+    with pytest.raises(ValueError, match="finite"):
+        LensDistortion(k1=float("nan"))
