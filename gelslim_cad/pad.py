@@ -6,10 +6,9 @@ import hashlib
 import json
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.markers.nodes import nearest_nodes
+from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.sight import camera_record
 from gelslim_cad.spec import Spec
@@ -63,7 +62,7 @@ def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
     )
 
 
-def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NDArray[np.int64], Outline]:
+def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NearestNodes, Outline]:
     """What the marker files need beside the grid: nearest surface node per dot, gel outline."""
     mesh, _ = pad_mesh(d, grid)
     nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
