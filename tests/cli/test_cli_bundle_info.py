@@ -1,0 +1,57 @@
+"""`gelslim bundle-info`: what is in a bundle, and damage named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from gelslim_cad.cli import main
+
+SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bundle") / "mini20"
+    assert main(["bundle", SPEC, "-o", str(folder)]) == 0
+    return folder
+
+
+def test_a_good_bundle_is_described_and_verified(
+    bundle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(["bundle-info", str(bundle)]) == 0
+    said = capsys.readouterr().out
+    for words in ("gelslim-bundle/1", "cells of", "E = 0.147 MPa", "markers", "verified"):
+        assert words in said
+    assert main(["bundle-info", str(bundle), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verification"] == {"ok": True}
+    assert found["mesh"]["nodes"] > 500
+
+
+def test_a_flipped_byte_is_named(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import shutil
+
+    damaged = tmp_path / "damaged"
+    shutil.copytree(bundle, damaged)
+    data = bytearray((damaged / "nodes_mm.npy").read_bytes())
+    data[700] ^= 1
+    (damaged / "nodes_mm.npy").write_bytes(data)
+    capsys.readouterr()
+    assert main(["bundle-info", str(damaged)]) == 2
+    said = " ".join(capsys.readouterr().out.split())
+    assert "NOT VALID nodes_mm.npy: its SHA-256 differs" in said
+
+
+def test_no_bundle_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bundle-info", str(tmp_path / "none")]) == 2
+    captured = capsys.readouterr()
+    assert "manifest.json is missing" in captured.err.replace(
+        "manifest.json: is", "manifest.json is"
+    )
