@@ -9,6 +9,7 @@ import typer
 from gelslim_cad import __version__
 from gelslim_cad.cli.build import build
 from gelslim_cad.cli.bundle import bundle
+from gelslim_cad.cli.bundle_export import bundle_export
 from gelslim_cad.cli.bundle_info import bundle_info
 from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
@@ -50,5 +51,17 @@ def _options(
     """Options before any command."""
 
 
-for _command in (new, check, derive, explain, build, bundle, bundle_info, markers, light, schema):
+for _command in (
+    new,
+    check,
+    derive,
+    explain,
+    build,
+    bundle,
+    bundle_info,
+    bundle_export,
+    markers,
+    light,
+    schema,
+):
     app.command()(carried(_command))

@@ -55,3 +55,14 @@ def test_no_bundle_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "manifest.json is missing" in captured.err.replace(
         "manifest.json: is", "manifest.json is"
     )
+
+
+@pytest.mark.parametrize("ending", ["mtx", "mat"])
+def test_a_matrix_is_exported(
+    bundle: Path, tmp_path: Path, ending: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / f"k.{ending}"
+    assert main(["bundle-export", str(bundle), str(file)]) == 0
+    assert file.stat().st_size > 1000
+    assert main(["bundle-export", str(bundle), str(tmp_path / "k.xyz")]) == 2
+    assert "names no format" in capsys.readouterr().err
