@@ -20,7 +20,7 @@ def test_words_say_certificate_ledger_and_verdict(
     assert main(["light", SPEC, "-o", str(tmp_path / "light"), *FEW]) == 0
     said = " ".join(capsys.readouterr().out.split())
     for words in (
-        "Not fully guided: the bends keep",
+        "Not fully guided",
         "a straight guide with glued 45° mirrors",
         "95 % interval",
         "lost at corners 0.00%",
