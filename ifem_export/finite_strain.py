@@ -195,8 +195,8 @@ class NeoHookeanPad:
         least = 1.0 + float(dilatation.min())
         return FiniteStrainError(
             f"cell {number} at lattice position ({i}, {j}, {k}) is turned inside out or torn: "
-            f"its volume ratio J reaches {least:.3g}, must be finite and > 0 (beyond rounding); check the "
-            f"displacement of nodes {self.hexes[number].tolist()} or use a smaller step",
+            f"its volume ratio J reaches {least:.3g}, must be finite and > 0 (beyond rounding); "
+            f"check the displacement of nodes {self.hexes[number].tolist()} or use a smaller step",
             (i, j, k),
         )
 

@@ -49,7 +49,15 @@ class GaussStates:
 
 
 def gauss_states(corners_mm: Array, cell_size_mm: tuple[float, float, float]) -> GaussStates:
-    """Kinematics of cells from their corner displacements (m, 8, 3) in mm."""
+    """Kinematics of cells from their corner displacements (m, 8, 3) in mm.
+
+    Displacements beyond the range of floating point give an infinite or NaN dilatation.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _gauss_states(corners_mm, cell_size_mm)
+
+
+def _gauss_states(corners_mm: Array, cell_size_mm: tuple[float, float, float]) -> GaussStates:
     gradients = shape_gradients(cell_size_mm, GAUSS)
     h = np.einsum("cai,gaj->cgij", corners_mm, gradients)
     f = h + np.eye(3)
