@@ -38,10 +38,11 @@ class TirCertificate(TirWords):
     verdict: fully_guided (no ray leaves by a wall; a ray at the critical angle stays),
     not_fully_guided, mirror_corners (walls and bends alone are certified: what a mirror's corner
     loses follows no closed form) or refused (`reasons` say why; nothing is certified).
-    bend_na: largest NA that reaches the bends; legs that narrow raise it. narrowing: whether a
-    leg does; shares are lower bounds then. straight_margin_deg: worst margin at flat walls.
+    mirrors: whether the profile has any. bend_na: largest NA that reaches the bends; legs that
+    narrow raise it. tapers: whether a leg's walls are not parallel; shares are lower bounds then.
+    straight_margin_deg: worst margin at flat walls.
     guided_2d, guided: least share that walls and bends keep, for rays in the section's plane and
-    in the whole cone; lower bounds where a leg narrows or a bend is short; 0 when refused.
+    in the whole cone; lower bounds where a leg tapers or a bend is short; 0 when refused.
     largest_na: largest launched NA that is fully guided; None where not even collimated light is.
     gel_critical_deg: elevation above the bonded face from which light enters the gel.
     top_elevation_deg: the highest that reaches that face. largest_entry_ratio: R/t above which
@@ -54,8 +55,9 @@ class TirCertificate(TirWords):
     outside_index: float
     verdict: Verdict
     reasons: tuple[str, ...]
+    mirrors: bool
     bend_na: float
-    narrowing: bool
+    tapers: bool
     straight_margin_deg: float
     bends: tuple[BendCertificate, ...]
     guided_2d: float
@@ -120,8 +122,9 @@ def certify_tir(
         outside_index=outside,
         verdict=verdict,
         reasons=walls.reasons,
+        mirrors=walls.mirrors,
         bend_na=bend_na,
-        narrowing=narrowing,
+        tapers=any(leg.tapers for leg in walls.legs),
         straight_margin_deg=straight,
         bends=certified,
         guided_2d=flat,
@@ -151,7 +154,7 @@ def _kept(
 ) -> tuple[float, float]:
     """Least shares kept, (plane, cone).
 
-    With parallel walls the bends keep nothing that the walls lose. A leg that narrows fills only
+    With parallel walls the bends keep nothing that the walls lose. A leg that tapers fills only
     part of the bend's acceptance t · NA_b (t · NA_b² for the cone) with the étendue foot · NA
     (foot · NA²); were all that leaks in it filled, the share lost would grow by their quotient.
     """
@@ -161,7 +164,7 @@ def _kept(
         ([b.guided_2d for b in bends], [b.guided_3d for b in bends])
     ):
         kept, lost = min(w[dimension] for w in walls), 1 - min(at_bend, default=1.0)
-        if not any(leg.narrows for leg in legs):
+        if not any(leg.tapers for leg in legs):
             shares.append(min(kept, 1 - lost))
             continue
         ratio = min(leg.ratio for leg in legs)
