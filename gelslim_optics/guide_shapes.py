@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Point, Segment
 
@@ -86,11 +86,14 @@ class MirrorGuide:
 def mirror_profile(guide: MirrorGuide, gel: GelSection | None = None) -> GuideProfile:
     """Edges of the straight guide with 45° mirrors, and of the gel; air_gap has several bodies.
 
-    Raises ValueError for lengths that are not positive or a gel wider than the flat window.
+    Raises ValueError for lengths that are not positive, a fit that does not exist or a gel wider
+    than the flat window.
     """
     _require_positive(
         flat_width_mm=guide.flat_width_mm, thickness_mm=guide.thickness_mm, leg_mm=guide.leg_mm
     )
+    if guide.fit not in get_args(Fit):
+        raise ValueError(f"fit = {guide.fit!r}: must be one of {', '.join(get_args(Fit))}")
     half, top = guide.flat_width_mm / 2, guide.window_top_z_mm
     bottom = top - guide.thickness_mm
     right = _glued_side(guide) if guide.fit == "glued" else _air_gap_side(guide)
@@ -169,9 +172,11 @@ def _window_top(half: float, top: float, gel: GelSection | None) -> list[Edge]:
     if gel is None:
         return [Edge("window_top", Segment((half, top), (-half, top)), "acrylic", "air")]
     _require_positive(gel_width_mm=gel.width_mm, gel_thickness_mm=gel.thickness_mm)
-    if gel.crown_mm < 0:
-        raise ValueError(f"gel crown_mm = {gel.crown_mm:g}: must be >= 0")
     side = gel.width_mm / 2
+    if not 0 <= gel.crown_mm <= side:
+        raise ValueError(
+            f"gel crown_mm = {gel.crown_mm:g}: must be from 0 to half the width, {side:g}"
+        )
     if side > half:
         raise ValueError(
             f"gel width_mm = {gel.width_mm:g} exceeds the flat window's {2 * half:g} mm; "
@@ -222,12 +227,14 @@ def _check_curved(guide: CurvedGuide) -> None:
         inner_radius_mm=guide.inner_radius_mm,
         leg_mm=guide.leg_mm,
         bend_rad=guide.bend_rad,
-        foot_thickness_mm=guide.foot_thickness_mm or guide.thickness_mm,
     )
     if guide.bend_rad > LARGEST_BEND_RAD:
         raise ValueError(f"bend = {math.degrees(guide.bend_rad):g}°: must be at most 150°")
     foot = guide.foot_thickness_mm
-    if foot is not None and foot / 2 >= guide.inner_radius_mm + guide.thickness_mm / 2:
+    if foot is None:
+        return
+    _require_positive(foot_thickness_mm=foot)
+    if foot / 2 >= guide.inner_radius_mm + guide.thickness_mm / 2:
         raise ValueError(f"foot_thickness_mm = {foot:g}: the foot reaches the bend's centre")
 
 

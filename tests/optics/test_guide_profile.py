@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.path import Path
 
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
 from gelslim_optics.guide_shapes import (
@@ -50,6 +51,64 @@ def test_outlines_close_counter_clockwise_with_their_exact_area(name: str) -> No
 def test_area_of_the_curved_guide_is_that_of_its_pieces() -> None:
     expected = 22 * 2 + 2 * (math.pi / 4 * (8**2 - 6**2) + 3 * 2)
     assert SHAPES["curved"].area_mm2("acrylic") == pytest.approx(expected, rel=1e-14)
+
+
+def test_areas_of_other_shapes_are_those_of_their_pieces() -> None:
+    """Window, two ring sectors, two trapezoid legs; the crown is a circular segment."""
+    gel = GEL.width_mm * GEL.thickness_mm
+    for name, flat, turn, foot in (
+        ("open", 22, 60, 2.0),
+        ("closed", 30, 120, 2.0),
+        ("tapered", 22, 90, 3.0),
+    ):
+        ring = math.radians(turn) / 2 * (8**2 - 6**2)
+        expected = flat * 2 + 2 * (ring + 3 * (2 + foot) / 2)
+        assert SHAPES[name].area_mm2("acrylic") == pytest.approx(expected, rel=1e-13)
+        assert SHAPES[name].area_mm2("gel") == pytest.approx(gel, rel=1e-13)
+    radius = (10**2 + 0.8**2) / (2 * 0.8)
+    half = math.asin(10 / radius)
+    cap = radius**2 * (half - math.sin(half) * math.cos(half))
+    assert SHAPES["crowned"].area_mm2("gel") == pytest.approx(gel + cap, rel=1e-12)
+    assert SHAPES["glued"].area_mm2("acrylic") == pytest.approx(22 * 2 + 2 * (2 * 2 / 2 + 3 * 2))
+    assert SHAPES["air_gap"].area_mm2("acrylic") == pytest.approx(22 * 2)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("turned", [False, True])
+def test_media_lie_on_the_sides_they_are_said_to(name: str, turned: bool) -> None:
+    """A point a little to the left of an edge is inside the outline of its left medium."""
+    profile = SHAPES[name].reflected() if turned else SHAPES[name]
+    solids = [m for m in ("acrylic", "gel") if any(m in (e.left, e.right) for e in profile.edges)]
+    regions = {
+        m: Path([e.curve.at(k / 400) for e in profile.outline(m) for k in range(400)])
+        for m in solids
+    }
+    for edge in profile.edges:
+        (a, b), (c, d) = edge.curve.at(0.499), edge.curve.at(0.501)
+        y, z = edge.curve.at(0.5)
+        step = 1e-2 / math.hypot(c - a, d - b)
+        left = (y - (d - b) * step, z + (c - a) * step)
+        right = (y + (d - b) * step, z - (c - a) * step)
+        for medium, region in regions.items():
+            assert region.contains_point(left) == (edge.left == medium)
+            assert region.contains_point(right) == (edge.right == medium)
+
+
+def test_reflecting_twice_and_scaling_back_restore_the_profile() -> None:
+    for profile in SHAPES.values():
+        back = profile.reflected().scaled(3.0).reflected().scaled(1 / 3.0)
+        for old, new in zip(profile.edges, back.edges, strict=True):
+            assert (old.name, old.left, old.right) == (new.name, new.left, new.right)
+            for part in (0.0, 0.3, 1.0):
+                assert new.curve.at(part) == pytest.approx(old.curve.at(part), abs=1e-12)
+
+
+def test_edges_run_either_way_are_the_same_face() -> None:
+    for edge in SHAPES["crowned"].edges:
+        turned = edge.reversed()
+        assert (turned.left, turned.right) == (edge.right, edge.left)
+        assert turned.curve.at(0.25) == pytest.approx(edge.curve.at(0.75))
+        assert turned.curve.length_mm == edge.curve.length_mm
 
 
 def test_guide_and_gel_share_one_face() -> None:
@@ -103,11 +162,33 @@ def test_a_gap_is_named() -> None:
         (lambda: CurvedGuide(22, 2, 6, 3, bend_rad=3.0), "at most 150"),
         (lambda: CurvedGuide(22, 2, 1, 3, foot_thickness_mm=5.0), "foot reaches"),
         (lambda: CurvedGuide(18, 2, 6, 3), "exceeds the flat window"),
+        (lambda: CurvedGuide(22, 2, 6, 3, bend_rad=0.0), "bend_rad = 0"),
+        (lambda: CurvedGuide(22, 2, 6, 3, foot_thickness_mm=0.0), "foot_thickness_mm = 0"),
     ],
 )
 def test_impossible_guides_are_refused(make: object, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         curved_profile(make(), GEL)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("guide", "gel", "words"),
+    [
+        (MirrorGuide(22, 2, -3), GEL, "leg_mm = -3"),
+        (MirrorGuide(22, math.inf, 3), GEL, "thickness_mm = inf"),
+        (MirrorGuide(18, 2, 3, "air_gap"), GEL, "exceeds the flat window"),
+        (MirrorGuide(22, 2, 3), GelSection(20, 0.0), "gel_thickness_mm = 0"),
+        (MirrorGuide(22, 2, 3), GelSection(20, 2, -0.1), "crown_mm = -0.1"),
+        (MirrorGuide(22, 2, 3), GelSection(20, 2, math.nan), "crown_mm = nan"),
+        (MirrorGuide(22, 2, 3), GelSection(20, 2, 10.5), "half the width, 10"),
+        (MirrorGuide(22, 2, 3, "loose"), GEL, "fit = 'loose'"),  # type: ignore[arg-type]
+    ],
+)
+def test_impossible_mirrors_and_gels_are_refused(
+    guide: MirrorGuide, gel: GelSection, words: str
+) -> None:
+    with pytest.raises(ValueError, match=words):
+        mirror_profile(guide, gel)
 
 
 def test_edges_need_two_media_and_a_length() -> None:
