@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.lookup import Lookup
 from gelslim_optics.virtual_camera import Layer, VirtualCamera
 
 
-def virtual_camera(d: Dimensions) -> VirtualCamera:
+def virtual_camera(d: Lookup) -> VirtualCamera:
     """The camera of the solved fold, looking through window and gel."""
     return VirtualCamera.from_fold(
         camera_mm=(d["camera_pose.x_mm"], 0.0, d["camera_pose.z_mm"]),
@@ -26,7 +26,7 @@ def virtual_camera(d: Dimensions) -> VirtualCamera:
     )
 
 
-def camera_record(d: Dimensions) -> dict[str, object]:
+def camera_record(d: Lookup) -> dict[str, object]:
     """The virtual camera as plain values for the bundle; lengths mm, angles as unit vectors."""
     camera = virtual_camera(d)
     return {

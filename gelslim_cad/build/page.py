@@ -21,6 +21,7 @@ from gelslim_cad.report import (
     ReportData,
     RuleRow,
 )
+from gelslim_cad.view_figures import projection_sentence
 from ifem_export.marker_grid import MarkerGrid
 
 PICTURES = {
@@ -28,6 +29,12 @@ PICTURES = {
     "pictures/exploded.png": ("Exploded", "Every part on its way into the finger."),
     "pictures/section.png": ("Section", "Cut along the mid-plane: camera, mirror, window, gel."),
     "pictures/section_across.png": ("Section across", "Light guide, LED channels and baffles."),
+}
+SIGHT_PICTURES = {
+    "pictures/projection_error.png": (
+        "Projection error left by each formula",
+        "Against the exact refracted ray, over the pad, for a press of 0.5 mm.",
+    ),
 }
 LIGHT_PICTURES = {
     "pictures/light_paths.png": ("Light paths", "From both LED rows, traced through the guide."),
@@ -161,6 +168,8 @@ def report_data(
             for b in bom
         ),
         light=pictures(drawn, "", LIGHT_PICTURES) if light else (),
+        sight=pictures(drawn, "", SIGHT_PICTURES),
+        sight_notes=(Note("Projection", projection_sentence(d)),),
         light_notes=light_notes(light) if light else (),
         versions=versions(),
     )

@@ -18,6 +18,7 @@ from gelslim_cad.light.inputs import light_inputs
 from gelslim_cad.pad import make_bundle, marker_grid, marker_print, pad_mesh, spec_hash
 from gelslim_cad.part import Part
 from gelslim_cad.spec.reader import LoadedSpec
+from gelslim_cad.view_figures import view_inputs
 from ifem_export.marker_grid import MarkerGrid
 
 
@@ -88,6 +89,7 @@ class Stages:
             Unit("glb", "glb", whole, named, cost=6),
             Unit("pictures", "pictures", whole, cost=20),
             self._mould_unit(packed["gel_pad"]),
+            Unit("view", "view", (), tuple(view_inputs(self.dimensions).items())),
             Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
         ]
         units += [

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_cad.build.light_writer import write_light  # noqa: F401
+from gelslim_cad.build.view_writer import write_view  # noqa: F401
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
 from gelslim_cad.part import Part
 

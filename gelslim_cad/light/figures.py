@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
 
+from gelslim_cad.figure import as_png, new_figure
 from gelslim_cad.guide_section import guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import LightStudy
@@ -15,14 +15,13 @@ from gelslim_optics.guide_profile import GuideProfile, Segment
 from gelslim_optics.trace import trace_paths
 
 PATHS = 70
-DPI = 150
 ACRYLIC, GEL, INK = "#cfe6f5", "#f4efe2", "#333a44"
 RAY_COLOURS = {"red": "#d0342c", "green": "#1c9a3d"}
 
 
 def paths_png(d: Lookup, seed: int = 3) -> bytes:
     """Cross-section with light paths from both LED rows."""
-    figure, axes = _figure(9.0, 3.2)
+    figure, axes = new_figure(9.0, 3.2)
     profile = guide_profile(d)
     for medium, colour in (("acrylic", ACRYLIC), ("gel", GEL)):
         outline = outline_points(profile, medium)
@@ -38,12 +37,12 @@ def paths_png(d: Lookup, seed: int = 3) -> bytes:
     axes.set_xlabel("y across the finger, mm")
     axes.set_ylabel("z, mm")
     axes.set_title("Light paths; where light splits, one branch is followed by chance", fontsize=10)
-    return _png(figure)
+    return as_png(figure)
 
 
 def irradiance_png(d: Lookup, study: LightStudy) -> bytes:
     """Irradiance of the coat for red and green, each over its mean, and profiles across."""
-    figure, axes = _figure(10.0, 3.6, columns=3)
+    figure, axes = new_figure(10.0, 3.6, columns=3)
     half_x, half_y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
     for panel, colour, shade in zip(axes, ("red", "green"), ("Reds", "Greens"), strict=False):
         bins = study.light.irradiance(colour)
@@ -65,12 +64,12 @@ def irradiance_png(d: Lookup, study: LightStudy) -> bytes:
     axes[2].set_xlabel("y, mm")
     axes[2].set_title("mean along x, over its mean", fontsize=10)
     axes[2].legend(frameon=False)
-    return _png(figure)
+    return as_png(figure)
 
 
 def ratio_png(study: LightStudy) -> bytes:
     """Light against a straight guide with glued mirrors over R/t, this finger marked."""
-    figure, axes = _figure(6.4, 4.0)
+    figure, axes = new_figure(6.4, 4.0)
     ratios = [r for r, _ in study.curve]
     values = np.array([e.value for _, e in study.curve])
     low, high = (np.array([getattr(e, side) for _, e in study.curve]) for side in ("low", "high"))
@@ -86,7 +85,7 @@ def ratio_png(study: LightStudy) -> bytes:
     axes.set_xlim(left=0)
     axes.legend(frameon=False, fontsize=9)
     axes.grid(alpha=0.3)
-    return _png(figure)
+    return as_png(figure)
 
 
 def outline_points(profile: GuideProfile, medium: str, per_arc: int = 40) -> np.ndarray:
@@ -98,22 +97,7 @@ def outline_points(profile: GuideProfile, medium: str, per_arc: int = 40) -> np.
     return np.array(points)
 
 
-def _figure(width: float, height: float, columns: int = 1) -> tuple[Any, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots(1, columns)
-
-
 def _box(corner: tuple[float, float], width: float, height: float, colour: str) -> Any:
     from matplotlib.patches import Rectangle
 
     return Rectangle(corner, width, height, fc=colour, ec=INK, lw=0.8, zorder=3)
-
-
-def _png(figure: Any) -> bytes:
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", metadata={"Software": None})
-    return stream.getvalue()

@@ -184,6 +184,9 @@ class ReportData:
     light: tuple[Picture, ...] = ()
     """Pictures of the light, each as wide as the page."""
     light_notes: tuple[Note, ...] = ()
+    sight: tuple[Picture, ...] = ()
+    """Pictures of the projection, shown below the camera's view, with `sight_notes`."""
+    sight_notes: tuple[Note, ...] = ()
     versions: tuple[tuple[str, str], ...] = field(default=())
 
     @property

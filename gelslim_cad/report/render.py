@@ -9,7 +9,7 @@ from importlib import resources
 
 from gelslim_cad.report import tables
 from gelslim_cad.report.camera_view import camera_view, ramp_style
-from gelslim_cad.report.data import Picture, ReportData
+from gelslim_cad.report.data import Note, Picture, ReportData
 from gelslim_cad.report.markup import text
 from gelslim_cad.report.rules import pill, rules, verdict
 
@@ -65,7 +65,8 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
         (
             "camera",
             "What the camera sees",
-            camera_view(view) if view else '<p class="card empty">No markers were projected.</p>',
+            (camera_view(view) if view else '<p class="card empty">No markers were projected.</p>')
+            + _told(data.sight_notes, data.sight),
         ),
         *_light(data),
         ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),
@@ -109,11 +110,14 @@ def _model(glb: bytes) -> str:
 
 
 def _light(data: ReportData) -> list[tuple[str, str, str]]:
-    if not (data.light or data.light_notes):
-        return []
-    said = tables.notes(data.light_notes) if data.light_notes else ""
-    shown = _pictures(data.light, "pictures wide") if data.light else ""
-    return [("light", "How the gel is lit", said + shown)]
+    told = _told(data.light_notes, data.light)
+    return [("light", "How the gel is lit", told)] if told else []
+
+
+def _told(notes: tuple[Note, ...], shown: tuple[Picture, ...]) -> str:
+    """Notes, then pictures as wide as the page; empty where there are none."""
+    said = tables.notes(notes) if notes else ""
+    return said + (_pictures(shown, "pictures wide") if shown else "")
 
 
 def _pictures(pictures: tuple[Picture, ...], look: str = "pictures") -> str:

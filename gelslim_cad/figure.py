@@ -1,0 +1,25 @@
+"""Figures without a display and without a date: the same content gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+DPI = 150
+
+
+def new_figure(width_in: float, height_in: float, columns: int = 1) -> tuple[Any, Any]:
+    """A matplotlib figure and its axes (an array of them for several columns)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(1, columns)
+
+
+def as_png(figure: Any) -> bytes:
+    """The figure as PNG."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
