@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,8 +13,6 @@ import typer
 from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from gelslim_cad.build import BuildResult
 
 
@@ -44,13 +41,14 @@ def build(
     from gelslim_cad.build import BuildRefusedError, build_variant
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.check import print_checks
+    from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.status import RULE_FAILED
     from gelslim_cad.spec.reader import read_spec
 
     started = time.monotonic()
     folder = out or Path("out") / read_spec(spec).spec.name
     try:
-        with _progress(quiet=as_json) as tell:
+        with progress_bar(quiet=as_json) as tell:
             result = build_variant(spec, folder, jobs=jobs, progress=tell)
     except BuildRefusedError as refused:
         failed = [c for c in refused.checks if c.status == "fail"]
@@ -100,33 +98,3 @@ def _report(result: BuildResult, seconds: float) -> None:
     for name, purpose in (("report.html", "look here first"), ("BUILD.md", "how to make it")):
         if name in result.files:
             print(f"  {shown / name}  {purpose}")
-
-
-@contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[str, int, int], None] | None]:
-    """A progress bar on a terminal's standard error, nothing elsewhere."""
-    from rich.console import Console
-
-    screen = Console(stderr=True, highlight=False)
-    if quiet or not screen.is_terminal:
-        yield None
-        return
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-    )
-
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
-    # No refreshing thread: the build forks its workers.
-    with Progress(
-        *columns, TimeElapsedColumn(), console=screen, transient=True, auto_refresh=False
-    ) as bar:
-        task = bar.add_task("starting", total=1)
-
-        def tell(text: str, done: int, total: int) -> None:
-            bar.update(task, description=text, completed=done, total=total, refresh=True)
-
-        yield tell

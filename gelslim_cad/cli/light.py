@@ -34,6 +34,7 @@ def light(
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.output import replace_file
+    from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.record import study_record
     from gelslim_cad.light.study import study_light
@@ -42,7 +43,8 @@ def light(
     started = time.monotonic()
     loaded = read_spec(spec)
     d = derive(loaded.spec)
-    study = study_light(d, rays=rays, seed=seed)
+    with progress_bar(quiet=as_json) as tell:
+        study = study_light(d, rays=rays, seed=seed, progress=tell)
     folder = out or Path("out") / f"{loaded.spec.name}-light"
     if pictures:
         from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -12,12 +13,14 @@ from gelslim_cad.lookup import Lookup
 from gelslim_optics.guide_shapes import curved_profile, mirror_profile
 from gelslim_optics.light_result import Estimate, LightResult, paired_ratio
 from gelslim_optics.tir_certificate import TirCertificate, certify_tir
-from gelslim_optics.trace import TraceOptions, trace_light
+from gelslim_optics.trace import trace_light
 
 RATIOS = (0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0)
 RAYS = 1 << 17
 CURVE_RAYS = 1 << 14
 COLOURS = ("red", "green")
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, steps done and steps in all."""
 Verdict = Literal["brighter", "darker", "no different"]
 
 
@@ -71,7 +74,13 @@ class LightStudy:
 
 
 def study_light(
-    d: Lookup, *, rays: int = RAYS, seed: int = 0, threads: int = 1, curve: bool = True
+    d: Lookup,
+    *,
+    rays: int = RAYS,
+    seed: int = 0,
+    threads: int = 1,
+    curve: bool = True,
+    progress: Progress | None = None,
 ) -> LightStudy:
     """Trace this finger's guide and both kinds of straight guide with 45° mirrors.
 
@@ -84,10 +93,12 @@ def study_light(
         "glued": light_scene(d, mirror_profile(straight, gel)),
         "air_gap": light_scene(d, mirror_profile(replace(straight, fit="air_gap"), gel)),
     }
-    traced = {
-        name: trace_light(scene, rays, seed=seed, threads=threads, options=TraceOptions())
-        for name, scene in scenes.items()
-    }
+    steps = len(scenes) + (len(RATIOS) if curve else 0)
+    tell = progress or (lambda text, done, total: None)
+    traced = {}
+    for done, (name, scene) in enumerate(scenes.items()):
+        tell(f"tracing {name.replace('_', ' ')}", done, steps)
+        traced[name] = trace_light(scene, rays, seed=seed, threads=threads)
     same = f"same LEDs and legs, mirrors of reflectance {MIRROR_REFLECTANCE:g}"
     light, glued, gap = (traced[n] for n in ("curved", "glued", "air_gap"))
     return LightStudy(
@@ -110,19 +121,29 @@ def study_light(
         ),
         exposures=tuple(exposure(d, light, c) for c in COLOURS),
         glued_exposures=tuple(exposure(d, glued, c) for c in COLOURS),
-        curve=ratio_curve(d, rays // 8, seed, threads) if curve else (),
+        curve=ratio_curve(
+            d, rays // 8, seed, threads, lambda ratio, k: tell(f"R/t = {ratio:g}", 3 + k, steps)
+        )
+        if curve
+        else (),
         bend_ratio=d["guide.bend_ratio"],
     )
 
 
 def ratio_curve(
-    d: Lookup, rays: int = CURVE_RAYS, seed: int = 0, threads: int = 1
+    d: Lookup,
+    rays: int = CURVE_RAYS,
+    seed: int = 0,
+    threads: int = 1,
+    tell: Callable[[float, int], None] | None = None,
 ) -> tuple[tuple[float, Estimate], ...]:
     """Light on the coat over that of glued mirrors, for other bend radii of this finger."""
     own, gel, points = curved_guide(d), gel_section(d), []
     mirrors = light_scene(d, mirror_profile(straight_guide(d), gel))
     other = trace_light(mirrors, rays, seed=seed, threads=threads)
-    for ratio in RATIOS:
+    for k, ratio in enumerate(RATIOS):
+        if tell is not None:
+            tell(ratio, k)
         radius = ratio * own.thickness_mm
         bent = curved_profile(replace(own, inner_radius_mm=radius), gel)
         ours = trace_light(light_scene(d, bent), rays, seed=seed, threads=threads)
