@@ -15,6 +15,8 @@ MAX_NEWTON_STEPS = 80
 MAX_HALVINGS = 40
 STEP_LEFT = 1e-15
 MISS_LEFT = 4e-16
+# Points whose work fits into the processor's cache.
+BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -79,34 +81,27 @@ class LensDistortion:
         Raises ValueError for points that no point within the monotone radius is distorted to.
         """
         target = np.atleast_2d(np.asarray(distorted, dtype=float))
-        xy = target.copy()
-        radius = np.hypot(xy[:, 0], xy[:, 1])
-        limit = self.monotone_radius
-        outside = radius >= limit
-        xy[outside] *= (0.9 * limit / radius[outside])[:, None]
-        whole = np.isfinite(target).all(axis=1)
-        xy[~whole] = np.nan
-        open_ = np.flatnonzero(whole)
-        lost = open_[:0]
-        for _ in range(MAX_NEWTON_STEPS):
-            xy[open_], settled, stuck = self._newton_step(xy[open_], target[open_])
-            lost = np.concatenate([lost, open_[stuck]])
-            open_ = open_[~(settled | stuck)]
-            if not len(open_):
-                break
-        open_ = np.concatenate([lost, open_])
-        if len(open_):
-            worst = target[open_[np.argmax(np.hypot(*target[open_].T))]]
+        found = [
+            self._inverted(target[k : k + BLOCK]) for k in range(0, max(1, len(target)), BLOCK)
+        ]
+        lost = np.concatenate([missed for _, missed in found])
+        if lost.any():
+            worst = target[lost][np.argmax(np.hypot(*target[lost].T))]
             raise ValueError(
-                f"{len(open_)} of {len(target)} points, such as ({worst[0]:.6g}, {worst[1]:.6g}) "
-                "focal lengths from the axis, are the image of no point within the distortion's "
-                f"monotone radius of {limit:.6g}: the coefficients do not hold there"
+                f"{int(lost.sum())} of {len(target)} points, such as ({worst[0]:.6g}, "
+                f"{worst[1]:.6g}) focal lengths from the axis, are the image of no point within "
+                f"the distortion's monotone radius of {self.monotone_radius:.6g}: the coefficients "
+                "do not hold there"
             )
-        return xy.reshape(np.shape(distorted))
+        return np.concatenate([xy for xy, _ in found]).reshape(np.shape(distorted))
 
     def jacobian(self, undistorted: ArrayLike) -> Array:
         """Derivative (n, 2, 2) of the distorted by the undistorted coordinates (n, 2)."""
-        xy = np.asarray(undistorted, dtype=float)
+        xx, cross, yy = self._stretch(np.asarray(undistorted, dtype=float))
+        return np.stack([np.stack([xx, cross], -1), np.stack([cross, yy], -1)], -2)
+
+    def _stretch(self, xy: Array) -> tuple[Array, Array, Array]:
+        """The Jacobian's elements xx, xy = yx and yy."""
         x, y = xy[..., 0], xy[..., 1]
         s = x * x + y * y
         f = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
@@ -114,7 +109,7 @@ class LensDistortion:
         cross = g * x * y + 2 * self.p1 * x + 2 * self.p2 * y
         xx = f + g * x * x + 2 * self.p1 * y + 6 * self.p2 * x
         yy = f + g * y * y + 6 * self.p1 * y + 2 * self.p2 * x
-        return np.stack([np.stack([xx, cross], -1), np.stack([cross, yy], -1)], -2)
+        return xx, cross, yy
 
     def to_record(self) -> dict[str, float]:
         """The coefficients by name."""
@@ -149,13 +144,35 @@ class LensDistortion:
             axis=-1,
         )
 
+    def _inverted(self, target: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Points (n, 2) distorted to `target`, and which have none."""
+        xy = target.copy()
+        radius = np.hypot(xy[:, 0], xy[:, 1])
+        outside = radius >= self.monotone_radius
+        xy[outside] *= (0.9 * self.monotone_radius / radius[outside])[:, None]
+        whole = np.isfinite(target).all(axis=1)
+        xy[~whole] = np.nan
+        open_ = np.flatnonzero(whole)
+        lost = np.zeros(len(xy), dtype=bool)
+        for _ in range(MAX_NEWTON_STEPS):
+            if not len(open_):
+                break
+            xy[open_], settled, stuck = self._newton_step(xy[open_], target[open_])
+            lost[open_[stuck]] = True
+            open_ = open_[~(settled | stuck)]
+        lost[open_] = True
+        return xy, lost
+
     def _newton_step(
         self, xy: Array, target: Array
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """One damped step from `xy` (n, 2); which points have arrived, which find no way on."""
         miss = target - self._map(xy)
         off = np.hypot(miss[:, 0], miss[:, 1])
-        step = np.linalg.solve(self.jacobian(xy), miss[:, :, None])[:, :, 0]
+        xx, cross, yy = self._stretch(xy)
+        u, v = miss.T
+        step = np.stack([yy * u - cross * v, xx * v - cross * u], -1)
+        step /= (xx * yy - cross * cross)[:, None]
         size = 1 + np.hypot(target[:, 0], target[:, 1])
         # Near the fold the step stays long when the image is already met to the last digit.
         near = (np.hypot(step[:, 0], step[:, 1]) <= STEP_LEFT * size) | (off <= MISS_LEFT * size)

@@ -12,6 +12,9 @@ Models, by the angle α of the ray in air and β of the ray in the gel, sin β =
   arctan            tan α = |r| / |z - z_c|, the straight ray that the paper means
   effective_height  tan α = |r| / H, H = h_air + Σ h_i/n_i, the height seen through the layers
   exact             the refracted ray through M + d traced back to the plane of M
+
+The first three take the angle at M, before the motion, so for a press they are low by another
+|d|/H.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ MAX_NEWTON_STEPS = 60
 SETTLED = 1e-8
 # Below this slope the grazing start is never the better one; the root it costs is saved.
 STEEP = 0.5
-FARTHEST_MM = 1e150
+STEEPEST = 1e150
 # Compiling costs about a second and loading the compiled loop 0.3 s: it pays on long arrays only.
 COMPILED_FROM = 20_000
 
@@ -75,15 +75,17 @@ def ray_slope(
     of zero (slope 0) to grazing. A NaN reach gives NaN. Long arrays run in a compiled loop,
     which gives the same digits.
     Raises ValueError for a missing air gap, an index or a height out of range, a reach beyond
-    1e150 mm.
+    1e150 times the air gap.
     """
     signed = np.asarray(reach_mm, dtype=float)
     heights = [np.asarray(h, dtype=float) for h in heights_mm]
     media = [np.asarray(n, dtype=float) for n in indices]
     _check_layers(heights, media)
     r = np.abs(signed)
-    if np.any(r > FARTHEST_MM):
-        raise ValueError(f"a reach of {np.nanmax(r):g} mm is beyond the limit of {FARTHEST_MM:g}")
+    if np.any(r > STEEPEST * heights[0]):
+        raise ValueError(
+            f"a reach of {np.nanmax(r):g} mm is beyond the limit of {STEEPEST:g} air gaps"
+        )
     shape = np.broadcast_shapes(r.shape, *(a.shape for a in heights + media))
     size = int(np.prod(shape))
     if size >= COMPILED_FROM:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_optics.camera_rays import air_slopes
 from gelslim_optics.pad_grid import grid_points
+from gelslim_optics.refraction import reach_growth, reach_per_slope
 
 if TYPE_CHECKING:
     from gelslim_optics.virtual_camera import VirtualCamera
@@ -57,14 +59,25 @@ def blur_map(
     focus_mm: float,
     z_mm: float = 0.0,
 ) -> Array:
-    """Blur diameter (len(y), len(x)) in mm on the gel: A |Z - s| / s at apparent distance Z.
+    """Largest blur diameter (len(y), len(x)) in mm on the gel: A |Z - s| / s.
 
-    `aperture_mm` is the entrance pupil f/N, `focus_mm` the distance s in air at which the lens is
-    focused; the diameter is that across the axis. Raises ValueError unless both are positive.
+    `aperture_mm` A is the entrance pupil f/N, `focus_mm` the distance s in air at which the lens
+    is focused. Flat layers seen aslant are astigmatic: with r(t) the reach at slope t, rays side
+    by side meet r/t above the pinhole, rays one above the other dr/dt; Z is the distance along
+    the axis of whichever image is less sharp (`blur_on_gel_mm` takes both as seen along the
+    normal). Raises ValueError unless aperture and focus are positive.
     """
     if not (aperture_mm > 0 and focus_mm > 0):
         raise ValueError(
             f"an aperture of {aperture_mm} mm focused at {focus_mm} mm: both must be positive"
         )
     x, y, points = grid_points(x_mm, y_mm, z_mm)
-    return camera.blur_on_gel_mm(points, aperture_mm, focus_mm).reshape(len(y), len(x))
+    slopes = air_slopes(camera, points)
+    steepness = np.hypot(slopes[:, 0], slopes[:, 1])
+    heights, indices = camera.stack.crossed_mm(points[:, 2]), camera.stack.indices
+    per_height = slopes @ camera.forward[:2] + camera.forward[2]
+    distances = [
+        seen(steepness, heights, indices) * per_height for seen in (reach_per_slope, reach_growth)
+    ]
+    off = np.max([np.abs(z - focus_mm) for z in distances], axis=0)
+    return np.asarray(aperture_mm * off / focus_mm).reshape(len(y), len(x))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from gelslim_optics.refraction import lateral_reach, ray_slope
+from gelslim_optics.refraction import lateral_reach, newton_slope, ray_slope, reach_growth
 
 LAYERS = [
     ([8.0], [1.0]),
@@ -93,3 +95,132 @@ def test_reach_is_concave_in_the_slope_and_below_the_straight_ray() -> None:
 def test_a_camera_without_air_before_it_is_refused(air_mm: float) -> None:
     with pytest.raises(ValueError, match="air gap"):
         ray_slope(1.0, [air_mm, 2.0], [1.0, 1.49])
+
+
+# Grazing: thin and thick air, an index next to 1, high ones, a layer of no height.
+GRAZING = [
+    ([8.0], [1.0]),
+    ([15.0, 2.5, 2.0], [1.0, 1.49, 1.41]),
+    ([0.01, 2.5, 2.0], [1.0, 1.49, 1.41]),
+    ([1e-4, 10.0], [1.0, 1.49]),
+    ([3.0, 20.0, 5.0], [1.0, 1.0 + 1e-9, 4.0]),
+    ([3.0, 2.0, 0.0, 1.0], [1.0, 1.0, 2.0, 1.0 + 2**-52]),
+]
+
+
+def decimal_reach(slope: Decimal, heights: list[float], indices: list[float]) -> Decimal:
+    """Snell's law in 60 digits: sin θi = sin θ0 / n, tan θi = sin θi / cos θi."""
+    square = slope * slope / (1 + slope * slope)
+    total = Decimal(0)
+    for h, n in zip(heights, indices, strict=True):
+        inside = square / (Decimal(n) * Decimal(n))
+        total += Decimal(h) * (inside / (1 - inside)).sqrt()
+    return total
+
+
+def bisected(reach: float, heights: list[float], indices: list[float]) -> Decimal:
+    """Slope of the ray, by bisection of its logarithm between the bounds 0 < t <= n r / h."""
+    goal = Decimal(reach)
+    low = goal / Decimal(sum(heights))
+    high = goal * max(Decimal(n) for n in indices) / Decimal(heights[0])
+    for _ in range(110):
+        middle = (low * high).sqrt()
+        if decimal_reach(middle, heights, indices) < goal:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def angle_between(slopes: NDArray[np.float64], truth: list[Decimal]) -> NDArray[np.float64]:
+    """tan(a - b) = (tan a - tan b) / (1 + tan a tan b), in 60 digits."""
+    return np.array(
+        [
+            float((Decimal(float(s)) - t) / (1 + Decimal(float(s)) * t))
+            for s, t in zip(slopes, truth, strict=True)
+        ]
+    )
+
+
+@pytest.mark.parametrize(("heights", "indices"), GRAZING)
+def test_angles_hold_from_the_normal_to_grazing(heights: list[float], indices: list[float]) -> None:
+    with localcontext() as context:
+        context.prec = 60
+        reaches = np.geomspace(1e-12, 1e9, 64)
+        truth = [bisected(r, heights, indices) for r in reaches]
+        slopes = ray_slope(reaches, heights, indices)
+        assert slopes[-1] > 1e7
+        assert np.abs(angle_between(slopes, truth)).max() < 1e-13
+
+
+@pytest.mark.parametrize(("heights", "indices"), GRAZING)
+def test_slopes_far_beyond_grazing_come_back(heights: list[float], indices: list[float]) -> None:
+    with localcontext() as context:
+        context.prec = 60
+        slopes = [Decimal(float(t)) for t in np.geomspace(1e-14, 1e14, 113)]
+        reaches = np.array([float(decimal_reach(t, heights, indices)) for t in slopes])
+        assert np.abs(angle_between(ray_slope(reaches, heights, indices), slopes)).max() < 1e-13
+
+
+def test_an_index_of_one_gives_the_straight_ray() -> None:
+    reaches = np.geomspace(1e-9, 1e9, 50)
+    slopes = ray_slope(reaches, [3.0, 2.0, 5.0], [1.0, 1.0, 1.0])
+    np.testing.assert_allclose(slopes, reaches / 10, rtol=4e-16)
+
+
+def test_compiled_loop_gives_the_same_digits() -> None:
+    rng = np.random.default_rng(1)
+    n = 40_000
+    signed = np.concatenate([rng.uniform(-40, 40, n // 2), -np.geomspace(1e-300, 1e145, n // 2)])
+    signed[:3] = 0.0, -0.0, np.nan
+    for heights, indices in [*LAYERS, *GRAZING, ([rng.uniform(1, 9, n), 2.0], [1.0, 1.5])]:
+        h = [np.asarray(v, dtype=float) for v in heights]
+        m = [np.asarray(v, dtype=float) for v in indices]
+        compiled = ray_slope(signed, h, m)
+        plain = np.copysign(newton_slope(np.abs(signed), h, m), signed)
+        np.testing.assert_allclose(compiled, plain, rtol=1e-15, atol=0)
+        assert np.isfinite(compiled[3:]).all()
+        assert np.isnan(compiled[2])
+
+
+def test_compiled_loop_broadcasts_like_the_plain_one() -> None:
+    rng = np.random.default_rng(2)
+    reach = rng.uniform(-20, 20, (200, 1))
+    air, gel = rng.uniform(10, 12, (1, 150)), rng.uniform(1, 2, (200, 150))
+    index = rng.uniform(1.3, 1.6, (200, 1))
+    together = ray_slope(reach, [air, 2.5, gel], [1.0, 1.49, index])
+    assert together.shape == (200, 150)
+    for i in (0, 77, 199):
+        row = ray_slope(reach[i], [air[0], 2.5, gel[i]], [1.0, 1.49, index[i]])
+        np.testing.assert_allclose(together[i], row, rtol=1e-15)
+
+
+def test_growth_is_the_derivative_of_the_reach() -> None:
+    for heights, indices in LAYERS:
+        for slope in (0.0, 0.3, 2.0, 30.0):
+            h = 1e-4 * (1 + slope)
+            r = [lateral_reach(slope + k * h, heights, indices) for k in (-2, -1, 1, 2)]
+            fourth = (r[0] - 8 * r[1] + 8 * r[2] - r[3]) / (12 * h)
+            assert float(reach_growth(slope, heights, indices)) == pytest.approx(fourth, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("reach", "heights", "indices", "message"),
+    [
+        (1.0, [5.0, 2.0], [1.0, 0.9], "index of"),
+        (1.0, [5.0, 2.0], [1.0, math.nan], "index"),
+        (1.0, [5.0, -2.0], [1.0, 1.4], "height"),
+        (1.0, [5.0, math.inf], [1.0, 1.4], "height"),
+        (1.0, [5.0, 2.0], [1.33, 1.4], "layer 0 is the air"),
+        (1.0, [5.0, 2.0], [1.0], "one of each"),
+        (1.0, [], [], "one of each"),
+        (1e200, [5.0], [1.0], "limit"),
+        (math.inf, [5.0], [1.0], "limit"),
+        (1.0, [math.nan], [1.0], "air gap"),
+    ],
+)
+def test_layers_that_make_no_sense_are_refused(
+    reach: float, heights: list[float], indices: list[float], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        ray_slope(reach, heights, indices)

@@ -3,85 +3,18 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from camera_cases import HEIGHT, WIDTH, finger_camera, random_pose, rotation_about_y, traced
 
+from gelslim_optics.camera_rays import newton_rays
+from gelslim_optics.lens_distortion import LensDistortion
+from gelslim_optics.refraction_kernel import solve_rays
 from gelslim_optics.virtual_camera import Layer, VirtualCamera, reflect_direction, reflect_point
-
-Vector = NDArray[np.float64]
-WIDTH, HEIGHT = 640, 480
-
-
-def random_pose(rng: np.random.Generator, indices: tuple[float, float] | None = None) -> dict:
-    """A camera left of a mirror that folds its view up to the gel."""
-    angle = rng.uniform(math.radians(25), math.radians(40))
-    n_window, n_gel = indices or (rng.uniform(1.3, 1.7), rng.uniform(1.3, 1.6))
-    window, gel = rng.uniform(1, 6), rng.uniform(0.5, 6)
-    bottom = -(window + gel)
-    mirror = np.array([rng.uniform(2, 10), 0.0, bottom - rng.uniform(5, 12)])
-    pitch = math.pi / 2 - 2 * angle - rng.uniform(0, math.radians(30))
-    away = rng.uniform(10, 25)
-    camera = mirror - away * np.array([math.cos(pitch), 0.0, -math.sin(pitch)])
-    camera[1] = rng.uniform(-2, 2)
-    return {
-        "camera_mm": camera,
-        "pitch_rad": pitch,
-        "mirror_point_mm": mirror,
-        "mirror_angle_rad": angle,
-        "focal_px": rng.uniform(500, 900),
-        "image_width_px": WIDTH,
-        "image_height_px": HEIGHT,
-        "window_bottom_z_mm": bottom,
-        "layers": (Layer(window, n_window), Layer(gel, n_gel)),
-    }
-
-
-def rotation_about_y(angle: float) -> Vector:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
-def refracted(direction: Vector, normal: Vector, ratio: float) -> Vector:
-    """Snell's law in vectors: `normal` points along the light, ratio = n before / n after."""
-    along = direction @ normal
-    across = ratio * (direction - along * normal)
-    return across + math.sqrt(1 - across @ across) * normal
-
-
-def traced(pose: dict, u: float, v: float, depth_of_gel: float) -> Vector:
-    """Where the real camera's pixel (u, v) ends, `depth_of_gel` above the gel's back.
-
-    The real camera is an ordinary right-handed one; it stands on its head: its image's right
-    is -y... turned by its pitch about y, then half a turn about its own axis.
-    """
-    x = (u - (WIDTH - 1) / 2) / pose["focal_px"]
-    y = (v - (HEIGHT - 1) / 2) / pose["focal_px"]
-    # Upright camera looking along +x: image right is -y, image down is -z. On its head: +y, +z.
-    local = np.array([1.0, x, y])
-    ray = rotation_about_y(pose["pitch_rad"]) @ local
-    ray /= np.linalg.norm(ray)
-    angle = pose["mirror_angle_rad"]
-    slope = np.array([math.cos(angle), 0.0, math.sin(angle)])
-    normal = np.cross(slope, [0.0, 1.0, 0.0])
-    start = pose["camera_mm"]
-    path = ((pose["mirror_point_mm"] - start) @ normal) / (ray @ normal)
-    assert path > 0
-    point = start + path * ray
-    # Reflection as half a turn about the normal, reversed.
-    ray = -(2 * np.outer(normal, normal) - np.eye(3)) @ ray
-    up = np.array([0.0, 0.0, 1.0])
-    assert ray[2] > 0
-    point = point + ray * (pose["window_bottom_z_mm"] - point[2]) / ray[2]
-    before = 1.0
-    window, gel = pose["layers"]
-    for height, index in ((window.thickness_mm, window.index), (depth_of_gel, gel.index)):
-        ray = refracted(ray, up, before / index)
-        point = point + ray * height / ray[2]
-        before = index
-    return point
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -192,3 +125,146 @@ def test_blur_vanishes_at_the_focus_and_grows_to_both_sides() -> None:
     np.testing.assert_allclose(blur, 1.24 * np.abs(distance / distance[4] - 1), atol=1e-12)
     assert blur[0] > blur[2] > 0
     assert blur[8] > blur[6] > 0
+
+
+LENS = LensDistortion(k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_distorted_lens_moves_the_traced_pixels_by_its_polynomial(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    pose = random_pose(rng)
+    camera = VirtualCamera.from_fold(**pose, lens=LENS)
+    ideal = rng.uniform((0, 0), (WIDTH - 1, HEIGHT - 1), (30, 2))
+    gel = pose["layers"][1].thickness_mm
+    points = np.array([traced(pose, u, v, gel) for u, v in ideal])
+    middle = np.array([(WIDTH - 1) / 2, (HEIGHT - 1) / 2])
+    expected = LENS.distort((ideal - middle) / pose["focal_px"]) * pose["focal_px"] + middle
+    assert np.abs(camera.project(points) - expected).max() < 1e-8
+    assert np.abs(expected - ideal).max() > 1
+
+
+@pytest.mark.parametrize("lens", [None, LENS])
+def test_jacobian_is_the_derivative_in_all_three_directions(lens: LensDistortion | None) -> None:
+    for seed in range(4):
+        rng = np.random.default_rng(30 + seed)
+        camera = VirtualCamera.from_fold(**random_pose(rng), lens=lens)
+        points = np.column_stack([rng.uniform(-6, 6, (20, 2)), rng.uniform(-0.3, 0.3, 20)])
+        # The foot of the pinhole, where the ray's azimuth has no meaning.
+        points[0, :2] = camera.position_mm[:2]
+        points[1, :2] = camera.position_mm[:2] + np.array([1e-11, -1e-12])
+        jacobian = camera.jacobian_3d(points)
+        np.testing.assert_array_equal(camera.jacobian(points), jacobian[:, :, :2])
+        h = 0.01
+        for axis in range(3):
+            e = np.eye(3)[axis] * h
+            p = camera.project
+            fourth = (
+                p(points - 2 * e) - 8 * p(points - e) + 8 * p(points + e) - p(points + 2 * e)
+            ) / (12 * h)
+            np.testing.assert_allclose(jacobian[:, :, axis], fourth, rtol=1e-8, atol=1e-7)
+
+
+def test_one_mirror_turns_the_picture_over() -> None:
+    camera = finger_camera()
+    points = np.column_stack([np.random.default_rng(9).uniform(-9, 9, (40, 2)), np.zeros(40)])
+    # Seen from below by an ordinary camera, x to y turns as right to down does... in a mirror not.
+    straight = replace(camera, right=-camera.right)
+    assert np.linalg.det([straight.right, straight.down, straight.forward]) == pytest.approx(1)
+    assert np.all(np.linalg.det(straight.jacobian(points)) > 0)
+    assert np.all(np.linalg.det(camera.jacobian(points)) < 0)
+
+
+def test_points_within_window_or_air_cross_only_what_lies_below_them() -> None:
+    pose = random_pose(np.random.default_rng(10))
+    camera = VirtualCamera.from_fold(**pose)
+    window, _ = pose["layers"]
+    bottom = pose["window_bottom_z_mm"]
+    rng = np.random.default_rng(11)
+    xy = rng.uniform(-5, 5, (20, 2))
+    for z, layers in (
+        (bottom - 1.0, ()),
+        (bottom + 0.4 * window.thickness_mm, (Layer(0.4 * window.thickness_mm, window.index),)),
+    ):
+        points = np.column_stack([xy, np.full(20, z)])
+        np.testing.assert_allclose(
+            camera.project(points), replace(camera, layers=layers).project(points), atol=1e-10
+        )
+
+
+def test_compiled_and_plain_rays_agree() -> None:
+    rng = np.random.default_rng(12)
+    for seed in range(3):
+        camera = VirtualCamera.from_fold(**random_pose(np.random.default_rng(seed)))
+        bottom = camera.window_bottom_z_mm
+        points = np.column_stack(
+            [rng.uniform(-10, 10, (30_000, 2)), rng.uniform(bottom - 1, 1, 30_000)]
+        )
+        points[0] = [*camera.position_mm[:2], 0]
+        points[1] = np.nan
+        points[2, 0] = np.inf
+        stack = camera.stack
+        compiled = solve_rays(
+            points, camera.position_mm, camera.axes, np.array(stack.tops_mm),
+            np.array(stack.indices),
+        )  # fmt: skip
+        np.testing.assert_allclose(compiled, newton_rays(camera, points), rtol=1e-15, atol=1e-15)
+        # `project` takes the compiled way for all, the plain one for a few.
+        seen = points[compiled[:, 2] > 0]
+        assert len(seen) > 25_000
+        np.testing.assert_allclose(
+            camera.project(seen)[:500], camera.project(seen[:500]), rtol=1e-13, atol=1e-10
+        )
+
+
+def test_missing_points_have_no_image_and_disturb_no_other() -> None:
+    camera = finger_camera()
+    pixels = camera.project([[1.0, 2.0, 0.0], [np.nan, 0.0, 0.0]])
+    np.testing.assert_array_equal(pixels[:1], camera.project([[1.0, 2.0, 0.0]]))
+    assert np.isnan(pixels[1]).all()
+
+
+def test_what_cannot_be_seen_is_refused() -> None:
+    camera = finger_camera()
+    with pytest.raises(ValueError, match="behind the camera"):
+        camera.project([[-400.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="above"):
+        camera.project([[0.0, 0.0, -50.0]])
+    with pytest.raises(ValueError, match="shape"):
+        camera.project([[0.0, 0.0]])
+    with pytest.raises(ValueError, match="monotone"):
+        replace(camera, lens=LensDistortion(k1=-6.0)).project([[9.0, 9.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"position_mm": np.array([0.0, 0.0, -4.0])}, "below the window"),
+        ({"right": np.array([0.0, 2.0, 0.0])}, "unit vectors"),
+        ({"forward": np.array([0.0, 1.0])}, "three finite"),
+        ({"focal_px": 0.0}, "focal_px"),
+        ({"image_width_px": -1}, "image_width_px"),
+        ({"window_bottom_z_mm": math.nan}, "below the window"),
+    ],
+)
+def test_values_that_make_no_camera_are_refused(changes: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(finger_camera(), **changes)
+
+
+def test_layers_that_cannot_be_are_refused() -> None:
+    with pytest.raises(ValueError, match="thick"):
+        Layer(-1.0, 1.4)
+    with pytest.raises(ValueError, match="index of"):
+        Layer(1.0, 0.9)
+
+
+def test_a_few_points_need_no_compiler() -> None:
+    code = (
+        "import sys; from gelslim_optics.virtual_camera import VirtualCamera, Layer;"
+        "c = VirtualCamera.from_fold(camera_mm=(-26, 0, -11), pitch_rad=.14, mirror_angle_rad=.56,"
+        "mirror_point_mm=(-2, 0, -14.3), focal_px=635, image_width_px=640, image_height_px=480,"
+        "window_bottom_z_mm=-4.5, layers=(Layer(2.5, 1.49), Layer(2, 1.41)));"
+        "c.backproject(c.project([[1, 2, 0]] * 1000)); sys.exit('numba' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

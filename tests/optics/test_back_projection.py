@@ -1,0 +1,173 @@
+"""Pixels back to planes and surfaces: the inverse of the projection."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from camera_cases import HEIGHT, WIDTH, finger_camera, random_pose, traced
+
+from gelslim_optics.height_field import HeightGrid
+from gelslim_optics.lens_distortion import LensDistortion
+from gelslim_optics.virtual_camera import VirtualCamera
+
+LENSES = [None, LensDistortion(k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4, k3=-2e-3)]
+
+
+def dent(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A press of 0.9 mm with a sharp flank."""
+    return -0.9 * np.exp(-((x - 2) ** 2 + (y + 1) ** 2) / 4)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("seed", range(5))
+def test_plane_round_trip(lens: LensDistortion | None, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pose = random_pose(rng)
+    camera = VirtualCamera.from_fold(**pose, lens=lens)
+    bottom = camera.window_bottom_z_mm
+    for z in (0.0, -0.4, 0.3, bottom + 0.2, bottom - 0.5):
+        pixels = rng.uniform((0, 0), (WIDTH - 1, HEIGHT - 1), (100, 2))
+        points = camera.backproject(pixels, z)
+        assert np.all(points[:, 2] == z)
+        assert np.abs(camera.project(points) - pixels).max() < 1e-9
+        again = camera.backproject(camera.project(points), z)
+        assert np.abs(again - points).max() < 1e-9
+
+
+def test_finds_where_light_traced_from_the_real_camera_ends() -> None:
+    rng = np.random.default_rng(6)
+    pose = random_pose(rng)
+    camera = VirtualCamera.from_fold(**pose)
+    pixels = rng.uniform((0, 0), (WIDTH - 1, HEIGHT - 1), (40, 2))
+    truth = [traced(pose, u, v, pose["layers"][1].thickness_mm) for u, v in pixels]
+    np.testing.assert_allclose(camera.backproject(pixels), truth, atol=1e-10)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_height_field_round_trip(lens: LensDistortion | None) -> None:
+    camera = finger_camera(lens=lens)
+    rng = np.random.default_rng(7)
+    xy = rng.uniform(-9, 9, (500, 2))
+    points = np.column_stack([xy, dent(*xy.T)])
+    found = camera.backproject(camera.project(points), dent)
+    assert np.abs(found - points).max() < 1e-9
+
+
+def test_sampled_surface_is_met_where_its_cells_are() -> None:
+    camera = finger_camera()
+    x, y = np.linspace(-10, 10, 81), np.linspace(-9, 9, 61)
+    grid = HeightGrid(x, y, dent(*np.meshgrid(x, y)))
+    rng = np.random.default_rng(8)
+    xy = np.vstack([rng.uniform((-10, -9), (10, 9), (500, 2)), [[10, 9], [-10, -9], [x[3], y[5]]]])
+    points = np.column_stack([xy, grid(*xy.T)])
+    found = camera.backproject(camera.project(points), grid)
+    assert np.abs(found - points).max() < 1e-9
+
+
+def test_a_flat_field_is_the_plane() -> None:
+    camera = finger_camera()
+    pixels = np.random.default_rng(9).uniform((220, 60), (420, 340), (50, 2))
+    plane = camera.backproject(pixels, -0.25)
+    grid = HeightGrid([-15, 15], [-15, 15], np.full((2, 2), -0.25))
+    np.testing.assert_allclose(camera.backproject(pixels, grid), plane, atol=1e-12)
+    field = camera.backproject(pixels, lambda x, y: -0.25)
+    np.testing.assert_allclose(field, plane, atol=1e-12)
+
+
+def test_a_steep_wall_hides_what_is_behind_it() -> None:
+    # A wall that hangs 1.5 mm into the gel: the ray meets its face towards the camera's foot.
+    def wall(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return -0.75 * (np.tanh((x - 4) / 0.02) - np.tanh((x - 5) / 0.02))
+
+    camera = finger_camera()
+    behind = np.array([[5.2, 0.0, 0.0]])
+    pixel = camera.project(behind)
+    found = camera.backproject(pixel, wall)[0]
+    assert 3.9 < found[0] < 5.1
+    assert found[2] < -0.1
+    assert np.abs(camera.project(found) - pixel).max() < 1e-9
+    beyond = np.array([[7.0, 0.0, float(wall(np.array(7.0), np.array(0.0)))]])
+    np.testing.assert_allclose(camera.backproject(camera.project(beyond), wall), beyond, atol=1e-9)
+
+
+def test_a_step_is_met_in_its_face() -> None:
+    camera = finger_camera()
+    face = np.column_stack([np.full(9, 0.1), np.linspace(-1, 1, 9), np.linspace(-0.28, 0.28, 9)])
+    found = camera.backproject(camera.project(face), lambda x, y: np.where(x < 0.1, 0.3, -0.3))
+    np.testing.assert_allclose(found, face, atol=1e-9)
+
+
+def test_bilinear_heights_by_hand() -> None:
+    grid = HeightGrid([0.0, 1.0, 3.0], [0.0, 2.0], [[0.0, 1.0, 2.0], [4.0, 5.0, 6.0]])
+    # Between columns 1 and 2 at a quarter, between the rows at a half.
+    assert grid(1.5, 1.0) == pytest.approx(1.25 + 2.0)
+    np.testing.assert_allclose(grid([3.0, 9.0, -2.0], [2.0, 9.0, -1.0]), [6.0, 6.0, 0.0])
+    np.testing.assert_array_equal(grid.contains([0, 3, 3.1], [0, 2, 1]), [True, True, False])
+    # Slopes within a cell do not exceed `steepest`: 1 per mm along, 2 per mm across.
+    assert grid.steepest == pytest.approx(math.hypot(1, 2))
+
+
+def test_pixels_off_the_surface_are_refused_or_missing() -> None:
+    camera = finger_camera()
+    grid = HeightGrid([-5, 5], [-5, 5], np.zeros((2, 2)))
+    pixels = camera.project([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
+    with pytest.raises(ValueError, match="1 of 2 pixels"):
+        camera.backproject(pixels, grid)
+    found = camera.backproject(pixels, grid, outside="nan")
+    np.testing.assert_allclose(found[0], 0, atol=1e-12)
+    assert np.isnan(found[1]).all()
+    with pytest.raises(ValueError, match="1 of 1 pixels"):
+        camera.backproject(pixels[:1], lambda x, y: 0 * x, z_range_mm=(0.5, 1.0))
+
+
+def test_missing_pixels_give_missing_points() -> None:
+    camera = finger_camera()
+    pixels = np.array([[300.0, 200.0], [np.nan, 3.0]])
+    for surface in (0.0, dent, HeightGrid([-15, 15], [-15, 15], np.zeros((2, 2)))):
+        points = camera.backproject(pixels, surface)
+        assert np.isfinite(points[0]).all()
+        assert np.isnan(points[1]).all()
+
+
+def test_pixels_that_look_along_the_window_are_refused() -> None:
+    with pytest.raises(ValueError, match="away from the window"):
+        finger_camera().backproject([[320.0, 6000.0]])
+
+
+@pytest.mark.parametrize(
+    ("surface", "options", "message"),
+    [
+        (-60.0, {}, "above the virtual pinhole"),
+        (math.nan, {}, "finite"),
+        (dent, {"z_range_mm": (1.0, -1.0)}, "lower first"),
+        (dent, {"z_range_mm": (-99.0, 1.0)}, "above the virtual pinhole"),
+        (lambda x, y: np.zeros(3), {}, "shape"),
+        (0.0, {"outside": "ignore"}, "outside"),
+    ],
+)
+def test_bad_surfaces_are_refused(surface: object, options: dict, message: str) -> None:
+    camera = finger_camera()
+    pixels = camera.project(np.column_stack([np.linspace(-1, 1, 41), np.zeros(41), np.zeros(41)]))
+    with pytest.raises(ValueError, match=message):
+        camera.backproject(pixels, surface, **options)
+
+
+def test_default_heights_need_a_gel() -> None:
+    with pytest.raises(ValueError, match="z_range_mm"):
+        finger_camera(layers=()).backproject([[320.0, 200.0]], dent)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "z", "message"),
+    [
+        ([0, 0], [0, 1], np.zeros((2, 2)), "increasing"),
+        ([0], [0, 1], np.zeros((2, 1)), "increasing"),
+        ([0, 1, 2], [0, 1], np.zeros((3, 2)), "shape"),
+        ([0, 1], [0, 1], [[0, np.nan], [0, 0]], "finite"),
+    ],
+)
+def test_bad_height_grids_are_refused(x: list, y: list, z: object, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        HeightGrid(x, y, z)
