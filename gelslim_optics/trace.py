@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_optics.kernel_cache import drop_stale
 from gelslim_optics.light_launch import launch, launch_medium
 from gelslim_optics.light_points import Sampling, point_batches
 from gelslim_optics.light_result import LightResult
@@ -22,6 +24,8 @@ Array = NDArray[np.float64]
 # Sums are kept per block and added in order, so that neither batches nor threads change a bit.
 BLOCK_RAYS = 4096
 SMALLEST_SPLIT = 1e-4
+KERNELS = ("trace_kernel", "trace_face", "trace_crossing")
+HELPERS = ("trace_kernel", "trace_face", "trace_crossing", "trace_geometry")
 
 
 @dataclass(frozen=True)
@@ -182,10 +186,19 @@ def _blocks(
         first += len(starts)
 
 
+@cache
+def _kernel() -> Any:
+    """The compiled kernel; loads numba."""
+    drop_stale(KERNELS, HELPERS)
+    from gelslim_optics.trace_kernel import trace_block
+
+    return trace_block
+
+
 def _run(
     job: _Job, starts: Array, key: Any, first_ray: int, trail: Array | None = None
 ) -> tuple[Array, Array, int]:
-    from gelslim_optics.trace_kernel import trace_block
+    trace_block = _kernel()
 
     sums, heat = np.zeros(columns(job.edges)), np.zeros(job.bins)
     trail = np.zeros((0, 5)) if trail is None else trail

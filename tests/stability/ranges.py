@@ -86,9 +86,7 @@ def _leaf(path: str, field: FieldInfo) -> Leaf:
     name: Literal["int", "float"] = "int" if kind is int else "float"
     words = [get_args(a)[0] for a in get_args(field.annotation) if get_origin(a) is Literal]
     word = words[0] if words else ""
-    return Leaf(
-        path, name, default, required, optional, low, high, low_open, high_open, word=word
-    )
+    return Leaf(path, name, default, required, optional, low, high, low_open, high_open, word=word)
 
 
 def _leaves(model: type[BaseModel], prefix: str = "") -> Iterator[Leaf]:
