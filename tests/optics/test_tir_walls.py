@@ -21,6 +21,7 @@ from gelslim_optics.guide_shapes import (
     mirror_profile,
 )
 from gelslim_optics.tir_certificate import certify_tir
+from gelslim_optics.tir_walls import ENDS, kept_by_walls, survey_walls
 
 N = 1.4906
 COUNT = 2**15
@@ -117,6 +118,26 @@ def test_shares_of_tapered_guides_are_lower_bounds(foot_mm: float, plane: bool) 
         if found.fully_guided:
             assert marched == 1.0
         assert any("legs taper" in s for s in found.sentences())
+
+
+@pytest.mark.parametrize("plane", [True, False])
+@pytest.mark.parametrize(("foot_mm", "na"), [(2.5, 1.0), (3.0, 0.8), (4.0, 0.8), (4.0, 1.0)])
+def test_the_bound_of_a_narrowing_leg_s_walls_holds_and_is_near(
+    foot_mm: float, na: float, plane: bool
+) -> None:
+    for leg_mm, slack in ((3.0, 0.15), (12.0, 0.06)):
+        guide = CurvedGuide(22.0, 2.0, 6.0, leg_mm, foot_thickness_mm=foot_mm)
+        profile = curved_profile(guide)
+        leg = next(
+            found
+            for found in survey_walls(profile, profile.bends(), ENDS).legs
+            if found.foot == "foot_right"
+        )
+        place, way = tir_march.launch(profile.edge(leg.foot).curve, na, COUNT, N, plane=plane)
+        fate, _ = tir_march.march(tir_march.leg(profile), place, way, N)
+        marched = float(np.mean(fate != LEAKED))
+        bound = kept_by_walls(leg, na, N, 1.0)[0 if plane else 1]
+        assert marched - slack < bound <= marched + 5e-4
 
 
 def test_a_narrowing_leg_is_not_a_pass_for_collimated_light() -> None:
