@@ -97,7 +97,7 @@ class NeoHookeanPad:
         occupancy, size = mesh
         h = np.asarray(size, dtype=float)
         if h.shape != (3,) or not np.isfinite(h).all() or (h <= 0.0).any():
-            raise MeshError(f"cell_size_mm = {tuple(size)}: must be three numbers > 0")
+            raise MeshError(f"cell_size_mm = {size}: must be three numbers > 0")
         numbering = number_nodes(occupancy)
         cell_size = (float(h[0]), float(h[1]), float(h[2]))
         hexes = hexahedra(occupancy, numbering)
@@ -169,7 +169,10 @@ class NeoHookeanPad:
         return tangent
 
     def _checked(self, displacement_mm: ArrayLike) -> Array:
-        u = np.ascontiguousarray(displacement_mm, dtype=np.float64)
+        try:
+            u = np.ascontiguousarray(displacement_mm, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise FiniteStrainError(f"displacement_mm: must be numbers, {error}") from None
         if u.shape != (self.n_nodes, 3):
             raise FiniteStrainError(
                 f"displacement_mm has shape {u.shape}: must be ({self.n_nodes}, 3), a row per node"

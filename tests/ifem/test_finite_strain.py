@@ -270,6 +270,10 @@ def test_bad_input_is_refused():
         NeoHookeanPad.of(mesh, material).force(0.0 * wobble(mesh), engine="gpu")
     with pytest.raises(MeshError, match="cell_size_mm"):
         internal_force((mesh.occupancy, (1.0, -1.0, 1.0)), material, u)
+    with pytest.raises(MeshError, match="cell_size_mm"):
+        internal_force((mesh.occupancy, 0.5), material, u)
+    with pytest.raises(FiniteStrainError, match="must be numbers"):
+        internal_force(mesh, material, [["a", "b", "c"]])
 
 
 def test_the_reference_runs_without_numba():
