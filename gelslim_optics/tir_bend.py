@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,7 +195,13 @@ def _guided_at(rho: float, na: float, index: float, nodes: int) -> float:
 
 def _bunched(low: float, high: float, nodes: int) -> tuple[Array, Array]:
     """Nodes and weights on [low, high] bunched at both ends, where roots have steep slopes."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
+    x, w = _gauss(nodes)
     angle = (x + 1) * math.pi / 4
     slope = np.sin(2 * angle) * math.pi / 4
     return low + (high - low) * np.sin(angle) ** 2, (high - low) * slope * w
+
+
+@lru_cache(maxsize=8)
+def _gauss(nodes: int) -> tuple[Array, Array]:
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    return x, w
