@@ -28,18 +28,8 @@ def virtual_camera(d: Lookup) -> VirtualCamera:
 
 def camera_record(d: Lookup) -> dict[str, object]:
     """The virtual camera as plain values for the bundle; lengths mm, angles as unit vectors."""
-    camera = virtual_camera(d)
     return {
-        "model": "folded pinhole behind flat layers",
-        "position_mm": camera.position_mm.tolist(),
-        "right": camera.right.tolist(),
-        "down": camera.down.tolist(),
-        "forward": camera.forward.tolist(),
-        "focal_px": camera.focal_px,
-        "image_width_px": camera.image_width_px,
-        "image_height_px": camera.image_height_px,
-        "window_bottom_z_mm": camera.window_bottom_z_mm,
-        "layers": [{"thickness_mm": v.thickness_mm, "index": v.index} for v in camera.layers],
+        **virtual_camera(d).to_record(),
         "aperture_mm": d["view.aperture_mm"],
         "focus_mm": d["view.focus_mm"],
     }
