@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import signal
@@ -38,6 +39,7 @@ def _one(monkeypatch: pytest.MonkeyPatch, folder: Path, body: Callable[[], Outco
 
 def _killed(number: int) -> Callable[[], Outcome]:
     def body() -> Outcome:
+        faulthandler.disable()
         os.kill(os.getpid(), number)
         time.sleep(30)
         raise AssertionError("still alive")
