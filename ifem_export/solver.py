@@ -1,0 +1,178 @@
+"""Solvers of the pad's equations behind one interface; the true residual is always reported."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from ifem_export.errors import IfemError
+from ifem_export.layered_operator import LayeredOperator
+from ifem_export.pad_system import PadSystem
+
+Array = NDArray[np.float64]
+Method = Literal["auto", "pcg", "direct"]
+MOST_ITERATIONS = 500
+DIRECT_BELOW = 2000
+"""Unknowns under which a factor is quicker than the first transform."""
+DIRECT_RESIDUAL = 1e-8
+
+
+class ConvergenceError(IfemError):
+    """No solution within the tolerance; the message says how far it got and what to try."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """`x` of A x = b; `residual` is |b - A x| / |b|, computed afresh from x."""
+
+    x: Array
+    residual: float
+    iterations: int
+    seconds: float
+
+
+class Solver(Protocol):
+    """Solves A x = b for one matrix."""
+
+    def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
+        """Raise IfemError for a bad b, ConvergenceError where |b - A x| <= rtol |b| fails."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConjugateGradients:
+    """Conjugate gradients preconditioned by the infinite layered pad."""
+
+    matrix: sparse.csr_array
+    guess: LayeredOperator
+    layers: int
+    most_iterations: int = MOST_ITERATIONS
+
+    def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
+        """Solve to a relative residual; starts from the preconditioner's answer."""
+        started = time.perf_counter()
+        right = _checked(b, self.matrix.shape[0])
+        size = float(np.linalg.norm(right))
+        if size == 0.0:
+            return Solution(np.zeros_like(right), 0.0, 0, time.perf_counter() - started)
+        x, trail = _iterate(self.matrix, right, self._guess, rtol * size, self.most_iterations)
+        residual = float(np.linalg.norm(right - self.matrix @ x)) / size
+        if not residual <= rtol * (1 + 1e-6):
+            raise ConvergenceError(_diagnosis(residual, rtol, [t / size for t in trail]))
+        return Solution(x, residual, len(trail) - 1, time.perf_counter() - started)
+
+    def _guess(self, r: Array) -> Array:
+        return self.guess(r.reshape(self.layers, -1, 3)).reshape(-1)
+
+
+@dataclass(frozen=True, eq=False)
+class SparseFactor:
+    """SuperLU factor, made on the first use and kept."""
+
+    matrix: sparse.csr_array
+
+    @cached_property
+    def factor(self):  # type: ignore[no-untyped-def]
+        """The factor; raises IfemError for a singular matrix."""
+        try:
+            return splu(
+                sparse.csc_array(self.matrix),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise IfemError(f"the stiffness matrix cannot be factored ({error})") from error
+
+    def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
+        """Back-substitute, once more on the residual where that is not enough."""
+        started = time.perf_counter()
+        right = _checked(b, self.matrix.shape[0])
+        size = float(np.linalg.norm(right))
+        x = np.asarray(self.factor.solve(right))
+        residual = 0.0 if size == 0.0 else float(np.linalg.norm(right - self.matrix @ x)) / size
+        steps = 1
+        if residual > rtol:
+            x = x + self.factor.solve(right - self.matrix @ x)
+            residual, steps = float(np.linalg.norm(right - self.matrix @ x)) / size, 2
+        if not residual <= max(rtol, DIRECT_RESIDUAL):
+            raise ConvergenceError(_diagnosis(residual, rtol, [residual]))
+        return Solution(x, residual, steps, time.perf_counter() - started)
+
+
+def pad_solver(system: PadSystem, method: Method = "auto") -> Solver:
+    """Solver of the free unknowns, K_ff u = f."""
+    n = system.stiffness.shape[0]
+    if method == "direct" or (method == "auto" and n < DIRECT_BELOW):
+        return SparseFactor(system.stiffness)
+    return ConjugateGradients(system.stiffness, system.compliance_guess, system.layers)
+
+
+def inner_solver(system: PadSystem, method: Method = "auto") -> Solver:
+    """Solver of the inner unknowns with the surface held, K_ii u = f. At least two layers."""
+    if system.layers < 2:
+        raise IfemError("a pad of one layer has no inner nodes: nothing is left to solve")
+    n = system.inner.shape[0]
+    if method == "direct" or (method == "auto" and n < DIRECT_BELOW):
+        return SparseFactor(system.inner)
+    return ConjugateGradients(system.inner, system.inner_guess, system.layers - 1)
+
+
+def _iterate(
+    matrix: sparse.csr_array,
+    b: Array,
+    guess: Callable[[Array], Array],
+    tolerance: float,
+    most: int,
+) -> tuple[Array, list[float]]:
+    """Preconditioned conjugate gradients; x and the residual norms, the first at x = M⁻¹ b."""
+    x = guess(b)
+    r = b - matrix @ x
+    trail = [float(np.linalg.norm(r))]
+    p, rho = np.zeros_like(b), 1.0
+    while trail[-1] > tolerance and len(trail) <= most and np.isfinite(trail[-1]):
+        z = guess(r)
+        rho, last = float(r @ z), rho
+        p = z if len(trail) == 1 else z + rho / last * p
+        q = matrix @ p
+        curvature = float(p @ q)
+        if not (curvature > 0 and rho > 0):
+            break
+        step = rho / curvature
+        x = x + step * p
+        r = r - step * q
+        trail.append(float(np.linalg.norm(r)))
+    return x, trail
+
+
+def _checked(b: ArrayLike, n: int) -> Array:
+    right = np.asarray(b, dtype=float).reshape(-1)
+    if right.shape != (n,):
+        raise IfemError(f"the right-hand side has {right.size} values: must have {n}")
+    if not np.isfinite(right).all():
+        raise IfemError("the right-hand side holds a value that is not finite")
+    return right
+
+
+def _diagnosis(residual: float, rtol: float, trail: list[float]) -> str:
+    tail = ", ".join(f"{t:.2g}" for t in trail[-4:])
+    stalled = len(trail) > 20 and trail[-1] > 0.5 * trail[-20]
+    why = (
+        "the residual has stalled at rounding: ask for a looser tolerance"
+        if stalled and residual < 1e-9
+        else "the matrix is too ill-conditioned for it: use method 'direct', flatter cells "
+        "(aspect nearer 1) or a Poisson's ratio further from 0.5"
+        if stalled or residual > 1
+        else "allow more iterations or a looser tolerance"
+    )
+    return (
+        f"no solution to {rtol:.1g} after {len(trail) - 1} iterations: residual {residual:.2g} "
+        f"(last: {tail}); {why}"
+    )
