@@ -1,0 +1,61 @@
+"""The paper's surface operator: one layer, every node seen, F = K u by a stencil."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ifem_export.occupancy_table import occupancy_table
+from ifem_export.pad_system import PadSystem
+from ifem_export.solver import Solver, pad_solver
+from ifem_export.surface_field import checked, solved_displacement
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Paper:
+    """Surface stiffness of a pad of one layer."""
+
+    system: PadSystem
+    name: str = "paper"
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """K_ss u."""
+        from ifem_export.surface_kernel import apply_stencil
+
+        u = checked(displacement_mm, self.system.columns)
+        force = np.empty_like(u)
+        apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
+        return force
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Solve K_ss u = f."""
+        return solved_displacement(self.system, self.whole, force_n)
+
+    @cached_property
+    def whole(self) -> Solver:
+        """Solver of the surface nodes."""
+        return pad_solver(self.system)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of table, types and neighbours."""
+        return int(sum(part.nbytes for part in self._stencil))
+
+    @cached_property
+    def _stencil(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Type of each node, its neighbours (c where absent) and the blocks of each type."""
+        s = self.system
+        masks = s.mesh.numbering.masks[-s.columns :]
+        kinds, types = np.unique(masks, return_inverse=True)
+        table = occupancy_table(np.asarray(s.element_matrix))[kinds][:, 9:18]
+        columns, rows = s.places[:, 1] + 1, s.places[:, 0] + 1
+        lattice = np.full((rows.max() + 2, columns.max() + 2), s.columns, dtype=np.int64)
+        lattice[rows, columns] = np.arange(s.columns)
+        around = [lattice[rows + dy, columns + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+        blocks = np.ascontiguousarray(table.transpose(0, 2, 3, 1))
+        return types.astype(np.int64), np.stack(around, axis=1), blocks

@@ -1,0 +1,31 @@
+"""Fields on the outer surface, (c, 3) over the nodes of `PadMesh.surface`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ifem_export.errors import IfemError
+from ifem_export.pad_system import PadSystem
+from ifem_export.solver import Solver
+
+Array = NDArray[np.float64]
+COMPLIANCE_RTOL = 1e-8
+
+
+def solved_displacement(system: PadSystem, solver: Solver, force_n: ArrayLike) -> Array:
+    """Surface part of K_ff u = f for forces (c, 3) on the surface alone."""
+    f = checked(force_n, system.columns)
+    whole = np.zeros((system.layers, system.columns, 3))
+    whole[-1] = f
+    return np.asarray(solver.solve(whole, COMPLIANCE_RTOL).x.reshape(whole.shape)[-1])
+
+
+def checked(field: ArrayLike, columns: int) -> Array:
+    """A finite (c, 3) field."""
+    values = np.asarray(field, dtype=float)
+    if values.shape != (columns, 3):
+        raise IfemError(f"the field has shape {values.shape}: must be ({columns}, 3)")
+    if not np.isfinite(values).all():
+        raise IfemError("the field holds a value that is not finite: fill lost markers first")
+    return values

@@ -1,0 +1,210 @@
+"""From the motion of the pad's outer surface to the forces on it, and back: F = S u, u = C F.
+
+No force acts on inner nodes, so they condense away exactly: S = K_ss - K_si K_ii⁻¹ K_is. The rungs
+differ in how K_ii⁻¹ is applied, from the paper's single layer, which has no inner nodes, to a
+factor of K_ii. Fields are (c, 3) over the nodes of `PadMesh.surface`, mm and N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from ifem_export.element import Formulation, hex8_stiffness
+from ifem_export.errors import IfemError
+from ifem_export.layered_operator import LayeredOperator
+from ifem_export.material import Material
+from ifem_export.pad_mesh import PadMesh
+from ifem_export.pad_system import PadSystem
+from ifem_export.paper_operator import Paper
+from ifem_export.solver import Solver, SparseFactor, inner_solver, pad_solver
+from ifem_export.surface_field import checked, solved_displacement
+
+Array = NDArray[np.float64]
+Rung = Literal["paper", "truncated", "fft", "pcg", "factor", "dense32"]
+RUNGS: tuple[Rung, ...] = get_args(Rung)
+DEFAULT_RTOL = 1e-4
+DEFAULT_RADIUS = 6
+DENSE_BATCH = 256
+
+
+class SurfaceOperator(Protocol):
+    """Stiffness of the outer surface; both ways raise IfemError for a field of a wrong shape."""
+
+    @property
+    def name(self) -> str:
+        """The rung."""
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """Forces (c, 3) in N that hold the surface nodes at (c, 3) mm."""
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Displacement (c, 3) in mm under forces (c, 3) in N."""
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory of what the operator keeps."""
+
+
+def surface_operator(
+    mesh: PadMesh,
+    material: Material,
+    formulation: Formulation,
+    rung: Rung,
+    *,
+    rtol: float = DEFAULT_RTOL,
+    radius: int = DEFAULT_RADIUS,
+) -> SurfaceOperator:
+    """Operator of a rung for a pad of uniform thickness.
+
+    `rtol` is the residual of the inner solve (pcg), `radius` the reach in nodes (truncated).
+    `paper` takes one layer of the mesh's outline and full thickness. Raises IfemError for an
+    unknown rung and MeshError for a pad whose layers differ.
+    """
+    if rung not in RUNGS:
+        raise IfemError(f"surface operator {rung!r}: must be one of {', '.join(RUNGS)}")
+    if rung == "paper":
+        mesh = one_layer(mesh)
+    system = PadSystem(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
+    if rung == "paper" or system.layers == 1:
+        return Paper(system)
+    if rung == "fft":
+        return Convolved("fft", system, system.surface_guess)
+    if rung == "truncated":
+        return Convolved("truncated", system, truncated(system.surface_guess, radius))
+    if rung == "dense32":
+        return Dense(system)
+    solver = inner_solver(system, "direct" if rung == "factor" else "pcg")
+    return Condensed(rung, system, solver, rtol if rung == "pcg" else 1e-10)
+
+
+def one_layer(mesh: PadMesh) -> PadMesh:
+    """The paper's mesh: the same outline with a single layer of cells."""
+    hx, hy, hz = mesh.cell_size_mm
+    cells = np.ascontiguousarray(np.asarray(mesh.occupancy)[:, :, :1])
+    return PadMesh.from_occupancy(cells, (hx, hy, hz * mesh.layers), mesh.origin_mm)
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """Exact condensation; the inner nodes are solved for at each call."""
+
+    name: str
+    system: PadSystem
+    inner: Solver
+    rtol: float = DEFAULT_RTOL
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """F = K_ss u + K_si u_i with K_ii u_i = -K_is u."""
+        u = checked(displacement_mm, self.system.columns).reshape(-1)
+        held = self.inner.solve(-(self.system.surface_to_inner @ u), self.rtol).x
+        force = self.system.surface @ u + self.system.inner_to_surface @ held
+        return np.asarray(force.reshape(-1, 3))
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Solve the whole pad for surface forces alone."""
+        return solved_displacement(self.system, self.whole, force_n)
+
+    @cached_property
+    def whole(self) -> Solver:
+        """Solver of all free nodes."""
+        return pad_solver(self.system, "direct" if self.name == "factor" else "auto")
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the blocks that a call reads."""
+        s = self.system
+        parts = (s.surface, s.inner, s.surface_to_inner, s.inner_to_surface)
+        kept = sum(p.data.nbytes + p.indices.nbytes + p.indptr.nbytes for p in parts)
+        if isinstance(self.inner, SparseFactor):
+            return int(kept + 12 * self.inner.factor.nnz)
+        return int(kept + s.inner_guess.blocks.nbytes)
+
+
+@dataclass(frozen=True, eq=False)
+class Convolved:
+    """Surface stiffness of the infinite pad: wrong near free edges, more so as ν nears 0.5."""
+
+    name: str
+    system: PadSystem
+    stiffness: LayeredOperator
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """Convolution with the surface stiffness."""
+        u = checked(displacement_mm, self.system.columns)
+        return np.asarray(self.stiffness(u[None])[0])
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Convolution with the infinite pad's compliance."""
+        f = checked(force_n, self.system.columns)
+        return np.asarray(self.system.surface_compliance_guess(f[None])[0])
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the blocks."""
+        return int(self.stiffness.blocks.nbytes)
+
+
+@dataclass(frozen=True, eq=False)
+class Dense:
+    """S as a dense float32 matrix, made column by column."""
+
+    system: PadSystem
+    name: str = "dense32"
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float32]:
+        """S (3c, 3c) in N/mm, symmetric."""
+        s = self.system
+        factor = SparseFactor(s.inner).factor
+        n = s.surface.shape[0]
+        dense = np.empty((n, n), dtype=np.float32)
+        across = sparse.csc_array(s.surface_to_inner)
+        for first in range(0, n, DENSE_BATCH):
+            part = slice(first, min(first + DENSE_BATCH, n))
+            held = factor.solve(across[:, part].toarray())
+            block = s.surface[:, part].toarray() - s.inner_to_surface @ held
+            dense[:, part] = block
+        return np.asarray((dense + dense.T) / 2, dtype=np.float32)
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """One matrix-vector product."""
+        u = checked(displacement_mm, self.system.columns).astype(np.float32)
+        return np.asarray(self.matrix @ u.reshape(-1), dtype=float).reshape(-1, 3)
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Solve the whole pad for surface forces alone."""
+        return solved_displacement(self.system, self.whole, force_n)
+
+    @cached_property
+    def whole(self) -> Solver:
+        """Solver of all free nodes."""
+        return pad_solver(self.system)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the matrix."""
+        return int(self.matrix.nbytes)
+
+
+def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
+    """The convolution cut off at `radius` nodes, what is cut lumped onto the diagonal.
+
+    Lumping keeps the force of a uniform motion. Raises IfemError for a radius below 1.
+    """
+    if radius < 1:
+        raise IfemError(f"truncation radius = {radius}: must be at least 1 node")
+    rows, columns = stiffness.shape
+    kernel = np.fft.irfft2(stiffness.blocks, s=stiffness.shape, axes=(0, 1))
+    away_y = np.minimum(np.arange(rows), rows - np.arange(rows))
+    away_x = np.minimum(np.arange(columns), columns - np.arange(columns))
+    near = np.hypot(away_y[:, None], away_x[None, :]) <= radius
+    cut = np.where(near[..., None, None], kernel, 0.0)
+    cut[0, 0] += (kernel - cut).sum(axis=(0, 1))
+    blocks = np.fft.rfft2(cut, axes=(0, 1))
+    return LayeredOperator(blocks, stiffness.columns, stiffness.shape)
