@@ -23,8 +23,10 @@ from ifem_export.assembly import assemble_csr
 from ifem_export.element import Formulation, hex8_stiffness
 from ifem_export.errors import IfemError
 from ifem_export.interpolation import marker_to_node
+from ifem_export.ladder import Ladder, chosen_rung
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
+from ifem_export.surface_operator import Rung, SurfaceOperator, surface_operator
 
 _SELF_TEST_SEED = 20190521
 _SELF_TEST_AMPLITUDE = 0.1
@@ -68,6 +70,8 @@ class Bundle:
         camera: camera parameters, any JSON-able mapping; passed through untouched.
         self_test: reference pair checked when the bundle is loaded.
         spec_hash: identifies the spec the bundle was made from.
+        ladder: surface operators with their measured error and time, or None.
+        operator: label of the ladder's rung that the bundle's maker chose, or "".
     """
 
     mesh: PadMesh
@@ -79,6 +83,30 @@ class Bundle:
     camera: Mapping[str, Any]
     self_test: SelfTest
     spec_hash: str
+    ladder: Ladder | None = None
+    operator: str = ""
+
+    def surface_operator(
+        self,
+        rung: Rung | None = None,
+        *,
+        error: float | None = None,
+        time_ms: float | None = None,
+        **parameters: Any,
+    ) -> SurfaceOperator:
+        """Operator on the outer surface, F = S u and u = C F.
+
+        By name with its parameters, or by budget: the quickest with a field error of at most
+        `error`, the most accurate within `time_ms`; else the maker's choice, else `pcg`. Raises
+        BudgetError where no measured rung keeps the budget, IfemError where none was measured.
+        """
+        if rung is None:
+            chosen = chosen_rung(self.ladder, self.operator, error, time_ms)
+            if chosen is not None:
+                rung, parameters = chosen.rung, dict(chosen.parameters)
+        return surface_operator(
+            self.mesh, self.material, self.formulation, rung or "pcg", **parameters
+        )
 
     @cached_property
     def stiffness_matrix(self) -> sparse.csr_array:
@@ -107,18 +135,22 @@ def build_bundle(
     camera: Mapping[str, Any] | None = None,
     spec_hash: str = "",
     with_stiffness: bool = True,
+    ladder: Ladder | None = None,
+    operator: str = "",
 ) -> Bundle:
     """Make a bundle.
 
     Args:
         mesh: the cropped pad.
         material: the gel.
-        formulation: "full" (the paper's standard element) or "bbar".
+        formulation: "full" (the paper's standard element), "bbar" or "incompatible".
         marker_positions_mm: (k, 2) or (k, 3) in the sensor frame.
         marker_arrays: further arrays of length k by name.
         camera: JSON-able mapping of camera parameters.
         spec_hash: hash of the spec this sensor comes from.
         with_stiffness: materialise K.
+        ladder: measured surface operators of this pad.
+        operator: label of the rung to use unless told otherwise.
 
     Raises:
         IfemError: markers that carry no field, marker arrays of another length, or a camera
@@ -140,6 +172,8 @@ def build_bundle(
         camera=plain_camera,
         self_test=SelfTest(displacement, recipe_force(mesh, matrix, displacement)),
         spec_hash=spec_hash,
+        ladder=ladder,
+        operator=operator,
     )
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ifem_export.bundle import Bundle
 from ifem_export.bundle_check import check_bundle
+from ifem_export.bundle_ladder import LADDER, ladder_json, read_ladder
 from ifem_export.bundle_layout import bundle_arrays, bundle_from
 from ifem_export.bundle_manifest import MANIFEST, REBUILD, describe, read_manifest, to_json
 from ifem_export.errors import BundleError
@@ -44,6 +45,9 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
             name: _write_array(temporary, name, array)
             for name, array in bundle_arrays(bundle).items()
         }
+        ladder = ladder_json(bundle)
+        if ladder:
+            (temporary / LADDER).write_bytes(ladder)
         (temporary / MANIFEST).write_text(
             to_json(describe(bundle, entries)), encoding="utf-8", newline="\n"
         )
@@ -88,7 +92,7 @@ def load_bundle(
     arrays = {
         name: _open_array(folder, entry, verify) for name, entry in manifest["arrays"].items()
     }
-    bundle = bundle_from(manifest, arrays)
+    bundle = bundle_from(manifest, arrays, read_ladder(folder, manifest))
     if verify:
         check_bundle(bundle)
         if not np.array_equal(arrays["free_nodes"], bundle.mesh.free):

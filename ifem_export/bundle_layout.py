@@ -10,6 +10,7 @@ from scipy import sparse
 from ifem_export.bundle import Bundle, MarkerField, SelfTest
 from ifem_export.bundle_manifest import MANIFEST, REBUILD
 from ifem_export.errors import BundleError, IfemError
+from ifem_export.ladder import Ladder
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
 
@@ -43,7 +44,11 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def bundle_from(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Bundle:
+def bundle_from(
+    manifest: dict[str, Any],
+    arrays: dict[str, NDArray[Any]],
+    ladder: tuple[Ladder | None, str] = (None, ""),
+) -> Bundle:
     """Put a bundle together from its manifest and opened arrays, reading no values.
 
     Raises:
@@ -90,6 +95,8 @@ def bundle_from(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Bu
             take("self_test_force_n", "<f8", (n, 3)),
         ),
         spec_hash=manifest["spec_hash"],
+        ladder=ladder[0],
+        operator=ladder[1],
     )
 
 

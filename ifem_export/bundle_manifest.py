@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from ifem_export.bundle import Bundle
+from ifem_export.bundle_ladder import ladder_section
 from ifem_export.errors import BundleError
 
 FORMAT = "gelslim-bundle/1"
@@ -89,6 +90,7 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
         if markers is None
         else {"count": len(markers.positions_mm), "arrays": sorted(markers.arrays)},
         "camera": dict(bundle.camera),
+        "ladder": ladder_section(bundle),
         "arrays": arrays,
     }
     return {**manifest, _SEAL: _seal(manifest)}

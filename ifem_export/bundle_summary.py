@@ -34,7 +34,9 @@ def summarise_bundle(path: str | os.PathLike[str]) -> dict[str, Any]:
     total = sum(entry["bytes"] or 0 for entry in manifest["arrays"].values())
     verification: dict[str, Any] = {"ok": True}
     try:
-        load_bundle(folder)
+        loaded = load_bundle(folder)
+        if loaded.ladder is not None:
+            manifest["ladder"] = {**manifest["ladder"], **loaded.ladder.to_record()}
     except BundleError as error:
         verification = {
             "ok": False,

@@ -63,15 +63,16 @@ def surface_operator(
     """Operator of a rung for a pad of uniform thickness.
 
     `rtol` is the residual of the inner solve (pcg), `radius` the reach in nodes (truncated).
-    `paper` takes one layer of the mesh's outline and full thickness. Raises IfemError for an
+    `paper` takes one layer of fully integrated elements over the mesh's outline and thickness;
+    a pad of one layer has no other operator. Raises IfemError for an
     unknown rung and MeshError for a pad whose layers differ.
     """
     if rung not in RUNGS:
         raise IfemError(f"surface operator {rung!r}: must be one of {', '.join(RUNGS)}")
     if rung == "paper":
-        mesh = one_layer(mesh)
+        mesh, formulation = one_layer(mesh), "full"
     system = PadSystem(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
-    if rung == "paper" or system.layers == 1:
+    if system.layers == 1:
         return Paper(system)
     if rung == "fft":
         return Convolved("fft", system, system.surface_guess)

@@ -1,0 +1,263 @@
+"""What each surface operator costs in error and time, measured for one sensor.
+
+The reference is the same pad at half the pitch with eight layers, its inner nodes solved for to
+1e-8; its forces are lumped to the coarse nodes by the bilinear functions. Fields are smooth bumps
+about a pad thickness wide, sideways and down: narrower ones no marker grid resolves.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifem_export.element import Formulation
+from ifem_export.errors import IfemError
+from ifem_export.material import Material
+from ifem_export.pad_mesh import PadMesh
+from ifem_export.surface_operator import Rung, SurfaceOperator, surface_operator
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+REFERENCE_LAYERS = 8
+REFERENCE_RTOL = 1e-8
+FIELD_SEED = 7
+TIMED_S = 0.12
+CHOICES: tuple[tuple[Rung, dict[str, Any]], ...] = (
+    ("paper", {}),
+    ("truncated", {"radius": 3}),
+    ("truncated", {"radius": 6}),
+    ("fft", {}),
+    ("pcg", {"rtol": 1e-2}),
+    ("pcg", {"rtol": 1e-4}),
+    ("factor", {}),
+)
+DENSE: tuple[tuple[Rung, dict[str, Any]], ...] = (("dense32", {}),)
+
+
+class BudgetError(IfemError):
+    """No rung keeps the budget; the message names the nearest ones."""
+
+
+@dataclass(frozen=True)
+class MeasuredRung:
+    """One operator. Errors are relative: of the field (L2, worst of the fields) and resultant.
+
+    `error_operator` is against exact condensation on the same mesh, without the mesh's own error.
+    """
+
+    rung: Rung
+    parameters: Mapping[str, float]
+    error_field: float
+    error_operator: float
+    error_resultant: float
+    milliseconds: float
+    n_bytes: int
+
+    @property
+    def label(self) -> str:
+        """Name with parameters."""
+        inside = ", ".join(f"{k} {v:g}" for k, v in self.parameters.items())
+        return f"{self.rung} ({inside})" if inside else self.rung
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Rungs of one sensor in the order of CHOICES, and what they were measured against."""
+
+    rungs: tuple[MeasuredRung, ...]
+    reference: str
+    layers: int
+    formulation: str
+    poissons_ratio: float
+
+    def within_error(self, error: float) -> MeasuredRung:
+        """Quickest rung whose field error is at most `error`. Raises BudgetError."""
+        good = [r for r in self.rungs if r.error_field <= error]
+        if not good:
+            best = min(self.rungs, key=lambda r: r.error_field)
+            raise BudgetError(
+                f"no operator reaches a field error of {error:.2%}: the most accurate, "
+                f"{best.label}, has {best.error_field:.2%} in {best.milliseconds:.2f} ms; "
+                "use more layers or a finer pitch"
+            )
+        return min(good, key=lambda r: r.milliseconds)
+
+    def within_time(self, milliseconds: float) -> MeasuredRung:
+        """Most accurate rung that takes at most `milliseconds`. Raises BudgetError."""
+        good = [r for r in self.rungs if r.milliseconds <= milliseconds]
+        if not good:
+            quickest = min(self.rungs, key=lambda r: r.milliseconds)
+            raise BudgetError(
+                f"no operator takes {milliseconds:g} ms or less: the quickest, {quickest.label}, "
+                f"takes {quickest.milliseconds:.3f} ms"
+            )
+        return min(good, key=lambda r: r.error_field)
+
+    def to_record(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**asdict(self), "rungs": [asdict(r) for r in self.rungs]}
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> Ladder:
+        """From plain data; raises IfemError where it is malformed."""
+        try:
+            rungs = tuple(MeasuredRung(**r) for r in record["rungs"])
+            return cls(**{**record, "rungs": rungs})
+        except (KeyError, TypeError) as error:
+            raise IfemError(f"the ladder is malformed ({error!r})") from error
+
+
+def chosen_rung(
+    ladder: Ladder | None, label: str, error: float | None, time_ms: float | None
+) -> MeasuredRung | None:
+    """Rung for a budget, else the one called `label`, else None; both budgets must hold.
+
+    Raises BudgetError where none does, IfemError for a budget without a ladder.
+    """
+    if error is None and time_ms is None:
+        return next((r for r in ladder.rungs if r.label == label), None) if ladder else None
+    if ladder is None:
+        raise IfemError("this bundle holds no measured ladder: build it with one, or name a rung")
+    if error is None:
+        return ladder.within_time(float(time_ms or 0.0))
+    found = ladder.within_error(error)
+    if time_ms is not None and found.milliseconds > time_ms:
+        nearest = ladder.within_time(time_ms)
+        raise BudgetError(
+            f"no operator has a field error of {error:.2%} within {time_ms:g} ms: {found.label} "
+            f"takes {found.milliseconds:.2f} ms, {nearest.label} errs {nearest.error_field:.2%}"
+        )
+    return found
+
+
+def measure_ladder(
+    mesh: PadMesh,
+    material: Material,
+    formulation: Formulation,
+    *,
+    dense: bool = False,
+    progress: Progress | None = None,
+) -> Ladder:
+    """Measure every operator of a pad; `dense` adds the dense rung, which takes much longer.
+
+    Raises MeshError for a pad whose layers differ.
+    """
+    tell = progress or (lambda text, done, total: None)
+    choices = CHOICES + (DENSE if dense else ())
+    steps = len(choices) + 1
+    tell("reference", 0, steps)
+    fields = bumps(mesh)
+    expected = [reference_force(mesh, material, formulation, field) for field in fields]
+    points = np.asarray(mesh.nodes_mm)[mesh.surface]
+    moved = [field(points) for field in fields]
+    exact = surface_operator(mesh, material, formulation, "pcg", rtol=REFERENCE_RTOL)
+    condensed = [exact.force(u) for u in moved]
+    rungs = []
+    for done, (rung, parameters) in enumerate(choices):
+        tell(rung, done + 1, steps)
+        operator = surface_operator(mesh, material, formulation, rung, **parameters)
+        found = [operator.force(u) for u in moved]
+        rungs.append(
+            MeasuredRung(
+                rung=rung,
+                parameters=parameters,
+                error_field=max(map(_off, found, expected)),
+                error_operator=max(map(_off, found, condensed)),
+                error_resultant=max(map(_resultant_off, found, expected)),
+                milliseconds=timed_ms(operator, moved),
+                n_bytes=operator.n_bytes,
+            )
+        )
+    reference = f"{REFERENCE_LAYERS} layers at half the pitch, inner solve to {REFERENCE_RTOL:g}"
+    return Ladder(tuple(rungs), reference, mesh.layers, formulation, material.poissons_ratio)
+
+
+def bumps(mesh: PadMesh) -> list[Callable[[Array], Array]]:
+    """Smooth surface motions (n, 3) mm of points (n, 3), one per direction and one at an edge."""
+    rng = np.random.default_rng(FIELD_SEED)
+    points = np.asarray(mesh.nodes_mm)[mesh.surface][:, :2]
+    low, high = points.min(axis=0), points.max(axis=0)
+    thickness = mesh.layers * mesh.cell_size_mm[2]
+    width = max(thickness, 2.5 * max(mesh.cell_size_mm[:2]))
+    middle, span = (low + high) / 2, (high - low) / 2
+    at_edge = middle + np.array([0.75, 0.0]) * span
+    places = [*(middle + rng.uniform(-0.4, 0.4, (3, 2)) * span), at_edge]
+    directions = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.3, 0.1, -0.7)]
+    return [
+        _bump(place, width, np.array(way)) for place, way in zip(places, directions, strict=True)
+    ]
+
+
+def reference_force(
+    mesh: PadMesh,
+    material: Material,
+    formulation: Formulation,
+    field: Callable[[Array], Array],
+) -> Array:
+    """Forces (c, 3) on the coarse surface nodes, from the pad at half pitch and eight layers."""
+    fine = refined(mesh)
+    operator = surface_operator(fine, material, formulation, "pcg", rtol=REFERENCE_RTOL)
+    force = operator.force(field(np.asarray(fine.nodes_mm)[fine.surface]))
+    return lumped(force, fine, mesh)
+
+
+def refined(mesh: PadMesh) -> PadMesh:
+    """The same pad at half the lateral pitch with eight layers."""
+    hx, hy, hz = mesh.cell_size_mm
+    plan = np.asarray(mesh.occupancy)[:, :, 0].repeat(2, axis=0).repeat(2, axis=1)
+    cells = np.repeat(plan[:, :, None], REFERENCE_LAYERS, axis=2)
+    size = (hx / 2, hy / 2, hz * mesh.layers / REFERENCE_LAYERS)
+    return PadMesh.from_occupancy(cells, size, mesh.origin_mm)
+
+
+def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
+    """Forces of fine surface nodes on coarse ones, by the coarse bilinear functions."""
+    j, i = _places(fine)
+    lattice = np.zeros((j.max() + 3, i.max() + 3, 3))
+    lattice[j + 1, i + 1] = force
+    rows, columns = _places(coarse)
+    total = np.zeros((len(rows), 3))
+    for dy, wy in ((-1, 0.5), (0, 1.0), (1, 0.5)):
+        for dx, wx in ((-1, 0.5), (0, 1.0), (1, 0.5)):
+            total += wy * wx * lattice[2 * rows + 1 + dy, 2 * columns + 1 + dx]
+    return total
+
+
+def timed_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
+    """Median time of a call in ms, after a first one."""
+    operator.force(fields[0])
+    times: list[float] = []
+    while sum(times) < TIMED_S or len(times) < 3:
+        started = time.perf_counter()
+        operator.force(fields[len(times) % len(fields)])
+        times.append(time.perf_counter() - started)
+    return float(np.median(times)) * 1000
+
+
+def _bump(place: Array, width: float, way: Array) -> Callable[[Array], Array]:
+    def field(points: Array) -> Array:
+        square = ((points[:, :2] - place) ** 2).sum(axis=1)
+        return np.asarray(0.1 * np.exp(-square / (2 * width**2))[:, None] * way)
+
+    return field
+
+
+def _places(mesh: PadMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Lattice rows and columns of the surface nodes."""
+    numbering = mesh.numbering
+    _, j, i = np.unravel_index(numbering.positions[mesh.surface], numbering.shape)
+    return j, i
+
+
+def _off(found: Array, expected: Array) -> float:
+    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
+def _resultant_off(found: Array, expected: Array) -> float:
+    miss = np.linalg.norm(found.sum(axis=0) - expected.sum(axis=0))
+    return float(miss / np.linalg.norm(expected.sum(axis=0)))
