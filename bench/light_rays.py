@@ -1,9 +1,10 @@
-"""Light tracer: error against rays and time, Sobol or chance; exact arcs against facets.
+"""Light tracer: error against rays and time, facets against exact arcs, brightness against R/t.
 
-    python bench/light_rays.py [--rays 20] [--out light_rays.json]
+    python bench/light_rays.py [--rays 18] [--reference 24] [--docs docs]
 
-Errors are the spread of independent runs about a longer one of another seed. Times are CPU
-seconds of one thread, after the kernel is compiled.
+Writes data/light_rays.json and images/light_rays.png under the folder of --docs. Errors are the
+root mean square over independent runs about a long run of another seed. Times are CPU seconds of
+one thread, after the kernel is compiled.
 """
 
 from __future__ import annotations
@@ -11,11 +12,16 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
+import platform
 import time
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from light_ratios import changes, published, ratios
+from light_rays_figure import draw
 
 from gelslim_optics.guide_facets import facetted_profile
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
@@ -23,17 +29,16 @@ from gelslim_optics.guide_shapes import CurvedGuide, GelSection, curved_profile
 from gelslim_optics.light_points import Sampling
 from gelslim_optics.light_scene import LightScene
 from gelslim_optics.light_source import EdgeLaunch, LedRow
+from gelslim_optics.tir_certificate import certify_tir
 from gelslim_optics.trace import TraceOptions, trace_light
 
 RUNS = 12
+REFERENCE_SEED = 10_001
 ENTRIES = ("delivered", "leaked.outer_bend_right")
-SPLITS = (1.0, 1e-2)
-FACETS_DEG = (1.0, 2.5, 5.0, 10.0, 15.0, 22.5, 30.0)
+SPLITS = (1.0, 5e-2)
+FACETS_DEG = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.5, 10.0, 15.0, 22.5, 30.0)
+FACET_RAYS = 1 << 18
 GUIDED_NA, N_ACRYLIC = 0.5, 1.4906
-
-
-def curved(ratio: float) -> GuideProfile:
-    return curved_profile(CurvedGuide(20.0, 2.0, 2.0 * ratio, 5.0), GelSection(20.0, 2.0))
 
 
 def led_scene() -> LightScene:
@@ -42,7 +47,8 @@ def led_scene() -> LightScene:
         LedRow(f"foot_{side}", (-7.5, -2.5, 2.5, 7.5), 2.0, 0.1, colour=colour)
         for side, colour in (("left", "red"), ("right", "green"))
     )
-    return LightScene(curved(1.5), (-10, 10), (-10, 10), rows)
+    profile = curved_profile(CurvedGuide(20.0, 2.0, 3.0, 5.0), GelSection(20.0, 2.0))
+    return LightScene(profile, (-10, 10), (-10, 10), rows)
 
 
 def timed(scene: LightScene, rays: int, **options: Any) -> tuple[Any, float]:
@@ -51,25 +57,21 @@ def timed(scene: LightScene, rays: int, **options: Any) -> tuple[Any, float]:
     return result, time.process_time() - start
 
 
-def ladder(largest: int) -> list[dict[str, Any]]:
+def ladder(largest: int, reference: int) -> dict[str, Any]:
+    """Errors by number of rays, points and splitting, about a run of 2^reference rays."""
     scene = led_scene()
     trace_light(scene, 64)
-    truth = trace_light(scene, 1 << (largest + 2), seed=10_001, options=TraceOptions(split=1e-3))
+    truth = trace_light(scene, 1 << reference, seed=REFERENCE_SEED).ledger()
+    sampling: Sampling
     rows = []
     for power in range(10, largest + 1, 2):
-        sampling: Sampling
         for sampling in ("sobol", "random"):
             for split in SPLITS:
-                runs = [
-                    timed(
-                        scene,
-                        1 << power,
-                        seed=seed,
-                        sampling=sampling,
-                        options=TraceOptions(split=split),
-                    )
-                    for seed in range(RUNS)
-                ]
+                options: dict[str, Any] = {
+                    "sampling": sampling,
+                    "options": TraceOptions(split=split),
+                }
+                runs = [timed(scene, 1 << power, seed=seed, **options) for seed in range(RUNS)]
                 row: dict[str, Any] = {
                     "rays": 1 << power,
                     "sampling": sampling,
@@ -77,11 +79,17 @@ def ladder(largest: int) -> list[dict[str, Any]]:
                     "cpu_s": float(np.median([seconds for _, seconds in runs])),
                 }
                 for entry in ENTRIES:
-                    exact = truth.value(entry)
-                    errors = [result.value(entry) / exact - 1 for result, _ in runs]
+                    errors = [r.value(entry) / truth[entry].value - 1 for r, _ in runs]
                     row[f"error_{entry}"] = math.sqrt(float(np.mean(np.square(errors))))
                 rows.append(row)
-    return rows
+    known = {
+        entry: {
+            "value": truth[entry].value,
+            "relative_error": truth[entry].standard_error / truth[entry].value,
+        }
+        for entry in ENTRIES
+    }
+    return {"reference_rays": 1 << reference, "reference": known, "rows": rows}
 
 
 def lone_bend(ratio: float) -> GuideProfile:
@@ -97,28 +105,34 @@ def lone_bend(ratio: float) -> GuideProfile:
     return GuideProfile((exit_edge, *(Edge(n, c, "acrylic", "air") for n, c in curves.items())))
 
 
-def facets() -> list[dict[str, Any]]:
+def facets() -> dict[str, Any]:
     """Light of NA 0.5 in a bend that guides it all: what its chords lose."""
     ratio = 1.05 / (math.sqrt(N_ACRYLIC**2 - GUIDED_NA**2) - 1)
-    sine = math.sqrt(N_ACRYLIC**2 - GUIDED_NA**2) / N_ACRYLIC * ratio / (ratio + 1)
-    margin = math.degrees(math.asin(sine) - math.asin(1 / N_ACRYLIC))
     exact = lone_bend(ratio)
+    margin = certify_tir(exact, GUIDED_NA, guide_index=N_ACRYLIC).bends[0].margin_deg
     rows = []
     for facet in (0.0, *FACETS_DEG):
         profile = facetted_profile(exact, facet, margin, allow=True) if facet else exact
         lamp = EdgeLaunch("foot_right", na=GUIDED_NA)
         scene = LightScene(profile, (-10, 10), (-10, 10), (lamp,))
-        result, seconds = timed(scene, 1 << 16)
+        result, seconds = timed(scene, FACET_RAYS)
+        leak = sum(result.value(e) for e in ("leaked.outer_bend", "leaked.inner_bend"))
         rows.append(
             {
                 "facet_deg": facet,
                 "half_facet_over_margin": facet / 2 / margin,
-                "leak": result.total("leaked").value,
+                "leak": leak,
                 "lost": result.value("lost"),
                 "cpu_s": seconds,
             }
         )
-    return rows
+    return {
+        "na": GUIDED_NA,
+        "bend_ratio": ratio,
+        "margin_deg": margin,
+        "rays": FACET_RAYS,
+        "rows": rows,
+    }
 
 
 def speed(rays: int = 1 << 20) -> list[dict[str, Any]]:
@@ -127,6 +141,24 @@ def speed(rays: int = 1 << 20) -> list[dict[str, Any]]:
         _, seconds = timed(led_scene(), rays, options=TraceOptions(split=split))
         rows.append({"split": split, "rays": rays, "million_rays_per_s": rays / seconds / 1e6})
     return rows
+
+
+def setting() -> dict[str, Any]:
+    return {
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("numpy", "scipy", "numba", "gelslim-cad")},
+        "seeds": {"runs": list(range(RUNS)), "reference": REFERENCE_SEED, "others": 0},
+    }
+
+
+def processor() -> dict[str, Any]:
+    """Name and number of this machine's processors."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return {"cpu": names[0] if names else platform.processor(), "cores": os.cpu_count()}
 
 
 def table(rows: list[dict[str, Any]]) -> str:
@@ -141,15 +173,29 @@ def table(rows: list[dict[str, Any]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--rays", type=int, default=18, help="power of 2 of the largest run")
-    parser.add_argument("--out", type=Path, help="write the JSON here too")
+    parser.add_argument("--reference", type=int, default=24, help="power of 2 of the long run")
+    parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
     options = parser.parse_args()
-    report = {"ladder": ladder(options.rays), "facets": facets(), "speed": speed()}
-    for name, rows in report.items():
-        print(f"{name}\n{table(rows)}\n")
-    text = json.dumps(report, indent=1)
-    print(text)
-    if options.out:
-        options.out.write_text(text + "\n")
+    report: dict[str, Any] = {
+        "setting": setting(),
+        "machine": processor(),
+        "ladder": ladder(options.rays, options.reference),
+        "facets": facets(),
+        "speed": speed(),
+        "ratios": ratios(),
+        "published": published(),
+        "changes": changes(),
+    }
+    for name in ("ladder", "facets", "ratios"):
+        print(f"{name}\n{table(report[name]['rows'])}\n")
+    for name in ("speed", "published", "changes"):
+        print(f"{name}\n{table(report[name])}\n")
+    if options.docs:
+        for folder in ("data", "images"):
+            (options.docs / folder).mkdir(parents=True, exist_ok=True)
+        text = json.dumps(report, indent=1) + "\n"
+        (options.docs / "data" / "light_rays.json").write_text(text)
+        draw(report, options.docs / "images" / "light_rays.png")
 
 
 if __name__ == "__main__":

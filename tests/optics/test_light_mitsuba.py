@@ -222,9 +222,9 @@ def agree(ours: Delivered, mitsuba: Delivered) -> None:
 
 
 def test_fully_guided_bends(tmp_path: Path) -> None:
-    """R/t = 12 guides all of a bare LED, and so do chords of 1°: half a chord is below the margin.
+    """R/t = 12 guides all of a bare LED; half a chord of 1° is below the margin of 1.06°.
 
-    Chords that leak nothing still turn light a little: 0.6 % more of it reaches the coat.
+    Such chords leak less than 1e-4, but they turn light: 0.6 % more of it reaches the coat.
     """
     exact = lit(finger(12.0, absorption=0.0))
     certificate = certify_tir(exact.profile, 1.0, guide_index=N_ACRYLIC, gel_index=N_GEL)
