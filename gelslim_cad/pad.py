@@ -14,6 +14,7 @@ from gelslim_cad.sight import camera_record
 from gelslim_cad.spec import Spec
 from ifem_export.bundle import Bundle, build_bundle
 from ifem_export.crop import CropReport
+from ifem_export.ladder import Ladder
 from ifem_export.marker_grid import MarkerGrid, build_marker_grid
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
@@ -70,12 +71,26 @@ def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NearestNodes, Outline
     return nodes, Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
 
 
-def make_bundle(spec: Spec, d: Dimensions, mesh: PadMesh, grid: MarkerGrid) -> Bundle:
-    """The stiffness bundle of this sensor."""
+def gel_material(spec: Spec) -> Material:
+    """The gel as the stiffness needs it."""
     gel = spec.material.gel
+    return Material(gel.youngs_modulus_mpa, gel.poissons_ratio, gel.density_kg_m3)
+
+
+def make_bundle(
+    spec: Spec,
+    d: Dimensions,
+    mesh: PadMesh,
+    grid: MarkerGrid,
+    *,
+    with_stiffness: bool = False,
+    ladder: Ladder | None = None,
+    operator: str = "",
+) -> Bundle:
+    """The stiffness bundle of this sensor; K itself only `with_stiffness`: its recipe is there."""
     return build_bundle(
         mesh,
-        Material(gel.youngs_modulus_mpa, gel.poissons_ratio, gel.density_kg_m3),
+        gel_material(spec),
         spec.mesh.element,
         marker_positions_mm=grid.positions_mm,
         marker_arrays={
@@ -86,4 +101,7 @@ def make_bundle(spec: Spec, d: Dimensions, mesh: PadMesh, grid: MarkerGrid) -> B
         },
         camera=camera_record(d),
         spec_hash=spec_hash(spec),
+        with_stiffness=with_stiffness,
+        ladder=ladder,
+        operator=operator,
     )

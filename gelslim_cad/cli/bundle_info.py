@@ -48,9 +48,13 @@ def _describe(path: Path, found: dict[str, Any]) -> None:
     print(f"  stiffness  {stored if found['stiffness']['stored'] else 'assembled when needed'}")
     markers = found["markers"]
     print(f"  markers    {markers['count'] if markers else 'none'}")
-    for rung in found.get("ladder") or ():
-        print(f"  operator   {rung['name']}: field error {rung['error_field']:.2%}, "
-              f"{rung['milliseconds']:.2f} ms")  # fmt: skip
+    ladder = found.get("ladder") or {}
+    for rung in ladder.get("rungs", ()):
+        inside = ", ".join(f"{k} {v:g}" for k, v in rung["parameters"].items())
+        label = f"{rung['rung']} ({inside})" if inside else rung["rung"]
+        mark = ", chosen" if label == ladder.get("operator") else ""
+        print(f"  operator   {label}: field error {rung['error_field']:.2%}, "
+              f"{rung['milliseconds']:.3f} ms{mark}")  # fmt: skip
     verdict = found["verification"]
     if verdict["ok"]:
         print("  verified   all hashes, values and the self-test pair")

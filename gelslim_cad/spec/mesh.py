@@ -26,7 +26,12 @@ class Mesh(Block):
     cells_across: Count | None = Field(
         default=None, description="Cells across the finger, instead of nodes_per_marker_pitch"
     )
-    layers: int = Field(default=1, ge=1, le=32, description="Cell layers through the thickness")
+    layers: int = Field(
+        default=4,
+        ge=1,
+        le=32,
+        description="Cell layers through the thickness; one is the paper's form",
+    )
     element: Literal["full", "bbar", "incompatible"] = Field(
         default="bbar",
         description="Hex-8 element: full 2×2×2 integration, B-bar (mean dilatation) or "

@@ -155,6 +155,7 @@ def test_a_batch_fails_where_single_designs_fail() -> None:
         "design.housing.baffle_mm": rng.uniform(0.4, 1.5, count),
         "design.markers.diameter_mm": rng.uniform(0.25, 0.7, count),
         "material.gel.poissons_ratio": rng.uniform(0.3, 0.49, count),
+        "mesh.layers": rng.integers(1, 3, count),
     }
     failed = check_batch(derive_batch(shipped("mini20"), overrides))
     assert set(failed) == set(RULES)
@@ -162,7 +163,7 @@ def test_a_batch_fails_where_single_designs_fail() -> None:
     assert {"guide.bend_ratio", "wall.thinnest_mm", "mesh.layers"} <= some
     for k in range(count):
         single = check(
-            derive(varied(shipped("mini20"), {p: float(v[k]) for p, v in overrides.items()}))
+            derive(varied(shipped("mini20"), {p: v[k].item() for p, v in overrides.items()}))
         )
         here = {r for r, where in failed.items() if np.broadcast_to(where, (count,))[k]}
         assert here == {c.id for c in single if c.status == "fail"}

@@ -66,8 +66,8 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
     ],
     "gel.too_soft_mpa": [({"material.gel.youngs_modulus_mpa": 0.01}, "warn")],
     "mesh.layers": [
-        ({"material.gel.poissons_ratio": 0.42}, "warn"),
-        ({"material.gel.poissons_ratio": 0.46}, "fail"),
+        ({"material.gel.poissons_ratio": 0.42, "mesh.layers": 1}, "warn"),
+        ({"material.gel.poissons_ratio": 0.46, "mesh.layers": 1}, "fail"),
     ],
     "mesh.alignment_mm": [({"mesh.cells_along": 30, "mesh.cells_across": 30}, "warn")],
     "mesh.aspect": [
@@ -76,7 +76,7 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
          "fail"),
     ],
     "mesh.size": [
-        ({"mesh.nodes_per_marker_pitch": 20}, "warn"),
+        ({"mesh.nodes_per_marker_pitch": 20, "mesh.layers": 1}, "warn"),
         ({"mesh.nodes_per_marker_pitch": 20, "mesh.layers": 8}, "fail"),
     ],
     "finger.thickness_mm": [({"design.envelope.max_thickness_mm": 17.0}, "fail")],

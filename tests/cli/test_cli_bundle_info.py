@@ -66,3 +66,26 @@ def test_a_matrix_is_exported(
     assert file.stat().st_size > 1000
     assert main(["bundle-export", str(bundle), str(tmp_path / "k.xyz")]) == 2
     assert "names no format" in capsys.readouterr().err
+
+
+def test_a_budget_chooses_the_operator(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "bundle"
+    assert main(["bundle", SPEC, "-o", str(folder), "--error", "5%"]) == 0
+    said = capsys.readouterr().out
+    assert "field error" in said
+    assert "chosen" in said
+    assert (folder / "ladder.json").is_file()
+    assert main(["bundle-info", str(folder)]) == 0
+    assert "chosen" in capsys.readouterr().out
+    for wrong in ("x", "-3%", "0"):
+        assert main(["bundle", SPEC, "-o", str(tmp_path / "no"), "--error", wrong]) == 2
+    capsys.readouterr()
+    assert main(["bundle", SPEC, "-o", str(tmp_path / "no"), "--error", "0.0001%"]) == 2
+    assert "no operator reaches a field error" in capsys.readouterr().err
+    assert not (tmp_path / "no").exists()
+
+
+def test_the_matrix_is_stored_on_request(tmp_path: Path) -> None:
+    assert main(["bundle", SPEC, "-o", str(tmp_path / "k"), "--with-k", "--no-ladder"]) == 0
+    assert (tmp_path / "k" / "stiffness_data_n_per_mm.npy").is_file()
+    assert not (tmp_path / "k" / "ladder.json").exists()

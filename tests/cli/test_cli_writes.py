@@ -129,7 +129,9 @@ def test_pad_commands_refuse_a_pad_that_breaks_a_rule_unless_forced(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     spec = altered(
-        tmp_path, "  envelope:\n    max_thickness_mm: 18", "material: {gel: {poissons_ratio: 0.47}}"
+        tmp_path,
+        "  envelope:\n    max_thickness_mm: 18",
+        "material: {gel: {poissons_ratio: 0.47}}\nmesh: {layers: 1}",
     )
     target = tmp_path / "out"
     assert main([command, str(spec), "-o", str(target)]) == 1
