@@ -29,13 +29,19 @@ SPEC = Path(__file__).parents[1] / "designs" / "gelslim2.yaml"
 RAYS = 1 << 16
 QUANTITIES = ("arrived", "entered_gel")
 RATIOS = (0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0)
-PUBLISHED = {1.0: (0.74, 0.77), 2.05: (0.92, 0.95), 3.0: (1.10, 1.14), 4.0: (1.10, 1.14)}
-"""Published ranges, for a 20 mm pad and mirrors of reflectance 0.88 to 0.95."""
+EARLIER = {1.0: (0.74, 0.77), 2.05: (0.92, 0.95), 3.0: (1.10, 1.14), 4.0: (1.10, 1.14)}
+"""Ranges an earlier prototype tracer gave, for a 20 mm pad and mirrors of 0.88 to 0.95."""
 
 
-OPEN = {"pad_mm": 20.0, "window_mm": 20.0, "thickness_mm": 2.0, "leg_mm": 0.5, "gap_mm": 0.0}
+OPEN: dict[str, Any] = {
+    "pad_mm": 20.0,
+    "window_mm": 20.0,
+    "thickness_mm": 2.0,
+    "leg_mm": 0.5,
+    "gap_mm": 0.0,
+}
 CHANGES: dict[str, dict[str, Any]] = {
-    "published setting": {},
+    "plain setting": {},
     "black housing": {"black": True},
     "legs of 1 mm, gap 0.2 mm": {"leg_mm": 1.0, "gap_mm": 0.2},
     "legs of 5 mm": {"leg_mm": 5.0},
@@ -44,11 +50,11 @@ CHANGES: dict[str, dict[str, Any]] = {
     "coat scatters half": {"coat": Surface(0.5, diffuse=True)},
     "pad of 28 mm": {"pad_mm": 28.0, "window_mm": 28.0},
 }
-"""What differs between the published setting and a finger, one at a time."""
+"""What differs between the plain setting and a finger, one at a time."""
 
 
 def ratios() -> dict[str, Any]:
-    """Curves over R/t: gelslim2 as it is and with short legs, and the published setting."""
+    """Curves over R/t: gelslim2 as it is and with short legs, and the plain setting."""
     d = derive(read_spec(SPEC).spec)
     t, gap = d["design.light_guide.thickness_mm"], d["design.housing.fit_clearance_mm"]
     leg = d["design.light_guide.leg_length_mm"]
@@ -56,9 +62,9 @@ def ratios() -> dict[str, Any]:
     rows = []
     for name, (leg_mm, gap_mm) in legs.items():
         rows += _curve(f"gelslim2, {name} legs", leg_mm, gap_mm, _finger(d, leg_mm, gap_mm))
-    rows += _curve("published, short legs", 0.5, 0.0, partial(_open, **OPEN))
+    rows += _curve("plain, short legs", 0.5, 0.0, partial(_open, **OPEN))
     longer = {**OPEN, "leg_mm": leg, "gap_mm": gap}
-    rows += _curve("published, legs of gelslim2", leg, gap, partial(_open, **longer))
+    rows += _curve("plain, legs of gelslim2", leg, gap, partial(_open, **longer))
     return {
         "design": SPEC.name,
         "own_bend_ratio": d["guide.bend_ratio"],
@@ -68,18 +74,18 @@ def ratios() -> dict[str, Any]:
     }
 
 
-def published() -> list[dict[str, Any]]:
-    """20 mm pad as wide as the window, legs of t/4, LEDs touch, nothing black but the coat."""
-    rows = _curve("published", 0.5, 0.0, partial(_open, **OPEN), tuple(PUBLISHED))
+def earlier() -> list[dict[str, Any]]:
+    """The plain setting: 20 mm pad as wide as the window, legs of t/4, LEDs touch, no housing."""
+    rows = _curve("plain", 0.5, 0.0, partial(_open, **OPEN), tuple(EARLIER))
     keys = ("bend_ratio", *QUANTITIES)
     return [
-        {**{k: row[k] for k in keys}, "published_low": low, "published_high": high}
-        for row, (low, high) in zip(rows, PUBLISHED.values(), strict=True)
+        {**{k: row[k] for k in keys}, "earlier_low": low, "earlier_high": high}
+        for row, (low, high) in zip(rows, EARLIER.values(), strict=True)
     ]
 
 
 def changes() -> list[dict[str, Any]]:
-    """The published setting with one change at a time."""
+    """The plain setting with one change at a time."""
     rows = []
     for name, change in CHANGES.items():
         found = _curve(name, 0.0, 0.0, partial(_open, **{**OPEN, **change}), (1.0, 2.05, 3.0))

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from light_ratios import changes, published, ratios
+from light_ratios import changes, earlier, ratios
 from light_rays_figure import draw
 
 from gelslim_optics.guide_facets import facetted_profile
@@ -183,12 +183,12 @@ def main() -> None:
         "facets": facets(),
         "speed": speed(),
         "ratios": ratios(),
-        "published": published(),
+        "earlier": earlier(),
         "changes": changes(),
     }
     for name in ("ladder", "facets", "ratios"):
         print(f"{name}\n{table(report[name]['rows'])}\n")
-    for name in ("speed", "published", "changes"):
+    for name in ("speed", "earlier", "changes"):
         print(f"{name}\n{table(report[name])}\n")
     if options.docs:
         for folder in ("data", "images"):

@@ -17,8 +17,8 @@ POINTS = {
 QUANTITIES = {"arrived": ("light on the coat", "-"), "entered_gel": ("light into the gel", "--")}
 SETTINGS = {
     "gelslim2, own legs": "#1f4e8c",
-    "published, legs of gelslim2": "#1c7d3a",
-    "published, short legs": "#c4580a",
+    "plain, legs of gelslim2": "#1c7d3a",
+    "plain, short legs": "#c4580a",
 }
 
 
@@ -29,14 +29,15 @@ def draw(report: dict[str, Any], path: Path) -> None:
 
     figure = Figure(figsize=(14.5, 9.0), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
-    upper, lower = figure.subfigures(2, 1, height_ratios=(1.08, 1))
+    rows: Any = figure.subfigures(2, 1, height_ratios=(1.08, 1))
+    upper, lower = rows
     errors = upper.subplots(1, 4)
     _errors(errors, report["ladder"])
     handles, labels = errors[0].get_legend_handles_labels()
     upper.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, fontsize=9)
     left, right = lower.subplots(1, 2)
     _facets(left, report["facets"])
-    _ratios(right, report["ratios"], report["published"])
+    _ratios(right, report["ratios"], report["earlier"])
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     fresh = path.with_suffix(".new")
@@ -103,7 +104,7 @@ def _facets(panel: Any, facets: dict[str, Any]) -> None:
     panel.grid(**GRID)
 
 
-def _ratios(panel: Any, ratios: dict[str, Any], published: list[dict[str, Any]]) -> None:
+def _ratios(panel: Any, ratios: dict[str, Any], earlier: list[dict[str, Any]]) -> None:
     for setting, colour in SETTINGS.items():
         rows = [r for r in ratios["rows"] if r["setting"] == setting]
         x = [r["bend_ratio"] for r in rows]
@@ -113,9 +114,9 @@ def _ratios(panel: Any, ratios: dict[str, Any], published: list[dict[str, Any]])
             sides = [[r[f"{quantity}_{side}"] for r in rows] for side in ("low", "high")]
             panel.fill_between(x, *sides, color=colour, alpha=0.2, lw=0)
             panel.plot(x, y, color=colour, ls=style, marker=".", label=f"{about}: {name}")
-    middle = [(r["published_low"] + r["published_high"]) / 2 for r in published]
-    half = [(r["published_high"] - r["published_low"]) / 2 for r in published]
-    at = [r["bend_ratio"] for r in published]
+    middle = [(r["earlier_low"] + r["earlier_high"]) / 2 for r in earlier]
+    half = [(r["earlier_high"] - r["earlier_low"]) / 2 for r in earlier]
+    at = [r["bend_ratio"] for r in earlier]
     panel.errorbar(
         at,
         middle,
@@ -125,7 +126,7 @@ def _ratios(panel: Any, ratios: dict[str, Any], published: list[dict[str, Any]])
         capsize=5,
         lw=1.6,
         zorder=5,
-        label="published figures",
+        label="earlier prototype, plain, short legs: into the gel",
     )
     panel.axhline(1.0, color=INK, lw=0.8)
     panel.axvline(ratios["own_bend_ratio"], color=INK, lw=0.8, ls=":")
