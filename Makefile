@@ -8,7 +8,7 @@ PINS := requirements/constraints.txt
 
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: variant test test-slow lint stability designs pins clean
+.PHONY: variant test test-slow lint stability designs bench pins clean
 
 variant: $(VENV)/.installed
 	$(BIN)/gelslim build "$(SPEC)" -o "$(OUT)"
@@ -26,6 +26,13 @@ lint: $(VENV)/.installed-dev
 
 stability: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.stability.run --count 300
+
+bench: $(VENV)/.installed-dev
+	$(BIN)/python bench/design_batch.py
+	$(BIN)/python bench/refraction.py
+	$(BIN)/python bench/light_rays.py
+	$(BIN)/python bench/stiffness_ladder.py
+	$(BIN)/python bench/assembly.py --write
 
 designs: $(VENV)/.installed
 	for spec in designs/*.yaml; do $(BIN)/gelslim build "$$spec" -o "out/$$(basename "$$spec" .yaml)" || exit $$?; done

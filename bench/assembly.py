@@ -1,0 +1,149 @@
+"""Assembly time and peak memory of the stiffness matrix against peers, in one run.
+
+    python bench/assembly.py                 # sizes up to 128 x 128 x 8; peers where installed
+    python bench/assembly.py --write         # docs/data/assembly.json too
+
+The floor is the time to touch fresh memory of the matrix's size for the first time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import platform
+import resource
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+SIZES = ((42, 42, 1), (100, 100, 4), (128, 128, 8))
+SIZE_MM = (0.5, 0.5, 0.5)
+REPEATS = 7
+YOUNGS_MPA, POISSON = 0.147, 0.3223
+
+
+def ours(cells: tuple[int, int, int]) -> Callable[[], Any]:
+    """This project, CSR, element matrix and numbering included."""
+    from ifem_export.assembly import assemble_csr
+    from ifem_export.element import hex8_stiffness
+    from ifem_export.material import Material
+
+    occupancy = np.ones(cells, dtype=bool)
+    gel = Material(YOUNGS_MPA, POISSON, 1000.0)
+
+    def run() -> Any:
+        return assemble_csr(occupancy, hex8_stiffness(SIZE_MM, gel, "full"))
+
+    return run
+
+
+def scikit_fem(cells: tuple[int, int, int]) -> Callable[[], Any]:
+    """scikit-fem, mesh and basis prepared."""
+    import skfem
+    from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+    axes = [np.arange(n + 1) * h for n, h in zip(cells, SIZE_MM, strict=True)]
+    mesh = skfem.MeshHex.init_tensor(*axes)
+    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementHex1()), intorder=2)
+    form = linear_elasticity(*lame_parameters(YOUNGS_MPA, POISSON))
+    return lambda: form.assemble(basis)
+
+
+def felupe(cells: tuple[int, int, int]) -> Callable[[], Any]:
+    """felupe, mesh and region prepared."""
+    import felupe as fem
+
+    far = tuple(n * h for n, h in zip(cells, SIZE_MM, strict=True))
+    mesh = fem.Cube(b=far, n=tuple(n + 1 for n in cells))
+    field = fem.FieldContainer([fem.Field(fem.RegionHexahedron(mesh), dim=3)])
+    law = fem.LinearElastic(E=YOUNGS_MPA, nu=POISSON)
+    return lambda: fem.SolidBody(law, field).assemble.matrix()
+
+
+TOOLS = {"gelslim-cad": ours, "felupe": felupe, "scikit-fem": scikit_fem}
+
+
+def measured(tool: str, cells: tuple[int, int, int], pipe: Any) -> None:
+    """Times and memory of one tool in a process of its own."""
+    try:
+        # Compilers and caches first, on a small pad: their memory is not the matrix's.
+        TOOLS[tool]((4, 4, 2))()
+        run = TOOLS[tool](cells)
+    except ImportError:
+        pipe.send(None)
+        return
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    matrix = run()
+    peak = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
+    matrix = matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
+    size = matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes
+    del matrix
+    times: list[float] = []
+    while len(times) < REPEATS and sum(times) < 20.0:
+        started = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - started)
+    pipe.send({"seconds": statistics.median(times), "peak_bytes": peak, "matrix_bytes": size})
+
+
+def touched(n_bytes: int) -> float:
+    """Median time to write fresh memory once."""
+    times = []
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        fresh = np.empty(n_bytes // 8)
+        fresh.fill(1.0)
+        times.append(time.perf_counter() - started)
+        del fresh
+    return statistics.median(times)
+
+
+def main() -> None:
+    """Print a table; write it on request."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true")
+    write = parser.parse_args().write
+    context = multiprocessing.get_context("spawn")
+    rows: list[dict[str, Any]] = []
+    for cells in SIZES:
+        base: dict[str, Any] = {}
+        for tool in TOOLS:
+            ours_end, theirs = context.Pipe(duplex=False)
+            process = context.Process(target=measured, args=(tool, cells, theirs))
+            process.start()
+            theirs.close()
+            try:
+                found = ours_end.recv()
+            except EOFError:
+                found = None
+            process.join()
+            if found is None:
+                print(f"{cells}  {tool}: not installed or out of memory")
+                continue
+            base = base or found
+            floor = touched(base["matrix_bytes"])
+            row = {"cells": cells, "tool": tool, **found, "touch_seconds": floor}
+            rows.append(row)
+            print(
+                f"{'x'.join(map(str, cells)):11s} {tool:12s} {found['seconds'] * 1e3:10.2f} ms  "
+                f"{found['seconds'] / base['seconds']:7.1f} x ours  "
+                f"{found['seconds'] / floor:7.1f} x first touch  "
+                f"peak {found['peak_bytes'] / base['matrix_bytes']:5.2f} x matrix"
+            )
+    if write:
+        data = {
+            "machine": f"{platform.machine()}, Python {platform.python_version()}",
+            "rows": rows,
+        }
+        target = ROOT / "docs" / "data" / "assembly.json"
+        target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
