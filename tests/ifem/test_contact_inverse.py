@@ -1,0 +1,130 @@
+"""Forces from noisy motion: the mask and cone against raw condensation, resultants kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from ifem_export.contact_inverse import _projected, masked_force, smoothed_force, smoothing
+from ifem_export.errors import IfemError
+from ifem_export.material import Material
+from ifem_export.outline import RoundedRectangle
+from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.surface_operator import surface_operator
+
+NOISE_MM = 0.02
+
+
+class Press:
+    """A 2 N press with shear, the motion it makes and what the operators say of it."""
+
+    def __init__(self, nu: float) -> None:
+        mesh, _ = build_pad_mesh(RoundedRectangle(20.0, 18.0, 2.0), 2.0, pitch_mm=0.7, layers=4)
+        gel = Material(0.147, nu, 1020.0)
+        self.exact = surface_operator(mesh, gel, "bbar", "factor")
+        self.quick = surface_operator(mesh, gel, "bbar", "fft")
+        self.points = np.asarray(mesh.nodes_mm)[mesh.surface]
+        square = ((self.points[:, :2] - [1.0, -1.5]) ** 2).sum(axis=1)
+        shape = np.sqrt(np.maximum(1 - square / 9.0, 0.0))
+        self.mask = square < 3.3**2
+        self.force = np.zeros((len(self.points), 3))
+        self.force[:, 2] = -2.0 * shape / shape.sum()
+        self.force[:, 0] = 0.4 * 2.0 * shape / shape.sum()
+        self.motion = self.exact.displacement(self.force)
+        rng = np.random.default_rng(12)
+        self.noisy = self.motion + rng.normal(size=self.motion.shape) * NOISE_MM
+
+    def error(self, found: np.ndarray) -> float:
+        return float(np.linalg.norm(found - self.force) / np.linalg.norm(self.force))
+
+
+@pytest.fixture(scope="module", params=[0.3223, 0.49])
+def press(request: pytest.FixtureRequest) -> Press:
+    return Press(request.param)
+
+
+def test_mask_and_cone_beat_noise(press: Press) -> None:
+    raw = press.exact.force(press.noisy)
+    found = masked_force(press.quick, press.noisy, press.mask, friction=1.0)
+    assert found.converged
+    assert press.error(found.force_n) < 0.12
+    assert press.error(raw) > 3 * press.error(found.force_n)
+    resultant = found.force_n.sum(axis=0) - press.force.sum(axis=0)
+    assert np.abs(resultant).max() < 0.05 * 2.0
+
+
+def test_found_forces_keep_every_constraint(press: Press) -> None:
+    found = masked_force(press.quick, press.noisy, press.mask, friction=0.3).force_n
+    assert not found[~press.mask].any()
+    assert found[:, 2].max() <= 0
+    side = np.hypot(found[:, 0], found[:, 1])
+    assert (side <= 0.3 * -found[:, 2] + 1e-12).all()
+
+
+def test_a_warm_start_saves_steps(press: Press) -> None:
+    cold = masked_force(press.quick, press.noisy, press.mask)
+    warm = masked_force(press.quick, press.noisy, press.mask, start_n=cold.force_n)
+    assert warm.steps < cold.steps / 3
+    assert press.error(warm.force_n) < 1.1 * press.error(cold.force_n)
+
+
+def test_without_noise_the_force_comes_back(press: Press) -> None:
+    found = masked_force(press.exact, press.motion, press.mask, most_steps=60, tolerance=1e-6)
+    assert press.error(found.force_n) < 0.03
+    assert found.misfit < 1e-3
+
+
+def test_smoothing_keeps_the_resultant_exactly(press: Press) -> None:
+    raw = press.exact.force(press.noisy)
+    soft = smoothed_force(press.exact, press.noisy, smoothing(press.points, 0.7))
+    np.testing.assert_allclose(soft.sum(axis=0), raw.sum(axis=0), atol=1e-10)
+    # What smoothing removes is noise: the roughness from node to node falls.
+    rough, calm = (np.linalg.norm(f[~press.mask]) for f in (raw, soft))
+    assert calm < 0.5 * rough
+
+
+def test_projection_is_the_nearest_point_of_the_cone() -> None:
+    rng = np.random.default_rng(1)
+    forces = rng.normal(size=(40, 3))
+    for friction in (0.0, 0.4, 2.0):
+        found = _projected(forces, np.ones(40, bool), friction)
+        for force, ours in zip(forces, found, strict=True):
+
+            def inside(x: np.ndarray, mu: float = friction) -> float:
+                return float(-mu * x[2] - np.hypot(x[0], x[1]))
+
+            def push(x: np.ndarray) -> float:
+                return float(-x[2])
+
+            best = min(
+                float(minimize(
+                    lambda x, f=force: ((x - f) ** 2).sum(),
+                    start,
+                    constraints=[{"type": "ineq", "fun": inside}, {"type": "ineq", "fun": push}],
+                    method="SLSQP",
+                ).fun)
+                for start in ([0.0, 0.0, -0.5], [0.01, 0.01, -1.0])
+            )  # fmt: skip
+            assert ((ours - force) ** 2).sum() <= best + 1e-5
+            assert inside(ours) >= -1e-12
+            assert push(ours) >= 0
+
+
+def test_edge_cases_and_bad_input(press: Press) -> None:
+    count = len(press.points)
+    nothing = masked_force(press.quick, np.zeros((count, 3)), press.mask)
+    assert not nothing.force_n.any()
+    assert nothing.misfit == 0.0
+    off = masked_force(press.quick, press.noisy, np.zeros(count, bool))
+    assert off.misfit == 1.0
+    short = masked_force(press.quick, press.noisy, press.mask, most_steps=1)
+    assert not short.converged
+    with pytest.raises(IfemError, match="shape"):
+        masked_force(press.quick, press.noisy[:5], press.mask)
+    with pytest.raises(IfemError, match="friction"):
+        masked_force(press.quick, press.noisy, press.mask, friction=-1.0)
+    with pytest.raises(IfemError, match="not finite"):
+        masked_force(press.quick, press.noisy * np.nan, press.mask)
+    with pytest.raises(IfemError, match="width_mm"):
+        smoothing(press.points, 0.0)
