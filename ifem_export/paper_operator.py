@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.occupancy_table import occupancy_table
-from ifem_export.pad_system import PadSystem
-from ifem_export.solver import Solver, pad_solver
-from ifem_export.surface_field import checked, solved_displacement
+from ifem_export.surface_field import SolvedCompliance, checked
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Paper:
+class Paper(SolvedCompliance):
     """Surface stiffness of a pad of one layer."""
 
-    system: PadSystem
     name: str = "paper"
 
     def force(self, displacement_mm: ArrayLike) -> Array:
@@ -31,15 +28,6 @@ class Paper:
         force = np.empty_like(u)
         apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
         return force
-
-    def displacement(self, force_n: ArrayLike) -> Array:
-        """Solve K_ss u = f."""
-        return solved_displacement(self.system, self.whole, force_n)
-
-    @cached_property
-    def whole(self) -> Solver:
-        """Solver of the surface nodes."""
-        return pad_solver(self.system)
 
     @property
     def n_bytes(self) -> int:

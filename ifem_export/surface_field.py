@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import IfemError
 from ifem_export.pad_system import PadSystem
-from ifem_export.solver import Solver
+from ifem_export.solver import Solver, pad_solver
 
 Array = NDArray[np.float64]
 COMPLIANCE_RTOL = 1e-8
 
 
-def solved_displacement(system: PadSystem, solver: Solver, force_n: ArrayLike) -> Array:
-    """Surface part of K_ff u = f for forces (c, 3) on the surface alone."""
-    f = checked(force_n, system.columns)
-    whole = np.zeros((system.layers, system.columns, 3))
-    whole[-1] = f
-    return np.asarray(solver.solve(whole, COMPLIANCE_RTOL).x.reshape(whole.shape)[-1])
+@dataclass(frozen=True, eq=False)
+class SolvedCompliance:
+    """Displacement under surface forces, by solving the whole pad."""
+
+    system: PadSystem
+
+    @cached_property
+    def whole(self) -> Solver:
+        """Solver of all free nodes."""
+        return pad_solver(self.system)
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Surface part of K_ff u = f for forces (c, 3) on the surface alone."""
+        f = checked(force_n, self.system.columns)
+        whole = np.zeros((self.system.layers, self.system.columns, 3))
+        whole[-1] = f
+        return np.asarray(self.whole.solve(whole, COMPLIANCE_RTOL).x.reshape(whole.shape)[-1])
 
 
 def checked(field: ArrayLike, columns: int) -> Array:

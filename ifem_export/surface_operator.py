@@ -23,7 +23,7 @@ from ifem_export.pad_mesh import PadMesh
 from ifem_export.pad_system import PadSystem
 from ifem_export.paper_operator import Paper
 from ifem_export.solver import Solver, SparseFactor, inner_solver, pad_solver
-from ifem_export.surface_field import checked, solved_displacement
+from ifem_export.surface_field import SolvedCompliance, checked
 
 Array = NDArray[np.float64]
 Rung = Literal["paper", "truncated", "fft", "pcg", "factor", "dense32"]
@@ -81,7 +81,7 @@ def surface_operator(
     if rung == "dense32":
         return Dense(system)
     solver = inner_solver(system, "direct" if rung == "factor" else "pcg")
-    return Condensed(rung, system, solver, rtol if rung == "pcg" else 1e-10)
+    return Condensed(system, rung, solver, rtol if rung == "pcg" else 1e-10)
 
 
 def one_layer(mesh: PadMesh) -> PadMesh:
@@ -92,11 +92,10 @@ def one_layer(mesh: PadMesh) -> PadMesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Condensed:
+class Condensed(SolvedCompliance):
     """Exact condensation; the inner nodes are solved for at each call."""
 
     name: str
-    system: PadSystem
     inner: Solver
     rtol: float = DEFAULT_RTOL
 
@@ -106,10 +105,6 @@ class Condensed:
         held = self.inner.solve(-(self.system.surface_to_inner @ u), self.rtol).x
         force = self.system.surface @ u + self.system.inner_to_surface @ held
         return np.asarray(force.reshape(-1, 3))
-
-    def displacement(self, force_n: ArrayLike) -> Array:
-        """Solve the whole pad for surface forces alone."""
-        return solved_displacement(self.system, self.whole, force_n)
 
     @cached_property
     def whole(self) -> Solver:
@@ -152,10 +147,9 @@ class Convolved:
 
 
 @dataclass(frozen=True, eq=False)
-class Dense:
+class Dense(SolvedCompliance):
     """S as a dense float32 matrix, made column by column."""
 
-    system: PadSystem
     name: str = "dense32"
 
     @cached_property
@@ -177,15 +171,6 @@ class Dense:
         """One matrix-vector product."""
         u = checked(displacement_mm, self.system.columns).astype(np.float32)
         return np.asarray(self.matrix @ u.reshape(-1), dtype=float).reshape(-1, 3)
-
-    def displacement(self, force_n: ArrayLike) -> Array:
-        """Solve the whole pad for surface forces alone."""
-        return solved_displacement(self.system, self.whole, force_n)
-
-    @cached_property
-    def whole(self) -> Solver:
-        """Solver of all free nodes."""
-        return pad_solver(self.system)
 
     @property
     def n_bytes(self) -> int:
