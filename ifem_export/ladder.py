@@ -27,6 +27,7 @@ REFERENCE_LAYERS = 8
 REFERENCE_RTOL = 1e-8
 FIELD_SEED = 7
 TIMED_S = 0.12
+NOISE_SEED, NOISE_DRAWS = 11, 6
 CHOICES: tuple[tuple[Rung, dict[str, Any]], ...] = (
     ("paper", {}),
     ("truncated", {"radius": 3}),
@@ -48,6 +49,8 @@ class MeasuredRung:
     """One operator. Errors are relative: of the field (L2, worst of the fields) and resultant.
 
     `error_operator` is against exact condensation on the same mesh, without the mesh's own error.
+    `noise_…` are gains: standard deviation of a force component, at a node and of the resultant,
+    per mm of independent noise on every surface displacement.
     """
 
     rung: Rung
@@ -55,6 +58,8 @@ class MeasuredRung:
     error_field: float
     error_operator: float
     error_resultant: float
+    noise_node_n_per_mm: float
+    noise_resultant_n_per_mm: float
     milliseconds: float
     n_bytes: int
 
@@ -169,6 +174,8 @@ def measure_ladder(
                 error_field=max(map(_off, found, expected)),
                 error_operator=max(map(_off, found, condensed)),
                 error_resultant=max(map(_resultant_off, found, expected)),
+                noise_node_n_per_mm=float(np.std(noise := noisy(operator, len(points)))),
+                noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
                 milliseconds=timed_ms(operator, moved),
                 n_bytes=operator.n_bytes,
             )
@@ -226,6 +233,12 @@ def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
         for dx, wx in ((-1, 0.5), (0, 1.0), (1, 0.5)):
             total += wy * wx * lattice[2 * rows + 1 + dy, 2 * columns + 1 + dx]
     return total
+
+
+def noisy(operator: SurfaceOperator, count: int) -> Array:
+    """Forces (draws, c, 3) in N for unit noise on every surface displacement, mm."""
+    rng = np.random.default_rng(NOISE_SEED)
+    return np.stack([operator.force(rng.normal(size=(count, 3))) for _ in range(NOISE_DRAWS)])
 
 
 def timed_ms(operator: SurfaceOperator, fields: list[Array]) -> float:

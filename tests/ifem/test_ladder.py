@@ -46,6 +46,19 @@ def test_errors_fall_from_the_paper_to_condensation(ladder: Ladder) -> None:
     assert exact.error_operator < 1e-6
 
 
+def test_noise_gains_are_those_of_the_operator(ladder: Ladder) -> None:
+    mesh = pad()
+    operator = surface_operator(mesh, GEL, "bbar", "factor")
+    count = len(mesh.surface)
+    columns = np.zeros((2, count, 3))
+    columns[0, count // 2, 0] = columns[1, count // 2, 2] = 1.0
+    # The variance of a component is the sum of squares of a row of S, which is symmetric.
+    rows = [np.linalg.norm(operator.force(c)) for c in columns]
+    found = next(r for r in ladder.rungs if r.rung == "factor")
+    assert 0.6 * min(rows) < found.noise_node_n_per_mm < 1.4 * max(rows)
+    assert found.noise_resultant_n_per_mm > 0
+
+
 def test_the_resultant_of_the_paper_is_right_and_its_field_is_not(ladder: Ladder) -> None:
     paper = next(r for r in ladder.rungs if r.rung == "paper")
     assert paper.error_resultant < 0.1
