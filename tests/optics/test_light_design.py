@@ -24,8 +24,8 @@ def entered(scene: LightScene) -> float:
 def test_brightness_against_a_glued_mirror_reverses_below_a_ratio_of_two() -> None:
     """Net flux through the bonded face, LED as wide as the guide and touching it, short legs.
 
-    With legs of about t/4 an earlier prototype's figures hold; longer legs favour the curve, as the mirror's
-    corner loses the light that a leg has turned outward.
+    With legs of about t/4 an earlier prototype's figures hold; longer legs favour the curve, as
+    the mirror's corner loses the light that a leg has turned outward.
     """
     mirror = entered(finger(mirror="glued", leg_mm=0.45))
     for ratio, (low, high) in RATIOS.items():
