@@ -1,0 +1,1 @@
+"""Marker frames to forces: detection, registration and tracking of printed dots. Imports no CAD."""

@@ -1,0 +1,139 @@
+"""Compiled image passes: channel sums, background, darkness. Import only where they run: numba.
+
+The background is the grey-scale closing (max, then min) of cell means: it keeps every ramp of
+light and every dark region larger than the window, and fills whatever dark is smaller.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@njit(**COMPILED)
+def channel_sums(image: Any, sums: Any) -> None:
+    """Write the sum over channels of `image` (h, w, c) uint8 to `sums` (h, w) uint16."""
+    height, width, channels = image.shape
+    if channels == 3:
+        for y in range(height):
+            for x in range(width):
+                sums[y, x] = (
+                    np.uint16(image[y, x, 0])
+                    + np.uint16(image[y, x, 1])
+                    + np.uint16(image[y, x, 2])
+                )
+    else:
+        for y in range(height):
+            for x in range(width):
+                sums[y, x] = image[y, x, 0]
+
+
+@njit(**COMPILED)
+def cell_means(sums: Any, cell: Any, means: Any) -> None:
+    """Write the means of cell x cell squares of `sums` to `means` (h // cell, w // cell)."""
+    rows, columns = means.shape
+    strip = np.empty(sums.shape[1], dtype=np.uint32)
+    for i in range(rows):
+        strip[:] = 0
+        for y in range(i * cell, (i + 1) * cell):
+            for x in range(strip.size):
+                strip[x] += sums[y, x]
+        for j in range(columns):
+            total = np.uint32(0)
+            for x in range(j * cell, (j + 1) * cell):
+                total += strip[x]
+            means[i, j] = np.float32(total) / np.float32(cell * cell)
+
+
+@njit(**COMPILED)
+def _extreme_rows(values: Any, half: Any, sign: Any, out: Any) -> None:
+    """Maximum (sign 1) or minimum (-1) over 2 half + 1 rows, windows cut at the edge."""
+    rows, columns = values.shape
+    for i in range(rows):
+        first, last = max(0, i - half), min(rows - 1, i + half)
+        for j in range(columns):
+            out[i, j] = values[first, j]
+        for k in range(first + 1, last + 1):
+            if sign > 0:
+                for j in range(columns):
+                    out[i, j] = max(out[i, j], values[k, j])
+            else:
+                for j in range(columns):
+                    out[i, j] = min(out[i, j], values[k, j])
+
+
+@njit(**COMPILED)
+def _transposed(values: Any) -> Any:
+    out = np.empty((values.shape[1], values.shape[0]), dtype=values.dtype)
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[j, i] = values[i, j]
+    return out
+
+
+@njit(**COMPILED)
+def closed(means: Any, half: Any) -> Any:
+    """Return the closing of `means` (r, c) by a square of 2 half + 1 cells, lightly smoothed."""
+    a = means.copy()
+    b = np.empty_like(means)
+    _extreme_rows(a, half, 1, b)
+    at = _transposed(b)
+    bt = np.empty_like(at)
+    _extreme_rows(at, half, 1, bt)
+    _extreme_rows(bt, half, -1, at)
+    b = _transposed(at)
+    _extreme_rows(b, half, -1, a)
+    rows, columns = a.shape
+    for i in range(rows):
+        up, down = max(0, i - 1), min(rows - 1, i + 1)
+        for j in range(columns):
+            b[i, j] = (a[up, j] + 2 * a[i, j] + a[down, j]) * np.float32(0.25)
+    for i in range(rows):
+        for j in range(columns):
+            left, right = max(0, j - 1), min(columns - 1, j + 1)
+            a[i, j] = (b[i, left] + 2 * b[i, j] + b[i, right]) * np.float32(0.25)
+    return a
+
+
+@njit(**COMPILED)
+def darkness(sums: Any, background: Any, cell: Any, floor: Any, slack: Any, dark: Any) -> None:
+    """Write 1 - (smoothed + slack) / background to `dark` (h, w) float32.
+
+    Smoothed is the 3 x 3 binomial mean of `sums`; `background` (r, c) lies at cell centres and is
+    interpolated bilinearly, at least `floor`, below which the picture is black and tells nothing;
+    `slack` allows for noise, which weighs more where the light is weak.
+    """
+    height, width = sums.shape
+    rows, columns = background.shape
+    strip = np.empty(width, dtype=np.uint32)
+    across = np.empty(columns, dtype=np.float32)
+    left = np.empty(width, dtype=np.int32)
+    part = np.empty(width, dtype=np.float32)
+    for x in range(width):
+        at = min(max((x + 0.5) / cell - 0.5, 0.0), columns - 1.0)
+        left[x] = min(int(at), max(columns - 2, 0))
+        part[x] = at - left[x]
+    step = 1 if columns > 1 else 0
+    for y in range(height):
+        at = min(max((y + 0.5) / cell - 0.5, 0.0), rows - 1.0)
+        top = min(int(at), max(rows - 2, 0))
+        below = min(top + 1, rows - 1)
+        share = np.float32(at - top)
+        for j in range(columns):
+            value = background[top, j] + share * (background[below, j] - background[top, j])
+            across[j] = max(value, np.float32(floor))
+        before, after = max(0, y - 1), min(height - 1, y + 1)
+        for x in range(width):
+            strip[x] = sums[before, x] + 2 * np.uint32(sums[y, x]) + sums[after, x]
+        for x in range(width):
+            j = left[x]
+            ground = across[j] + part[x] * (across[j + step] - across[j])
+            near = strip[max(0, x - 1)] + 2 * strip[x] + strip[min(width - 1, x + 1)]
+            dark[y, x] = (
+                np.float32(1.0)
+                - (np.float32(near) * np.float32(0.0625) + np.float32(slack)) / ground
+            )
