@@ -14,92 +14,286 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from gelslim_force.darkness_kernel import COMPILED
-
 CX, CY, AREA, CONTRAST, MXX, MXY, MYY, STEPS, INSIDE, SKEW = range(10)
-"""Columns of a weighed dot; INSIDE is the share of the window within the picture."""
+"""Columns of a weighed dot; INSIDE is the share of the window within the picture, SKEW the last
+move of the window in px."""
+
+# Sums may be reordered for the vector unit, nothing else is relaxed.
+COMPILED: dict[str, Any] = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"reassoc", "contract", "nsz"},
+}
+_FITS = 2
+"""Windows for which the light is fitted anew; later ones have hardly moved."""
+_SPARE = 3
+_REST2 = 4e-6
 
 
 @njit(**COMPILED)
-def _window(mxx: Any, mxy: Any, myy: Any, factor: Any, margin: Any) -> Any:
-    """Inverse shape (a, b, c) of the ellipse with semi-axes factor * axis + margin, and its box.
+def _ellipse(mxx: Any, mxy: Any, myy: Any, factor: Any, margin: Any) -> Any:
+    """Ellipse a u^2 + 2 b u v + c v^2 <= 1 of semi-axes factor * axis + margin, and its half box.
 
-    A filled ellipse of semi-axis s has the second moment s^2 / 4 along it.
+    Returns (a, b, c, box_x, box_y). A filled ellipse has the second moment axis^2 / 4.
     """
     middle = 0.5 * (mxx + myy)
     spread = math.sqrt(0.25 * (mxx - myy) ** 2 + mxy * mxy)
     long = factor * 2.0 * math.sqrt(middle + spread) + margin
     short = factor * 2.0 * math.sqrt(max(middle - spread, 0.05)) + margin
-    turn = 0.5 * math.atan2(2 * mxy, mxx - myy)
-    c, s = math.cos(turn), math.sin(turn)
-    p, q = 1 / (long * long), 1 / (short * short)
-    box_x = math.sqrt((long * c) ** 2 + (short * s) ** 2)
-    box_y = math.sqrt((long * s) ** 2 + (short * c) ** 2)
-    return p * c * c + q * s * s, (p - q) * c * s, p * s * s + q * c * c, box_x, box_y
+    cos2, sin2 = 1.0, 0.0
+    if spread > 0:
+        cos2, sin2 = 0.5 * (mxx - myy) / spread, mxy / spread
+    mean, half = 0.5 * (1 / long**2 + 1 / short**2), 0.5 * (1 / long**2 - 1 / short**2)
+    mean2, half2 = 0.5 * (long**2 + short**2), 0.5 * (long**2 - short**2)
+    box_x, box_y = math.sqrt(mean2 + half2 * cos2), math.sqrt(mean2 - half2 * cos2)
+    return mean + half * cos2, half * sin2, mean - half * cos2, box_x, box_y
 
 
 @njit(**COMPILED)
-def _value(image: Any, y: Any, x: Any) -> Any:
+def _chord(shape: Any, v: Any) -> Any:
+    """First and last u (float) of the ellipse at height v; first > last where it has none."""
+    b = shape[1] * v
+    root = b * b - shape[0] * (shape[2] * v * v - 1.0)
+    if root < 0:
+        return 1.0, -1.0
+    root = math.sqrt(root)
+    return (-b - root) / shape[0], (-b + root) / shape[0]
+
+
+@njit(**COMPILED)
+def _copy(image: Any, left: Any, top: Any, patch: Any) -> None:
+    """Sum the channels of the box at (left, top), inside the picture, into `patch` (h, w)."""
     if image.shape[2] == 3:
-        return float(image[y, x, 0]) + float(image[y, x, 1]) + float(image[y, x, 2])
-    return float(image[y, x, 0])
+        for y in range(patch.shape[0]):
+            for x in range(patch.shape[1]):
+                patch[y, x] = (
+                    np.float32(image[top + y, left + x, 0])
+                    + np.float32(image[top + y, left + x, 1])
+                    + np.float32(image[top + y, left + x, 2])
+                )
+    else:
+        for y in range(patch.shape[0]):
+            for x in range(patch.shape[1]):
+                patch[y, x] = image[top + y, left + x, 0]
 
 
 @njit(**COMPILED)
-def _light_plane(image: Any, x0: Any, y0: Any, inner: Any, outer: Any, plane: Any) -> Any:
+def _ring_part(
+    row: Any, first: Any, last: Any, start: Any, level: Any, slope: Any, low: Any, high: Any
+) -> Any:
+    """Sums over pixels first ... last of a row whose value lies low ... high off the light."""
+    one, zero = np.float32(1), np.float32(0)
+    n = su = suu = sv = suv = svv = zero
+    rise, base = np.float32(slope), np.float32(level)
+    for x in range(first, last + 1):
+        u = np.float32(x) - np.float32(start)
+        off = row[x] - base - rise * u
+        keep = one if (off > low) & (off < high) else zero
+        n += keep
+        su += keep * u
+        suu += keep * u * u
+        sv += keep * off
+        suv += keep * u * off
+        svv += keep * off * off
+    return n, su, suu, sv, suv, svv
+
+
+@njit(**COMPILED)
+def _light_plane(
+    patch: Any, x0: Any, y0: Any, inner: Any, outer: Any, plane: Any, rounds: Any, limits: Any
+) -> Any:
     """Fit level and slopes of the light to the ring between two ellipses; False if too few.
 
-    Two rounds drop what is far from the fit: other dots, glare.
+    (x0, y0) is the centre in the patch. Each round drops what is far from the last fit: other
+    dots, glare. `limits` carries the bounds on to the next call.
     """
-    height, width, _ = image.shape
-    box_x, box_y = outer[3], outer[4]
-    left, right = max(0, math.ceil(x0 - box_x)), min(width - 1, math.floor(x0 + box_x))
-    top, bottom = max(0, math.ceil(y0 - box_y)), min(height - 1, math.floor(y0 + box_y))
-    low, high = -1e30, 1e30
-    plane[0], plane[1], plane[2] = 0.0, 0.0, 0.0
-    for attempt in range(3):
-        n = sx = sy = sxx = sxy = syy = sv = sxv = syv = svv = 0.0
+    height, width = patch.shape
+    top = max(0, math.ceil(y0 - outer[4]))
+    bottom = min(height - 1, math.floor(y0 + outer[4]))
+    for k in range(rounds):
+        low, high = np.float32(limits[0]), np.float32(limits[1])
+        n = su = suu = sy = suy = syy = sv = suv = syv = svv = 0.0
         for y in range(top, bottom + 1):
             v = y - y0
-            for x in range(left, right + 1):
-                u = x - x0
-                if outer[0] * u * u + 2 * outer[1] * u * v + outer[2] * v * v > 1.0:
+            first, last = _chord(outer, v)
+            if first > last:
+                continue
+            a, b = max(0, math.ceil(x0 + first)), min(width - 1, math.floor(x0 + last))
+            first, last = _chord(inner, v)
+            base = plane[0] + plane[2] * v
+            for side in range(2):
+                if first > last:
+                    if side == 1:
+                        break
+                    i, j = a, b
+                elif side == 0:
+                    i, j = a, min(b, math.ceil(x0 + first) - 1)
+                else:
+                    i, j = max(a, math.floor(x0 + last) + 1), b
+                if j < i:
                     continue
-                if inner[0] * u * u + 2 * inner[1] * u * v + inner[2] * v * v < 1.0:
-                    continue
-                value = _value(image, y, x)
-                off = value - plane[0] - plane[1] * u - plane[2] * v
-                if off < low or off > high:
-                    continue
-                n += 1
-                sx += u
-                sy += v
-                sxx += u * u
-                sxy += u * v
-                syy += v * v
-                sv += value
-                sxv += u * value
-                syv += v * value
-                svv += off * off
+                part = _ring_part(patch[y], i, j, x0, base, plane[1], low, high)
+                n += part[0]
+                su += part[1]
+                suu += part[2]
+                sv += part[3]
+                suv += part[4]
+                svv += part[5]
+                sy += part[0] * v
+                suy += part[1] * v
+                syy += part[0] * v * v
+                syv += part[3] * v
         if n < 8:
             return False
-        if attempt == 0:
+        if limits[1] > 1e29:
             # Level first: slopes fitted through a neighbour's dark rim would tilt the plane.
-            plane[0] = sv / n
-            scatter = math.sqrt(max(svv / n - plane[0] * plane[0], 0.0))
-            low, high = -0.7 * scatter, 1.5 * scatter
+            plane[0] += sv / n
+            scatter = math.sqrt(max(svv / n - (sv / n) ** 2, 1e-6))
+            limits[0], limits[1] = -0.7 * scatter, 1.5 * scatter
             continue
-        mx, my, mv = sx / n, sy / n, sv / n
-        axx, axy, ayy = sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my
-        bx, by = sxv / n - mx * mv, syv / n - my * mv
-        det = axx * ayy - axy * axy
-        if det > 0.02 * axx * ayy and axx > 0 and ayy > 0:
-            plane[1] = (bx * ayy - by * axy) / det
-            plane[2] = (by * axx - bx * axy) / det
-        plane[0] = mv - plane[1] * mx - plane[2] * my
+        mu, my, mv = su / n, sy / n, sv / n
+        auu, auy, ayy = suu / n - mu * mu, suy / n - mu * my, syy / n - my * my
+        bu, by = suv / n - mu * mv, syv / n - my * mv
+        det = auu * ayy - auy * auy
+        du = dy = 0.0
+        if auu > 0 and ayy > 0 and det > 0.02 * auu * ayy:
+            du = (bu * ayy - by * auy) / det
+            dy = (by * auu - bu * auy) / det
+        plane[1] += du
+        plane[2] += dy
+        plane[0] += mv - du * mu - dy * my
         scatter = math.sqrt(max(svv / n, 1e-6))
-        low, high = -2.5 * scatter, 2.5 * scatter
+        limits[0], limits[1] = -2.5 * scatter, 2.5 * scatter
     return plane[0] > 0
+
+
+@njit(**COMPILED)
+def _darken(patch: Any, x0: Any, y0: Any, plane: Any, dark: Any) -> None:
+    """Write 1 - light / plane to `dark`, of the shape of `patch`."""
+    slope, one = np.float32(plane[1]), np.float32(1)
+    for y in range(patch.shape[0]):
+        base = np.float32(plane[0] + plane[2] * (y - y0) - plane[1] * x0)
+        for x in range(patch.shape[1]):
+            ground = max(base + slope * np.float32(x), one)
+            dark[y, x] = one - patch[y, x] / ground
+
+
+@njit(**COMPILED)
+def _row_sums(row: Any, first: Any, last: Any, start: Any, scale: Any, offset: Any) -> Any:
+    one, zero = np.float32(1), np.float32(0)
+    mass = square = area = su = suu = zero
+    for x in range(first, last + 1):
+        u = np.float32(x) - np.float32(start)
+        d = row[x]
+        positive = max(d, zero)
+        mass += positive
+        square += positive * positive
+        w = min(max(d * scale - offset, zero), one)
+        area += w
+        su += w * u
+        suu += w * u * u
+    return mass, square, area, su, suu
+
+
+@njit(**COMPILED)
+def _window_sums(dark: Any, x0: Any, y0: Any, window: Any, low: Any, high: Any, sums: Any) -> None:
+    """Write mass, square, area, first and second moments of the weights in the window."""
+    height, width = dark.shape
+    scale = np.float32(1 / (high - low))
+    offset = np.float32(low / (high - low))
+    sums[:] = 0.0
+    for y in range(
+        max(0, math.ceil(y0 - window[4])), min(height - 1, math.floor(y0 + window[4])) + 1
+    ):
+        v = y - y0
+        first, last = _chord(window, v)
+        if first > last:
+            continue
+        a, b = max(0, math.ceil(x0 + first)), min(width - 1, math.floor(x0 + last))
+        if b < a:
+            continue
+        mass, square, area, su, suu = _row_sums(dark[y], a, b, x0, scale, offset)
+        sums[0] += mass
+        sums[1] += square
+        sums[2] += area
+        sums[3] += su
+        sums[4] += area * v
+        sums[5] += suu
+        sums[6] += su * v
+        sums[7] += area * v * v
+
+
+@njit(**COMPILED)
+def _weigh_one(
+    image: Any, start: Any, moment: Any, low: Any, high: Any, most: Any, out: Any
+) -> Any:
+    """Write one dot; returns whether it was found."""
+    height, width, _ = image.shape
+    x0, y0 = start[0], start[1]
+    mxx, mxy, myy = moment[0], moment[1], moment[2]
+    plane, limits, sums = np.zeros(3), np.array([-1e30, 1e30]), np.zeros(8)
+    left = top = right = bottom = 0
+    patch = np.empty((0, 0), dtype=np.float32)
+    dark = np.empty((0, 0), dtype=np.float32)
+    contrast = 0.0
+    px, py = x0, y0
+    for step in range(most):
+        window = _ellipse(mxx, mxy, myy, 1.1, 1.5)
+        outer = _ellipse(mxx, mxy, myy, 1.7, 3.5)
+        if (
+            max(0, math.floor(x0 - outer[3])) < left
+            or max(0, math.floor(y0 - outer[4])) < top
+            or min(width - 1, math.ceil(x0 + outer[3])) > right
+            or min(height - 1, math.ceil(y0 + outer[4])) > bottom
+            or step == 0
+        ):
+            left = max(0, math.floor(x0 - outer[3]) - _SPARE)
+            top = max(0, math.floor(y0 - outer[4]) - _SPARE)
+            right = min(width - 1, math.ceil(x0 + outer[3]) + _SPARE)
+            bottom = min(height - 1, math.ceil(y0 + outer[4]) + _SPARE)
+            patch = np.empty((bottom - top + 1, right - left + 1), dtype=np.float32)
+            dark = np.empty_like(patch)
+            _copy(image, left, top, patch)
+            if step >= _FITS:
+                _darken(patch, px - left, py - top, plane, dark)
+        if step < _FITS:
+            inner = _ellipse(mxx, mxy, myy, 1.35, 1.5)
+            plane[0] += plane[1] * (x0 - px) + plane[2] * (y0 - py)
+            px, py = x0, y0
+            rounds = 2 if step == 0 else 1
+            if not _light_plane(patch, x0 - left, y0 - top, inner, outer, plane, rounds, limits):
+                return False
+            _darken(patch, x0 - left, y0 - top, plane, dark)
+        if step == 0:
+            _window_sums(dark, x0 - left, y0 - top, window, 0.0, 1.0, sums)
+        else:
+            _window_sums(dark, x0 - left, y0 - top, window, low * contrast, high * contrast, sums)
+        mass, square, area = sums[0], sums[1], sums[2]
+        if area < 1.0 or mass <= 0:
+            return False
+        contrast = square / mass
+        dx, dy = sums[3] / area, sums[4] / area
+        out[INSIDE] = (
+            x0 - window[3] > -0.5
+            and y0 - window[4] > -0.5
+            and x0 + window[3] < width - 0.5
+            and y0 + window[4] < height - 0.5
+        )
+        x0 += dx
+        y0 += dy
+        if x0 < 0 or y0 < 0 or x0 > width - 1 or y0 > height - 1:
+            return False
+        if step > 0:
+            mxx = 0.5 * (mxx + max(sums[5] / area - dx * dx, 0.25))
+            mxy = 0.5 * (mxy + sums[6] / area - dx * dy)
+            myy = 0.5 * (myy + max(sums[7] / area - dy * dy, 0.25))
+        out[CX], out[CY], out[AREA], out[CONTRAST] = x0, y0, area, contrast
+        out[MXX], out[MXY], out[MYY] = mxx, mxy, myy
+        out[STEPS], out[SKEW] = step + 1, math.sqrt(dx * dx + dy * dy)
+        if step >= _FITS and dx * dx + dy * dy < _REST2:
+            break
+    return True
 
 
 @njit(**COMPILED)
@@ -109,76 +303,8 @@ def weigh(image: Any, starts: Any, moments: Any, low: Any, high: Any, most: Any,
     `image` (h, w, c) uint8; `low` and `high` are the shares of a dot's darkness between which
     the weight rises; at most `most` moves of the window. A dot that is not found has area 0.
     """
-    plane = np.zeros(3)
     for i in range(starts.shape[0]):
-        _weigh_one(image, starts[i], moments[i], low, high, most, plane, out[i])
-
-
-@njit(**COMPILED)
-def _weigh_one(
-    image: Any, start: Any, moment: Any, low: Any, high: Any, most: Any, plane: Any, out: Any
-) -> None:
-    height, width, _ = image.shape
-    x0, y0 = start[0], start[1]
-    mxx, mxy, myy = moment[0], moment[1], moment[2]
-    contrast = 0.0
-    out[:] = 0.0
-    out[CX], out[CY] = x0, y0
-    for step in range(most):
-        window = _window(mxx, mxy, myy, 1.25, 1.5)
-        if step < 3:
-            inner = _window(mxx, mxy, myy, 1.35, 1.5)
-            outer = _window(mxx, mxy, myy, 1.7, 3.5)
-            shift_x, shift_y = x0, y0
-            if not _light_plane(image, x0, y0, inner, outer, plane):
-                out[AREA] = 0.0
-                return
-        left, right = math.ceil(x0 - window[3]), math.floor(x0 + window[3])
-        top, bottom = math.ceil(y0 - window[4]), math.floor(y0 + window[4])
-        mass = square = 0.0
-        area = sx = sy = sxx = sxy = syy = 0.0
-        seen = all_of = 0.0
-        from_, to = low * contrast, high * contrast
-        for y in range(top, bottom + 1):
-            v = y - y0
-            for x in range(left, right + 1):
-                u = x - x0
-                if window[0] * u * u + 2 * window[1] * u * v + window[2] * v * v > 1.0:
-                    continue
-                all_of += 1
-                if x < 0 or y < 0 or x >= width or y >= height:
-                    continue
-                seen += 1
-                ground = plane[0] + plane[1] * (x - shift_x) + plane[2] * (y - shift_y)
-                d = 1.0 - _value(image, y, x) / max(ground, 1.0)
-                if d > 0:
-                    mass += d
-                    square += d * d
-                w = d if step == 0 else (d - from_) / (to - from_)
-                w = min(max(w, 0.0), 1.0)
-                area += w
-                sx += w * u
-                sy += w * v
-                sxx += w * u * u
-                sxy += w * u * v
-                syy += w * v * v
-        if area < 1.0 or mass <= 0:
-            out[AREA] = 0.0
-            return
-        contrast = square / mass
-        dx, dy = sx / area, sy / area
-        x0 += dx
-        y0 += dy
-        if x0 < 0 or y0 < 0 or x0 > width - 1 or y0 > height - 1:
-            out[AREA] = 0.0
-            return
-        if step > 0:
-            mxx = 0.5 * (mxx + max(sxx / area - dx * dx, 0.25))
-            mxy = 0.5 * (mxy + sxy / area - dx * dy)
-            myy = 0.5 * (myy + max(syy / area - dy * dy, 0.25))
-        out[CX], out[CY], out[AREA], out[CONTRAST] = x0, y0, area, contrast
-        out[MXX], out[MXY], out[MYY] = mxx, mxy, myy
-        out[STEPS], out[INSIDE] = step + 1, seen / max(all_of, 1.0)
-        out[SKEW] = math.sqrt(dx * dx + dy * dy)
-        if step >= 3 and dx * dx + dy * dy < 1e-6:
-            return
+        out[i] = 0.0
+        out[i, CX], out[i, CY] = starts[i, 0], starts[i, 1]
+        if not _weigh_one(image, starts[i], moments[i], low, high, most, out[i]):
+            out[i, AREA] = 0.0

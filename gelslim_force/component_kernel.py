@@ -29,11 +29,11 @@ def components(dark: Any, left: Any, top: Any, right: Any, bottom: Any, least: A
     Searched are columns left <= x < right and rows top <= y < bottom. Pixels touching by an edge
     or a corner belong together. Centroids and second moments are weighted by darkness.
     """
-    runs = 1024
-    begin = np.empty(runs, dtype=np.int32)
-    end = np.empty(runs, dtype=np.int32)
-    line = np.empty(runs, dtype=np.int32)
-    parent = np.empty(runs, dtype=np.int32)
+    most = (bottom - top) * ((right - left) // 2 + 1)
+    begin = np.empty(most, dtype=np.int32)
+    end = np.empty(most, dtype=np.int32)
+    line = np.empty(most, dtype=np.int32)
+    parent = np.empty(most, dtype=np.int32)
     count = 0
     previous = 0
     for y in range(top, bottom):
@@ -47,12 +47,6 @@ def components(dark: Any, left: Any, top: Any, right: Any, bottom: Any, least: A
             start = x
             while x < right and dark[y, x] > least:
                 x += 1
-            if count == runs:
-                runs *= 2
-                begin = _grown(begin)
-                end = _grown(end)
-                line = _grown(line)
-                parent = _grown(parent)
             begin[count], end[count], line[count], parent[count] = start, x, y, count
             while candidate < first and end[candidate] < start:
                 candidate += 1
@@ -67,13 +61,6 @@ def components(dark: Any, left: Any, top: Any, right: Any, bottom: Any, least: A
             count += 1
         previous = first
     return _summed(dark, begin[:count], end[:count], line[:count], parent[:count])
-
-
-@njit(**COMPILED)
-def _grown(array: Any) -> Any:
-    larger = np.empty(2 * array.size, dtype=array.dtype)
-    larger[: array.size] = array
-    return larger
 
 
 @njit(**COMPILED)

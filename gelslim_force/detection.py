@@ -7,7 +7,7 @@ components give place and shape, and each dot is then weighed on the untouched p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ _FLOOR = 8.0
 class Detector:
     """Finds dots in frames of one sensor; stateless, safe to share between threads."""
 
-    settings: DetectorSettings = DetectorSettings()
+    settings: DetectorSettings = field(default_factory=DetectorSettings)
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
         """Return all dots of a frame (h, w) or (h, w, 3) uint8, in order of components.

@@ -22,8 +22,8 @@ class DetectorSettings:
     least_contrast: float = 0.12
     """Darkness against the light around under which nothing is a dot."""
     shape: DotShape = "round"
-    weight_from: float = 0.15
-    weight_to: float = 0.85
+    weight_from: float = 0.25
+    weight_to: float = 1.0
     """Shares of a dot's darkness between which a pixel's weight rises from 0 to 1."""
 
     def __post_init__(self) -> None:
