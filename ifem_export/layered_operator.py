@@ -21,6 +21,8 @@ from ifem_export.occupancy_table import occupancy_table
 Array = NDArray[np.float64]
 Blocks = NDArray[np.complex128]
 PADDING_THICKNESSES = 1.7
+LEAST_PADDING, MOST_PADDING = 4, 2.0
+"""Columns at least, extents of the pad at most: beyond, a thick pad gains nothing."""
 INNER_NODE, TOP_NODE = 255, 15
 """Masks of a node with all eight cells, and of one on the outer surface with the lower four."""
 
@@ -66,17 +68,32 @@ def layered_operator(
         change: from (ky, kx, 3L, 3L) blocks to the blocks wanted.
     """
     extent = columns.max(axis=0) + 1
-    shape = tuple(
-        int(fft.next_fast_len(int(n + p), real=True)) for n, p in zip(extent, padding, strict=True)
-    )
+    shape = tuple(even_fast_length(int(n + p)) for n, p in zip(extent, padding, strict=True))
     symbol = stiffness_symbol(element_matrix, layers, (shape[0], shape[1]))
     return LayeredOperator(change(symbol), columns, (shape[0], shape[1]))
 
 
-def padding_columns(cell_size_mm: tuple[float, float, float], layers: int) -> tuple[int, int]:
-    """Columns of zeros along (y, x) that keep the pad from meeting its own image."""
+def padding_columns(
+    cell_size_mm: tuple[float, float, float], layers: int, extent: tuple[int, int]
+) -> tuple[int, int]:
+    """Columns of zeros along (y, x) that keep a pad of `extent` from meeting its own image."""
     reach = PADDING_THICKNESSES * layers * cell_size_mm[2]
-    return math.ceil(reach / cell_size_mm[1]), math.ceil(reach / cell_size_mm[0])
+    most = math.ceil(MOST_PADDING * max(extent))
+    y, x = (max(LEAST_PADDING, min(most, math.ceil(reach / cell_size_mm[axis]))) for axis in (1, 0))
+    return y, x
+
+
+def even_fast_length(least: int) -> int:
+    """Smallest even length >= `least` that transforms fast.
+
+    The alternating motion of neighbouring nodes changes no cell's mean volume, so it is soft near
+    ν = 0.5. A lattice of odd length has no such wave and takes it for a stiff one: at ν = 0.4999
+    that costs 80 to 110 iterations instead of 20 to 40.
+    """
+    length = int(fft.next_fast_len(least, real=True))
+    while length % 2:
+        length = int(fft.next_fast_len(length + 1, real=True))
+    return length
 
 
 def stiffness_symbol(element_matrix: Array, layers: int, shape: tuple[int, int]) -> Blocks:

@@ -120,7 +120,8 @@ class PadSystem:
         return self._operator(surface_compliance)
 
     def _operator(self, change) -> LayeredOperator:  # type: ignore[no-untyped-def]
-        padding = padding_columns(self.mesh.cell_size_mm, self.layers)
+        rows, columns = (int(n) + 1 for n in self.places.max(axis=0))
+        padding = padding_columns(self.mesh.cell_size_mm, self.layers, (rows, columns))
         return layered_operator(
             np.asarray(self.element_matrix), self.layers, self.places, padding, change
         )
