@@ -111,7 +111,7 @@ def _light_plane(
     height, width = patch.shape
     top = max(0, math.ceil(y0 - outer[4]))
     bottom = min(height - 1, math.floor(y0 + outer[4]))
-    for k in range(rounds):
+    for _ in range(rounds):
         low, high = np.float32(limits[0]), np.float32(limits[1])
         n = su = suu = sy = suy = syy = sv = suv = syv = svv = 0.0
         for y in range(top, bottom + 1):
