@@ -33,6 +33,7 @@ CHOICES: tuple[tuple[Rung, dict[str, Any]], ...] = (
     ("truncated", {"radius": 3}),
     ("truncated", {"radius": 6}),
     ("fft", {}),
+    ("fft", {"lumped": 1}),
     ("pcg", {"rtol": 1e-2}),
     ("pcg", {"rtol": 1e-4}),
     ("factor", {}),

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from ifem_export.convolved_operator import Convolved, missing_resultant, truncated
 from ifem_export.element import Formulation, hex8_stiffness
 from ifem_export.errors import IfemError
-from ifem_export.layered_operator import LayeredOperator
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.pad_system import PadSystem
@@ -59,10 +59,12 @@ def surface_operator(
     *,
     rtol: float = DEFAULT_RTOL,
     radius: int = DEFAULT_RADIUS,
+    lumped: bool | float = False,
 ) -> SurfaceOperator:
     """Operator of a rung for a pad of uniform thickness.
 
     `rtol` is the residual of the inner solve (pcg), `radius` the reach in nodes (truncated).
+    `lumped` makes the resultant of `fft` exact, as that of `truncated` always is.
     `paper` takes one layer of fully integrated elements over the mesh's outline and thickness;
     a pad of one layer has no other operator. Raises IfemError for an
     unknown rung and MeshError for a pad whose layers differ.
@@ -75,9 +77,11 @@ def surface_operator(
     if system.layers == 1:
         return Paper(system)
     if rung == "fft":
-        return Convolved("fft", system, system.surface_guess)
+        missing = missing_resultant(system, system.surface_guess) if lumped else None
+        return Convolved("fft", system, system.surface_guess, missing)
     if rung == "truncated":
-        return Convolved("truncated", system, truncated(system.surface_guess, radius))
+        near = truncated(system.surface_guess, radius)
+        return Convolved("truncated", system, near, missing_resultant(system, near))
     if rung == "dense32":
         return Dense(system)
     solver = inner_solver(system, "direct" if rung == "factor" else "pcg")
@@ -123,30 +127,6 @@ class Condensed(SolvedCompliance):
 
 
 @dataclass(frozen=True, eq=False)
-class Convolved:
-    """Surface stiffness of the infinite pad: wrong near free edges, more so as ν nears 0.5."""
-
-    name: str
-    system: PadSystem
-    stiffness: LayeredOperator
-
-    def force(self, displacement_mm: ArrayLike) -> Array:
-        """Convolution with the surface stiffness."""
-        u = checked(displacement_mm, self.system.columns)
-        return np.asarray(self.stiffness(u[None])[0])
-
-    def displacement(self, force_n: ArrayLike) -> Array:
-        """Convolution with the infinite pad's compliance."""
-        f = checked(force_n, self.system.columns)
-        return np.asarray(self.system.surface_compliance_guess(f[None])[0])
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes of the blocks."""
-        return int(self.stiffness.blocks.nbytes)
-
-
-@dataclass(frozen=True, eq=False)
 class Dense(SolvedCompliance):
     """S as a dense float32 matrix, made column by column."""
 
@@ -176,21 +156,3 @@ class Dense(SolvedCompliance):
     def n_bytes(self) -> int:
         """Bytes of the matrix."""
         return int(self.matrix.nbytes)
-
-
-def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
-    """The convolution cut off at `radius` nodes, what is cut lumped onto the diagonal.
-
-    Lumping keeps the force of a uniform motion. Raises IfemError for a radius below 1.
-    """
-    if radius < 1:
-        raise IfemError(f"truncation radius = {radius}: must be at least 1 node")
-    rows, columns = stiffness.shape
-    kernel = np.fft.irfft2(stiffness.blocks, s=stiffness.shape, axes=(0, 1))
-    away_y = np.minimum(np.arange(rows), rows - np.arange(rows))
-    away_x = np.minimum(np.arange(columns), columns - np.arange(columns))
-    near = np.hypot(away_y[:, None], away_x[None, :]) <= radius
-    cut = np.where(near[..., None, None], kernel, 0.0)
-    cut[0, 0] += (kernel - cut).sum(axis=(0, 1))
-    blocks = np.fft.rfft2(cut, axes=(0, 1))
-    return LayeredOperator(blocks, stiffness.columns, stiffness.shape)
