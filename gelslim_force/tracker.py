@@ -125,8 +125,8 @@ class Tracker:
         return result
 
     def _near(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame | None:
-        known = np.isfinite(expected).all(axis=1)
-        places = np.where(known[:, None], expected, -1.0)
+        known = np.isfinite(expected).all(axis=1, keepdims=True)
+        places = np.where(known, expected, -1.0)
         dots = self._detector.detect_near(image, places, self._moments)
         dots = dots.take(dots.found)
         tracks = match(self._reference, dots.centres_px, expected)
@@ -158,8 +158,8 @@ class Tracker:
     def _remember(self, result: TrackedFrame) -> None:
         tracks = result.tracks
         step = tracks.places_px - self._places
-        moved = np.isfinite(step).all(axis=1)
-        self._velocity = np.where(moved[:, None], step, 0.0)
+        moved = np.isfinite(step).all(axis=1, keepdims=True)
+        self._velocity = np.where(moved, step, 0.0)
         # A lost marker is next looked for where it was last seen.
         self._places = np.where(tracks.known[:, None], tracks.places_px, self._places)
         seen = tracks.tracked

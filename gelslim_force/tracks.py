@@ -48,8 +48,7 @@ class Tracks:
     @property
     def tracked(self) -> NDArray[np.bool_]:
         """(n,) seen in this frame and verified."""
-        mask: NDArray[np.bool_] = self.status == int(MarkerStatus.TRACKED)
-        return mask
+        return np.equal(self.status, int(MarkerStatus.TRACKED)).reshape(-1)
 
     @property
     def known(self) -> NDArray[np.bool_]:

@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("gelslim_cad", "gelslim_optics", "ifem_export")
+PACKAGES = ("gelslim_cad", "gelslim_force", "gelslim_optics", "ifem_export")
 SOURCES = sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py"))
 CAD_LIBRARIES = ("cadquery", "OCP", "vtk", "vtkmodules", "pyvista")
 
 FORBIDDEN = {
-    "ifem_export": ("gelslim_cad", "gelslim_optics", *CAD_LIBRARIES),
-    "gelslim_optics": ("gelslim_cad", "ifem_export", *CAD_LIBRARIES),
+    "ifem_export": ("gelslim_cad", "gelslim_force", "gelslim_optics", *CAD_LIBRARIES),
+    "gelslim_optics": ("gelslim_cad", "ifem_export", "gelslim_force", *CAD_LIBRARIES),
+    "gelslim_force": ("gelslim_cad", *CAD_LIBRARIES),
     "gelslim_cad.spec": tuple(
         f"gelslim_cad.{part}"
         for part in ("dimensions", "solids", "build", "checks", "report", "export", "cli")
