@@ -48,7 +48,7 @@ class Tracks:
     @property
     def tracked(self) -> NDArray[np.bool_]:
         """(n,) seen in this frame and verified."""
-        return np.asarray(self.status == int(MarkerStatus.TRACKED), dtype=bool)
+        return np.isin(self.status, [int(MarkerStatus.TRACKED)])
 
     @property
     def known(self) -> NDArray[np.bool_]:
