@@ -48,12 +48,12 @@ class Tracks:
     @property
     def tracked(self) -> NDArray[np.bool_]:
         """(n,) seen in this frame and verified."""
-        return np.isin(self.status, [int(MarkerStatus.TRACKED)])
+        return self.status == int(MarkerStatus.TRACKED)
 
     @property
     def known(self) -> NDArray[np.bool_]:
         """(n,) with a place, seen or predicted."""
-        return np.isfinite(self.places_px).all(axis=1)
+        return np.isfinite(self.places_px[:, 0]) & np.isfinite(self.places_px[:, 1])
 
     @property
     def coverage(self) -> float:
