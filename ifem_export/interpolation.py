@@ -35,7 +35,7 @@ def marker_to_node(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> sparse.csr_arr
         InterpolationError: wrong shape, values that are not finite, two markers in one place,
             or markers all on one line.
     """
-    markers, nodes = _xy(markers_mm, "markers_mm"), _xy(nodes_mm, "nodes_mm")
+    markers, nodes = checked_markers(markers_mm), points_in_plane(nodes_mm, "nodes_mm")
     triangulation = _triangulate(markers)
     columns, weights = _in_lattice(markers, nodes)
     rest = np.flatnonzero(weights.sum(axis=1) == 0.0)
@@ -55,7 +55,8 @@ def marker_to_node(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> sparse.csr_arr
     return operator
 
 
-def _xy(points_mm: ArrayLike, name: str) -> NDArray[np.float64]:
+def points_in_plane(points_mm: ArrayLike, name: str) -> NDArray[np.float64]:
+    """x and y (n, 2) of finite points (n, 2) or (n, 3); raises InterpolationError for others."""
     points = np.asarray(points_mm, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
         raise InterpolationError(f"{name} has shape {points.shape}: must be (k, 2) or (k, 3)")
@@ -64,7 +65,13 @@ def _xy(points_mm: ArrayLike, name: str) -> NDArray[np.float64]:
     return points[:, :2]
 
 
-def _triangulate(markers: NDArray[np.float64]) -> Delaunay:
+def checked_markers(markers_mm: ArrayLike) -> NDArray[np.float64]:
+    """x and y (k, 2) of markers that carry a field.
+
+    Raises:
+        InterpolationError: fewer than 3, two in one place, all on one line, or not finite.
+    """
+    markers = points_in_plane(markers_mm, "markers_mm")
     if len(markers) < 3:
         raise InterpolationError(
             f"{len(markers)} markers: a displacement field needs at least 3, not on one line"
@@ -80,6 +87,10 @@ def _triangulate(markers: NDArray[np.float64]) -> Delaunay:
     spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-9 * spread[0]:
         raise InterpolationError("the markers lie on one line: a field needs a second row")
+    return markers
+
+
+def _triangulate(markers: NDArray[np.float64]) -> Delaunay:
     try:
         return Delaunay(markers)
     except QhullError as error:
