@@ -1,0 +1,36 @@
+"""Small pads with known surface forces."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ifem_export.bundle import Bundle, build_bundle
+from ifem_export.marker_grid import build_marker_grid
+from ifem_export.material import Material
+from ifem_export.outline import RoundedRectangle
+from ifem_export.pad_mesh import build_pad_mesh
+
+
+@cache
+def small_bundle(layers: int = 4, poissons_ratio: float = 0.3223) -> Bundle:
+    """A pad of 12 x 10 x 2 mm with cells of 0.5 mm and 10 x 8 markers."""
+    outline = RoundedRectangle(length_mm=12.0, width_mm=10.0, corner_radius_mm=1.0)
+    mesh, _ = build_pad_mesh(outline, 2.0, pitch_mm=0.5, layers=layers)
+    grid = build_marker_grid(10, 8, 1.1, 0.45)
+    return build_bundle(
+        mesh,
+        Material(0.147, poissons_ratio, 1000.0),
+        "bbar",
+        marker_positions_mm=grid.positions_mm,
+        with_stiffness=False,
+    )
+
+
+def hertz_like(points_mm: np.ndarray, normal_n: float, shear_n: tuple[float, float]) -> np.ndarray:
+    """Forces (c, 3) on a disc of 2.2 mm about (0.4, -0.3) with the given resultant."""
+    away = np.hypot(points_mm[:, 0] - 0.4, points_mm[:, 1] + 0.3)
+    shape = np.sqrt(np.maximum(1 - (away / 2.2) ** 2, 0.0))
+    shape /= shape.sum()
+    return shape[:, None] * np.array([*shear_n, -normal_n])

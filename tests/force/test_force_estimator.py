@@ -1,0 +1,180 @@
+"""Forces from the motion of the surface, on pads with known forces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pad_samples import hertz_like, small_bundle
+
+from gelslim_force.finite_strain_force import FiniteStrainForce
+from gelslim_force.force_estimator import ForceEstimator, ForceSettings
+from gelslim_force.surface_share import surface_share_mm2
+from gelslim_force.wrench import resultant
+from gelslim_force.wrench_noise import WrenchNoise, rigid_motions
+
+
+@pytest.fixture(scope="module")
+def case():
+    bundle = small_bundle()
+    operator = bundle.surface_operator("factor")
+    points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
+    force = hertz_like(points, 1.0, (0.3, -0.2))
+    return bundle, operator, force, operator.displacement(force)
+
+
+def estimator(case, method: str, **settings) -> ForceEstimator:
+    bundle, operator, _, _ = case
+    return ForceEstimator(bundle.mesh, operator, ForceSettings(method=method, **settings))
+
+
+def test_direct_returns_the_forces_that_made_the_motion(case) -> None:
+    _, _, force, moved = case
+    found = estimator(case, "direct").estimate(moved)
+    assert np.abs(found.force_n - force).max() < 1e-7
+    assert found.centre_of_pressure_mm == pytest.approx([0.4, -0.3], abs=0.06)
+    assert found.slip_margin == pytest.approx(1 - np.hypot(0.3, 0.2), abs=1e-6)
+    assert found.traction_mpa[:, 2] @ found_area(case) == pytest.approx(-1.0, abs=1e-6)
+
+
+def found_area(case) -> np.ndarray:
+    return surface_share_mm2(case[0].mesh)
+
+
+def test_shares_of_the_surface_sum_to_its_cells(case) -> None:
+    mesh = case[0].mesh
+    share = surface_share_mm2(mesh)
+    cells = np.asarray(mesh.occupancy)[:, :, -1].sum()
+    assert share.sum() == pytest.approx(cells * 0.25, rel=1e-12)
+    assert share.max() == pytest.approx(0.25) and share.min() >= 0.0625 - 1e-12
+
+
+def test_low_pass_keeps_the_resultant(case) -> None:
+    _, _, force, moved = case
+    found = estimator(case, "low_pass").estimate(moved)
+    assert found.force_n.sum(axis=0) == pytest.approx(force.sum(axis=0), abs=1e-7)
+
+
+def test_masked_fit_keeps_forces_on_the_contact(case) -> None:
+    _, operator, force, moved = case
+    noisy = moved + np.random.default_rng(5).normal(0, 0.005, moved.shape)
+    touched = force[:, 2] < 0
+    masked = estimator(case, "auto", most_steps=200).estimate(noisy, touched)
+    assert not masked.force_n[~touched].any()
+    assert (masked.contact == touched).all()
+    raw = operator.force(noisy)
+    size = np.linalg.norm(force)
+    assert np.linalg.norm(masked.force_n - force) < 0.5 * np.linalg.norm(raw - force)
+    assert np.linalg.norm(masked.force_n - force) < 0.04 * size
+    assert masked.force_n.sum(axis=0) == pytest.approx([0.3, -0.2, -1.0], abs=0.04)
+
+
+def test_without_normal_motion_the_tangential_resultant_is_right(case) -> None:
+    _, _, _, moved = case
+    blind = moved.copy()
+    blind[:, 2] = np.nan
+    found = estimator(case, "auto").estimate(blind)
+    assert np.isnan(found.force_n[:, 2]).all() and np.isnan(found.slip_margin)
+    assert np.isnan(found.centre_of_pressure_mm).all()
+    assert found.force_n[:, :2].sum(axis=0) == pytest.approx([0.3, -0.2], abs=0.02)
+
+
+def test_rest_is_no_force_and_no_nan(case) -> None:
+    _, _, force, _ = case
+    rest = np.zeros_like(force)
+    for touched in (None, np.zeros(len(force), bool), force[:, 2] < 0):
+        found = estimator(case, "auto").estimate(rest, touched)
+        assert not found.force_n.any() and np.isfinite(found.force_n).all()
+        assert np.isnan(found.slip_margin)
+
+
+def test_wrench_covariance_is_that_of_many_draws(case) -> None:
+    bundle, operator, force, moved = case
+    points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
+    noise = WrenchNoise.of(operator, points)
+    to_nodes = bundle.markers.to_surface
+    count = to_nodes.shape[1]
+    spread = np.array([[4e-6, 1e-6], [1e-6, 2e-6]])
+    predicted = noise.covariance(to_nodes, np.broadcast_to(spread, (count, 2, 2)))
+    rng = np.random.default_rng(0)
+    draws = []
+    for _ in range(400):
+        d = np.zeros((count, 3))
+        d[:, :2] = rng.multivariate_normal([0, 0], spread, count)
+        f, t = resultant(points, operator.force(to_nodes @ d))
+        draws.append([*f, *t])
+    found = np.cov(np.array(draws).T)
+    ratio = np.diag(found) / np.diag(predicted)
+    assert ((ratio > 0.75) & (ratio < 1.3)).all()
+    scale = np.sqrt(np.outer(np.diag(predicted), np.diag(predicted)))
+    assert np.abs((found - predicted) / scale).max() < 0.25
+
+
+def test_uncertain_depth_adds_to_the_normal_force(case) -> None:
+    bundle, operator, _, moved = case
+    points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
+    noise = WrenchNoise.of(operator, points)
+    to_nodes = bundle.markers.to_surface
+    nothing = np.zeros((to_nodes.shape[1], 2, 2))
+    sigma = np.abs(moved[:, 2]) * 0.1
+    found = noise.covariance(to_nodes, nothing, sigma)
+    shift = np.zeros_like(moved)
+    shift[:, 2] = sigma
+    assert found[2, 2] == pytest.approx(operator.force(shift).sum(axis=0)[2] ** 2, rel=1e-5)
+
+
+def test_wrench_without_normal_motion_marks_what_it_does_not_know(case) -> None:
+    bundle, operator, force, _ = case
+    points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
+    blind = force.copy()
+    blind[:, 2] = np.nan
+    wrench = WrenchNoise.of(operator, points).wrench(blind, np.eye(6))
+    assert np.isnan(wrench.vector).tolist() == [False, False, True, True, True, False]
+    assert np.isnan(wrench.standard_deviation).tolist() == [False, False, True, True, True, False]
+
+
+def test_rigid_motions_turn_forces_into_the_resultant(case) -> None:
+    _, _, force, _ = case
+    points = np.asarray(case[0].mesh.nodes_mm)[case[0].mesh.surface]
+    found = np.einsum("ack,ck->a", rigid_motions(points), force)
+    assert found == pytest.approx(np.concatenate(resultant(points, force)), abs=1e-12)
+
+
+def test_neo_hookean_equals_linear_for_small_motion_and_differs_for_large(case) -> None:
+    bundle, operator, force, moved = case
+    law = FiniteStrainForce(bundle, tolerance=1e-6)
+    small = law.force(1e-5 * moved) / 1e-5
+    assert np.linalg.norm(small - force) < 2e-3 * np.linalg.norm(force)
+    large = law.force(0.5 * moved)
+    assert large[:, 2].sum() < 0.51 * force[:, 2].sum()
+
+
+def test_neo_hookean_inner_nodes_are_in_balance(case) -> None:
+    """Against Newton's method with the exact tangent, to the last digit."""
+    bundle, _, _, moved = case
+    from scipy.sparse.linalg import spsolve
+
+    u = 0.5 * moved
+    law = FiniteStrainForce(bundle, tolerance=1e-3)
+    columns = law.system.columns
+    whole = np.zeros((bundle.mesh.n_nodes, 3))
+    whole[-columns:] = u
+    inside = np.arange(3 * columns, whole.size - 3 * columns)
+    for step in range(30):
+        whole[-columns:] = min(1.0, (step + 1) / 10) * u
+        rest = law.pad.force(whole).reshape(-1)[inside]
+        tangent = law.pad.tangent(whole).tocsr()[inside][:, inside]
+        whole.reshape(-1)[inside] -= spsolve(tangent.tocsc(), rest)
+    assert np.abs(law.pad.force(whole).reshape(-1)[inside]).max() < 1e-10
+    exact = law.pad.force(whole)[-columns:]
+    assert np.linalg.norm(law.force(u) - exact) < 2e-3 * np.linalg.norm(exact)
+
+
+def test_impossible_settings_are_named() -> None:
+    for bad, name in (
+        ({"method": "magic"}, "method"),
+        ({"friction": -1.0}, "friction"),
+        ({"low_pass_mm": 0.0}, "low_pass_mm"),
+        ({"most_steps": 0}, "most_steps"),
+    ):
+        with pytest.raises(ValueError, match=name):
+            ForceSettings(**bad)
