@@ -45,7 +45,8 @@ def test_shares_of_the_surface_sum_to_its_cells(case) -> None:
     share = surface_share_mm2(mesh)
     cells = np.asarray(mesh.occupancy)[:, :, -1].sum()
     assert share.sum() == pytest.approx(cells * 0.25, rel=1e-12)
-    assert share.max() == pytest.approx(0.25) and share.min() >= 0.0625 - 1e-12
+    assert share.max() == pytest.approx(0.25)
+    assert share.min() >= 0.0625 - 1e-12
 
 
 def test_low_pass_keeps_the_resultant(case) -> None:
@@ -73,7 +74,8 @@ def test_without_normal_motion_the_tangential_resultant_is_right(case) -> None:
     blind = moved.copy()
     blind[:, 2] = np.nan
     found = estimator(case, "auto").estimate(blind)
-    assert np.isnan(found.force_n[:, 2]).all() and np.isnan(found.slip_margin)
+    assert np.isnan(found.force_n[:, 2]).all()
+    assert np.isnan(found.slip_margin)
     assert np.isnan(found.centre_of_pressure_mm).all()
     assert found.force_n[:, :2].sum(axis=0) == pytest.approx([0.3, -0.2], abs=0.02)
 
@@ -83,12 +85,13 @@ def test_rest_is_no_force_and_no_nan(case) -> None:
     rest = np.zeros_like(force)
     for touched in (None, np.zeros(len(force), bool), force[:, 2] < 0):
         found = estimator(case, "auto").estimate(rest, touched)
-        assert not found.force_n.any() and np.isfinite(found.force_n).all()
+        assert not found.force_n.any()
+        assert np.isfinite(found.force_n).all()
         assert np.isnan(found.slip_margin)
 
 
 def test_wrench_covariance_is_that_of_many_draws(case) -> None:
-    bundle, operator, force, moved = case
+    bundle, operator, _force, _moved = case
     points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
     noise = WrenchNoise.of(operator, points)
     to_nodes = bundle.markers.to_surface
@@ -140,7 +143,7 @@ def test_rigid_motions_turn_forces_into_the_resultant(case) -> None:
 
 
 def test_neo_hookean_equals_linear_for_small_motion_and_differs_for_large(case) -> None:
-    bundle, operator, force, moved = case
+    bundle, _operator, force, moved = case
     law = FiniteStrainForce(bundle, tolerance=1e-6)
     small = law.force(1e-5 * moved) / 1e-5
     assert np.linalg.norm(small - force) < 2e-3 * np.linalg.norm(force)
