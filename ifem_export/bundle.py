@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,8 +21,8 @@ from scipy import sparse
 from ifem_export.assembly import assemble_csr
 from ifem_export.element import Formulation, hex8_stiffness
 from ifem_export.errors import IfemError
-from ifem_export.interpolation import marker_to_node
 from ifem_export.ladder import Ladder, chosen_rung
+from ifem_export.marker_field import MarkerField, marker_field
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.surface_operator import Rung, SurfaceOperator, surface_operator
@@ -38,22 +37,6 @@ class SelfTest:
 
     displacement_mm: NDArray[np.float64]
     force_n: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class MarkerField:
-    """Markers and how their displacements reach the surface nodes.
-
-    Args:
-        positions_mm: (k, 2) or (k, 3) positions at rest in the sensor frame.
-        to_surface: (s, k) CSR, node displacement = to_surface @ marker displacement, for the s
-            nodes of `PadMesh.surface`; rows sum to 1.
-        arrays: further arrays of length k (lattice row, column, kind, diameter …) by name.
-    """
-
-    positions_mm: NDArray[np.float64]
-    to_surface: sparse.csr_array
-    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +151,7 @@ def build_bundle(
         formulation=formulation,
         element_matrix=matrix,
         stiffness=stiffness,
-        markers=_marker_field(mesh, marker_positions_mm, marker_arrays),
+        markers=marker_field(mesh, marker_positions_mm, marker_arrays),
         camera=plain_camera,
         self_test=SelfTest(displacement, recipe_force(mesh, matrix, displacement)),
         spec_hash=spec_hash,
@@ -277,29 +260,6 @@ def _test_displacement(mesh: PadMesh) -> NDArray[np.float64]:
     u = rng.uniform(-_SELF_TEST_AMPLITUDE, _SELF_TEST_AMPLITUDE, (mesh.n_nodes, 3))
     u[mesh.bonded] = 0.0
     return u
-
-
-def _marker_field(
-    mesh: PadMesh, positions_mm: ArrayLike | None, arrays: Mapping[str, ArrayLike] | None
-) -> MarkerField | None:
-    if positions_mm is None:
-        if arrays:
-            raise IfemError("marker arrays without marker positions: give both")
-        return None
-    positions = np.array(positions_mm, dtype=float)
-    operator = marker_to_node(positions, mesh.nodes_mm[mesh.surface])
-    held: dict[str, NDArray[Any]] = {}
-    for name, values in (arrays or {}).items():
-        if not re.fullmatch(r"[a-z][a-z0-9_]{0,40}", name) or name == "positions_mm":
-            raise IfemError(f"marker array name {name!r}: use lower-case letters, digits and _")
-        array = np.array(values)
-        if array.shape[:1] != (len(positions),) or array.dtype.kind not in "biufU":
-            raise IfemError(
-                f"marker array {name!r} has shape {array.shape} and type {array.dtype}: must be "
-                f"numbers or text, one per marker ({len(positions)})"
-            )
-        held[name] = array
-    return MarkerField(positions, operator, held)
 
 
 def _plain_json(camera: Mapping[str, Any]) -> dict[str, Any]:

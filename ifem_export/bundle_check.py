@@ -12,9 +12,12 @@ from ifem_export.bundle import Bundle, recipe_force
 from ifem_export.bundle_manifest import REBUILD
 from ifem_export.element import hex8_stiffness
 from ifem_export.errors import BundleError, IfemError
+from ifem_export.marker_field import MarkerField
 from ifem_export.pad_mesh import PadMesh
+from ifem_export.thin_plate import affine
 
 _SELF_TEST_TOLERANCE = 1e-10
+_ROW_TOLERANCE = 1e-9
 _ELEMENT_TOLERANCE = 1e-12
 
 
@@ -29,11 +32,7 @@ def check_bundle(bundle: Bundle) -> None:
     _check_element(bundle)
     if bundle.stiffness is not None:
         _check_csr("stiffness", bundle.stiffness)
-    if bundle.markers is not None:
-        _check_csr("interpolation", bundle.markers.to_surface)
-        rows = np.asarray(bundle.markers.to_surface.sum(axis=1)).reshape(-1)
-        if np.abs(rows - 1.0).max() > 1e-9:
-            _fail("interpolation_data", "rows do not sum to one")
+    _check_markers(bundle.markers)
     _check_self_test(bundle)
 
 
@@ -53,6 +52,9 @@ def _check_finite(bundle: Bundle) -> None:
     if bundle.markers is not None:
         arrays["marker_positions_mm"] = bundle.markers.positions_mm
         arrays["interpolation_data"] = bundle.markers.to_surface.data
+        if bundle.markers.spline is not None:
+            arrays["thin_plate"] = bundle.markers.spline.to_nodes
+            arrays["thin_plate_bending"] = bundle.markers.spline.bending
         for name, values in bundle.markers.arrays.items():
             arrays[f"marker_{name}"] = values
     for name, array in arrays.items():
@@ -97,6 +99,26 @@ def _check_element(bundle: Bundle) -> None:
             "element_matrix_n_per_mm",
             f"differs by {gap:.2g} from the {bundle.formulation} element of this material",
         )
+
+
+def _check_markers(markers: MarkerField | None) -> None:
+    if markers is None:
+        return
+    _check_csr("interpolation", markers.to_surface)
+    rows = np.asarray(markers.to_surface.sum(axis=1)).reshape(-1)
+    if np.abs(rows - 1.0).max() > _ROW_TOLERANCE:
+        _fail("interpolation_data", "rows do not sum to one")
+    if markers.spline is None:
+        return
+    to_nodes, bending = markers.spline.to_nodes, markers.spline.bending
+    if np.abs(to_nodes.sum(axis=1) - 1.0).max() > _ROW_TOLERANCE:
+        _fail("thin_plate", "rows do not sum to one")
+    # What lost markers read rests on this form: symmetric and zero on affine fields.
+    planes = affine(np.asarray(markers.positions_mm)[:, :2])
+    scale = np.abs(bending).max()
+    off = np.abs(bending @ planes).max() / np.abs(planes).max()
+    if np.abs(bending - bending.T).max() > _ROW_TOLERANCE * scale or off > _ROW_TOLERANCE * scale:
+        _fail("thin_plate_bending", "is not the bending energy of a spline through the markers")
 
 
 def _check_csr(name: str, matrix: sparse.csr_array) -> None:

@@ -7,12 +7,14 @@ from typing import Any
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.bundle import Bundle, MarkerField, SelfTest
+from ifem_export.bundle import Bundle, SelfTest
 from ifem_export.bundle_manifest import MANIFEST, REBUILD
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.ladder import Ladder
+from ifem_export.marker_field import MarkerField
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
+from ifem_export.thin_plate import ThinPlate
 
 
 def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
@@ -39,6 +41,9 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
         arrays["interpolation_data"] = bundle.markers.to_surface.data
         arrays["interpolation_indices"] = bundle.markers.to_surface.indices
         arrays["interpolation_indptr"] = bundle.markers.to_surface.indptr
+        if bundle.markers.spline is not None:
+            arrays["thin_plate"] = bundle.markers.spline.to_nodes
+            arrays["thin_plate_bending"] = bundle.markers.spline.bending
         for name, values in bundle.markers.arrays.items():
             arrays[f"marker_{name}"] = values
     return arrays
@@ -107,10 +112,17 @@ def _markers_from(manifest: dict[str, Any], take: _Taker, n_surface: int) -> Mar
     count, names = section.get("count"), section.get("arrays")
     if not isinstance(count, int) or not isinstance(names, list):
         raise BundleError(MANIFEST, "section 'markers' is malformed", REBUILD)
+    spline = None
+    if section.get("thin_plate"):
+        spline = ThinPlate(
+            take("thin_plate", "<f8", (n_surface, count)),
+            take("thin_plate_bending", "<f8", (count, count)),
+        )
     return MarkerField(
         positions_mm=take("marker_positions_mm", "<f8", (count, None)),
         to_surface=take.csr("interpolation", "interpolation_data", (n_surface, count)),
         arrays={name: take(f"marker_{name}") for name in names},
+        spline=spline,
     )
 
 

@@ -88,7 +88,11 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
         },
         "markers": None
         if markers is None
-        else {"count": len(markers.positions_mm), "arrays": sorted(markers.arrays)},
+        else {
+            "count": len(markers.positions_mm),
+            "arrays": sorted(markers.arrays),
+            "thin_plate": markers.spline is not None,
+        },
         "camera": dict(bundle.camera),
         "ladder": ladder_section(bundle),
         "arrays": arrays,

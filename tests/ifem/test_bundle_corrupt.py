@@ -26,6 +26,8 @@ ARRAYS = [
     "interpolation_data",
     "interpolation_indices",
     "interpolation_indptr",
+    "thin_plate",
+    "thin_plate_bending",
     "marker_row",
     "marker_kind",
 ]
@@ -129,6 +131,10 @@ def put(index, value):
         ("stiffness_indptr", put(7, 0), "out of order"),
         ("interpolation_indices", put(0, 99), "out of range"),
         ("interpolation_data", lambda a: a * 1.01, "sum to one"),
+        ("thin_plate", put((3, 4), np.nan), "not finite"),
+        ("thin_plate", lambda a: a * 1.01, "sum to one"),
+        ("thin_plate_bending", put((3, 4), 9.0), "bending energy"),
+        ("thin_plate_bending", lambda a: a + a.max(), "bending energy"),
     ],
 )
 def test_wrong_content_with_honest_checksums_is_refused(stored, name, change, reason):

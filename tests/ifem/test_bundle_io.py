@@ -2,6 +2,7 @@ import json
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from ifem_export.bundle import build_bundle, force
 from ifem_export.bundle_io import load_bundle, write_bundle
 from ifem_export.bundle_layout import bundle_arrays
 from ifem_export.bundle_summary import summarise_bundle
-from ifem_export.errors import BundleError
+from ifem_export.errors import BundleError, IfemError
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import build_pad_mesh
 
@@ -150,7 +151,11 @@ def test_summary(stored, bundle):
     assert summary["verification"] == {"ok": True}
     assert summary["mesh"]["nodes"] == bundle.mesh.n_nodes
     assert summary["mesh"]["elements"] == 20 * 15 - 4 * cells_cut_per_corner()
-    assert summary["markers"] == {"count": 35, "arrays": ["kind", "row"]}
+    assert summary["markers"] == {
+        "count": 35,
+        "arrays": ["kind", "row"],
+        "thin_plate": True,
+    }
     assert summary["total_bytes"] == sum(p.stat().st_size for p in stored.glob("*.npy"))
     flip_byte(stored / "hexes.npy")
     verification = summarise_bundle(stored)["verification"]
@@ -177,3 +182,29 @@ def test_bundle_of_a_bare_pad(gel, tmp_path):
     back = load_bundle(tmp_path / "one")
     assert back.markers is None
     assert back.formulation == "bbar"
+
+
+def test_both_interpolations_come_back(bundle, pristine):
+    from ifem_export.marker_interpolation import thin_plate_interpolation
+
+    back = load_bundle(pristine).markers
+    motion = np.random.default_rng(5).normal(size=(35, 3))
+    lost = np.zeros(35, dtype=bool)
+    lost[[3, 17]] = True
+    for name in ("sparse", "thin_plate"):
+        made, read = getattr(bundle.markers, name), getattr(back, name)
+        assert np.array_equal(read(motion), made(motion))
+        assert np.array_equal(read.with_missing(lost)(motion), made.with_missing(lost)(motion))
+    surface = bundle.mesh.nodes_mm[bundle.mesh.surface]
+    anew = thin_plate_interpolation(back.positions_mm, surface)
+    assert back.thin_plate(motion) == pytest.approx(anew(motion), abs=1e-9)
+    assert np.array_equal(back.sparse(motion), back.to_surface @ motion)
+
+
+def test_a_bundle_without_a_spline_says_so(bundle, tmp_path):
+    bare = replace(bundle, markers=replace(bundle.markers, spline=None))
+    write_bundle(tmp_path / "bare", bare)
+    back = load_bundle(tmp_path / "bare").markers
+    assert back.spline is None
+    with pytest.raises(IfemError, match="no thin-plate spline: rebuild"):
+        _ = back.thin_plate
