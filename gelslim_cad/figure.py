@@ -8,14 +8,16 @@ from typing import Any
 DPI = 150
 
 
-def new_figure(width_in: float, height_in: float, columns: int = 1) -> tuple[Any, Any]:
-    """A matplotlib figure and its axes (an array of them for several columns)."""
+def new_figure(
+    width_in: float, height_in: float, columns: int = 1, rows: int = 1
+) -> tuple[Any, Any]:
+    """A matplotlib figure and its axes (an array of them for several columns or rows)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    return figure, figure.subplots(1, columns)
+    return figure, figure.subplots(rows, columns)
 
 
 def as_png(figure: Any) -> bytes:
