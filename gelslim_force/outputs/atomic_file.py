@@ -1,0 +1,35 @@
+"""A file that is there whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def replace_file(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write `data` next to `path`, force it to the disk and move it into place.
+
+    Raises OSError; the old file, if any, is then as it was.
+    """
+    target = Path(path)
+    handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as out:
+            out.write(data)
+            out.flush()
+            os.fsync(out.fileno())
+        os.chmod(part, 0o644)
+        os.replace(part, target)
+    except BaseException:
+        Path(part).unlink(missing_ok=True)
+        raise
+
+
+def json_bytes(record: Mapping[str, Any]) -> bytes:
+    """Return indented UTF-8 JSON with a final newline; NaN is not allowed in it."""
+    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
+    return (text + "\n").encode("utf-8")

@@ -1,0 +1,172 @@
+"""One line of CSV per frame: wrench, its noise, contact, markers and what was wrong.
+
+UTF-8, comma, a header line, `\\n` at the end of each line; floats in the shortest form that reads
+back to the same double; `nan` for what is not known. A line is complete when its newline is there.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_force.outputs.output_error import OutputError, disk_error
+from gelslim_force.tracks import MarkerStatus
+
+_AXES = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
+_STATUS = {
+    "tracked": MarkerStatus.TRACKED,
+    "predicted": MarkerStatus.PREDICTED,
+    "lost": MarkerStatus.LOST,
+    "rejected": MarkerStatus.REJECTED,
+}
+NUMBERS = (
+    "index",
+    "time_s",
+    *_AXES,
+    *(f"sigma_{axis}" for axis in _AXES),
+    "normal_known",
+    "coverage",
+    *_STATUS,
+    "contact_nodes",
+    "cop_x_mm",
+    "cop_y_mm",
+    "slip_margin",
+    "misfit",
+)
+"""Columns of numbers; `normal_known` is 0 or 1, counts are nan where there is nothing to count."""
+COLUMNS = (*NUMBERS, "problems")
+"""All columns; problems are joined by "; "."""
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchTable:
+    """Lines of a wrench file: n frames."""
+
+    numbers: NDArray[np.float64]
+    """(n, len(NUMBERS)), columns as in `NUMBERS`."""
+    problems: tuple[str, ...]
+    """One text per frame, empty where nothing was wrong."""
+    torn: bool = False
+    """The last line was cut off while it was written, and is left out."""
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.numbers)
+
+    def __getitem__(self, column: str) -> NDArray[np.float64]:
+        """(n,) values of a column of numbers. Raises KeyError for another name."""
+        if column not in NUMBERS:
+            raise KeyError(f"{column!r} is no column of numbers; there are {', '.join(NUMBERS)}")
+        return self.numbers[:, NUMBERS.index(column)]
+
+    @property
+    def wrench(self) -> NDArray[np.float64]:
+        """(n, 6) force in N, then torque in N mm."""
+        return self.numbers[:, [NUMBERS.index(axis) for axis in _AXES]]
+
+    @property
+    def sigma(self) -> NDArray[np.float64]:
+        """(n, 6) standard deviations in N and N mm."""
+        return self.numbers[:, [NUMBERS.index(f"sigma_{axis}") for axis in _AXES]]
+
+
+def header() -> str:
+    """Return the first line."""
+    return ",".join(COLUMNS) + "\n"
+
+
+def line(result: FrameResult) -> str:
+    """Return the line of a frame, its newline included."""
+    numbers = [_text(value) for value in _numbers(result)]
+    out = io.StringIO()
+    problems = "; ".join(" ".join(problem.split()) for problem in result.problems)
+    csv.writer(out, lineterminator="\n").writerow([*numbers, problems])
+    return out.getvalue()
+
+
+def write_wrenches(path: str | os.PathLike[str], results: Iterable[FrameResult]) -> None:
+    """Write a file in one go. Raises OutputError."""
+    try:
+        with open(path, "w", encoding="utf-8", newline="") as out:
+            out.write(header())
+            out.writelines(line(result) for result in results)
+    except OSError as error:
+        raise disk_error(path, "writing wrenches", error) from error
+
+
+def read_wrenches(path: str | os.PathLike[str]) -> WrenchTable:
+    """Read a file, also one whose writer was killed. Raises OutputError for anything else."""
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise disk_error(path, "reading wrenches", error) from error
+    whole, newline, rest = data.rpartition(b"\n")
+    try:
+        rows = list(csv.reader(io.StringIO((whole + newline).decode("utf-8"), newline="")))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise OutputError(f"{os.fspath(path)}: no wrench file ({error})") from error
+    if not rows:
+        if (header().encode()).startswith(rest):
+            return WrenchTable(np.zeros((0, len(NUMBERS))), (), torn=True)
+        raise OutputError(f"{os.fspath(path)}: no wrench file; its first line must be {header()!r}")
+    if tuple(rows[0]) != COLUMNS:
+        raise OutputError(f"{os.fspath(path)}: no wrench file; its first line must be {header()!r}")
+    numbers = np.array([_row(path, k + 2, row) for k, row in enumerate(rows[1:])])
+    return WrenchTable(
+        numbers.reshape(len(rows) - 1, len(NUMBERS)),
+        tuple(row[-1] for row in rows[1:]),
+        torn=bool(rest),
+    )
+
+
+def _row(path: str | os.PathLike[str], number: int, row: list[str]) -> list[float]:
+    if len(row) != len(COLUMNS):
+        raise OutputError(
+            f"{os.fspath(path)}, line {number}: {len(row)} values, expected {len(COLUMNS)}"
+        )
+    try:
+        return [float(value) for value in row[:-1]]
+    except ValueError as error:
+        raise OutputError(f"{os.fspath(path)}, line {number}: {error}") from error
+
+
+def _numbers(result: FrameResult) -> list[float]:
+    unknown = [math.nan] * 6
+    wrench, field, tracks = result.wrench, result.field, result.tracks
+    counts = [math.nan] * 4 if tracks is None else [tracks.count(s) for s in _STATUS.values()]
+    contact = [math.nan] * 5
+    if field is not None:
+        contact = [
+            int(field.contact.sum()),
+            *field.centre_of_pressure_mm,
+            field.slip_margin,
+            field.misfit,
+        ]
+    return [
+        result.index,
+        result.time_s,
+        *(unknown if wrench is None else wrench.vector),
+        *(unknown if wrench is None else _sigma(wrench.covariance)),
+        int(result.normal_known),
+        result.coverage,
+        *counts,
+        *contact,
+    ]
+
+
+def _sigma(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round-off may leave a variance a little below zero."""
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _text(value: float) -> str:
+    return str(value) if isinstance(value, int) else repr(float(value))
