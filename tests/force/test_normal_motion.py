@@ -1,0 +1,229 @@
+"""Depth, motion and force from a contact patch, against closed forms and brute force."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from bonded_layer import layer_contact
+from scipy.linalg import cholesky
+from scipy.optimize import nnls
+
+from gelslim_force.contact_patch import ContactPatch
+from gelslim_force.indenter import Cylinder, Flat, Sphere
+from gelslim_force.normal_compliance import NormalCompliance
+from gelslim_force.normal_motion import NormalModel
+from ifem_export.material import Material
+from ifem_export.pad_mesh import PadMesh
+from ifem_export.surface_operator import surface_operator
+
+E_MPA, THICK_MM = 0.147, 2.0
+BALL = Sphere(10.0)
+
+
+def pad(cells, pitch_mm, nu=0.48, layers=4, hole=False):
+    occupied = np.ones((*cells, layers), dtype=bool)
+    if hole:
+        occupied[0, 0] = False
+    size = (pitch_mm, pitch_mm, THICK_MM / layers)
+    corner = (-cells[0] * pitch_mm / 2, -cells[1] * pitch_mm / 2, -THICK_MM)
+    mesh = PadMesh.from_occupancy(occupied, size, corner)
+    operator = surface_operator(mesh, Material(E_MPA, nu, 1000.0), "bbar", "factor")
+    return operator, mesh.nodes_mm[mesh.surface]
+
+
+@cache
+def wide_model(nu=0.48):
+    operator, points = pad((44, 44), 0.5, nu)
+    return NormalModel(operator, points)
+
+
+@cache
+def small():
+    """Model of a small pad with its compliance made one solve at a time."""
+    operator, points = pad((20, 16), 0.5)
+    columns = []
+    for node in range(len(points)):
+        force = np.zeros((len(points), 3))
+        force[node, 2] = 1.0
+        columns.append(operator.displacement(force)[:, 2])
+    return NormalModel(operator, points), np.array(columns)
+
+
+def reference_push(compliance, gap):
+    """q ≥ 0 with C q ≥ gap and no push across a gap: the least of qCq/2 - gap q, by NNLS."""
+    factor = cholesky(compliance)
+    cut = np.where(np.isfinite(gap), gap, -1e3)
+    push, _ = nnls(factor, np.linalg.solve(factor.T, cut), maxiter=20000)
+    return push
+
+
+def disc(x=0.0, y=0.0, a=2.0, sigma=0.0):
+    return ContactPatch("disc", np.array([x, y]), a, covariance=np.eye(4) * sigma**2)
+
+
+def test_truth_is_hertz_on_a_thick_layer():
+    nu = 0.4
+    truth = layer_contact(lambda r: r * r / 20, 1.0, 25.0, E_MPA, nu)
+    hertz = 4 / 3 * E_MPA / (1 - nu**2) / 10
+    # a thick layer sinks less than a half-space by about 1.3 a/h of its depth (Hayes 1972)
+    assert truth.depth_mm == pytest.approx(0.1, rel=0.06)
+    assert truth.force_n == pytest.approx(hertz, rel=1e-3)
+
+
+@pytest.mark.parametrize("radius", [1.5, 2.2, 3.1])
+@pytest.mark.parametrize("nu", [0.3223, 0.48])
+def test_depth_motion_and_force_of_a_sphere(radius, nu):
+    """Elastic layer on a rigid base, by Hankel transforms; the patch anywhere on the lattice."""
+    model = wide_model(nu)
+    truth = layer_contact(lambda r: BALL.profile(r, 0 * r), radius, THICK_MM, E_MPA, nu)
+    rng = np.random.default_rng(5)
+    depth, force, field, cap, bulge = [], [], [], [], []
+    for centre in rng.uniform(-0.5, 0.5, (8, 2)):
+        patch = disc(*centre, radius)
+        motion = model.motion(patch, BALL)
+        r = np.hypot(*(model.points_mm - centre).T)
+        exact = np.where(r < radius, BALL.profile(r, 0 * r) - truth.depth_mm, -truth.sinking(r))
+        paper = model.cap_only(patch, BALL)
+        depth.append(motion.depth_mm / truth.depth_mm - 1)
+        force.append(motion.push_n / truth.force_n - 1)
+        field.append(np.linalg.norm(motion.w_mm - exact) / np.linalg.norm(exact))
+        cap.append(np.linalg.norm(paper.w_mm - exact) / np.linalg.norm(exact))
+        beside = (r > 1.25 * radius) & (r < radius + 4)
+        bulge.append(np.abs(motion.w_mm - exact)[beside].max() / truth.depth_mm)
+        assert abs(motion.depth_mm - truth.depth_mm) < 4 * motion.depth_sigma_mm
+    assert abs(np.mean(depth)) < 0.02
+    assert np.abs(depth).max() < 0.055
+    assert np.abs(force).max() < 0.13
+    assert abs(np.mean(force)) < 0.05
+    assert np.max(field) < 0.12
+    assert np.max(bulge) < 0.03
+    assert np.min(cap) > 3 * np.mean(field)
+
+
+@pytest.mark.parametrize(
+    ("patch", "indenter", "depth"),
+    [
+        (disc(0.1, -0.3, 1.7), BALL, 0.16),
+        (disc(4.6, 0.2, 1.7), BALL, 0.16),
+        (ContactPatch("strip", np.array([0.0, 0.4]), 1.3, angle_deg=25.0), Cylinder(6.0), 0.15),
+        (disc(0.0, 0.0, 1.6), Flat(radius_mm=1.6), 0.1),
+        (
+            ContactPatch("outline", np.array([1.0, 0.0]), 1.5, 70.0, 2.5),
+            Flat(half_sizes_mm=(1.5, 2.5)),
+            0.1,
+        ),
+    ],
+)
+def test_contact_at_a_known_depth_is_that_of_brute_force(patch, indenter, depth):
+    model, compliance = small()
+    motion = model.motion(patch, indenter, depth_mm=depth)
+    gap = depth - indenter.profile(*patch.local(*model.points_mm.T))
+    push = reference_push(compliance, gap)
+    np.testing.assert_allclose(motion.force_n, push, atol=2e-4 * push.max())
+    np.testing.assert_allclose(motion.w_mm, -compliance @ push, atol=2e-4 * depth)
+    assert (motion.patch == (push > 1e-6 * push.max())).mean() > 0.995
+    assert (motion.force_n >= 0).all()
+
+
+def test_depth_at_the_pads_edge():
+    """The patch of a contact that the edge cuts, by brute force at half the node spacing."""
+    fine, points = pad((32, 32), 0.25)
+    table = NormalCompliance(fine, len(points))
+    table.prepare()
+    depth, centre = 0.30, np.array([3.0, 0.0])
+    r = np.hypot(*(points[:, :2] - centre).T)
+    push = reference_push(table.block(np.arange(len(points))), depth - BALL.profile(r, 0 * r))
+    weight = np.where(np.isclose(np.abs(points[:, 0]), 4.0), 0.5, 1.0)
+    area = (weight * (push > 0)).sum() / 16
+    radii = np.linspace(1, 4, 3001)
+    half = np.arccos(np.clip(1.0 / radii, -1, 1))
+    segment = radii**2 * (half - np.sin(half) * np.cos(half))
+    radius = float(np.interp(area, np.pi * radii**2 - segment, radii))
+    operator, nodes = pad((16, 16), 0.5)
+    motion = NormalModel(operator, nodes).motion(disc(*centre, radius), BALL)
+    assert motion.depth_mm == pytest.approx(depth, rel=0.08)
+    assert motion.push_n == pytest.approx(push.sum(), rel=0.16)
+
+
+def test_depth_of_a_cylinder():
+    """A strip lies shallower than a disc of its half-width and does not depend on its angle."""
+    model = wide_model()
+    straight, turned = (
+        model.motion(ContactPatch("strip", np.zeros(2), 1.8, angle_deg=a), Cylinder(10.0))
+        for a in (0.0, 90.0)
+    )
+    assert straight.depth_mm == pytest.approx(turned.depth_mm, rel=1e-6)
+    oblique = model.motion(ContactPatch("strip", np.zeros(2), 1.8, angle_deg=33.0), Cylinder(10.0))
+    assert oblique.depth_mm == pytest.approx(straight.depth_mm, rel=0.04)
+    ball = model.motion(disc(a=1.8), BALL)
+    rim = BALL.profile(1.8, 0.0)
+    assert rim < straight.depth_mm * 1.6 < ball.depth_mm * 2.2
+
+
+def test_compliance_by_symmetry_is_that_of_single_solves():
+    model, columns = small()
+    model.prepare()
+    assert model.compliance.ready == 1.0
+    every = np.arange(len(columns))
+    np.testing.assert_allclose(model.compliance.block(every), columns, atol=2e-7 * columns.max())
+    # a pad with a corner cut off has one mirror line only
+    operator, points = pad((9, 9), 1.0, hole=True)
+    table = NormalCompliance(operator, len(points))
+    force = np.zeros((len(points), 3))
+    for node in (0, 17, 55):
+        force[:] = 0
+        force[node, 2] = 1.0
+        exact = operator.displacement(force)[:, 2]
+        np.testing.assert_allclose(
+            table.apply(np.array([node]), np.ones(1)), exact, atol=1e-6 * exact.max()
+        )
+    assert 0 < table.ready < 1
+
+
+def test_uncertainty_is_that_of_drawn_patches():
+    model = wide_model()
+    sigma = np.array([0.05, 0.03, 0.04])
+    mean = np.array([0.1, 0.2, 2.5])
+    patch = ContactPatch("disc", mean[:2], mean[2], covariance=np.diag([*sigma**2, 0.0]))
+    motion = model.motion(patch, BALL)
+    rng = np.random.default_rng(2)
+    draws = [model.motion(disc(x, y, a), BALL) for x, y, a in rng.normal(mean, sigma, (150, 3))]
+    depths = np.array([d.depth_mm for d in draws])
+    assert motion.depth_sigma_mm == pytest.approx(depths.std(), rel=0.25)
+    seen = np.std([d.w_mm for d in draws], axis=0)
+    stated = motion.sigma_mm
+    clear = seen > 0.3 * seen.max()
+    assert np.median(stated[clear] / seen[clear]) == pytest.approx(1.0, abs=0.2)
+    # nodes that only some draws touch move by a law of their own
+    assert (stated[clear] > 0.6 * seen[clear]).mean() > 0.95
+
+
+def test_height_of_the_rim_moves_the_patch_along_the_line_of_sight():
+    model = wide_model()
+    leaning = ContactPatch("disc", np.zeros(2), 2.0, lean=np.array([3.0, 0.0]), growth_per_mm=0.04)
+    motion = model.motion(leaning, BALL)
+    rim = float(BALL.profile(2.0, 0.0)) - motion.depth_mm
+    plain = model.motion(disc(3.0 * rim, 0.0, 2.0 * (1 + 0.04 * rim)), BALL)
+    np.testing.assert_allclose(motion.w_mm, plain.w_mm, atol=0.02 * motion.depth_mm)
+    upright = model.motion(disc(), BALL)
+    assert np.abs(motion.w_mm - upright.w_mm).max() > 0.04 * motion.depth_mm
+
+
+def test_what_is_not_known_is_not_invented():
+    model = wide_model()
+    flat = model.motion(disc(), Flat(radius_mm=2.0))
+    assert not flat.known
+    assert "supply" in flat.problem
+    assert np.isnan(flat.w_mm).all()
+    assert np.isnan(flat.push_n)
+    wide = model.motion(disc(a=3.0), Sphere(2.0))
+    assert "wider than the indenter" in wide.problem
+    beside = model.motion(disc(40.0, 0.0, 1.0), BALL)
+    assert not beside.known
+    assert not beside.patch.any()
+    with pytest.raises(ValueError, match="depth_mm"):
+        model.motion(disc(), BALL, depth_mm=-1.0)
+    with pytest.raises(ValueError, match="surface nodes"):
+        NormalModel(None, np.zeros(3))
