@@ -52,7 +52,9 @@ class FieldChunk:
             yield unpack(frame, self.points_mm, self.problems[k], self.extra[k], stages)
 
 
-def fits(first: PackedFrame | None, points_mm: NDArray[np.float64] | None, new: PackedFrame) -> int:
+def fits(
+    first: PackedFrame | None, points_mm: NDArray[np.float64] | None, new: PackedFrame
+) -> bool:
     """Whether a frame can join a chunk.
 
     `first` is the chunk's first frame with markers, `points_mm` its nodes; None where it has none.

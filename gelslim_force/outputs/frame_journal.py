@@ -27,7 +27,7 @@ def record(frame: PackedFrame, with_points: bool) -> bytes:
     arrays = dict(frame.arrays)
     if with_points and frame.points_mm is not None:
         arrays["points_mm"] = frame.points_mm
-    blocks = [np.ascontiguousarray(a, dtype=a.dtype.newbyteorder("<")) for a in arrays.values()]
+    blocks = [np.asarray(a, dtype=a.dtype.newbyteorder("<"), order="C") for a in arrays.values()]
     names = [
         [name, block.dtype.str, block.shape] for name, block in zip(arrays, blocks, strict=True)
     ]

@@ -1,0 +1,128 @@
+"""A run read back, whether it was finished, stopped or killed."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_force.outputs.field_chunk import FieldChunk, read_chunk, stack
+from gelslim_force.outputs.frame_journal import read_journal
+from gelslim_force.outputs.output_error import OutputError, disk_error
+from gelslim_force.outputs.packed_frame import PackedFrame
+from gelslim_force.outputs.run_manifest import read_manifest
+from gelslim_force.outputs.run_recorder import FIELD_FILE, STAGES, WRENCHES
+from gelslim_force.outputs.wrench_csv import NUMBERS, WrenchTable, read_wrenches
+from gelslim_force.stage_clock import StageClock, StageTimes
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """A run folder; wrenches are in memory, fields are read as they are asked for."""
+
+    folder: Path
+    manifest: Mapping[str, Any]
+    """`run.json`; in a killed run its counts are those of the last chunk."""
+    wrenches: WrenchTable
+    stage_ms: Mapping[int, Mapping[str, float]]
+    """Stage times by frame index."""
+    torn: tuple[str, ...]
+    """Files whose last piece was cut off while it was written."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run was finished."""
+        return bool(self.manifest["state"] == "complete")
+
+    def __len__(self) -> int:
+        """Return the number of frames with a line of wrenches."""
+        return len(self.wrenches)
+
+    def chunks(self) -> Iterator[FieldChunk]:
+        """Yield the chunks of fields in order. Raises OutputError for a damaged one."""
+        for path in field_files(self.folder):
+            if path.suffix == ".part":
+                yield from _journal_chunks(path)
+            else:
+                yield read_chunk(path)
+
+    def results(self) -> Iterator[FrameResult]:
+        """Yield the frames in order, as they were appended, up to the precision of the run."""
+        for chunk in self.chunks():
+            yield from chunk.results(self.stage_ms)
+
+    def stage_times(self, warm_up: int = 0) -> tuple[StageTimes, ...]:
+        """Return the times per stage, without the first `warm_up` frames."""
+        clock = StageClock(window=max(1, len(self.stage_ms)))
+        for index in sorted(self.stage_ms)[warm_up:]:
+            clock.add(self.stage_ms[index])
+        return clock.summary()
+
+
+def read_run(folder: str | os.PathLike[str]) -> RecordedRun:
+    """Open a run folder. Raises OutputError where there is none, or a file is damaged."""
+    root = Path(folder)
+    manifest = read_manifest(root)
+    path = root / WRENCHES
+    if path.exists():
+        wrenches = read_wrenches(path)
+    else:  # killed before the first line
+        wrenches = WrenchTable(np.zeros((0, len(NUMBERS))), (), torn=True)
+    stage_ms, torn_stages = _read_stages(root / STAGES)
+    torn = [WRENCHES] * wrenches.torn + [STAGES] * torn_stages
+    for part in field_files(root):
+        if part.suffix == ".part" and _journal(part)[1]:
+            torn.append(part.name)
+    return RecordedRun(root, manifest, wrenches, stage_ms, tuple(torn))
+
+
+def field_files(folder: Path) -> list[Path]:
+    """Return the files of fields in order: the chunk where there is one, else its journal."""
+    best: dict[int, Path] = {}
+    try:
+        names = sorted(folder.iterdir())
+    except OSError as error:
+        raise disk_error(folder, "listing the run", error) from error
+    for path in names:
+        match = FIELD_FILE.fullmatch(path.name)
+        if match and (int(match[1]) not in best or path.suffix != ".part"):
+            best[int(match[1])] = path
+    return [best[number] for number in sorted(best)]
+
+
+def _journal(path: Path) -> tuple[list[PackedFrame], bool]:
+    try:
+        return read_journal(path)
+    except OSError as error:
+        raise disk_error(path, "reading fields", error) from error
+
+
+def _journal_chunks(path: Path) -> Iterator[FieldChunk]:
+    frames = _journal(path)[0]
+    if frames:
+        yield stack(frames)
+
+
+def _read_stages(path: Path) -> tuple[dict[int, dict[str, float]], bool]:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return {}, False
+    except OSError as error:
+        raise disk_error(path, "reading stage times", error) from error
+    whole, newline, rest = data.rpartition(b"\n")
+    times = {}
+    for number, text in enumerate((whole + newline).splitlines(), start=1):
+        try:
+            line = json.loads(text)
+            index = int(line.pop("index"))
+            times[index] = {str(k): float(v) for k, v in line.items()}
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise OutputError(f"{path}, line {number}: damaged ({error})") from error
+    return times, bool(rest)

@@ -1,0 +1,106 @@
+"""`run.json`: what a run folder holds, how it was made and whether it was finished."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+from gelslim_force.outputs.output_error import OutputError, disk_error
+from gelslim_force.outputs.packed_frame import plain
+from ifem_export.bundle import Bundle
+
+MANIFEST = "run.json"
+FORMAT_NAME = "gelslim-run/1"
+State = Literal["running", "complete", "stopped"]
+"""`running` also where the process was killed; `stopped` by an error, given in `reason`."""
+UNITS: Mapping[str, str] = {
+    "length": "mm",
+    "force": "N",
+    "torque": "N mm, about the origin",
+    "traction": "MPa",
+    "image": "px, centre of the first pixel at (0, 0), x right, y down",
+    "time": "s",
+    "frame": "origin at the centre of the gel's outer surface, x to the tip, z out of the gel",
+    "byte_order": "little-endian",
+    "unknown": "NaN",
+}
+
+
+@dataclass
+class RunCounts:
+    """Frames of a run so far."""
+
+    frames: int = 0
+    with_tracks: int = 0
+    with_field: int = 0
+    with_wrench: int = 0
+    with_problems: int = 0
+    first_time_s: float | None = None
+    last_time_s: float | None = None
+    problems: dict[str, int] = field(default_factory=dict)
+    """Frames by problem; at most `_KINDS` kinds are counted apart."""
+
+    def add(self, result: FrameResult) -> None:
+        """Count a frame."""
+        self.frames += 1
+        self.with_tracks += result.tracks is not None
+        self.with_field += result.field is not None
+        self.with_wrench += result.wrench is not None
+        self.with_problems += bool(result.problems)
+        if self.first_time_s is None:
+            self.first_time_s = plain(float(result.time_s))
+        self.last_time_s = plain(float(result.time_s))
+        for problem in result.problems:
+            known = problem in self.problems or len(self.problems) < _KINDS
+            name = problem if known else "other"
+            self.problems[name] = self.problems.get(name, 0) + 1
+
+
+_KINDS = 50
+
+
+def bundle_identity(bundle: Bundle) -> dict[str, str]:
+    """Return the hashes that tell which bundle a run was made with."""
+    return {"geometry_hash": bundle.geometry_hash, "spec_hash": bundle.spec_hash}
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that make the numbers."""
+    found = {"python": platform.python_version()}
+    for name in ("gelslim-cad", "numpy", "scipy", "numba", "pyarrow", "opencv-python-headless"):
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def write_manifest(folder: Path, record: Mapping[str, Any]) -> None:
+    """Write `run.json` whole or not at all. Raises OSError."""
+    replace_file(folder / MANIFEST, json_bytes(record))
+
+
+def read_manifest(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read `run.json`. Raises OutputError where the folder holds no run."""
+    path = Path(folder) / MANIFEST
+    try:
+        record = json.loads(path.read_bytes())
+    except FileNotFoundError as error:
+        raise OutputError(
+            f"{os.fspath(folder)}: no run here; a run folder has a {MANIFEST}"
+        ) from error
+    except OSError as error:
+        raise disk_error(path, "reading the manifest", error) from error
+    except ValueError as error:
+        raise OutputError(f"{path}: damaged ({error})") from error
+    if not isinstance(record, dict) or record.get("format") != FORMAT_NAME:
+        raise OutputError(f"{path}: not a run of the format {FORMAT_NAME}")
+    return record

@@ -1,0 +1,260 @@
+"""A run on disk while it happens: what was appended survives a kill of the process.
+
+run.json               what, with what, how many; rewritten with each chunk
+wrenches.csv           a line per frame, see `wrench_csv`
+stages.jsonl           a JSON object per frame: index and ms by stage
+fields_00000.npz       frames with markers and nodes, see `field_chunk`
+fields_00001.part      the chunk in the making, see `frame_journal`
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_force.outputs import optional_library, wrench_csv
+from gelslim_force.outputs.append_file import AppendFile
+from gelslim_force.outputs.chunk_writer import ChunkWriter
+from gelslim_force.outputs.field_chunk import Format, fits
+from gelslim_force.outputs.frame_journal import record
+from gelslim_force.outputs.output_error import OutputError, disk_error
+from gelslim_force.outputs.packed_frame import PackedFrame, Precision, pack, plain
+from gelslim_force.outputs.run_manifest import (
+    FORMAT_NAME,
+    MANIFEST,
+    UNITS,
+    RunCounts,
+    State,
+    versions,
+    write_manifest,
+)
+
+WRENCHES, STAGES = "wrenches.csv", "stages.jsonl"
+FIELD_FILE = re.compile(r"fields_(\d{5,})\.(npz|parquet|part)")
+
+
+@dataclass(frozen=True)
+class RecorderSettings:
+    """What a run keeps. Raises ValueError for values that make no run."""
+
+    fields: Format | None = "npz"
+    """Format of markers and nodes per frame; None keeps the wrenches only."""
+    precision: Precision = "float32"
+    frames_per_chunk: int = 64
+
+    def __post_init__(self) -> None:
+        if self.fields not in (None, *get_args(Format)):
+            raise ValueError(f"fields = {self.fields!r}: must be npz, parquet or None")
+        if self.precision not in get_args(Precision):
+            raise ValueError(f"precision = {self.precision!r}: must be float32 or float64")
+        if not 1 <= self.frames_per_chunk <= 10_000:
+            raise ValueError(f"frames_per_chunk = {self.frames_per_chunk}: must be in 1 ... 10000")
+
+
+@dataclass
+class _OpenChunk:
+    """The chunk in the making; the journal is made with its first frame."""
+
+    number: int
+    frames: list[PackedFrame] = field(default_factory=list)
+    journal: AppendFile | None = None
+    first: PackedFrame | None = None
+    """First frame with markers."""
+    points_mm: NDArray[np.float64] | None = None
+
+    def takes(self, frame: PackedFrame) -> bool:
+        return fits(self.first, self.points_mm, frame)
+
+    def add(self, frame: PackedFrame) -> None:
+        self.frames.append(frame)
+        if self.first is None and frame.markers:
+            self.first = frame
+        if self.points_mm is None:
+            self.points_mm = frame.points_mm
+
+
+class RunRecorder:
+    """Writes results in the order of their index.
+
+    >>> with RunRecorder("out/run") as run:  # doctest: +SKIP
+    ...     for result in results:
+    ...         run.append(result)
+    """
+
+    def __init__(
+        self,
+        folder: str | os.PathLike[str],
+        bundle: Mapping[str, str] | None = None,
+        settings: Mapping[str, Any] | None = None,
+        keep: RecorderSettings | None = None,
+        overwrite: bool = False,
+    ) -> None:
+        """`bundle` is `bundle_identity(...)`, `settings` those of the pipeline, for the record.
+
+        Raises OutputError where the folder holds a run already (unless `overwrite`), cannot be
+        made, or pyarrow is missing for Parquet.
+        """
+        self.folder = Path(folder)
+        self._keep = keep or RecorderSettings()
+        if self._keep.fields == "parquet":
+            optional_library.load("pyarrow.parquet", "record", "Parquet")
+        self._about: dict[str, Any] = {
+            "bundle": dict(bundle) if bundle else None,
+            "versions": versions(),
+            "settings": plain(settings or {}),
+        }
+        self._counts = RunCounts()
+        self._last_index: int | None = None
+        self._open = False
+        self._chunk = _OpenChunk(0)
+        try:
+            self._make_room(overwrite)
+            self._write_manifest("running")
+            self._csv = AppendFile(self.folder / WRENCHES)
+            self._stages = AppendFile(self.folder / STAGES)
+            self._csv.append(wrench_csv.header().encode())
+        except OSError as error:
+            raise disk_error(self.folder, "starting the run", error) from error
+        self._writer = ChunkWriter(self._checkpoint)
+        self._open = True
+
+    def append(self, result: FrameResult) -> None:
+        """Write a frame. Raises OutputError; what was appended before stays readable."""
+        if not self._open:
+            raise OutputError(f"{self.folder}: the run is finished; begin another")
+        if self._last_index is not None and result.index <= self._last_index:
+            raise OutputError(
+                f"{self.folder}: frame {result.index} after frame {self._last_index}; "
+                "indices must increase"
+            )
+        try:
+            self._writer.check()
+            self._csv.append(wrench_csv.line(result).encode())
+            if result.stage_ms:
+                stages = {"index": result.index, **plain(result.stage_ms)}
+                self._stages.append((json.dumps(stages) + "\n").encode())
+            if self._keep.fields:
+                self._append_fields(pack(result, self._keep.precision))
+        except (OutputError, OSError) as error:
+            raise self._failed(f"writing frame {result.index}", error) from error
+        self._last_index = result.index
+        self._counts.add(result)
+
+    def finish(self, reason: str = "") -> None:
+        """Write what is left and say so in `run.json`; `reason` if the run was cut short.
+
+        Raises OutputError; again is harmless.
+        """
+        if not self._open:
+            return
+        try:
+            self._end_chunk()
+        except (OutputError, OSError) as error:
+            raise self._failed("finishing the run", error) from error
+        self._close("stopped" if reason else "complete", reason)
+        self._writer.check()
+
+    def __enter__(self) -> RunRecorder:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
+    ) -> None:
+        """Finish, with the reason where an error ended the block."""
+        if kind is None:
+            self.finish()
+            return
+        with contextlib.suppress(OutputError):  # the first error is the one to tell
+            self.finish(f"{kind.__name__}: {error}")
+
+    def _append_fields(self, frame: PackedFrame) -> None:
+        chunk = self._chunk
+        if len(chunk.frames) >= self._keep.frames_per_chunk or not chunk.takes(frame):
+            self._end_chunk()
+            chunk = self._chunk
+        if chunk.journal is None:
+            chunk.journal = AppendFile(self._chunk_path("part"))
+        chunk.journal.append(record(frame, with_points=chunk.points_mm is None))
+        chunk.add(frame)
+
+    def _end_chunk(self) -> None:
+        done = self._chunk
+        if done.journal is None:
+            return
+        done.journal.close()
+        target = self._chunk_path(str(self._keep.fields))
+        self._writer.submit(target, done.journal.path, done.frames)
+        self._chunk = _OpenChunk(done.number + 1)
+
+    def _chunk_path(self, suffix: str) -> Path:
+        return self.folder / f"fields_{self._chunk.number:05d}.{suffix}"
+
+    def _checkpoint(self) -> None:
+        """Before each chunk, on the writer's thread: lines and counts reach the disk too."""
+        self._csv.sync()
+        self._stages.sync()
+        self._write_manifest("running")
+
+    def _failed(self, doing: str, error: OutputError | OSError) -> OutputError:
+        """Close the run; the error to raise."""
+        failure = disk_error(self.folder, doing, error) if isinstance(error, OSError) else error
+        self._close("stopped", str(failure))
+        return failure
+
+    def _close(self, state: State, reason: str) -> None:
+        """End the run; where the disk refuses even this, `run.json` keeps its last state."""
+        self._open = False
+        self._writer.close()
+        try:
+            self._writer.check()
+        except OutputError as error:
+            state, reason = "stopped", reason or str(error)
+        try:
+            self._csv.sync()
+            self._write_manifest(state, reason)
+        except OSError as error:
+            if state == "complete":
+                raise disk_error(self.folder, "finishing the run", error) from error
+        finally:
+            for file in (self._csv, self._stages, self._chunk.journal):
+                if file is not None:
+                    file.close()
+
+    def _write_manifest(self, state: State, reason: str = "") -> None:
+        write_manifest(
+            self.folder,
+            {
+                "format": FORMAT_NAME,
+                "state": state,
+                "reason": reason,
+                **self._about,
+                "fields": asdict(self._keep),
+                "units": dict(UNITS),
+                "counts": asdict(self._counts),
+            },
+        )
+
+    def _make_room(self, overwrite: bool) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        fixed = (MANIFEST, WRENCHES, STAGES)
+        found = [
+            p for p in self.folder.iterdir() if p.name in fixed or FIELD_FILE.fullmatch(p.name)
+        ]
+        if found and not overwrite:
+            raise OutputError(
+                f"{self.folder}: holds a run already; choose another folder or overwrite it"
+            )
+        for path in sorted(found):
+            path.unlink()
