@@ -42,7 +42,7 @@ $(VENV)/.installed: pyproject.toml $(PINS)
 	touch $@
 
 $(VENV)/.installed-dev: pyproject.toml $(PINS)
-	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,dev"
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,dev"
 	touch $@ $(VENV)/.installed
 
 pins: $(VENV)/.installed-dev

@@ -95,7 +95,7 @@ class ForceEstimator:
         displacement_mm: Array,
         touched: Mask | None = None,
         start_n: Array | None = None,
-        least_force_n: float = 0.0,
+        least_force_n: Array | float = 0.0,
     ) -> ForceField:
         """Forces for a motion (c, 3) in mm whose z is NaN where the normal motion is unknown.
 
@@ -103,7 +103,7 @@ class ForceEstimator:
             displacement_mm: (c, 3).
             touched: (c,) nodes in contact, or None where that is not known.
             start_n: (c, 3) forces of the frame before.
-            least_force_n: a nodal force that noise alone does not reach; tells the contact where
+            least_force_n: force, one or (c,), that noise alone does not reach; tells the contact where
                 `touched` is None.
 
         Raises:
@@ -117,7 +117,7 @@ class ForceEstimator:
         contact = touched
         if contact is None:
             sizes = np.linalg.norm(force[:, : 3 if normal_known else 2], axis=1)
-            contact = sizes > max(least_force_n, 0.0)
+            contact = sizes > least_force_n
         if not normal_known:
             force[:, 2] = np.nan
         return ForceField(

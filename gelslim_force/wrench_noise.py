@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.wrench import Wrench, resultant
+from ifem_export.marker_interpolation import MarkerInterpolation
 from ifem_export.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
@@ -34,22 +35,31 @@ class WrenchNoise:
         rows = [operator.force(motion) for motion in rigid_motions(points_mm)]
         return cls(points_mm, np.stack(rows))
 
+    def gains(self, interpolation: MarkerInterpolation) -> Array:
+        """Wrench (6, k, 2) per lateral motion of each marker, N/mm and N; 0 for lost ones.
+
+        W = (G S) M d is read off the transpose of M: the interpolation of unit motions.
+        """
+        rows = [interpolation.transposed(self.response[:, :, i].T) for i in (0, 1)]
+        return np.stack([r.T for r in rows], axis=2)
+
     def covariance(
         self,
-        to_nodes: Array,
+        gains: Array,
         marker_covariance_mm2: Array,
         normal_sigma_mm: Array | None = None,
     ) -> Array:
         """Covariance (6, 6) of the wrench in N and N mm.
 
         Args:
-            to_nodes: (c, k) interpolation, dense or CSR.
-            marker_covariance_mm2: (k, 2, 2) of each marker's lateral motion; zero for lost ones.
+            gains: of the interpolation in use.
+            marker_covariance_mm2: (k, 2, 2) of each marker's lateral motion.
             normal_sigma_mm: (c,) standard deviation of the normal motion, which errs in one
                 piece: a depth too large is too large everywhere.
         """
-        gains = np.stack([(to_nodes.T @ self.response[:, :, i].T).T for i in (0, 1)], axis=2)
-        total = np.einsum("aki,kij,bkj->ab", gains, marker_covariance_mm2, gains)
+        count = len(marker_covariance_mm2)
+        spread = (gains[:, :, None, :] @ marker_covariance_mm2)[:, :, 0, :]
+        total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
         if normal_sigma_mm is not None:
             lean = self.response[:, :, 2] @ normal_sigma_mm
             total = total + np.outer(lean, lean)

@@ -28,6 +28,7 @@ REFERENCE_ELEMENT: Formulation = "bbar"
 REFERENCE_RTOL = 1e-8
 FIELD_SEED = 7
 TIMED_S = 0.12
+BALANCE = 1.1
 NOISE_SEED, NOISE_DRAWS = 11, 6
 CHOICES: tuple[tuple[Rung, dict[str, Any]], ...] = (
     ("paper", {}),
@@ -104,6 +105,10 @@ class Ladder:
                 f"takes {quickest.milliseconds:.3f} ms"
             )
         return min(good, key=lambda r: r.error_field)
+
+    def balanced(self) -> MeasuredRung:
+        """Quickest rung within a tenth of the smallest field error: what a bundle starts with."""
+        return self.within_error(BALANCE * min(r.error_field for r in self.rungs))
 
     def to_record(self) -> dict[str, Any]:
         """Plain data."""

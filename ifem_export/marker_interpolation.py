@@ -55,6 +55,9 @@ class MarkerInterpolation(Protocol):
         Raises InterpolationError for a wrong shape or a kept value that is not finite.
         """
 
+    def transposed(self, values: ArrayLike) -> Array:
+        """The transpose: (k, m) at the markers from (s, m) at the nodes; 0 at lost ones."""
+
     def with_missing(self, mask: ArrayLike) -> MarkerInterpolation:
         """The same without the markers of (k,) bool `mask`, which replaces an earlier mask.
 
@@ -72,6 +75,11 @@ class _Fill:
 
     def __call__(self, kept: Array) -> Array:
         return np.asarray(linalg.cho_solve(self.factor, -(self.rows @ kept), check_finite=False))
+
+    def transposed(self, lost: Array) -> Array:
+        """The transpose, (k, m) from (r, m)."""
+        solved = linalg.cho_solve(self.factor, lost, check_finite=False)
+        return np.asarray(-(self.rows.T @ solved))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +135,14 @@ class FilledInterpolation:
         if self.fill is not None:
             d[self.fill.lost] = self.fill(d)
         return np.asarray(self.to_nodes @ d)
+
+    def transposed(self, values: ArrayLike) -> Array:
+        """See `MarkerInterpolation`."""
+        found = np.array(self.to_nodes.T @ np.asarray(values, dtype=float))
+        if self.fill is not None:
+            found += self.fill.transposed(found[self.fill.lost])
+            found[self.fill.lost] = 0.0
+        return found
 
     def with_missing(self, mask: ArrayLike) -> FilledInterpolation:
         """See `MarkerInterpolation`."""

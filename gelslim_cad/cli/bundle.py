@@ -62,7 +62,7 @@ def bundle(
         gel, element = gel_material(loaded.spec), loaded.spec.mesh.element
         with progress_bar(quiet=as_json) as tell:
             measured = measure_ladder(mesh, gel, element, dense=dense, progress=tell)
-        chosen = chosen_rung(measured, DEFAULT, allowed, time_ms)
+        chosen = chosen_rung(measured, measured.balanced().label, allowed, time_ms)
     label = chosen.label if chosen is not None else ""
     folder = out or Path("out") / f"{loaded.spec.name}-bundle"
     made = make_bundle(
@@ -88,10 +88,6 @@ def bundle(
         print_ladder(measured, label)
     print(f"{written(folder, files)}: {elements} elements, {nodes} nodes, {len(grid)} markers.")
     return 0
-
-
-DEFAULT = "pcg (rtol 0.0001)"
-"""Rung that a bundle starts with unless a budget chooses another."""
 
 
 def print_ladder(ladder: Ladder, chosen: str) -> None:

@@ -96,8 +96,9 @@ def test_wrench_covariance_is_that_of_many_draws(case) -> None:
     noise = WrenchNoise.of(operator, points)
     to_nodes = bundle.markers.to_surface
     count = to_nodes.shape[1]
+    gains = noise.gains(bundle.markers.sparse)
     spread = np.array([[4e-6, 1e-6], [1e-6, 2e-6]])
-    predicted = noise.covariance(to_nodes, np.broadcast_to(spread, (count, 2, 2)))
+    predicted = noise.covariance(gains, np.broadcast_to(spread, (count, 2, 2)))
     rng = np.random.default_rng(0)
     draws = []
     for _ in range(400):
@@ -116,10 +117,10 @@ def test_uncertain_depth_adds_to_the_normal_force(case) -> None:
     bundle, operator, _, moved = case
     points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
     noise = WrenchNoise.of(operator, points)
-    to_nodes = bundle.markers.to_surface
-    nothing = np.zeros((to_nodes.shape[1], 2, 2))
+    gains = noise.gains(bundle.markers.sparse)
+    nothing = np.zeros((gains.shape[1], 2, 2))
     sigma = np.abs(moved[:, 2]) * 0.1
-    found = noise.covariance(to_nodes, nothing, sigma)
+    found = noise.covariance(gains, nothing, sigma)
     shift = np.zeros_like(moved)
     shift[:, 2] = sigma
     assert found[2, 2] == pytest.approx(operator.force(shift).sum(axis=0)[2] ** 2, rel=1e-5)

@@ -163,3 +163,11 @@ def test_an_altered_ladder_is_refused(ladder: Ladder, tmp_path: Path) -> None:
     path.unlink()
     with pytest.raises(BundleError, match="cannot be read"):
         load_bundle(tmp_path / "b")
+
+
+def test_a_bundle_starts_with_the_quickest_rung_near_the_best(ladder: Ladder) -> None:
+    best = min(r.error_field for r in ladder.rungs)
+    start = ladder.balanced()
+    assert start.error_field <= 1.1 * best
+    quicker = [r for r in ladder.rungs if r.milliseconds < start.milliseconds]
+    assert all(r.error_field > 1.1 * best for r in quicker)

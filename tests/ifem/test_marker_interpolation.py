@@ -187,3 +187,11 @@ def test_bad_splines_are_refused():
         thin_plate_interpolation(grid(64, 1.0), NODES)
     with pytest.raises(InterpolationError, match="one line"):
         thin_plate_interpolation(MARKERS[:21], NODES)
+
+
+@pytest.mark.parametrize("lost", [np.zeros(441, bool), some_lost(0.1, 3)])
+def test_the_transpose_is_that_of_the_matrix(interpolation, lost):
+    kept = interpolation.with_missing(lost)
+    values = np.random.default_rng(4).normal(size=(len(NODES), 2))
+    assert kept.transposed(values) == pytest.approx(kept.dense().T @ values, abs=1e-9)
+    assert not kept.transposed(values)[lost].any()

@@ -1,0 +1,72 @@
+"""What a user may choose about the force pipeline; the defaults suit a 90 Hz camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from gelslim_force.force_estimator import ForceSettings
+from gelslim_force.marker_motion import COMPENSATIONS, Compensation
+from ifem_export.bundle import Bundle
+from ifem_export.errors import IfemError
+from ifem_export.surface_operator import RUNGS, Rung, SurfaceOperator
+
+Interpolation = Literal["sparse", "thin_plate"]
+Gel = Literal["linear", "neo_hookean"]
+
+
+@dataclass(frozen=True)
+class PipelineSettings:
+    """Choices of the pipeline. Raises ValueError for impossible ones.
+
+    Operator: a rung by name, or a budget (`error` of the force field, `time_ms` of the operator
+    per frame) that picks from the bundle's measured ladder; else the bundle's own choice.
+    """
+
+    rung: Rung | None = None
+    error: float | None = None
+    time_ms: float | None = None
+    compensation: Compensation = "exact"
+    interpolation: Interpolation = "sparse"
+    gel: Gel = "linear"
+    force: ForceSettings = field(default_factory=ForceSettings)
+    noise_px: float | None = None
+    """Standard deviation of a marker's place; estimated on each frame where None."""
+    least_coverage: float = 0.3
+    """Share of the markers seen under which a frame gives no forces."""
+
+    def __post_init__(self) -> None:
+        if self.rung is not None and self.rung not in RUNGS:
+            raise ValueError(f"operator {self.rung!r}: must be one of {', '.join(RUNGS)}")
+        if self.rung is not None and (self.error is not None or self.time_ms is not None):
+            raise ValueError("give an operator by name or a budget, not both")
+        if self.error is not None and not 0 < self.error < 10:
+            raise ValueError(f"error = {self.error:g}: must be a share > 0, such as 0.03")
+        if self.time_ms is not None and not self.time_ms > 0:
+            raise ValueError(f"time_ms = {self.time_ms:g}: must be > 0")
+        if self.compensation not in COMPENSATIONS:
+            raise ValueError(
+                f"compensation {self.compensation!r}: must be one of {', '.join(COMPENSATIONS)}"
+            )
+        if self.interpolation not in ("sparse", "thin_plate"):
+            raise ValueError(f"interpolation {self.interpolation!r}: sparse or thin_plate")
+        if self.gel not in ("linear", "neo_hookean"):
+            raise ValueError(f"gel {self.gel!r}: linear or neo_hookean")
+        if self.noise_px is not None and not self.noise_px >= 0:
+            raise ValueError(f"noise_px = {self.noise_px:g}: must be >= 0")
+        if not 0 <= self.least_coverage <= 1:
+            raise ValueError(f"least_coverage = {self.least_coverage:g}: must be in 0 ... 1")
+
+    def operator(self, bundle: Bundle) -> SurfaceOperator:
+        """Operator of the bundle that these settings ask for.
+
+        Raises BudgetError where no rung keeps the budget, IfemError for a budget without ladder.
+        """
+        return bundle.surface_operator(self.rung, error=self.error, time_ms=self.time_ms)
+
+    def compliance(self, bundle: Bundle) -> SurfaceOperator:
+        """The quick operator that a masked fit asks many times per frame."""
+        try:
+            return bundle.surface_operator("fft", lumped=True)
+        except IfemError:
+            return self.operator(bundle)
