@@ -1,0 +1,37 @@
+"""Bundles of small sensors for the calibration tests."""
+
+from __future__ import annotations
+
+from camera_rig import finger_view
+
+from gelslim_optics.virtual_camera import VirtualCamera
+from ifem_export.bundle import Bundle, build_bundle
+from ifem_export.marker_grid import MarkerGrid
+from ifem_export.material import Material
+from ifem_export.outline import RoundedRectangle
+from ifem_export.pad_mesh import build_pad_mesh
+
+
+def small_bundle(grid: MarkerGrid, camera: VirtualCamera | None = None) -> Bundle:
+    """A coarse pad two pitches larger than the print, with the print and a camera."""
+    rows, columns = grid.lattice_shape
+    outline = RoundedRectangle(
+        length_mm=(rows + 1) * grid.pitch_mm,
+        width_mm=(columns + 1) * grid.pitch_mm,
+        corner_radius_mm=1.0,
+    )
+    mesh, _ = build_pad_mesh(outline, 2.0, pitch_mm=1.0, layers=1)
+    return build_bundle(
+        mesh,
+        Material(0.147, 0.3223, 1000.0),
+        "full",
+        marker_positions_mm=grid.positions_mm,
+        marker_arrays={
+            "row": grid.row,
+            "column": grid.column,
+            "diameter_mm": grid.diameter_mm,
+            "kind": grid.kind,
+        },
+        camera=(camera or finger_view()).to_record(),
+        with_stiffness=False,
+    )
