@@ -103,7 +103,7 @@ class ForceEstimator:
             displacement_mm: (c, 3).
             touched: (c,) nodes in contact, or None where that is not known.
             start_n: (c, 3) forces of the frame before.
-            least_force_n: force, one or (c,), that noise alone does not reach; tells the contact where
+            least_force_n: one or (c,), that noise alone does not reach; tells the contact where
                 `touched` is None.
 
         Raises:

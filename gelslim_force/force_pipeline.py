@@ -97,7 +97,8 @@ class ForcePipeline:
             bundle.mesh, self.settings.compliance(bundle), self.settings.force
         )
         self._wrench = WrenchNoise.of(operator, self.points_mm)
-        self._index, self._last_force = 0, None
+        self._index = 0
+        self._last_force: Array | None = None
         self._kept_gains: tuple[bytes, Array] | None = None
 
     @property
@@ -113,7 +114,8 @@ class ForcePipeline:
     def reset(self) -> None:
         """Forget all motion and count frames from 0."""
         self._tracker.reset()
-        self._index, self._last_force = 0, None
+        self._index = 0
+        self._last_force: Array | None = None
 
     def unreadable(self, problem: str, *, time_s: float | None = None) -> FrameResult:
         """Result of a frame that never arrived whole; it counts, and the stream goes on."""
