@@ -1,0 +1,346 @@
+"""Finds the contact patch in a frame by its change of shading against the reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+
+from gelslim_force.contact_patch import ContactPatch
+from gelslim_force.indenter import Flat, Indenter
+from gelslim_force.patch_outline import fit_circle, fit_strip
+from gelslim_force.patch_place import flat_patch, rim_share
+from gelslim_force.patch_shading import ShadingFit, Window, fit_shading
+from gelslim_force.shading_change import ShadingChange, ShadingReference
+from gelslim_optics.virtual_camera import VirtualCamera
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PatchSettings:
+    """How sure a patch must be. Raises ValueError for values that make no sense."""
+
+    least_change: float = 0.02
+    """Logarithmic change of light (2 %) under which nothing is a patch, however quiet the frame."""
+    least_power: float = 6.0
+    """Squared change over the noise that a patch shows, averaged over 3 x 3 bins."""
+    least_bins: int = 12
+    outline_level: float = 0.4
+    """Share of the patch's own change at which its outline is drawn."""
+    window: float = 2.2
+    """Reach of the fit to the shading, in patch sizes."""
+    most_bins: int = 2200
+    """Bins that the fit takes part of."""
+    blur_px: float = 2.0
+    """Blur of the picture, about."""
+    least_explained: float = 0.5
+    """Share of the change that a fit to the shading must explain, else the outline stands."""
+    outline_error: float = 0.15
+    """Relative error of a size that rests on the outline alone: the light changes beside it too."""
+    shading_error: float = 0.015
+    """Relative error of a size from the shading: the law of the slope beside it is not exact."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"patch settings: {name} = {value!r} must be above 0")
+
+
+class PatchFinder:
+    """Contact patches of one camera against one reference frame.
+
+    `camera` is None for pictures of an unknown sensor: then `mm_per_px` gives the scale and the
+    picture's middle is the origin. `markers_px` (m, 2) are the reference's markers and
+    `marker_radius_px` one radius for all, or (m,); ink is masked out with a margin of a half.
+    `surface_mm` (c, 2 or 3) are the pad's surface nodes: only bins on them count. `indenter` says
+    what the patch looks like, a disc where it is None. Raises ValueError for an unusable reference.
+    """
+
+    def __init__(
+        self,
+        camera: VirtualCamera | None,
+        reference: NDArray[np.uint8],
+        markers_px: ArrayLike,
+        *,
+        marker_radius_px: ArrayLike = 6.0,
+        surface_mm: ArrayLike | None = None,
+        indenter: Indenter | None = None,
+        mm_per_px: float = 1.0,
+        settings: PatchSettings | None = None,
+    ) -> None:
+        self.settings = settings or PatchSettings()
+        self.indenter = indenter
+        markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
+        radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
+        picture = np.asarray(reference)
+        bin_px = max(2, round(picture.shape[1] / 160)) if picture.ndim >= 2 else 2
+        self._radius = np.ascontiguousarray(radius * 1.5 + 1.0)
+        self._light = ShadingReference(picture, markers, self._radius, bin_px)
+        self._x, self._y, self._lean, self._growth = _places(self._light, camera, mm_per_px)
+        self._bin_mm = _bin_sizes(self._x, self._y)
+        self._light.on_pad &= np.isfinite(self._x)
+        if surface_mm is not None:
+            self._light.on_pad &= _near(self._x, self._y, np.asarray(surface_mm, dtype=float))
+
+    def change(
+        self, image: NDArray[np.uint8], markers_px: ArrayLike | None = None
+    ) -> ShadingChange:
+        """Change of the shading in bins; see `find`."""
+        markers = None if markers_px is None else np.asarray(markers_px, dtype=float).reshape(-1, 2)
+        radius = self._radius if markers is not None and len(markers) == len(self._radius) else None
+        return self._light.change(image, markers, radius)
+
+    def find(
+        self, image: NDArray[np.uint8], markers_px: ArrayLike | None = None
+    ) -> ContactPatch | None:
+        """The patch in a frame, or None without contact.
+
+        `markers_px` (m, 2; NaN for a lost one) are the frame's markers, masked as well.
+        Raises ValueError for an image of another shape than the reference.
+        """
+        light = self.change(image, markers_px)
+        region, contrast = self._region(light)
+        if region is None:
+            return None
+        start = self._outline(region, light)
+        if start is None:
+            return None
+        patch = start if isinstance(self.indenter, Flat) else self._refined(start, light)
+        share = rim_share(patch, self._x, self._y, self._light.on_pad, 2 * self._local_bin(patch))
+        return _finished(patch, share, contrast)
+
+    def _region(self, light: ShadingChange) -> tuple[Mask | None, float]:
+        """Largest group of bins whose shading changed, and its contrast."""
+        s = self.settings
+        power = np.einsum("cij,c->ij", light.change**2, 1 / light.noise**2) / len(light.noise)
+        size = np.sqrt((light.change**2).max(axis=0))
+        weight = ndimage.uniform_filter(light.valid.astype(float), 3, mode="constant")
+        full = np.maximum(weight, 1e-6)
+        power = ndimage.uniform_filter(np.where(light.valid, power, 0.0), 3, mode="constant") / full
+        size = ndimage.uniform_filter(np.where(light.valid, size, 0.0), 3, mode="constant") / full
+        changed = (power > s.least_power) & (size > s.least_change) & (weight > 0.2)
+        # Ink splits a patch: groups that a bin or two keep apart are one.
+        labels, count = ndimage.label(ndimage.binary_dilation(changed, iterations=2))
+        if not count:
+            return None, 0.0
+        score = ndimage.sum_labels(np.where(changed, size, 0.0), labels, np.arange(1, count + 1))
+        region = (labels == 1 + int(np.argmax(score))) & changed
+        if region.sum() < s.least_bins:
+            return None, 0.0
+        level = s.outline_level * float(np.quantile(size[region], 0.9))
+        strong = region & (size >= level)
+        if strong.sum() < s.least_bins:
+            return None, 0.0
+        return strong, float(np.sqrt(power[strong].mean()))
+
+    def _outline(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
+        """Patch of the region's outline, from the part that the pad's edge does not cut."""
+        closed = ndimage.binary_closing(np.pad(region, 3), iterations=3)[3:-3, 3:-3]
+        filled = ndimage.binary_fill_holes(closed | region)
+        rim = filled & ~ndimage.binary_erosion(filled, border_value=1)
+        # Where the pad or the picture ends, the region's end is not the patch's.
+        rim &= ndimage.binary_erosion(self._light.on_pad, iterations=2, border_value=0)
+        points = np.column_stack([self._x[rim], self._y[rim]])
+        inside = np.column_stack([self._x[filled], self._y[filled]])
+        if len(points) < 6:
+            return None
+        if isinstance(self.indenter, Flat):
+            return flat_patch(self.indenter, points, inside)
+        covariance = np.zeros((4, 4))
+        try:
+            if self._strip:
+                (offset, half, angle), found = fit_strip(points)
+                angle = self._known_axis(angle)
+                patch = strip_patch(offset, half, angle, inside.mean(axis=0))
+                covariance[:] = _strip_covariance(found, angle)
+            else:
+                (x, y, half), found = fit_circle(points)
+                patch = ContactPatch("disc", np.array([x, y]), float(half))
+                covariance[:3, :3] = found
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+        if not (np.isfinite(half) and half < 3 * np.ptp(inside, axis=0).max() + 1e-9):
+            return None
+        spread = (self.settings.outline_error * float(half)) ** 2
+        covariance[2, 2] += spread
+        covariance[:2, :2] += np.eye(2) * spread / 4
+        return _with(patch, covariance, "outline", *self._sight(patch.centre_mm))
+
+    def _refined(self, start: ContactPatch, light: ShadingChange) -> ContactPatch:
+        """The outline's patch moved to where the shading puts its rim, if it tells."""
+        window = self._window(start, light)
+        if window is None:
+            return start
+        known = getattr(self.indenter, "radius_mm", None)
+        curvature = 1 / known if known else 0.0
+        # The light changes beside the patch as well: the outline lies outside the rim.
+        turn = np.deg2rad(start.angle_deg)
+        across = start.centre_mm @ np.array([-np.sin(turn), np.cos(turn)])
+        first = [across, turn] if self._strip else list(start.centre_mm)
+        begin = np.array([*first, 0.85 * start.size_mm, 0.5])
+        blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
+        blur = float(np.hypot(window.bin_mm / 2, blur))
+        fit = fit_shading(window, begin, self._strip, curvature, blur)
+        if fit is None or fit.explained < self.settings.least_explained:
+            return start
+        if not 0.4 < fit.values[2] / start.size_mm < 1.8:
+            return start
+        return self._from_fit(fit, start, curvature, window.bin_mm)
+
+    def _from_fit(
+        self, fit: ShadingFit, start: ContactPatch, curvature: float, bin_mm: float
+    ) -> ContactPatch:
+        size = float(fit.values[2])
+        extra = np.zeros((4, 4))
+        extra[2, 2] = (self.settings.shading_error * size) ** 2 + (0.1 * bin_mm) ** 2
+        extra[:2, :2] = np.eye(2) * ((0.01 * size) ** 2 + (0.1 * bin_mm) ** 2)
+        if self._strip:
+            offset, turn = float(fit.values[0]), float(fit.values[1])
+            patch = strip_patch(offset, size, turn, start.centre_mm)
+            found = fit.covariance[np.ix_([0, 2, 1], [0, 2, 1])]
+            covariance = _strip_covariance(found, turn) + extra
+        else:
+            patch = ContactPatch("disc", fit.values[:2].copy(), size)
+            covariance = np.zeros((4, 4))
+            covariance[:3, :3] = fit.covariance[:3, :3]
+            covariance += extra
+        lean, growth = self._sight(patch.centre_mm)
+        height = -0.1 * size * size * curvature
+        return _with(patch, covariance, "shading", lean, growth, height)
+
+    def _window(self, start: ContactPatch, light: ShadingChange) -> Window | None:
+        s = self.settings
+        near = start.outside_mm(self._x, self._y) < (s.window - 1) * start.size_mm
+        near &= light.valid
+        rows, columns = np.nonzero(near)
+        skip = 1
+        while len(rows) // (skip * skip) > s.most_bins:
+            skip += 1
+        kept = (rows % skip == 0) & (columns % skip == 0)
+        rows, columns = rows[kept], columns[kept]
+        if len(rows) < 40:
+            return None
+        number = np.full(near.shape, -1)
+        number[rows, columns] = np.arange(len(rows))
+        beside = np.where(columns + skip < near.shape[1], columns + skip, columns)
+        partner = number[rows, beside]
+        have = (partner >= 0) & (beside != columns)
+        return Window(
+            self._x[rows, columns],
+            self._y[rows, columns],
+            self._lean[rows, columns],
+            (light.change[:, rows, columns] / light.noise[:, None]).T,
+            self._local_bin(start),
+            (np.flatnonzero(have), partner[have]),
+        )
+
+    @property
+    def _strip(self) -> bool:
+        return self.indenter is not None and self.indenter.patch_kind == "strip"
+
+    def _known_axis(self, angle: float) -> float:
+        axis = getattr(self.indenter, "axis_deg", None)
+        return angle if axis is None else float(np.deg2rad(axis))
+
+    def _nearest(self, place: Array) -> tuple[int, int]:
+        away = np.where(
+            self._light.on_pad, np.hypot(self._x - place[0], self._y - place[1]), np.inf
+        )
+        row, column = np.unravel_index(int(np.argmin(away)), away.shape)
+        return int(row), int(column)
+
+    def _sight(self, place: Array) -> tuple[Array, float]:
+        at = self._nearest(place)
+        return self._lean[at].copy(), float(self._growth[at])
+
+    def _local_bin(self, patch: ContactPatch) -> float:
+        return float(self._bin_mm[self._nearest(patch.centre_mm)])
+
+
+def strip_patch(offset: float, half: float, angle: float, near: Array) -> ContactPatch:
+    """Strip whose centre is the point of its middle line next to `near` (2,)."""
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    centre = near + (offset - near @ across) * across
+    return ContactPatch("strip", centre, float(half), float(np.rad2deg(angle)))
+
+
+def _strip_covariance(found: Array, angle: float) -> Array:
+    """(4, 4) from that (3, 3) of offset, half-width and angle: nothing is known along the strip."""
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    spread = np.zeros((4, 3))
+    spread[:2, 0] = across
+    spread[2, 1] = spread[3, 2] = 1.0
+    return np.asarray(spread @ found @ spread.T)
+
+
+def _with(
+    patch: ContactPatch,
+    covariance: Array,
+    method: str,
+    lean: Array,
+    growth: float,
+    z_mm: float = 0.0,
+) -> ContactPatch:
+    from dataclasses import replace
+
+    return replace(
+        patch, covariance=covariance, method=method, lean=lean, growth_per_mm=growth, z_mm=z_mm
+    )
+
+
+def _finished(patch: ContactPatch, share: float, contrast: float) -> ContactPatch:
+    from dataclasses import replace
+
+    return replace(patch, rim_share=share, contrast=contrast)
+
+
+def _places(
+    light: ShadingReference, camera: VirtualCamera | None, mm_per_px: float
+) -> tuple[Array, Array, Array, Array]:
+    """x, y (rows, columns) of the bins on the rest surface, lean (…, 2) and growth per mm."""
+    pixels = light.centres_px()
+    if camera is None:
+        height, width = light.image.shape[:2]
+        points = (pixels - [(width - 1) / 2, (height - 1) / 2]) * mm_per_px
+        x, y = (points[:, k].reshape(light.shape) for k in (0, 1))
+        return x, y, np.zeros((*light.shape, 2)), np.zeros(light.shape)
+    expected = (camera.image_height_px, camera.image_width_px)
+    if light.image.shape[:2] != expected:
+        raise ValueError(
+            f"the reference frame is {light.image.shape[1]} x {light.image.shape[0]} px, the "
+            f"camera's pictures are {expected[1]} x {expected[0]} px: use frames of this camera"
+        )
+    depth = 0.2
+    at_rest = camera.backproject(pixels, 0.0)[:, :2]
+    below = camera.backproject(pixels, -depth)[:, :2]
+    lean = ((at_rest - below) / depth).reshape(*light.shape, 2)
+    x, y = (at_rest[:, k].reshape(light.shape) for k in (0, 1))
+    sunk = below.reshape(*light.shape, 2)
+    before = _bin_sizes(sunk[..., 0], sunk[..., 1])
+    growth = (1 - before / _bin_sizes(x, y)) / depth
+    return x, y, lean, growth
+
+
+def _bin_sizes(x: Array, y: Array) -> Array:
+    """Side (rows, columns) of the square of a bin's area on the gel."""
+    xi, xj = np.gradient(x)
+    yi, yj = np.gradient(y)
+    return np.sqrt(np.abs(xi * yj - xj * yi))
+
+
+def _near(x: Array, y: Array, surface_mm: Array) -> Mask:
+    """Bins within half a node spacing, along both axes, of a surface node."""
+    from scipy.spatial import cKDTree
+
+    nodes = surface_mm[:, :2]
+    steps = [np.diff(np.unique(np.round(v, 9))).min() for v in nodes.T]
+    places = np.column_stack([x.ravel(), y.ravel()]) / steps
+    finite = np.isfinite(places).all(axis=1)
+    out = np.zeros(len(places), dtype=bool)
+    apart, _ = cKDTree(nodes / steps).query(places[finite], p=np.inf)
+    out[finite] = apart <= 0.5
+    return out.reshape(x.shape)

@@ -1,0 +1,133 @@
+"""How the light on the gel changes from the reference to a frame, in coarse bins.
+
+The change is logarithmic: where red and green come from opposite sides, log R/G follows the
+surface's slope across the finger, whatever the paint and the lamps' fall-off; the brightness that
+is left carries the slope along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+LEAST_LEVEL = 8.0
+"""Mean grey value of the reference under which a channel says nothing."""
+LEAST_FREE = 0.34
+"""Share of a bin's pixels that must be free of ink and glare."""
+ROBUST = 1.4826
+"""Standard deviation of a normal law over its median absolute deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShadingChange:
+    """Change of log R/G and of log brightness in the used channels, one layer per combination."""
+
+    change: Array
+    """(c, rows, columns) about the median over the pad; 0 where not valid."""
+    valid: Mask
+    """(rows, columns) bins on the pad with enough free pixels."""
+    noise: Array
+    """(c,) standard deviation of a bin, from the spread off the patch."""
+
+
+class ShadingReference:
+    """Reference frame (h, w, 3) or (h, w) uint8 with its markers, and the bins' layout.
+
+    `on_pad` (rows, columns) is set later by who knows where the bins lie on the gel.
+    """
+
+    def __init__(
+        self, image: NDArray[np.uint8], markers_px: Array, radius_px: Array, bin_px: int
+    ) -> None:
+        self.image = as_picture(image)
+        self.bin_px = bin_px
+        height, width, channels = self.image.shape
+        self.shape = (height // bin_px, width // bin_px)
+        self.on_pad = np.ones(self.shape, dtype=bool)
+        self._radius = radius_px
+        self._blocked = np.zeros((height, width), dtype=np.uint8)
+        from gelslim_force.shading_kernel import block_discs
+
+        block_discs(self._blocked, markers_px, radius_px)
+        self._scratch = np.empty_like(self._blocked)
+        self._sums = np.zeros((2, *self.shape, channels), dtype=np.int64)
+        self._counts = np.zeros(self.shape, dtype=np.int64)
+        level = self.image.reshape(-1, channels).mean(axis=0)
+        self._used = np.flatnonzero(level >= LEAST_LEVEL)
+        if not len(self._used):
+            raise ValueError(
+                f"the reference frame is dark (mean {level.max():.0f} of 255): no shading to compare"
+            )
+
+    def centres_px(self) -> Array:
+        """Centres (rows * columns, 2) of the bins."""
+        y, x = np.mgrid[: self.shape[0], : self.shape[1]]
+        places = np.column_stack([x.ravel(), y.ravel()])
+        return places * self.bin_px + (self.bin_px - 1) / 2
+
+    def change(
+        self, image: NDArray[np.uint8], markers_px: Array | None, radius_px: Array | None = None
+    ) -> ShadingChange:
+        """Change from the reference to `image`, both without the markers of either.
+
+        Raises ValueError for an image of another shape.
+        """
+        from gelslim_force.shading_kernel import block_discs, sums_in_bins
+
+        picture = as_picture(image)
+        if picture.shape != self.image.shape:
+            raise ValueError(
+                f"the frame has shape {picture.shape}, the reference {self.image.shape}: "
+                "use frames of one camera mode"
+            )
+        np.copyto(self._scratch, self._blocked)
+        if markers_px is not None and len(markers_px):
+            radius = radius_px
+            if radius is None:
+                radius = np.full(len(markers_px), float(np.median(self._radius)))
+            block_discs(self._scratch, np.asarray(markers_px, dtype=float), radius)
+        sums_in_bins(self.image, picture, self._scratch, self.bin_px, self._sums, self._counts)
+        free = self._counts >= LEAST_FREE * self.bin_px**2
+        # One grey value keeps a black bin's logarithm finite.
+        ratio = (self._sums[1] + self._counts[..., None]) / np.maximum(
+            self._sums[0] + self._counts[..., None], 1
+        )
+        log = np.log(np.maximum(ratio[..., self._used], 1e-6))
+        return _about_median(np.moveaxis(_combined(log), 2, 0), free & self.on_pad)
+
+
+def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An (h, w, c) view. Raises ValueError for another shape or type."""
+    picture = np.asarray(image)
+    if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or not picture.size:
+        raise ValueError(
+            f"image of shape {picture.shape} and type {picture.dtype}: give (h, w, 3) or (h, w) "
+            "uint8"
+        )
+    return np.ascontiguousarray(picture if picture.ndim == 3 else picture[:, :, None])
+
+
+def _combined(log: Array) -> Array:
+    """Log R/G first, then the brightness, then what further channels add."""
+    if log.shape[2] == 1:
+        return log
+    ratio = log[..., :1] - log[..., 1:2]
+    bright = log[..., :2].mean(axis=2, keepdims=True)
+    rest = log[..., 2:] - bright
+    return np.concatenate([ratio, bright, rest], axis=2)
+
+
+def _about_median(change: Array, valid: Mask) -> ShadingChange:
+    layers = len(change)
+    if not valid.any():
+        return ShadingChange(np.zeros_like(change), valid, np.full(layers, np.inf))
+    seen = change[:, valid]
+    seen = seen - np.median(seen, axis=1, keepdims=True)
+    noise = np.maximum(ROBUST * np.median(np.abs(seen), axis=1), 1e-4)
+    out = np.zeros_like(change)
+    out[:, valid] = seen
+    return ShadingChange(out, valid, noise)
