@@ -1,0 +1,133 @@
+"""How long arrows are drawn: one scale for a run, so that its pictures can be compared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import astuple, dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.frame_result import FrameResult
+
+_STEPS = (1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True)
+class ArrowScale:
+    """Raises ValueError unless all are positive numbers."""
+
+    motion_gain: float
+    """Length of a displacement arrow over the displacement in the picture."""
+    traction_mm_per_mpa: float
+    """Length on the gel of a traction arrow."""
+    pressure_mpa: float
+    """Pressure with the full shade."""
+    force_bar_n: float
+    torque_bar_nmm: float
+    """Force and torque with a full bar in the legend."""
+
+    def __post_init__(self) -> None:
+        for name in (field.name for field in fields(self)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} = {value!r}: must be a positive number")
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What the largest arrows of some frames show; 0 where there are none."""
+
+    motion_px: float = 0.0
+    shear_mpa: float = 0.0
+    pressure_mpa: float = 0.0
+    force_n: float = 0.0
+    torque_nmm: float = 0.0
+
+    def joined(self, other: Extent) -> Extent:
+        """Return the larger of both."""
+        return Extent(*(max(pair) for pair in zip(astuple(self), astuple(other), strict=True)))
+
+    def outgrown_by(self, other: Extent) -> bool:
+        """Whether anything in `other` is more than twice as large."""
+        return any(b > 2 * a for a, b in zip(astuple(self), astuple(other), strict=True))
+
+
+def extent(result: FrameResult) -> Extent:
+    """Return the 98th percentile of motion, shear and pressure; largest force and torque."""
+    motion = shear = pressure = force = torque = 0.0
+    if result.tracks is not None:
+        motion = _high(np.hypot(*result.tracks.displacement_px[result.tracks.tracked].T))
+    if result.field is not None:
+        tangential = np.hypot(*result.field.traction_mpa[:, :2].T)
+        shear = _high(tangential[tangential > 0])
+        pressure = _high(-result.field.traction_mpa[result.field.contact, 2])
+    if result.wrench is not None:
+        force = float(np.nan_to_num(np.abs(result.wrench.force_n)).max())
+        torque = float(np.nan_to_num(np.abs(result.wrench.torque_nmm)).max())
+    return Extent(motion, shear, max(pressure, 0.0), force, torque)
+
+
+def scale_for(
+    largest: Extent, arrow_px: float = 24.0, arrow_mm: float = 1.6, most_gain: float = 10.0
+) -> ArrowScale:
+    """Return round scales (1, 2, 5 times a power of ten) with the largest arrows about so long.
+
+    `most_gain` keeps the noise of a run without contact from looking like motion; forces have
+    floors of 0.1 kPa, 10 mN and 0.1 N mm for the same reason.
+    """
+    gain = most_gain
+    if largest.motion_px > 0:
+        gain = min(most_gain, round_step(arrow_px / largest.motion_px))
+    return ArrowScale(
+        motion_gain=gain,
+        traction_mm_per_mpa=round_step(arrow_mm / max(largest.shear_mpa, 1e-4)),
+        pressure_mpa=_rounded_up(max(largest.pressure_mpa, 1e-4)),
+        force_bar_n=_rounded_up(max(largest.force_n, 0.01)),
+        torque_bar_nmm=_rounded_up(max(largest.torque_nmm, 0.1)),
+    )
+
+
+def scale_of_run(results: Iterable[FrameResult], arrow_px: float = 24.0) -> ArrowScale:
+    """Return the scale for all frames of a run, such as `RecordedRun.results()`."""
+    largest = Extent()
+    for result in results:
+        largest = largest.joined(extent(result))
+    return scale_for(largest, arrow_px)
+
+
+class LiveScale:
+    """A scale for a run whose end is not known: it starts from what is expected and only shrinks.
+
+    It shrinks in steps of 1, 2, 5 when an arrow would be twice as long as it should, so arrows
+    do not flicker; the scale bars in the picture show the step.
+    """
+
+    def __init__(self, expected: Extent, arrow_px: float = 24.0) -> None:
+        self._arrow_px, self._largest = arrow_px, expected
+        self._scale = scale_for(expected, arrow_px)
+
+    def scale(self, result: FrameResult) -> ArrowScale:
+        """Return the scale for the next frame."""
+        seen = extent(result)
+        if self._largest.outgrown_by(seen):
+            self._largest = self._largest.joined(seen)
+            self._scale = scale_for(self._largest, self._arrow_px)
+        return self._scale
+
+
+def round_step(value: float) -> float:
+    """Return the largest 1, 2 or 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * max(step for step in _STEPS if step <= value / power * (1 + 1e-9))
+
+
+def _rounded_up(value: float) -> float:
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * min(step for step in _STEPS if step >= value / power * (1 - 1e-9))
+
+
+def _high(values: NDArray[np.float64]) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.percentile(finite, 98)) if len(finite) else 0.0

@@ -1,0 +1,239 @@
+"""A frame with what was found in it, as in the paper: displacement yellow, force red.
+
+Yellow arrows are the markers' motion in the picture, red ones the tangential traction along the
+gel, and the red shade is the pressure. The column at the right has the wrench and the scales.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.frame_result import ForceField, FrameResult
+from gelslim_force.outputs.arrow_scale import ArrowScale
+from gelslim_force.outputs.atomic_file import replace_file
+from gelslim_force.outputs.canvas import Backend, Canvas, Image, arrow, canvas_on
+from gelslim_force.outputs.legend import (
+    LEAST_HEIGHT_PX,
+    RED,
+    WHITE,
+    WIDTH_PX,
+    YELLOW,
+    legend,
+    shade_share,
+    status_mark,
+)
+from gelslim_force.outputs.output_error import disk_error
+from gelslim_force.outputs.picture_file import encoded, enlarged
+from gelslim_force.outputs.surface_view import Projection, SurfaceView
+from gelslim_force.tracks import MarkerStatus, Tracks
+
+_DARK = (18, 20, 22)
+_SHADES = np.array([shade_share(k / 255.0) for k in range(256)])
+
+
+@dataclass(frozen=True)
+class OverlaySettings:
+    """What is drawn. Raises ValueError for impossible values."""
+
+    markers: bool = True
+    motion: bool = True
+    force: bool = True
+    column: bool = True
+    zoom: int | None = None
+    """Enlargement of the picture; None: until it is at least 640 px high."""
+    cell_mm: float = 1.1
+    """Side of the square of nodes that share a force arrow."""
+    brightness: float = 0.8
+    colourfulness: float = 0.6
+    """Of the picture behind, so that the arrows stand out."""
+    backend: Backend = "auto"
+
+    def __post_init__(self) -> None:
+        if self.zoom is not None and not 1 <= self.zoom <= 8:
+            raise ValueError(f"zoom = {self.zoom}: must be in 1 ... 8")
+        if not self.cell_mm > 0:
+            raise ValueError(f"cell_mm = {self.cell_mm}: must be > 0")
+        if not (0 <= self.brightness <= 1 and 0 <= self.colourfulness <= 1):
+            raise ValueError("brightness and colourfulness must be in 0 ... 1")
+
+
+class Overlay:
+    """Draws the frames of a run, all in one scale and size."""
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        project: Projection | None = None,
+        reference_px: NDArray[np.float64] | None = None,
+        settings: OverlaySettings | None = None,
+    ) -> None:
+        """`shape` is (h, w) of the frames; without `project` no forces are drawn in the picture.
+
+        `reference_px` (m, 2) are the markers at rest, where lost ones are shown; without it they
+        are shown once they have been seen.
+        """
+        self._shape, self._project = shape, project
+        self._settings = settings or OverlaySettings()
+        self.zoom = self._settings.zoom or int(np.clip(-(-LEAST_HEIGHT_PX // shape[0]), 1, 8))
+        self._rest = None if reference_px is None else np.array(reference_px, dtype=float)
+        self._view: SurfaceView | None = None
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """(h, w) of the pictures drawn."""
+        height, width = self._shape[0] * self.zoom, self._shape[1] * self.zoom
+        if not self._settings.column:
+            return height, width
+        return max(height, LEAST_HEIGHT_PX), width + WIDTH_PX
+
+    def draw(
+        self, image: NDArray[np.uint8] | None, result: FrameResult, scale: ArrowScale
+    ) -> Image:
+        """Return an RGB picture of `size_px`.
+
+        `image` is RGB (h, w, 3) or grey (h, w); None, or one of another size, leaves the picture
+        dark, and the result's problems tell why. Raises OutputError without OpenCV and Pillow.
+        """
+        field = result.field if self._settings.force and self._project is not None else None
+        view = None if field is None else self._view_of(field)
+        ground = self._ground(image)
+        if field is not None and view is not None:
+            ground = _shaded(ground, view, field, scale)
+        large = enlarged(np.rint(ground).astype(np.uint8), self.zoom)
+        canvas = canvas_on(large, self._settings.backend)
+        if field is not None and view is not None:
+            self._draw_forces(canvas, view, field, scale)
+        if result.tracks is not None:
+            self._draw_markers(canvas, result.tracks, scale)
+        if field is not None and view is not None:
+            self._draw_centre(canvas, view.place_px(field.centre_of_pressure_mm))
+        picture = canvas.picture()
+        return self._with_column(picture, result, scale) if self._settings.column else picture
+
+    def _ground(self, image: NDArray[np.uint8] | None) -> NDArray[np.float32]:
+        """The frame, dimmed and less colourful."""
+        if image is None or image.shape[:2] != self._shape:
+            return np.full((*self._shape, 3), 30, dtype=np.float32)
+        colour = image.reshape(*self._shape, -1).astype(np.float32)
+        if colour.shape[2] != 3:
+            colour = np.repeat(colour[:, :, :1], 3, axis=2)
+        grey = colour.mean(axis=2, keepdims=True)
+        share = self._settings.colourfulness
+        return np.asarray((grey + share * (colour - grey)) * self._settings.brightness)
+
+    def _view_of(self, field: ForceField) -> SurfaceView:
+        view = self._view
+        same = view is not None and np.array_equal(view.points_mm, field.points_mm)
+        if view is None or not same:
+            assert self._project is not None
+            view = SurfaceView(field.points_mm, self._project, self._shape, self._settings.cell_mm)
+            self._view = view
+        return view
+
+    def _at(self, place: NDArray[np.float64]) -> tuple[float, float]:
+        """Place in the enlarged picture."""
+        x, y = (place + 0.5) * self.zoom - 0.5
+        return float(x), float(y)
+
+    def _pen(self) -> float:
+        """Width of an arrow's shaft."""
+        return max(1.0, self._shape[0] * self.zoom / 420.0)
+
+    def _arrow(
+        self,
+        canvas: Canvas,
+        place: NDArray[np.float64],
+        length: NDArray[np.float64],
+        colour: tuple[int, int, int],
+    ) -> None:
+        start, end, pen = self._at(place), self._at(place + length), self._pen()
+        arrow(canvas, start, end, _DARK, pen + 2)
+        arrow(canvas, start, end, colour, pen)
+
+    def _draw_forces(
+        self, canvas: Canvas, view: SurfaceView, field: ForceField, scale: ArrowScale
+    ) -> None:
+        lengths = view.arrows_px(field.traction_mpa, scale.traction_mm_per_mpa)
+        drawn = np.isfinite(lengths).all(axis=1) & (np.hypot(*lengths.T) * self.zoom > 3)
+        for k in np.flatnonzero(drawn):
+            self._arrow(canvas, view.cells_px[k], lengths[k], RED)
+
+    def _draw_markers(self, canvas: Canvas, tracks: Tracks, scale: ArrowScale) -> None:
+        rest = self._rest_of(tracks)
+        moved = np.where(tracks.known[:, None], tracks.displacement_px, np.nan)
+        size = 0.8 * self._pen() + 0.4
+        for k, place in enumerate(rest):
+            status = MarkerStatus(int(tracks.status[k]))
+            if not np.isfinite(place).all():
+                continue
+            arrows = self._settings.motion and status == MarkerStatus.TRACKED
+            if arrows and np.isfinite(moved[k]).all():
+                self._arrow(canvas, place, scale.motion_gain * moved[k], YELLOW)
+            if self._settings.markers:
+                x, y = self._at(place)
+                status_mark(canvas, x, y, status, size)
+
+    def _rest_of(self, tracks: Tracks) -> NDArray[np.float64]:
+        """Places at rest (m, 2), remembered for the markers that are lost now."""
+        now = tracks.places_px - tracks.displacement_px
+        if self._rest is None or len(self._rest) != len(tracks):
+            self._rest = np.full((len(tracks), 2), np.nan)
+        new = np.isnan(self._rest).any(axis=1) & np.isfinite(now).all(axis=1)
+        self._rest[new] = now[new]
+        return self._rest
+
+    def _draw_centre(self, canvas: Canvas, place: NDArray[np.float64]) -> None:
+        """A cross hair at the centre of pressure."""
+        if not np.isfinite(place).all():
+            return
+        (x, y), size = self._at(place), 5 * self._pen()
+        for colour, width in ((_DARK, self._pen() + 2), (WHITE, self._pen())):
+            canvas.ring((x, y), size, colour, width)
+            for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                near, far = 0.6 * size, 1.7 * size
+                canvas.line(
+                    (x + near * dx, y + near * dy), (x + far * dx, y + far * dy), colour, width
+                )
+
+    def _with_column(self, picture: Image, result: FrameResult, scale: ArrowScale) -> Image:
+        per_mm = None
+        if self._view is not None:
+            per_mm = float(np.sqrt(np.abs(np.median(np.linalg.det(self._view.px_per_mm)))))
+        height, width = self.size_px
+        out = np.full((height, width, 3), 12, dtype=np.uint8)
+        out[: picture.shape[0], : picture.shape[1]] = picture
+        out[:, picture.shape[1] :] = legend(
+            result, scale, height, self.zoom, per_mm, self._settings.backend
+        )
+        return out
+
+
+def write_overlay(path: str | os.PathLike[str], picture: Image) -> None:
+    """Write a picture as PNG or JPEG by its ending, whole or not at all. Raises OutputError."""
+    data = encoded(picture, Path(path).suffix)
+    try:
+        replace_file(path, data)
+    except OSError as error:
+        raise disk_error(path, "writing the picture", error) from error
+
+
+def _shaded(
+    ground: NDArray[np.float32], view: SurfaceView, field: ForceField, scale: ArrowScale
+) -> NDArray[np.float32]:
+    """Red over the ground, the more the higher the pressure; none where it is unknown."""
+    pressure = np.maximum(-field.traction_mpa[:, 2], 0.0)
+    if not np.isfinite(pressure).all() or not pressure.any():
+        return ground
+    share = np.clip(view.spread(pressure) / scale.pressure_mpa, 0, 1)
+    rows = np.flatnonzero(share.any(axis=1))
+    if not len(rows):
+        return ground
+    part = slice(rows[0], rows[-1] + 1)
+    mix = _SHADES[(255 * share[part]).astype(int)][:, :, None].astype(np.float32)
+    ground[part] = ground[part] * (1 - mix) + np.array(RED, dtype=np.float32) * mix
+    return ground
