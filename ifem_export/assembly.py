@@ -48,7 +48,7 @@ def assemble_csr(
     """
     from ifem_export.kernels import fill_csr
 
-    plan = _Plan(occupancy, element_matrix, numbering)
+    plan = Plan(occupancy, element_matrix, numbering)
     n, blocks = plan.numbering.n_nodes, plan.n_blocks
     index = np.int32 if 9 * blocks <= np.iinfo(np.int32).max else np.int64
     indptr = np.empty(3 * n + 1, dtype=index)
@@ -57,7 +57,7 @@ def assemble_csr(
     data = np.empty(9 * blocks)
     table = np.ascontiguousarray(plan.table.transpose(0, 2, 1, 3))
     plan.run(fill_csr, table, indptr, indices, data, threads)
-    return _wrapped(sparse.csr_array((data, indices, indptr), shape=(3 * n, 3 * n)))
+    return wrapped(sparse.csr_array((data, indices, indptr), shape=(3 * n, 3 * n)))
 
 
 def assemble_bsr(
@@ -70,7 +70,7 @@ def assemble_bsr(
     """The same matrix as 3x3 block CSR; arguments as for `assemble_csr`."""
     from ifem_export.kernels import fill_bsr
 
-    plan = _Plan(occupancy, element_matrix, numbering)
+    plan = Plan(occupancy, element_matrix, numbering)
     n, blocks = plan.numbering.n_nodes, plan.n_blocks
     index = np.int32 if blocks <= np.iinfo(np.int32).max else np.int64
     indptr = np.empty(n + 1, dtype=index)
@@ -78,10 +78,10 @@ def assemble_bsr(
     indices = np.empty(blocks, dtype=index)
     data = np.empty((blocks, 3, 3))
     plan.run(fill_bsr, plan.table, indptr, indices, data, threads)
-    return _wrapped(sparse.bsr_array((data, indices, indptr), shape=(3 * n, 3 * n)))
+    return wrapped(sparse.bsr_array((data, indices, indptr), shape=(3 * n, 3 * n)))
 
 
-class _Plan:
+class Plan:
     """What both forms need: numbering, pattern, block offsets and the value table."""
 
     def __init__(
@@ -103,12 +103,13 @@ class _Plan:
     def run(
         self,
         fill: Callable[..., None],
-        table: NDArray[np.float64],
+        table: Any,
         indptr: NDArray[Any],
         indices: NDArray[Any],
         data: NDArray[np.float64],
         threads: int | None,
     ) -> None:
+        """Let `fill` write all rows into the arrays, over as many threads as the size asks for."""
         _, ny1, nx1 = self.numbering.shape
         d = np.arange(-1, 2)
         strides = ((d[:, None, None] * ny1 + d[None, :, None]) * nx1 + d).reshape(27)
@@ -153,7 +154,7 @@ def _available_processors() -> int:
     return os.cpu_count() or 1
 
 
-def _wrapped(matrix: Any) -> Any:
+def wrapped(matrix: Any) -> Any:
     """Tell SciPy what the fill guarantees, so that it never checks or sorts."""
     matrix.has_sorted_indices = True
     matrix.has_canonical_format = True

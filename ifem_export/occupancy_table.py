@@ -32,7 +32,7 @@ class NeighbourPattern:
 
 
 @lru_cache(maxsize=1)
-def _shared_cells() -> tuple[tuple[tuple[int, int, int], ...], ...]:
+def shared_cells() -> tuple[tuple[tuple[int, int, int], ...], ...]:
     """For each slot the (cell bit, node's corner, neighbour's corner) of the cells they share.
 
     Cells are in lattice order, so that the sums for (i, j) and (j, i) run over the same cells
@@ -57,7 +57,7 @@ def neighbour_pattern() -> NeighbourPattern:
     """The neighbour pattern, the same for every element matrix."""
     masks = np.arange(256)
     present = np.zeros((256, 27), dtype=bool)
-    for slot, pairs in enumerate(_shared_cells()):
+    for slot, pairs in enumerate(shared_cells()):
         for bit, _, _ in pairs:
             present[:, slot] |= (masks >> bit & 1).astype(bool)
     order = np.argsort(~present, axis=1, kind="stable").astype(np.uint8)
@@ -76,7 +76,7 @@ def occupancy_table(element_matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     blocks = element_matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3)
     bits = (np.arange(256)[:, None] >> np.arange(8) & 1).astype(float)
     table = np.zeros((256, 27, 3, 3))
-    for slot, pairs in enumerate(_shared_cells()):
+    for slot, pairs in enumerate(shared_cells()):
         for bit, a, b in pairs:
             table[:, slot] += bits[:, bit, None, None] * blocks[a, b]
     return table

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from ifem_export.alignment import misaligned, points_xy, shift_to
+from ifem_export.cell_fill import DEFAULT_FLOOR, Weighting, filled_cells
 from ifem_export.crop import CropReport, keep_bonded_part
+from ifem_export.crown import Crown
+from ifem_export.crowned_surface import crown_levels, require_thick, surface_of
 from ifem_export.errors import MeshError
 from ifem_export.lattice import (
     Numbering,
@@ -34,7 +37,7 @@ from ifem_export.lattice import (
 from ifem_export.outline import Outline
 
 _MAX_CELLS = 10_000_000
-_ARRAYS = ("nodes_mm", "hexes", "bonded", "surface", "sides", "occupancy")
+_ARRAYS = ("nodes_mm", "hexes", "bonded", "surface", "sides", "occupancy", "fill", "surface_shift")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,10 @@ class PadMesh:
         cell_size_mm: (hx, hy, hz).
         origin_mm: lowest corner of the lattice box.
         occupancy: (nx, ny, nz) bool, the cells of the lattice box that exist.
+        fill: (nx, ny, nz) by which each cell's stiffness is scaled, or None where all count
+            fully.
+        surface_shift: (s,) how far the outer surface of a crowned pad lies above its nodes, in
+            cells, from -1/2 to 1/2 (see `crowned_surface`); None for a flat one.
     """
 
     nodes_mm: NDArray[np.float64]
@@ -60,11 +67,13 @@ class PadMesh:
     cell_size_mm: tuple[float, float, float]
     origin_mm: tuple[float, float, float]
     occupancy: NDArray[np.bool_]
+    fill: NDArray[np.float64] | None = None
+    surface_shift: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
             array = getattr(self, name)
-            if array.flags.writeable:
+            if array is not None and array.flags.writeable:
                 view = array.view()
                 view.flags.writeable = False
                 object.__setattr__(self, name, view)
@@ -75,13 +84,15 @@ class PadMesh:
         occupancy: NDArray[np.bool_],
         cell_size_mm: Sequence[float],
         origin_mm: Sequence[float],
+        fill: NDArray[np.float64] | None = None,
     ) -> PadMesh:
-        """Mesh of every existing cell, connected or not.
+        """Mesh of every existing cell, connected or not; flat.
 
         Args:
             occupancy: (nx, ny, nz) bool.
             cell_size_mm: (hx, hy, hz), > 0.
             origin_mm: lowest corner of the lattice box.
+            fill: (nx, ny, nz) scale of each cell's stiffness, > 0 where it exists.
 
         Raises:
             MeshError: a size is not positive and finite, or no cell exists.
@@ -103,7 +114,17 @@ class PadMesh:
             cell_size_mm=(float(size[0]), float(size[1]), float(size[2])),
             origin_mm=(float(origin[0]), float(origin[1]), float(origin[2])),
             occupancy=occupancy.copy(),
+            fill=None if fill is None else fill.copy(),
         )
+
+    def crowned(self, levels: NDArray[np.float64] | None) -> PadMesh:
+        """The same cells with one surface node per column.
+
+        `levels` (ny + 1, nx + 1) is the height of the outer surface in layers; None puts it on
+        the highest nodes. Raises MeshError where a column has a gap.
+        """
+        surface, shift = surface_of(self.numbering, levels)
+        return replace(self, surface=surface, surface_shift=shift)
 
     @property
     def n_nodes(self) -> int:
@@ -114,6 +135,14 @@ class PadMesh:
     def n_elements(self) -> int:
         """Number of elements m."""
         return len(self.hexes)
+
+    @property
+    def surface_mm(self) -> NDArray[np.float64]:
+        """Points (s, 3) of the outer surface over its nodes."""
+        points = np.array(self.nodes_mm[self.surface])
+        if self.surface_shift is not None:
+            points[:, 2] += self.surface_shift * self.cell_size_mm[2]
+        return points
 
     @property
     def layers(self) -> int:
@@ -142,12 +171,15 @@ def build_pad_mesh(
     layers: int = 1,
     align_to_mm: ArrayLike | None = None,
     alignment_tolerance_mm: float | None = 1e-6,
+    crown: Crown | None = None,
+    weighting: Weighting = "cell_centre",
+    floor: float = DEFAULT_FLOOR,
 ) -> tuple[PadMesh, CropReport]:
     """Mesh the gel inside `outline`, from z = -thickness (bonded) to z = 0 (surface).
 
     Args:
         outline: the gel seen from above.
-        thickness_mm: gel thickness, > 0.
+        thickness_mm: gel thickness, > 0; of a crowned gel at its apex.
         cells: (nx, ny, nz) cells across the outline's bounding box and through the thickness.
         pitch_mm: or the cell size, one number or (hx, hy); the lattice is centred on the
             outline. Exactly one of `cells` and `pitch_mm` is given.
@@ -156,6 +188,10 @@ def build_pad_mesh(
             lattice is shifted so that as many as possible do.
         alignment_tolerance_mm: how far from a lattice line such a point may stay; None only
             reports the distance.
+        crown: the outer surface of a domed gel; None is flat at z = 0.
+        weighting: what becomes of cells that outline or crown cuts: "cell_centre" keeps or
+            drops them whole, "volume_fraction" scales them.
+        floor: filled fraction under which "volume_fraction" drops a cell.
 
     Raises:
         MeshError: bad sizes, too many cells, nothing inside the outline, or points that no
@@ -178,32 +214,42 @@ def build_pad_mesh(
     low = np.floor((np.array([x_min, y_min]) - start) / pitch).astype(int) - 1
     high = np.ceil((np.array([x_max, y_max]) - start) / pitch).astype(int) + 1
     _check_count(high - low, n_layers)
-    x = start[0] + (np.arange(low[0], high[0]) + 0.5) * pitch[0]
-    y = start[1] + (np.arange(low[1], high[1]) + 0.5) * pitch[1]
-    inside = outline.contains(x[:, None], y[None, :])
-    if not inside.any():
+    hz = thickness_mm / n_layers
+    x = np.asarray(start[0] + np.arange(low[0], high[0] + 1) * pitch[0], dtype=np.float64)
+    y = np.asarray(start[1] + np.arange(low[1], high[1] + 1) * pitch[1], dtype=np.float64)
+    z = np.asarray(np.arange(-n_layers, 1) * hz, dtype=np.float64)
+    occupancy, fill = filled_cells(outline, crown, (x, y, z), weighting, floor)
+    if not occupancy.any():
         raise MeshError(
             f"no cell centre of a {pitch[0]:g} x {pitch[1]:g} mm lattice is inside the outline: "
             "use a finer pitch"
         )
-    occupancy = np.repeat(inside[:, :, None], n_layers, axis=2)
     kept, dropped = keep_bonded_part(occupancy)
-    kept, first = _trim(kept)
+    window, first = _trim(kept)
     corner = start + (low + first) * pitch
-    hz = thickness_mm / n_layers
     mesh = PadMesh.from_occupancy(
-        kept, (pitch[0], pitch[1], hz), (corner[0], corner[1], -thickness_mm)
+        np.ascontiguousarray(kept[window]),
+        (pitch[0], pitch[1], hz),
+        (corner[0], corner[1], -thickness_mm),
+        None if fill is None else np.where(kept, fill, 0.0)[window],
     )
+    plan = kept.any(axis=2) if fill is None else np.where(kept, fill, 0.0).max(axis=2)
     report = CropReport(
         n_cells_inside=int(occupancy.sum()),
         n_cells_kept=int(kept.sum()),
         dropped=dropped,
         outline_area_mm2=outline.area_mm2,
-        mesh_area_mm2=float(kept.any(axis=2).sum() * pitch[0] * pitch[1]),
+        mesh_area_mm2=float(plan.sum() * pitch[0] * pitch[1]),
         aligned_points=aligned,
         alignment_error_mm=error,
     )
-    return _with_exact_faces(mesh, thickness_mm), report
+    mesh = _with_exact_faces(mesh, thickness_mm)
+    if crown is None:
+        return mesh, report
+    require_thick(outline, crown, thickness_mm, n_layers, (x, y))
+    on_steps = weighting == "cell_centre"
+    levels = crown_levels(crown, mesh.occupancy.shape, mesh.origin_mm, mesh.cell_size_mm)
+    return mesh.crowned(None if on_steps else levels), report
 
 
 def surface_nodes_at(
@@ -259,12 +305,14 @@ def _check_count(across: NDArray[Any], layers: int) -> None:
         )
 
 
-def _trim(occupancy: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+def _trim(
+    occupancy: NDArray[np.bool_],
+) -> tuple[tuple[slice, slice], NDArray[np.int64]]:
     """Smallest x-y box that holds every cell, and its first cell (i, j)."""
     along_x = np.flatnonzero(occupancy.any(axis=(1, 2)))
     along_y = np.flatnonzero(occupancy.any(axis=(0, 2)))
-    trimmed = occupancy[along_x[0] : along_x[-1] + 1, along_y[0] : along_y[-1] + 1]
-    return np.ascontiguousarray(trimmed), np.array([along_x[0], along_y[0]])
+    window = (slice(along_x[0], along_x[-1] + 1), slice(along_y[0], along_y[-1] + 1))
+    return window, np.array([along_x[0], along_y[0]])
 
 
 def _with_exact_faces(mesh: PadMesh, thickness_mm: float) -> PadMesh:
@@ -273,13 +321,4 @@ def _with_exact_faces(mesh: PadMesh, thickness_mm: float) -> PadMesh:
     nz = mesh.layers
     level = np.rint((nodes[:, 2] + thickness_mm) / thickness_mm * nz)
     nodes[:, 2] = (level - nz) / nz * thickness_mm
-    return PadMesh(
-        nodes,
-        mesh.hexes,
-        mesh.bonded,
-        mesh.surface,
-        mesh.sides,
-        mesh.cell_size_mm,
-        mesh.origin_mm,
-        mesh.occupancy,
-    )
+    return replace(mesh, nodes_mm=nodes)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.assembly import assemble_csr
 from ifem_export.errors import MeshError
 from ifem_export.layered_operator import (
     LayeredOperator,
@@ -25,6 +24,8 @@ from ifem_export.layered_operator import (
     surface_stiffness,
 )
 from ifem_export.pad_mesh import PadMesh
+from ifem_export.weighted_assembly import corner_fill, mesh_stiffness
+from ifem_export.weighted_guess import Guess, WeightedGuess
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,10 @@ class PadSystem:
 
     def __post_init__(self) -> None:
         cells = np.asarray(self.mesh.occupancy)
-        if not (cells == cells[:, :, :1]).all():
+        even = (cells == cells[:, :, :1]).all()
+        if even and self.mesh.fill is not None:
+            even = (self.mesh.fill == self.mesh.fill[:, :, :1]).all()
+        if not even or self.mesh.surface_shift is not None:
             raise MeshError(
                 "the pad's layers differ: condensation by layers needs a pad of uniform thickness"
             )
@@ -53,6 +57,16 @@ class PadSystem:
         """Columns of nodes c, each with one node on the surface."""
         return self.mesh.n_nodes // (self.layers + 1)
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether the pad has cut cells or a crown, which the infinite pad does not foresee."""
+        return self.mesh.fill is not None or self.mesh.surface_shift is not None
+
+    @property
+    def guess_layers(self) -> tuple[int, int]:
+        """Layers in which `compliance_guess` and `inner_guess` take their fields."""
+        return self.layers, self.layers - 1
+
     @cached_property
     def places(self) -> NDArray[np.int64]:
         """Lattice places (c, 2) of the columns, (j, i)."""
@@ -63,11 +77,7 @@ class PadSystem:
     @cached_property
     def stiffness(self) -> sparse.csr_array:
         """Free-free stiffness (3Lc, 3Lc) in N/mm."""
-        whole = assemble_csr(
-            np.asarray(self.mesh.occupancy),
-            np.asarray(self.element_matrix),
-            numbering=self.mesh.numbering,
-        )
+        whole = mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
         bonded = 3 * self.columns
         return sparse.csr_array(whole[bonded:, bonded:])
 
@@ -100,14 +110,14 @@ class PadSystem:
         return 3 * self.columns * (self.layers - 1)
 
     @cached_property
-    def compliance_guess(self) -> LayeredOperator:
+    def compliance_guess(self) -> Guess:
         """Inverse of the infinite pad: preconditioner of `stiffness`."""
-        return self._operator(inverse)
+        return self._weighted(self._operator(inverse))
 
     @cached_property
-    def inner_guess(self) -> LayeredOperator:
+    def inner_guess(self) -> Guess:
         """The same for `inner`."""
-        return self._operator(inner_compliance)
+        return self._weighted(self._operator(inner_compliance))
 
     @cached_property
     def surface_guess(self) -> LayeredOperator:
@@ -119,9 +129,25 @@ class PadSystem:
         """Surface compliance of the infinite pad."""
         return self._operator(surface_compliance)
 
+    def _weighted(self, guess: LayeredOperator) -> Guess:
+        if self.mesh.fill is None:
+            return guess
+        weight = node_weight(self.mesh)[self.columns :].reshape(self.layers, -1)
+        inner = guess.blocks.shape[-1] < 3 * self.layers
+        return WeightedGuess(guess, weight[:-1] if inner else weight)
+
     def _operator(self, change) -> LayeredOperator:  # type: ignore[no-untyped-def]
         rows, columns = (int(n) + 1 for n in self.places.max(axis=0))
         padding = padding_columns(self.mesh.cell_size_mm, self.layers, (rows, columns))
         return layered_operator(
             np.asarray(self.element_matrix), self.layers, self.places, padding, change
         )
+
+
+def node_weight(mesh: PadMesh) -> Array:
+    """D^-1/2 (n,) of every node, D the mean fill of the cells round it; 1 where all are full."""
+    if mesh.fill is None:
+        return np.ones(mesh.n_nodes)
+    numbering = mesh.numbering
+    around = corner_fill(np.asarray(mesh.occupancy), np.asarray(mesh.fill))[numbering.positions]
+    return np.asarray(np.sqrt((around > 0.0).sum(axis=1) / around.sum(axis=1)))

@@ -25,13 +25,18 @@ class Paper(SolvedCompliance):
         from ifem_export.surface_kernel import apply_stencil
 
         u = checked(displacement_mm, self.system.columns)
+        if self.system.mesh.fill is not None:
+            return np.asarray(self.system.stiffness @ u.reshape(-1)).reshape(-1, 3)
         force = np.empty_like(u)
         apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
         return force
 
     @property
     def n_bytes(self) -> int:
-        """Bytes of table, types and neighbours."""
+        """Bytes of table, types and neighbours; of the matrix where cells are scaled."""
+        if self.system.mesh.fill is not None:
+            k = self.system.stiffness
+            return int(k.data.nbytes + k.indices.nbytes + k.indptr.nbytes)
         return int(sum(part.nbytes for part in self._stencil))
 
     @cached_property

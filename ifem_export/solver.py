@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.errors import IfemError
-from ifem_export.layered_operator import LayeredOperator
 from ifem_export.pad_system import PadSystem
 from ifem_export.sparse_factor import Backend, Factor, factored
+from ifem_export.weighted_guess import Guess
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "pcg", "direct", "superlu", "cholmod", "pardiso"]
@@ -24,6 +24,8 @@ MOST_ITERATIONS = 500
 DIRECT_BELOW = 2000
 """Unknowns under which a factor is quicker than the first transform."""
 DIRECT_RESIDUAL = 1e-8
+MOST_FACTORED = 60_000
+"""Unknowns up to which a factor stands in for conjugate gradients that fail: some 2 GB."""
 STALLED = 0.1
 """A restart that gains less than this factor has met the rounding floor."""
 
@@ -54,7 +56,7 @@ class ConjugateGradients:
     """Conjugate gradients preconditioned by the infinite layered pad."""
 
     matrix: sparse.csr_array
-    guess: LayeredOperator
+    guess: Guess
     layers: int
     most_iterations: int = MOST_ITERATIONS
 
@@ -114,18 +116,49 @@ class SparseFactor:
         return Solution(x, residual, steps, time.perf_counter() - started)
 
 
+@dataclass(frozen=True, eq=False)
+class WithFactor:
+    """Conjugate gradients, and once they fail a factor for good.
+
+    Cut cells of a nearly incompressible gel are what the infinite pad does not foresee.
+    """
+
+    first: ConjugateGradients
+
+    def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
+        """Raise as `Solver`; ConvergenceError where the matrix is too large to factor."""
+        if "factor" in self.__dict__:
+            return self.factor.solve(b, rtol)
+        try:
+            return self.first.solve(b, rtol)
+        except ConvergenceError:
+            if self.first.matrix.shape[0] > MOST_FACTORED:
+                raise
+            return self.factor.solve(b, rtol)
+
+    @cached_property
+    def factor(self) -> SparseFactor:
+        """The factor, made when it is needed."""
+        return SparseFactor(self.first.matrix)
+
+
 def pad_solver(system: PadSystem, method: Method = "auto") -> Solver:
     """Solver of the free unknowns, K_ff u = f; IfemError for an unknown or missing method."""
     direct = _direct(system.stiffness, method)
-    return direct or ConjugateGradients(system.stiffness, system.compliance_guess, system.layers)
+    return direct or ConjugateGradients(
+        system.stiffness, system.compliance_guess, system.guess_layers[0]
+    )
 
 
 def inner_solver(system: PadSystem, method: Method = "auto") -> Solver:
     """Solver of the inner unknowns with the surface held, K_ii u = f. At least two layers."""
-    if system.layers < 2:
+    if system.inner.shape[0] == 0:
         raise IfemError("a pad of one layer has no inner nodes: nothing is left to solve")
     direct = _direct(system.inner, method)
-    return direct or ConjugateGradients(system.inner, system.inner_guess, system.layers - 1)
+    if direct is not None:
+        return direct
+    steps = ConjugateGradients(system.inner, system.inner_guess, system.guess_layers[1])
+    return WithFactor(steps) if method == "auto" and system.is_cut else steps
 
 
 def _direct(matrix: sparse.csr_array, method: Method) -> SparseFactor | None:

@@ -30,9 +30,10 @@ class SolvedCompliance:
     def displacement(self, force_n: ArrayLike) -> Array:
         """Surface part of K_ff u = f for forces (c, 3) on the surface alone."""
         f = checked(force_n, self.system.columns)
-        whole = np.zeros((self.system.layers, self.system.columns, 3))
-        whole[-1] = f
-        return np.asarray(self.whole.solve(whole, COMPLIANCE_RTOL).x.reshape(whole.shape)[-1])
+        whole = np.zeros((self.system.stiffness.shape[0] // 3, 3))
+        whole[-self.system.columns :] = f
+        moved = self.whole.solve(whole, COMPLIANCE_RTOL).x.reshape(-1, 3)
+        return np.asarray(moved[-self.system.columns :])
 
 
 def checked(field: ArrayLike, columns: int) -> Array:

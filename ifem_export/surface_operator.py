@@ -16,18 +16,19 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.convolved_operator import Convolved, missing_resultant, truncated
+from ifem_export.crowned_system import pad_system
 from ifem_export.element import Formulation, hex8_stiffness
-from ifem_export.errors import IfemError
+from ifem_export.errors import IfemError, MeshError
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
-from ifem_export.pad_system import PadSystem
 from ifem_export.paper_operator import Paper
-from ifem_export.solver import Solver, SparseFactor, inner_solver, pad_solver
+from ifem_export.solver import Method, Solver, SparseFactor, inner_solver, pad_solver
 from ifem_export.surface_field import SolvedCompliance, checked
 
 Array = NDArray[np.float64]
 Rung = Literal["paper", "truncated", "fft", "pcg", "factor", "dense32"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
+CROWNED_RUNGS: tuple[Rung, ...] = ("pcg", "factor", "dense32")
 DEFAULT_RTOL = 1e-4
 DEFAULT_RADIUS = 6
 DENSE_BATCH = 256
@@ -61,19 +62,25 @@ def surface_operator(
     radius: int = DEFAULT_RADIUS,
     lumped: bool | float = False,
 ) -> SurfaceOperator:
-    """Operator of a rung for a pad of uniform thickness.
+    """Operator of a rung for a flat or crowned pad.
 
     `rtol` is the residual of the inner solve (pcg), `radius` the reach in nodes (truncated).
     `lumped` makes the resultant of `fft` exact, as that of `truncated` always is.
     `paper` takes one layer of fully integrated elements over the mesh's outline and thickness;
-    a pad of one layer has no other operator. Raises IfemError for an
-    unknown rung and MeshError for a pad whose layers differ.
+    a pad of one layer has no other operator. Raises IfemError for an unknown rung, MeshError for a
+    pad whose layers differ unless it is crowned, and for a crowned one with a rung that needs one
+    thickness.
     """
     if rung not in RUNGS:
         raise IfemError(f"surface operator {rung!r}: must be one of {', '.join(RUNGS)}")
+    if mesh.surface_shift is not None and rung not in CROWNED_RUNGS:
+        raise MeshError(
+            f"the pad is crowned: {rung!r} needs one thickness; use one of "
+            f"{', '.join(CROWNED_RUNGS)}"
+        )
     if rung == "paper":
         mesh, formulation = one_layer(mesh), "full"
-    system = PadSystem(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
+    system = pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
     if system.layers == 1:
         return Paper(system)
     if rung == "fft":
@@ -84,7 +91,8 @@ def surface_operator(
         return Convolved("truncated", system, near, missing_resultant(system, near))
     if rung == "dense32":
         return Dense(system)
-    solver = inner_solver(system, "direct" if rung == "factor" else "pcg")
+    iterative: Method = "auto" if system.is_cut else "pcg"
+    solver = inner_solver(system, "direct" if rung == "factor" else iterative)
     return Condensed(system, rung, solver, rtol if rung == "pcg" else 1e-10)
 
 
@@ -92,7 +100,8 @@ def one_layer(mesh: PadMesh) -> PadMesh:
     """The paper's mesh: the same outline with a single layer of cells."""
     hx, hy, hz = mesh.cell_size_mm
     cells = np.ascontiguousarray(np.asarray(mesh.occupancy)[:, :, :1])
-    return PadMesh.from_occupancy(cells, (hx, hy, hz * mesh.layers), mesh.origin_mm)
+    fill = None if mesh.fill is None else np.ascontiguousarray(np.asarray(mesh.fill)[:, :, :1])
+    return PadMesh.from_occupancy(cells, (hx, hy, hz * mesh.layers), mesh.origin_mm, fill)
 
 
 @dataclass(frozen=True, eq=False)

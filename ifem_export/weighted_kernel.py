@@ -1,0 +1,54 @@
+"""Compiled loop of the weighted assembly. Import this module only where it runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def fill_weighted_csr(
+    start: int,
+    stop: int,
+    masks: Any,
+    positions: Any,
+    first_block: Any,
+    node_index: Any,
+    counts: Any,
+    slots: Any,
+    strides: Any,
+    recipe: Any,
+    indptr: Any,
+    indices: Any,
+    data: Any,
+) -> None:
+    """Write the scalar CSR rows 3·start … 3·stop.
+
+    `recipe` holds the fill of each node's cells (n, 8), the element's blocks (8, 8, 3, 3), and
+    per slot how many cells are shared (27,) and which (27, 8, 3).
+    """
+    scales, blocks, pair_counts, pairs = recipe
+    for node in range(start, stop):
+        mask = masks[node]
+        count = counts[mask]
+        position = positions[node]
+        row_start = 9 * first_block[node]
+        width = 3 * count
+        for row in range(3):
+            indptr[3 * node + row] = row_start + row * width
+        for b in range(count):
+            slot = slots[mask, b]
+            column = 3 * node_index[position + strides[slot]]
+            at = row_start + 3 * b
+            for row in range(3):
+                for c in range(3):
+                    total = 0.0
+                    for p in range(pair_counts[slot]):
+                        bit = pairs[slot, p, 0]
+                        total += (
+                            scales[node, bit] * blocks[pairs[slot, p, 1], pairs[slot, p, 2], row, c]
+                        )
+                    indices[at + c] = column + c
+                    data[at + c] = total
+                at += width
