@@ -90,6 +90,11 @@ class ForceEstimator:
         """The low-pass (c, c)."""
         return smoothing(self.points_mm, self.settings.low_pass_mm)
 
+    @property
+    def low_passed(self) -> SurfaceForce:
+        """The linear operator with the low-pass."""
+        return _LowPassed(self.operator, self.spread)
+
     def estimate(
         self,
         displacement_mm: Array,
@@ -161,3 +166,13 @@ class ForceEstimator:
         if not total[2] < 0 or self.settings.friction == 0:
             return float("nan")
         return float(1 - np.hypot(total[0], total[1]) / (self.settings.friction * -total[2]))
+
+
+@dataclass(frozen=True, eq=False)
+class _LowPassed:
+    operator: SurfaceOperator
+    spread: sparse.csr_array
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """S u, low-passed."""
+        return np.asarray(self.spread @ self.operator.force(displacement_mm))

@@ -16,45 +16,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_force.force_estimator import ForceEstimator
-from gelslim_force.frame_result import FrameResult
+from gelslim_force.frame_result import ForceField, FrameResult
+from gelslim_force.indenter_source import NormalReading
 from gelslim_force.marker_motion import MarkerView
 from gelslim_force.marker_noise import node_noise_n_per_px, noise_px
 from gelslim_force.pipeline_settings import PipelineSettings
 from gelslim_force.sensor_calibration import SensorCalibration
 from gelslim_force.single_thread import single_threaded
+from gelslim_force.surface_motion import SurfaceMotion
 from gelslim_force.tracker import TrackedFrame
 from gelslim_force.tracks import MarkerStatus
 from gelslim_force.wrench_noise import WrenchNoise
 from ifem_export.bundle import Bundle
 from ifem_export.errors import IfemError
-from ifem_export.interpolation import marker_to_node
 from ifem_export.marker_interpolation import FilledInterpolation
 
 Array = NDArray[np.float64]
 _CONTACT_SIGMAS = 5.0
 
 
-class NormalMotionLike(Protocol):
-    """What a normal model says of one frame."""
-
-    @property
-    def w_mm(self) -> Array:
-        """(c,) motion of the surface nodes along z, negative for a press."""
-
-    @property
-    def sigma_mm(self) -> Array:
-        """(c,) standard deviation."""
-
-    @property
-    def touched(self) -> NDArray[np.bool_] | None:
-        """(c,) nodes in contact, None where the model does not tell."""
-
-
 class NormalSource(Protocol):
-    """Finds the normal motion in a frame; None where it cannot tell."""
+    """Finds the normal motion of a frame in two steps, as `IndenterSource` does."""
 
-    def motion(self, image: NDArray[np.uint8]) -> NormalMotionLike | None:
-        """Normal motion of the surface nodes for a frame (h, w, 3)."""
+    def look(self, image: NDArray[np.uint8]) -> Any:
+        """What the frame (h, w, 3) shows."""
+
+    def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
+        """Normal motion; `lateral_mm` (2,) is that of the gel where it is touched."""
 
 
 class ForcePipeline:
@@ -87,9 +75,7 @@ class ForcePipeline:
         self._normal = normal
         self._tracker = calibration.tracker()
         reference = self._tracker.reference
-        self._view = MarkerView(calibration.camera, reference.places_px)
-        self._markers = reference.markers
-        self._count = len(bundle.markers.positions_mm)
+        markers = bundle.markers
         operator = self.settings.operator(bundle)
         law = FiniteStrainForce(bundle) if self.settings.gel == "neo_hookean" else None
         self._estimator = ForceEstimator(bundle.mesh, operator, self.settings.force, law)
@@ -97,6 +83,13 @@ class ForcePipeline:
             bundle.mesh, self.settings.compliance(bundle), self.settings.force
         )
         self._wrench = WrenchNoise.of(operator, self.points_mm)
+        self._motion = SurfaceMotion(
+            MarkerView(calibration.camera, reference.places_px),
+            reference.markers,
+            markers.sparse if self.settings.interpolation == "sparse" else markers.thin_plate,
+            self.points_mm,
+            self.settings.compensation,
+        )
         self._index = 0
         self._last_force: Array | None = None
         self._kept_gains: tuple[bytes, Array] | None = None
@@ -114,8 +107,7 @@ class ForcePipeline:
     def reset(self) -> None:
         """Forget all motion and count frames from 0."""
         self._tracker.reset()
-        self._index = 0
-        self._last_force: Array | None = None
+        self._index, self._last_force = 0, None
 
     def unreadable(self, problem: str, *, time_s: float | None = None) -> FrameResult:
         """Result of a frame that never arrived whole; it counts, and the stream goes on."""
@@ -158,27 +150,23 @@ class ForcePipeline:
             return self._numbered(
                 time_s, tracks=tracks, stage_ms=clock.stages, problems=(*problems, short)
             )
-        normal, touched, sigma, extra = self._normal_motion(image, normal_mm)
-        clock.stage("normal")
-        motion = self._marker_motion(tracks.places_px, normal)
-        clock.stage("displace")
+        reading, motion = self._motions(image, tracks.places_px, normal_mm, clock)
+        if reading is not None and not reading.known:
+            problems = (*problems, reading.problem)
+        known = reading is not None and reading.known
         try:
-            to_nodes, displacement = self._at_nodes(motion, normal)
+            interpolation, displacement = self._motion.of_nodes(motion, reading)
             clock.stage("interpolate")
             noise = self._noise_px(tracks.displacement_px)
-            estimator = self._fitter if self._is_masked(touched, normal) else self._estimator
-            least = _CONTACT_SIGMAS * noise * self._restlessness
-            field = estimator.estimate(displacement, touched, self._last_force, least)
+            field = self._forces(displacement, reading, noise)
             clock.stage("force")
-            wrench = self._wrench.wrench(
-                field.force_n, self._covariance(to_nodes, tracks.known, noise, sigma)
-            )
+            covariance = self._covariance(interpolation, motion, noise, reading)
+            wrench = self._wrench.wrench(field.force_n, covariance)
             clock.stage("wrench")
         except IfemError as error:
             return self._numbered(
                 time_s, tracks=tracks, stage_ms=clock.stages, problems=(*problems, str(error))
             )
-        known = normal is not None
         self._last_force = field.force_n if known else None
         return self._numbered(
             time_s,
@@ -189,7 +177,7 @@ class ForcePipeline:
             normal_known=known,
             stage_ms=clock.stages,
             problems=problems,
-            extra=extra,
+            extra={} if reading is None else {"normal": reading},
         )
 
     def _numbered(self, time_s: float | None, **found: Any) -> FrameResult:
@@ -204,40 +192,45 @@ class ForcePipeline:
             return f"frame of shape {got}: this sensor's are {size[1]} x {size[0]} px"
         return ""
 
-    def _normal_motion(
-        self, image: NDArray[np.uint8], given: ArrayLike | None
-    ) -> tuple[Array | None, NDArray[np.bool_] | None, Array | None, dict[str, Any]]:
-        if given is not None:
-            w = np.asarray(given, dtype=float)
-            if w.shape != (len(self.points_mm),) or not np.isfinite(w).all():
-                raise ValueError(
-                    f"normal motion of shape {w.shape}: must be ({len(self.points_mm)},), finite"
-                )
-            return w, None, None, {}
-        found = None if self._normal is None else self._normal.motion(image)
-        if found is None:
-            return None, None, None, {}
-        return found.w_mm, found.touched, found.sigma_mm, {"normal": found}
+    def _motions(
+        self, image: NDArray[np.uint8], places_px: Array, given: ArrayLike | None, clock: _Clock
+    ) -> tuple[NormalReading | None, Array]:
+        """Normal motion, and the motion (n, 3) of the reference's markers."""
+        motion_of = self._motion.of_markers
+        if given is not None or self._normal is None:
+            reading = None if given is None else self._given(given)
+            motion = motion_of(places_px, reading)
+            clock.stage("displace")
+            return reading, motion
+        seen = self._normal.look(image)
+        clock.stage("look")
+        reading = self._normal.motion(seen)
+        clock.stage("normal")
+        motion = motion_of(places_px, reading)
+        clock.stage("displace")
+        lateral = self._motion.of_touched(motion, reading)
+        if lateral is not None:
+            reading = self._normal.motion(seen, lateral)
+            clock.stage("normal")
+            motion = motion_of(places_px, reading)
+            clock.stage("displace")
+        return reading, motion
 
-    def _marker_motion(self, places_px: Array, normal: Array | None) -> Array:
-        """(n, 3) of the reference's markers."""
-        at_markers = 0.0 if normal is None else self._nodes_to_markers @ normal
-        lateral = self._view.lateral_motion(places_px, at_markers, self.settings.compensation)
-        height = np.full(len(lateral), np.nan) if normal is None else np.asarray(at_markers)
-        return np.column_stack([lateral, height])
+    def _given(self, normal_mm: ArrayLike) -> NormalReading:
+        w = np.asarray(normal_mm, dtype=float)
+        count = len(self.points_mm)
+        if w.shape != (count,) or not np.isfinite(w).all():
+            raise ValueError(f"normal motion of shape {w.shape}: must be ({count},) and finite")
+        return NormalReading(w, np.zeros(count), None)
 
-    def _at_nodes(self, motion: Array, normal: Array | None) -> tuple[FilledInterpolation, Array]:
-        values = np.full((self._count, 2), np.nan)
-        values[self._markers] = motion[:, :2]
-        operator = self._interpolation.with_missing(np.isnan(values).any(axis=1))
-        u = np.empty((len(self.points_mm), 3))
-        u[:, :2] = operator(values)
-        u[:, 2] = np.nan if normal is None else normal
-        return operator, u
-
-    def _is_masked(self, touched: Any, normal: Any) -> bool:
-        method = self.settings.force.method
-        return touched is not None and normal is not None and method in ("auto", "masked")
+    def _forces(
+        self, displacement: Array, reading: NormalReading | None, noise: float
+    ) -> ForceField:
+        touched = reading.touched if reading is not None and reading.known else None
+        masked = touched is not None and self.settings.force.method in ("auto", "masked")
+        estimator = self._fitter if masked else self._estimator
+        least = _CONTACT_SIGMAS * noise * self._restlessness
+        return estimator.estimate(displacement, touched, self._last_force, least)
 
     def _noise_px(self, displacement_px: Array) -> float:
         if self.settings.noise_px is not None:
@@ -248,16 +241,17 @@ class ForcePipeline:
     def _covariance(
         self,
         interpolation: FilledInterpolation,
-        known: NDArray[np.bool_],
+        motion: Array,
         noise: float,
-        sigma: Array | None,
+        reading: NormalReading | None,
     ) -> Array:
-        spread = np.zeros((self._count, 2, 2))
-        scale = self._view.mm_per_px
-        spread[self._markers] = noise**2 * scale @ scale.transpose(0, 2, 1)
-        spread[self._markers[~known]] = 0.0
         gains = self._gains(interpolation)
-        return self._wrench.covariance(gains, spread, sigma)
+        seen = np.isfinite(motion[:, 0])
+        spread = self._motion.covariance_mm2(seen, noise)
+        if reading is not None and reading.known:
+            return self._wrench.covariance(gains, spread, reading.sigma_mm)
+        unseen = self._motion.apparent_motion(motion, self.settings.unknown_normal_mm)
+        return self._wrench.covariance(gains, spread, lateral_sigma_mm=unseen)
 
     def _gains(self, interpolation: FilledInterpolation) -> Array:
         """Wrench per motion of each marker; made anew only where other markers are lost."""
@@ -267,38 +261,14 @@ class ForcePipeline:
         return self._kept_gains[1]
 
     @cached_property
-    def _interpolation(self) -> FilledInterpolation:
-        markers = self.bundle.markers
-        assert markers is not None
-        return markers.sparse if self.settings.interpolation == "sparse" else markers.thin_plate
-
-    @cached_property
-    def _nodes_to_markers(self) -> Any:
-        """(n, c) bilinear."""
-        return marker_to_node(self.points_mm, self._view.rest_mm)
-
-    @cached_property
     def _restlessness(self) -> Array:
         """(c,) N per px at each node."""
-        scale = np.zeros((self._count, 2, 2))
-        scale[self._markers] = self._view.mm_per_px
-        law = _LowPassed(self._estimator) if self._low_passed else self._estimator.operator
-        return node_noise_n_per_px(law, self._interpolation, scale)
+        law = self._estimator.low_passed if self._low_passed else self._estimator.operator
+        return node_noise_n_per_px(law, self._motion)
 
     @property
     def _low_passed(self) -> bool:
         return self.settings.force.method in ("auto", "low_pass")
-
-
-class _LowPassed:
-    """The estimator's linear operator with its low-pass."""
-
-    def __init__(self, estimator: ForceEstimator) -> None:
-        self._estimator = estimator
-
-    def force(self, displacement_mm: ArrayLike) -> Array:
-        """Low-passed forces (c, 3)."""
-        return np.asarray(self._estimator.spread @ self._estimator.operator.force(displacement_mm))
 
 
 class _Clock:
@@ -311,7 +281,7 @@ class _Clock:
     def stage(self, name: str) -> None:
         """Close a stage."""
         now = time.perf_counter()
-        self.stages[name] = (now - self._last) * 1000
+        self.stages[name] = self.stages.get(name, 0.0) + (now - self._last) * 1000
         self._last = now
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.force_estimator import SurfaceForce
 from gelslim_force.reference_lattice import ReferenceLattice
-from ifem_export.marker_interpolation import MarkerInterpolation
+from gelslim_force.surface_motion import SurfaceMotion
 
 Array = NDArray[np.float64]
 _DRAWS, _SEED = 16, 20190521
@@ -31,18 +31,14 @@ def noise_px(reference: ReferenceLattice, displacement_px: Array) -> float:
     return float(np.median(np.abs(off)) / 0.6745 / np.sqrt(1.25))
 
 
-def node_noise_n_per_px(
-    law: SurfaceForce, interpolation: MarkerInterpolation, mm_per_px: Array
-) -> Array:
+def node_noise_n_per_px(law: SurfaceForce, motion: SurfaceMotion) -> Array:
     """(c,) size of the tangential force that unit marker noise makes at each node, in N/px.
 
-    The root mean square of draws from a fixed seed; `mm_per_px` (k, 2, 2) per marker.
+    The root mean square of draws from a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
-    total = np.zeros(interpolation.n_nodes)
+    total = np.zeros(len(motion.points_mm))
     for _ in range(_DRAWS):
-        pixels = rng.normal(size=(interpolation.n_markers, 2))
-        motion = np.zeros((interpolation.n_markers, 3))
-        motion[:, :2] = np.einsum("kij,kj->ki", mm_per_px, pixels)
-        total += (law.force(interpolation(motion))[:, :2] ** 2).sum(axis=1)
-    return np.sqrt(total / _DRAWS)
+        moved = motion.of_noise(rng.normal(size=(len(motion.view), 2)))
+        total += (law.force(moved)[:, :2] ** 2).sum(axis=1)
+    return np.asarray(np.sqrt(total / _DRAWS))

@@ -32,6 +32,9 @@ class PipelineSettings:
     force: ForceSettings = field(default_factory=ForceSettings)
     noise_px: float | None = None
     """Standard deviation of a marker's place; estimated on each frame where None."""
+    unknown_normal_mm: float = 0.3
+    """Depth that may go unseen without a normal source: what projection makes of it enters the
+    covariance of the wrench."""
     least_coverage: float = 0.3
     """Share of the markers seen under which a frame gives no forces."""
 

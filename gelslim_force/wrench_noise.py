@@ -48,6 +48,7 @@ class WrenchNoise:
         gains: Array,
         marker_covariance_mm2: Array,
         normal_sigma_mm: Array | None = None,
+        lateral_sigma_mm: Array | None = None,
     ) -> Array:
         """Covariance (6, 6) of the wrench in N and N mm.
 
@@ -56,12 +57,17 @@ class WrenchNoise:
             marker_covariance_mm2: (k, 2, 2) of each marker's lateral motion.
             normal_sigma_mm: (c,) standard deviation of the normal motion, which errs in one
                 piece: a depth too large is too large everywhere.
+            lateral_sigma_mm: (k, 2) standard deviation of the markers' lateral motion, in one
+                piece likewise: what projection makes of an unknown depth.
         """
         count = len(marker_covariance_mm2)
         spread = (gains[:, :, None, :] @ marker_covariance_mm2)[:, :, 0, :]
         total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
         if normal_sigma_mm is not None:
             lean = self.response[:, :, 2] @ normal_sigma_mm
+            total = total + np.outer(lean, lean)
+        if lateral_sigma_mm is not None:
+            lean = gains.reshape(6, 2 * count) @ lateral_sigma_mm.reshape(-1)
             total = total + np.outer(lean, lean)
         return np.asarray(total)
 

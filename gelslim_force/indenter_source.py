@@ -1,0 +1,81 @@
+"""The normal motion of each frame from the contact patch of a known indenter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.contact_patch import ContactPatch
+from gelslim_force.indenter import Indenter
+from gelslim_force.normal_motion import NormalModel
+
+Array = NDArray[np.float64]
+
+
+class Finder(Protocol):
+    """Sees the contact patch in a frame."""
+
+    def find(self, image: NDArray[np.uint8]) -> ContactPatch | None:
+        """Return the patch, None where nothing touches."""
+
+
+@dataclass(frozen=True, eq=False)
+class NormalReading:
+    """Normal motion of the c surface nodes in one frame."""
+
+    w_mm: Array
+    """(c,) negative for a press."""
+    sigma_mm: Array
+    """(c,)."""
+    touched: NDArray[np.bool_] | None
+    """(c,) nodes in contact, None where the source does not tell."""
+    patch: ContactPatch | None = None
+    """Where the light changed; None where nothing touches."""
+    depth_mm: float = 0.0
+    """Of the indenter's lowest point."""
+    problem: str = ""
+    """Why the motion is unknown; its arrays are then NaN."""
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a motion."""
+        return not self.problem
+
+
+@dataclass(frozen=True, eq=False)
+class IndenterSource:
+    """Patch finder and contact model of one indenter.
+
+    A patch is seen where the gel is now; its nodes were elsewhere at rest. `motion` therefore
+    takes the lateral motion found in the patch and moves the patch back by it.
+    """
+
+    finder: Finder
+    model: NormalModel
+    indenter: Indenter
+    depth_mm: float | None = None
+    """Known depth, which a flat punch needs."""
+
+    def look(self, image: NDArray[np.uint8]) -> ContactPatch | None:
+        """Return the patch of a frame."""
+        return self.finder.find(image)
+
+    def motion(self, patch: ContactPatch | None, lateral_mm: Array | None = None) -> NormalReading:
+        """Normal motion for a patch; zero without one.
+
+        `lateral_mm` (2,) is the mean motion of the gel in the patch, once known.
+        """
+        count = len(self.model.points_mm)
+        if patch is None:
+            nothing = np.zeros(count)
+            return NormalReading(nothing, nothing, np.zeros(count, dtype=bool))
+        at_rest = patch
+        if lateral_mm is not None:
+            at_rest = replace(patch, centre_mm=patch.centre_mm - lateral_mm)
+        found = self.model.motion(at_rest, self.indenter, self.depth_mm)
+        return NormalReading(
+            found.w_mm, found.sigma_mm, found.patch, patch, found.depth_mm, found.problem
+        )
