@@ -150,17 +150,27 @@ class _PillowCanvas:
 
 
 def arrow(
-    canvas: Canvas, start: Place, end: Place, colour: Colour, width_px: float, least_px: float = 1.5
+    canvas: Canvas,
+    start: Place,
+    end: Place,
+    colour: Colour,
+    width_px: float,
+    rim: Colour | None = None,
+    least_px: float = 1.5,
 ) -> None:
-    """Draw an arrow with a filled head; a dot-sized one shorter than `least_px` is left out."""
+    """Draw an arrow with a filled head, and a rim around it; shorter than `least_px`, nothing."""
     tail, tip = np.array(start, dtype=float), np.array(end, dtype=float)
     length = float(np.hypot(*(tip - tail)))
     if not length >= least_px:
         return
     along = (tip - tail) / length
     across = np.array([-along[1], along[0]])
-    head = min(0.5 * length, 4.2 * width_px)
+    head = min(0.55 * length, 4.2 * width_px)
     neck = tip - head * along
-    half = 0.42 * head
-    canvas.line((tail[0], tail[1]), (neck[0], neck[1]), colour, width_px)
-    canvas.polygon(np.array([tip, neck + half * across, neck - half * across]), colour)
+    for grown, paint in ((1.0, rim), (0.0, colour)):
+        if paint is None:
+            continue
+        half, back = 0.45 * head + 1.5 * grown, neck - grown * along
+        canvas.line((tail[0], tail[1]), (neck[0], neck[1]), paint, width_px + 2 * grown)
+        point = tip + 2.2 * grown * along
+        canvas.polygon(np.array([point, back + half * across, back - half * across]), paint)

@@ -13,7 +13,9 @@ from gelslim_force.tracks import MarkerStatus
 
 WIDTH_PX, LEAST_HEIGHT_PX = 300, 640
 YELLOW: Colour = (255, 221, 40)
-RED: Colour = (255, 62, 48)
+RED: Colour = (255, 40, 40)
+SHADE: Colour = (255, 150, 118)
+"""Of full pressure; paler than the arrows, so that they stand out on it."""
 WHITE: Colour = (238, 240, 242)
 GREY: Colour = (142, 148, 156)
 ORANGE: Colour = (255, 160, 60)
@@ -162,17 +164,17 @@ def _scales(
     _sample(canvas, y + 32, value * per_mpa, RED, f"{1e3 * value:g} kPa shear")
     for x in range(90):
         mix = shade_share(x / 89.0)
-        colour = [round(g * (1 - mix) + r * mix) for g, r in zip((120, 150, 120), RED, strict=True)]
+        colour = [round(g * (1 - mix) + r * mix) for g, r in zip((90, 110, 90), SHADE, strict=True)]
         place = _LEFT + float(x)
         canvas.line((place, y + 48), (place, y + 60), (colour[0], colour[1], colour[2]), 1)
-    text = f"0 – {1e3 * scale.pressure_mpa:g} kPa pressure"
+    text = f"0 to {1e3 * scale.pressure_mpa:g} kPa pressure"
     canvas.text((_LEFT + 102, y + 59), text, WHITE, 14)
     return y + 84
 
 
 def shade_share(share_of_full: float) -> float:
     """Opacity of the red shade for a pressure over the full one, clipped to 0 ... 1."""
-    return 0.72 * min(max(share_of_full, 0.0), 1.0) ** 0.7
+    return 0.7 * min(max(share_of_full, 0.0), 1.0) ** 0.7
 
 
 def _sample(canvas: Canvas, y: float, length: float, colour: Colour, text: str) -> None:
@@ -189,6 +191,6 @@ def _problems(canvas: Canvas, result: FrameResult, y: float, height: int) -> Non
     ]
     room = max(1, int((height - y - 8) // 19))
     if len(lines) > room:
-        lines = [*lines[: room - 1], "…"]
+        lines = [*lines[: room - 1], "..."]
     for k, line in enumerate(lines):
         canvas.text((_LEFT, y + 10 + 19 * k), line, ORANGE, 14)

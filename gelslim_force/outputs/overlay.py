@@ -20,6 +20,7 @@ from gelslim_force.outputs.canvas import Backend, Canvas, Image, arrow, canvas_o
 from gelslim_force.outputs.legend import (
     LEAST_HEIGHT_PX,
     RED,
+    SHADE,
     WHITE,
     WIDTH_PX,
     YELLOW,
@@ -152,8 +153,7 @@ class Overlay:
         colour: tuple[int, int, int],
     ) -> None:
         start, end, pen = self._at(place), self._at(place + length), self._pen()
-        arrow(canvas, start, end, _DARK, pen + 2)
-        arrow(canvas, start, end, colour, pen)
+        arrow(canvas, start, end, colour, pen, _DARK)
 
     def _draw_forces(
         self, canvas: Canvas, view: SurfaceView, field: ForceField, scale: ArrowScale
@@ -235,5 +235,5 @@ def _shaded(
         return ground
     part = slice(rows[0], rows[-1] + 1)
     mix = _SHADES[(255 * share[part]).astype(int)][:, :, None].astype(np.float32)
-    ground[part] = ground[part] * (1 - mix) + np.array(RED, dtype=np.float32) * mix
+    ground[part] = ground[part] * (1 - mix) + np.array(SHADE, dtype=np.float32) * mix
     return ground
