@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.indenter import Flat, Indenter
@@ -33,7 +35,7 @@ class PatchSettings:
     """Share of the patch's own change at which its outline is drawn."""
     window: float = 2.2
     """Reach of the fit to the shading, in patch sizes."""
-    most_bins: int = 2200
+    most_bins: int = 1200
     """Bins that the fit takes part of."""
     blur_px: float = 2.0
     """Blur of the picture, about."""
@@ -86,6 +88,14 @@ class PatchFinder:
         if surface_mm is not None:
             self._light.on_pad &= _near(self._x, self._y, np.asarray(surface_mm, dtype=float))
 
+    @cached_property
+    def _pad(self) -> cKDTree:
+        return cKDTree(np.column_stack([self._x.ravel()[self._on], self._y.ravel()[self._on]]))
+
+    @cached_property
+    def _on(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self._light.on_pad)
+
     def change(
         self, image: NDArray[np.uint8], markers_px: ArrayLike | None = None
     ) -> ShadingChange:
@@ -110,7 +120,7 @@ class PatchFinder:
         if start is None:
             return None
         patch = start if isinstance(self.indenter, Flat) else self._refined(start, light)
-        share = rim_share(patch, self._x, self._y, self._light.on_pad, 2 * self._local_bin(patch))
+        share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
         return _finished(patch, share, contrast)
 
     def _region(self, light: ShadingChange) -> tuple[Mask | None, float]:
@@ -217,18 +227,15 @@ class PatchFinder:
         near = start.outside_mm(self._x, self._y) < (s.window - 1) * start.size_mm
         near &= light.valid
         rows, columns = np.nonzero(near)
-        skip = 1
-        while len(rows) // (skip * skip) > s.most_bins:
-            skip += 1
-        kept = (rows % skip == 0) & (columns % skip == 0)
+        skip = 1 + len(rows) // s.most_bins
+        kept = (rows + columns) % skip == 0
         rows, columns = rows[kept], columns[kept]
         if len(rows) < 40:
             return None
-        number = np.full(near.shape, -1)
+        number = np.full((near.shape[0] + 1, near.shape[1] + 1), -1)
         number[rows, columns] = np.arange(len(rows))
-        beside = np.where(columns + skip < near.shape[1], columns + skip, columns)
-        partner = number[rows, beside]
-        have = (partner >= 0) & (beside != columns)
+        partner = number[rows + 1, columns - 1]
+        have = partner >= 0
         return Window(
             self._x[rows, columns],
             self._y[rows, columns],
@@ -247,10 +254,8 @@ class PatchFinder:
         return angle if axis is None else float(np.deg2rad(axis))
 
     def _nearest(self, place: Array) -> tuple[int, int]:
-        away = np.where(
-            self._light.on_pad, np.hypot(self._x - place[0], self._y - place[1]), np.inf
-        )
-        row, column = np.unravel_index(int(np.argmin(away)), away.shape)
+        _, at = self._pad.query(place)
+        row, column = np.unravel_index(int(self._on[at]), self._x.shape)
         return int(row), int(column)
 
     def _sight(self, place: Array) -> tuple[Array, float]:
@@ -285,16 +290,12 @@ def _with(
     growth: float,
     z_mm: float = 0.0,
 ) -> ContactPatch:
-    from dataclasses import replace
-
     return replace(
         patch, covariance=covariance, method=method, lean=lean, growth_per_mm=growth, z_mm=z_mm
     )
 
 
 def _finished(patch: ContactPatch, share: float, contrast: float) -> ContactPatch:
-    from dataclasses import replace
-
     return replace(patch, rim_share=share, contrast=contrast)
 
 
@@ -334,8 +335,6 @@ def _bin_sizes(x: Array, y: Array) -> Array:
 
 def _near(x: Array, y: Array, surface_mm: Array) -> Mask:
     """Bins within half a node spacing, along both axes, of a surface node."""
-    from scipy.spatial import cKDTree
-
     nodes = surface_mm[:, :2]
     steps = [np.diff(np.unique(np.round(v, 9))).min() for v in nodes.T]
     places = np.column_stack([x.ravel(), y.ravel()]) / steps

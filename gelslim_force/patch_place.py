@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.spatial import cKDTree
 
 from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.indenter import Flat
@@ -83,22 +84,15 @@ def rim_points(patch: ContactPatch, reach_mm: float) -> Array:
     return np.asarray(patch.centre_mm + local @ np.array([[c, s], [-s, c]]))
 
 
-def rim_share(
-    patch: ContactPatch, x_mm: Array, y_mm: Array, on_pad: NDArray[np.bool_], near_mm: float
-) -> float:
-    """Share of the rim further than `near_mm` from every bin (rows, columns) on the pad.
+def rim_share(patch: ContactPatch, pad: cKDTree, near_mm: float) -> float:
+    """Share of the rim further than `near_mm` from every bin of the pad (a tree of places in mm).
 
     Of a strip, whose ends always lie beyond the pad, the share of its long sides of which the
     pad's other side is seen at the same place.
     """
-    from scipy.spatial import cKDTree
-
-    places = np.column_stack([x_mm[on_pad], y_mm[on_pad]])
-    if not len(places):
-        return 1.0
-    rim = rim_points(patch, float(np.ptp(places, axis=0).max()) / 2)
-    apart, _ = cKDTree(places).query(rim)
-    seen = apart <= near_mm
+    rim = rim_points(patch, float((pad.maxes - pad.mins).max()) / 2)
+    apart, _ = pad.query(rim, distance_upper_bound=near_mm)
+    seen = np.isfinite(apart)
     if patch.kind == "strip":
         half = len(seen) // 2
         either = seen[:half] | seen[half:]

@@ -16,11 +16,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-GAUSS = (-0.7746, 0.0, 0.7746), (5 / 18, 8 / 18, 5 / 18)
 STEPS = 12
-RIM_SINKING = 0.1
-MIDDLE_SINKING = 0.6
-"""Sinking at the rim and in the middle, in a²/R: rough, to place what is seen."""
+RIDGE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,39 +33,17 @@ class Window:
     """(n, c) over the noise."""
     bin_mm: float
     steps: tuple[NDArray[np.intp], NDArray[np.intp]]
-    """Pairs (k,) of neighbouring bins."""
+    """Pairs (k,) of bins next to one another on the diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShadingFit:
-    """`values` (4,) are x, y, radius, decay of a disc; offset, angle, half-width, decay of a strip."""
+    """`values` (4,): x, y, radius, decay of a disc; offset, angle, half-width, decay of a strip."""
 
     values: Array
     covariance: Array
     explained: float
     """Share of the change that the fit explains."""
-
-
-def disc_slope(ratio: Array, decay: float) -> tuple[Array, Array]:
-    """Slope over that at the rim, and the outer correction, at r/a (n,).
-
-    Beside the patch: Hertz's half-space, (2/π)(ρ asin 1/ρ - √(1 - 1/ρ²)), times exp(-decay (ρ-1))
-    for the layer's nearness.
-    """
-    out = np.maximum(ratio, 1.0)
-    hertz = (2 / np.pi) * (out * np.arcsin(1 / out) - np.sqrt(1 - 1 / (out * out)))
-    return _faded(ratio, out, hertz, decay)
-
-
-def strip_slope(ratio: Array, decay: float) -> tuple[Array, Array]:
-    """The same for a strip: ξ - √(ξ² - 1) beside it."""
-    out = np.maximum(ratio, 1.0)
-    return _faded(ratio, out, out - np.sqrt(out * out - 1), decay)
-
-
-def _faded(ratio: Array, out: Array, free: Array, decay: float) -> tuple[Array, Array]:
-    fade = np.exp(-decay * (out - 1))
-    return np.where(ratio < 1, ratio, free * fade), (out - 1) * np.exp(-(1 + decay) * (out - 1))
 
 
 def fit_shading(
@@ -80,7 +55,7 @@ def fit_shading(
     """
     theta = start.copy()
     scale = np.array([1.0, 1.0 if not strip else 0.2, 1.0, 2.0])
-    residual, _ = _residual(window, theta, strip, curvature_per_mm, blur_mm)
+    residual = _residual(window, theta, strip, curvature_per_mm, blur_mm)
     cost, damping = float((residual**2).sum()), 1e-3
     jacobian = np.zeros((residual.size, 4))
     for _ in range(STEPS):
@@ -88,7 +63,7 @@ def fit_shading(
             small = 1e-3 * scale[k] * max(theta[2], 0.1)
             moved = theta.copy()
             moved[k] += small
-            ahead, _ = _residual(window, moved, strip, curvature_per_mm, blur_mm)
+            ahead = _residual(window, moved, strip, curvature_per_mm, blur_mm)
             jacobian[:, k] = (ahead - residual).ravel() / small
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual.ravel()
         settled = False
@@ -100,20 +75,21 @@ def fit_shading(
             trial = theta + step
             trial[2] = max(trial[2], 0.3 * theta[2])
             trial[3] = min(max(trial[3], 0.0), 8.0)
-            tried, explained = _residual(window, trial, strip, curvature_per_mm, blur_mm)
+            tried = _residual(window, trial, strip, curvature_per_mm, blur_mm)
             new = float((tried**2).sum())
             if new <= cost:
                 gained = cost - new
                 theta, residual, cost = trial, tried, new
                 damping = max(damping / 5, 1e-6)
-                settled = gained < 1e-5 * cost and bool((np.abs(step[:3]) < 1e-3).all())
+                settled = gained < 1e-3 * cost and bool((np.abs(step[:3]) < 3e-3 * theta[2]).all())
                 break
             damping *= 6
         else:
             settled = True
         if settled:
             break
-    _, explained = _residual(window, theta, strip, curvature_per_mm, blur_mm)
+    whole = window.change - window.change.mean(axis=0)
+    explained = 1 - cost / max(float((whole**2).sum()), 1e-12)
     if not np.isfinite(theta).all() or theta[2] < 1.5 * window.bin_mm:
         return None
     freedom = max(residual.size - 4 - 7 * residual.shape[1], 1)
@@ -122,61 +98,26 @@ def fit_shading(
     return ShadingFit(theta, covariance, explained)
 
 
-def _residual(
-    window: Window, theta: Array, strip: bool, curvature: float, blur_mm: float
-) -> tuple[Array, float]:
-    """What the best gains leave (n, c), and the share they explain."""
-    basis = _basis(window, theta, strip, curvature, blur_mm)
-    q, _ = np.linalg.qr(basis)
-    left = window.change - q @ (q.T @ window.change)
-    whole = window.change - window.change.mean(axis=0)
-    return left, 1.0 - float((left**2).sum() / max((whole**2).sum(), 1e-12))
+def _residual(window: Window, theta: Array, strip: bool, curvature: float, blur_mm: float) -> Array:
+    """What the best gains leave of the change, (n, c)."""
+    from gelslim_force.slope_kernel import slope_basis
 
-
-def _basis(window: Window, theta: Array, strip: bool, curvature: float, blur_mm: float) -> Array:
-    size = max(float(theta[2]), 1e-3)
-    x, y = window.x_mm, window.y_mm
-    if curvature > 0:
-        # Where the ray meets the gel, sunk in: the sinking changes little over that shift.
-        r = _offset(x, y, theta, strip)[0] / size
-        inside = MIDDLE_SINKING - 0.5 * r * r
-        beside = RIM_SINKING * np.exp(-2 * np.maximum(r - 1, 0))
-        z = -size * size * curvature * np.where(r < 1, inside, beside)
-        x, y = x + window.lean[:, 0] * z, y + window.lean[:, 1] * z
-    r, ux, uy = _offset(x, y, theta, strip)
-    slope, outer = np.zeros_like(r), np.zeros_like(r)
-    law = strip_slope if strip else disc_slope
-    for place, weight in zip(*GAUSS, strict=True):
-        # The crease, averaged over the bin and the blur.
-        one, two = law(np.abs(r + place * blur_mm) / size, float(theta[3]))
-        slope += weight * one
-        outer += weight * two
-    ones = np.ones_like(r)
-    if strip:
-        return np.column_stack([slope * ux, outer * ux, slope * slope, ones])
-    return np.column_stack([slope * ux, slope * uy, outer * ux, outer * uy, slope * slope, ones])
-
-
-def _offset(x: Array, y: Array, theta: Array, strip: bool) -> tuple[Array, Array, Array]:
-    """Distance from the middle and its direction; of a strip, the side (±1)."""
-    if strip:
-        across = np.cos(theta[1]) * y - np.sin(theta[1]) * x - theta[0]
-        return np.abs(across), np.sign(across), np.zeros_like(across)
-    dx, dy = x - theta[0], y - theta[1]
-    r = np.hypot(dx, dy)
-    safe = np.maximum(r, 1e-9)
-    return r, dx / safe, dy / safe
+    basis = np.empty((len(window.x_mm), 6))
+    at = np.array([theta[0], theta[1], max(theta[2], 1e-3), theta[3]])
+    slope_basis(window.x_mm, window.y_mm, window.lean, at, strip, curvature, blur_mm, basis)
+    normal = basis.T @ basis
+    normal[np.diag_indices(6)] += RIDGE * np.trace(normal)
+    gains = np.linalg.solve(normal, basis.T @ window.change)
+    return np.asarray(window.change - basis @ gains)
 
 
 def _together(residual: Array, window: Window) -> float:
-    """How many bins err as one, from the likeness of neighbours along rows and columns."""
+    """How many bins err as one, from the likeness of neighbours on the diagonal."""
     power = float((residual**2).mean())
-    if power <= 0:
+    first, second = window.steps
+    if power <= 0 or not len(first):
         return 1.0
-    factor = 1.0
-    for a, b in (window.steps,):
-        if len(a):
-            like = float((residual[a] * residual[b]).mean()) / power
-            like = min(max(like, 0.0), 0.95)
-            factor *= ((1 + like) / (1 - like)) ** 2
-    return min(factor, 200.0)
+    diagonal = float((residual[first] * residual[second]).mean()) / power
+    # Along a row or column likeness is greater: its square is the diagonal's.
+    like = min(max(diagonal, 0.0), 0.9) ** 0.5
+    return min(((1 + like) / (1 - like)) ** 2, 200.0)

@@ -60,7 +60,7 @@ class ShadingReference:
         self._used = np.flatnonzero(level >= LEAST_LEVEL)
         if not len(self._used):
             raise ValueError(
-                f"the reference frame is dark (mean {level.max():.0f} of 255): no shading to compare"
+                f"the reference frame is dark (mean {level.max():.0f} of 255): no shading"
             )
 
     def centres_px(self) -> Array:

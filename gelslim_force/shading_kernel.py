@@ -1,4 +1,4 @@
-"""Compiled pass over a pair of frames for the change of shading. Import only where it runs: numba."""
+"""Compiled pass over two frames for the change of shading. Import only where it runs: numba."""
 
 from __future__ import annotations
 
