@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from ifem_export.assembly import assemble_csr
 from ifem_export.element import Formulation, hex8_stiffness
 from ifem_export.errors import IfemError
 from ifem_export.ladder import Ladder, chosen_rung
@@ -26,6 +25,7 @@ from ifem_export.marker_field import MarkerField, marker_field
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.surface_operator import Rung, SurfaceOperator, surface_operator
+from ifem_export.weighted_assembly import mesh_stiffness
 
 _SELF_TEST_SEED = 20190521
 _SELF_TEST_AMPLITUDE = 0.1
@@ -47,7 +47,7 @@ class Bundle:
         mesh: the cropped pad.
         material: the gel.
         formulation: Hex-8 formulation of `element_matrix`.
-        element_matrix: (24, 24) in N/mm; with the mesh's occupancy it determines K.
+        element_matrix: (24, 24) in N/mm; with the mesh's occupancy and fill it determines K.
         stiffness: materialised K, (3n, 3n) CSR in N/mm, or None.
         markers: marker grid, or None for a bare pad.
         camera: camera parameters, any JSON-able mapping; passed through untouched.
@@ -96,11 +96,7 @@ class Bundle:
         """K, (3n, 3n) in N/mm: the stored one, else assembled from the recipe once."""
         if self.stiffness is not None:
             return self.stiffness
-        return assemble_csr(
-            np.asarray(self.mesh.occupancy),
-            np.asarray(self.element_matrix),
-            numbering=self.mesh.numbering,
-        )
+        return mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
 
     @cached_property
     def geometry_hash(self) -> str:
@@ -143,7 +139,7 @@ def build_bundle(
     matrix = hex8_stiffness(mesh.cell_size_mm, material, formulation)
     stiffness = None
     if with_stiffness:
-        stiffness = assemble_csr(mesh.occupancy, matrix, numbering=mesh.numbering)
+        stiffness = mesh_stiffness(mesh, matrix)
     displacement = _test_displacement(mesh)
     return Bundle(
         mesh=mesh,
@@ -219,6 +215,10 @@ def recipe_force(
 ) -> NDArray[np.float64]:
     """F = K u element by element, without K: an independent check of the assembled matrix."""
     per_element = displacement_mm[mesh.hexes].reshape(-1, 24) @ element_matrix
+    if mesh.fill is not None:
+        # Cells are numbered x fastest, z slowest.
+        cells = np.asarray(mesh.fill).transpose(2, 1, 0)
+        per_element *= cells[np.asarray(mesh.occupancy).transpose(2, 1, 0)][:, None]
     nodes = np.asarray(mesh.hexes).reshape(-1)
     components = per_element.reshape(-1, 3)
     return np.stack(
@@ -240,6 +240,11 @@ def geometry_hash(mesh: PadMesh, markers: MarkerField | None) -> str:
         np.packbits(mesh.occupancy),
         _rounded(lengths),
     ]
+    for name, part in (("fill", mesh.fill), ("surface_shift", mesh.surface_shift)):
+        if part is not None:
+            parts += [np.frombuffer(name.encode(), dtype="u1"), _rounded(np.asarray(part))]
+    if mesh.surface_shift is not None:
+        parts.append(np.asarray(mesh.surface, dtype="<i8"))
     if markers is not None:
         parts += [
             np.array(markers.positions_mm.shape, dtype="<i8"),

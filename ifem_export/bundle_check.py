@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,13 @@ from scipy import sparse
 
 from ifem_export.bundle import Bundle, recipe_force
 from ifem_export.bundle_manifest import REBUILD
+from ifem_export.crowned_surface import column_tops
 from ifem_export.element import hex8_stiffness
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.marker_field import MarkerField
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.thin_plate import affine
+from ifem_export.weighted_assembly import corner_fill
 
 _SELF_TEST_TOLERANCE = 1e-10
 _ROW_TOLERANCE = 1e-9
@@ -70,8 +73,17 @@ def _check_mesh(mesh: PadMesh) -> None:
         built = PadMesh.from_occupancy(
             np.asarray(mesh.occupancy), mesh.cell_size_mm, mesh.origin_mm
         )
+        if mesh.surface_shift is not None:
+            built = replace(built, surface=_stored_surface(mesh))
     except IfemError as error:
         raise BundleError("occupancy.npy", str(error), REBUILD) from error
+    if mesh.fill is not None:
+        try:
+            corner_fill(np.asarray(mesh.occupancy), np.asarray(mesh.fill))
+        except IfemError as error:
+            raise BundleError("cell_fill.npy", str(error), REBUILD) from error
+        if np.asarray(mesh.fill).max() > 1.0 + 1e-12:
+            _fail("cell_fill", "holds a fraction above 1")
     for name, array in (
         ("hexes", "hexes"),
         ("bonded", "bonded_nodes"),
@@ -86,6 +98,27 @@ def _check_mesh(mesh: PadMesh) -> None:
         or np.abs(mesh.nodes_mm - built.nodes_mm).max() > 1e-9 * size
     ):
         _fail("nodes_mm", "does not follow from the occupancy and cell size")
+
+
+def _stored_surface(mesh: PadMesh) -> NDArray[np.int32]:
+    """Surface nodes that a crowned mesh's own heights lead to: one per column."""
+    shift = np.asarray(mesh.surface_shift)
+    if shift.shape != np.asarray(mesh.surface).shape:
+        _fail("surface_shift", f"holds {shift.size} heights for {len(mesh.surface)} surface nodes")
+    if not (np.isfinite(shift).all() and (np.abs(shift) <= 0.5).all()):
+        _fail("surface_shift", "must lie from -1/2 to 1/2")
+    nodes = np.asarray(mesh.surface)
+    if nodes.min() < 0 or nodes.max() >= mesh.n_nodes:
+        _fail("surface_nodes", "a node number is out of range")
+    numbering = mesh.numbering
+    k, j, i = np.unravel_index(numbering.positions[nodes], numbering.shape)
+    tops = column_tops(numbering)
+    if len(nodes) != (tops >= 0).sum() or len(np.unique(j * tops.shape[1] + i)) != len(nodes):
+        _fail("surface_nodes", "does not follow from the occupancy: one per column")
+    top = tops[j, i]
+    if (k < 1).any() or ((k == top) & (shift > 0.0)).any() or (np.diff(nodes) <= 0).any():
+        _fail("surface_nodes", "does not follow from the occupancy: off its columns")
+    return nodes
 
 
 def _check_element(bundle: Bundle) -> None:

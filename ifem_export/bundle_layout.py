@@ -32,6 +32,10 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
         "self_test_displacement_mm": bundle.self_test.displacement_mm,
         "self_test_force_n": bundle.self_test.force_n,
     }
+    if mesh.fill is not None:
+        arrays["cell_fill"] = mesh.fill
+    if mesh.surface_shift is not None:
+        arrays["surface_shift"] = mesh.surface_shift
     if bundle.stiffness is not None:
         arrays["stiffness_data_n_per_mm"] = bundle.stiffness.data
         arrays["stiffness_indices"] = bundle.stiffness.indices
@@ -66,6 +70,8 @@ def bundle_from(
         origin = tuple(float(v) for v in mesh_section["origin_mm"])
         n, m = int(mesh_section["nodes"]), int(mesh_section["elements"])
         cells = tuple(int(c) for c in mesh_section["cells"])
+        weighted = bool(mesh_section.get("weighted", False))
+        crowned = bool(mesh_section.get("crowned", False))
         formulation = manifest["element"]["formulation"]
         has_stiffness = bool(manifest["stiffness"]["stored"])
     except (KeyError, TypeError, ValueError) as error:
@@ -83,6 +89,8 @@ def bundle_from(
         cell_size_mm=(size[0], size[1], size[2]),
         origin_mm=(origin[0], origin[1], origin[2]),
         occupancy=take("occupancy", "|b1", cells),
+        fill=take("cell_fill", "<f8", cells) if weighted else None,
+        surface_shift=take("surface_shift", "<f8", (None,)) if crowned else None,
     )
     take("free_nodes", "<i4", (n - len(mesh.bonded),))
     return Bundle(

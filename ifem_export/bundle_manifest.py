@@ -45,6 +45,8 @@ _CONVENTIONS = {
     "cell_order": "existing cells, x fastest, z slowest",
     "corner_order": "VTK_HEXAHEDRON",
     "occupancy": "axes (x, y, z); with the element matrix it determines the stiffness matrix",
+    "cell_fill": "where present, what each cell's element matrix is multiplied by",
+    "surface_shift": "where present, cells by which the outer surface lies above its nodes",
     "forces": "external force on the gel; on bonded nodes the reaction of the acrylic",
 }
 
@@ -79,6 +81,8 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
             "free_nodes": len(mesh.free),
             "surface_nodes": len(mesh.surface),
             "side_nodes": len(mesh.sides),
+            "weighted": mesh.fill is not None,
+            "crowned": mesh.surface_shift is not None,
         },
         "element": {"type": "hex8", "formulation": bundle.formulation},
         "stiffness": {

@@ -93,6 +93,11 @@ class NeoHookeanPad:
     ) -> NeoHookeanPad:
         """From a pad mesh, or from an occupancy and a cell size; raises MeshError."""
         if isinstance(mesh, PadMesh):
+            if mesh.fill is not None or mesh.surface_shift is not None:
+                raise MeshError(
+                    "the finite-strain law takes flat pads of whole cells only: mesh with "
+                    "weighting 'cell_centre' and no crown"
+                )
             return cls(mesh.occupancy, mesh.cell_size_mm, material, mesh.numbering, mesh.hexes)
         occupancy, size = mesh
         h = np.asarray(size, dtype=float)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ifem_export.element import Formulation
-from ifem_export.errors import IfemError
+from ifem_export.errors import IfemError, MeshError
 from ifem_export.material import Material
 from ifem_export.pad_mesh import PadMesh
-from ifem_export.surface_operator import Rung, SurfaceOperator, surface_operator
+from ifem_export.surface_operator import CROWNED_RUNGS, Rung, SurfaceOperator, surface_operator
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -30,6 +30,8 @@ FIELD_SEED = 7
 TIMED_S = 0.12
 BALANCE = 1.1
 NOISE_SEED, NOISE_DRAWS = 11, 6
+_MARGIN = 4
+"""Nodes by which the boxes of a mesh and its reference may differ, and one more."""
 CHOICES: tuple[tuple[Rung, dict[str, Any]], ...] = (
     ("paper", {}),
     ("truncated", {"radius": 3}),
@@ -154,17 +156,23 @@ def measure_ladder(
     *,
     dense: bool = False,
     progress: Progress | None = None,
+    reference: PadMesh | None = None,
 ) -> Ladder:
     """Measure every operator of a pad; `dense` adds the dense rung, which takes much longer.
 
-    Raises MeshError for a pad whose layers differ.
+    `reference` is a finer mesh of the same gel on a lattice of half the pitch that has the nodes of
+    this one; by default `refined(mesh)`, which a crowned pad does not have.
+    Raises MeshError for a pad whose layers differ unless it is crowned.
     """
     tell = progress or (lambda text, done, total: None)
     choices = CHOICES + (DENSE if dense else ())
+    if mesh.surface_shift is not None:
+        choices = tuple(c for c in choices if c[0] in CROWNED_RUNGS)
+    fine = refined(mesh) if reference is None else reference
     steps = len(choices) + 1
     tell("reference", 0, steps)
     fields = bumps(mesh)
-    expected = [reference_force(mesh, material, field) for field in fields]
+    expected = [reference_force(mesh, material, field, fine) for field in fields]
     points = np.asarray(mesh.nodes_mm)[mesh.surface]
     moved = [field(points) for field in fields]
     exact = surface_operator(mesh, material, formulation, "pcg", rtol=REFERENCE_RTOL)
@@ -187,11 +195,11 @@ def measure_ladder(
                 n_bytes=operator.n_bytes,
             )
         )
-    reference = (
-        f"{REFERENCE_LAYERS} {REFERENCE_ELEMENT} layers at half the pitch, inner solve to "
+    told = (
+        f"{fine.layers} {REFERENCE_ELEMENT} layers at half the pitch, inner solve to "
         f"{REFERENCE_RTOL:g}"
     )
-    return Ladder(tuple(rungs), reference, mesh.layers, formulation, material.poissons_ratio)
+    return Ladder(tuple(rungs), told, mesh.layers, formulation, material.poissons_ratio)
 
 
 def bumps(mesh: PadMesh) -> list[Callable[[Array], Array]]:
@@ -214,33 +222,47 @@ def reference_force(
     mesh: PadMesh,
     material: Material,
     field: Callable[[Array], Array],
+    fine: PadMesh | None = None,
 ) -> Array:
     """Forces (c, 3) on the coarse surface nodes, from the pad at half pitch and eight layers."""
-    fine = refined(mesh)
+    fine = refined(mesh) if fine is None else fine
     operator = surface_operator(fine, material, REFERENCE_ELEMENT, "pcg", rtol=REFERENCE_RTOL)
     force = operator.force(field(np.asarray(fine.nodes_mm)[fine.surface]))
     return lumped(force, fine, mesh)
 
 
 def refined(mesh: PadMesh) -> PadMesh:
-    """The same pad at half the lateral pitch with eight layers."""
+    """The same pad, cut cells quartered as they are, at half the lateral pitch with eight layers.
+
+    Raises MeshError for a crowned pad: its cells do not say how the crown goes on between them.
+    """
+    if mesh.surface_shift is not None:
+        raise MeshError("a crowned pad has to be meshed anew for a reference: give one")
     hx, hy, hz = mesh.cell_size_mm
     plan = np.asarray(mesh.occupancy)[:, :, 0].repeat(2, axis=0).repeat(2, axis=1)
     cells = np.repeat(plan[:, :, None], REFERENCE_LAYERS, axis=2)
     size = (hx / 2, hy / 2, hz * mesh.layers / REFERENCE_LAYERS)
-    return PadMesh.from_occupancy(cells, size, mesh.origin_mm)
+    if mesh.fill is None:
+        return PadMesh.from_occupancy(cells, size, mesh.origin_mm)
+    fill = np.asarray(mesh.fill)[:, :, 0].repeat(2, axis=0).repeat(2, axis=1)
+    return PadMesh.from_occupancy(
+        cells, size, mesh.origin_mm, np.repeat(fill[:, :, None], REFERENCE_LAYERS, axis=2)
+    )
 
 
 def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
     """Forces of fine surface nodes on coarse ones, by the coarse bilinear functions."""
+    offset = (np.array(coarse.origin_mm) - fine.origin_mm) / fine.cell_size_mm
+    right, up = (int(n) + _MARGIN for n in np.rint(offset[:2]))
     j, i = _places(fine)
-    lattice = np.zeros((j.max() + 3, i.max() + 3, 3))
-    lattice[j + 1, i + 1] = force
     rows, columns = _places(coarse)
+    extent = (max(j.max(), 2 * rows.max() + up), max(i.max(), 2 * columns.max() + right))
+    lattice = np.zeros((extent[0] + 2 * _MARGIN, extent[1] + 2 * _MARGIN, 3))
+    lattice[j + _MARGIN, i + _MARGIN] = force
     total = np.zeros((len(rows), 3))
     for dy, wy in ((-1, 0.5), (0, 1.0), (1, 0.5)):
         for dx, wx in ((-1, 0.5), (0, 1.0), (1, 0.5)):
-            total += wy * wx * lattice[2 * rows + 1 + dy, 2 * columns + 1 + dx]
+            total += wy * wx * lattice[2 * rows + up + dy, 2 * columns + right + dx]
     return total
 
 
