@@ -38,8 +38,8 @@ _CONTACT_SIGMAS = 5.0
 class NormalSource(Protocol):
     """Finds the normal motion of a frame in two steps, as `IndenterSource` does."""
 
-    def look(self, image: NDArray[np.uint8]) -> Any:
-        """What the frame (h, w, 3) shows."""
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> Any:
+        """What the frame (h, w, 3) shows; its markers are at (n, 2), NaN for lost ones."""
 
     def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
         """Normal motion; `lateral_mm` (2,) is that of the gel where it is touched."""
@@ -202,7 +202,7 @@ class ForcePipeline:
             motion = motion_of(places_px, reading)
             clock.stage("displace")
             return reading, motion
-        seen = self._normal.look(image)
+        seen = self._normal.look(image, places_px)
         clock.stage("look")
         reading = self._normal.motion(seen)
         clock.stage("normal")

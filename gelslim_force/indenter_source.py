@@ -18,8 +18,10 @@ Array = NDArray[np.float64]
 class Finder(Protocol):
     """Sees the contact patch in a frame."""
 
-    def find(self, image: NDArray[np.uint8]) -> ContactPatch | None:
-        """Return the patch, None where nothing touches."""
+    def find(
+        self, image: NDArray[np.uint8], markers_px: Array | None = None
+    ) -> ContactPatch | None:
+        """Return the patch, None where nothing touches; ink at the markers does not count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +61,9 @@ class IndenterSource:
     depth_mm: float | None = None
     """Known depth, which a flat punch needs."""
 
-    def look(self, image: NDArray[np.uint8]) -> ContactPatch | None:
-        """Return the patch of a frame."""
-        return self.finder.find(image)
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | None:
+        """Return the patch of a frame whose markers are at (n, 2)."""
+        return self.finder.find(image, markers_px)
 
     def motion(self, patch: ContactPatch | None, lateral_mm: Array | None = None) -> NormalReading:
         """Normal motion for a patch; zero without one.
