@@ -12,8 +12,8 @@ from gelslim_cad.dimensions import Dimensions, definition
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension, unit_of
 from gelslim_cad.spec import Spec
-from gelslim_cad.spec.fields import field_at
 from gelslim_cad.spec.reader import LoadedSpec
+from yaml_model.fields import field_at
 
 Kind = Literal["dimension", "field", "solver", "rule"]
 AT_WORK = 0.004

@@ -11,14 +11,23 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("gelslim_cad", "gelslim_force", "gelslim_optics", "ifem_export")
+PACKAGES = (
+    "gelslim_cad",
+    "gelslim_force",
+    "gelslim_optics",
+    "gelslim_twin",
+    "ifem_export",
+    "yaml_model",
+)
 SOURCES = sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py"))
 CAD_LIBRARIES = ("cadquery", "OCP", "vtk", "vtkmodules", "pyvista")
 
 FORBIDDEN = {
-    "ifem_export": ("gelslim_cad", "gelslim_force", "gelslim_optics", *CAD_LIBRARIES),
-    "gelslim_optics": ("gelslim_cad", "ifem_export", "gelslim_force", *CAD_LIBRARIES),
-    "gelslim_force": ("gelslim_cad", *CAD_LIBRARIES),
+    "yaml_model": tuple(name for name in PACKAGES if name != "yaml_model") + CAD_LIBRARIES,
+    "ifem_export": tuple(name for name in PACKAGES if name != "ifem_export") + CAD_LIBRARIES,
+    "gelslim_optics": tuple(name for name in PACKAGES if name != "gelslim_optics") + CAD_LIBRARIES,
+    "gelslim_force": ("gelslim_cad", "gelslim_twin", *CAD_LIBRARIES),
+    "gelslim_twin": ("gelslim_cad", *CAD_LIBRARIES),
     "gelslim_cad.spec": tuple(
         f"gelslim_cad.{part}"
         for part in ("dimensions", "solids", "build", "checks", "report", "export", "cli")
@@ -110,6 +119,7 @@ def f():
 @pytest.mark.parametrize(
     "module",
     [
+        "yaml_model.reader",
         "gelslim_cad.spec.reader",
         "gelslim_cad.dimensions",
         "gelslim_cad.sight",

@@ -7,7 +7,7 @@ import hashlib
 from importlib import metadata, resources
 from pathlib import Path
 
-PACKAGES = ("gelslim_cad", "gelslim_optics", "ifem_export")
+PACKAGES = ("gelslim_cad", "gelslim_optics", "ifem_export", "yaml_model")
 LIBRARIES = (
     "cadquery",
     "cadquery-ocp",

@@ -55,7 +55,7 @@ def build_variant(
     """Build every file of a spec into `out_dir`, replacing an earlier build of it whole.
 
     `jobs` is the number of worker processes (default: the processors, at most 4); it does not
-    change a byte. Raises SpecError for a bad spec, BuildRefusedError when a rule or a proof fails,
+    change a byte. Raises InputError for a bad spec, BuildRefusedError when a rule or a proof fails,
     OutputError when the folder cannot be written.
     """
     from gelslim_cad.build.stages import Stages

@@ -75,7 +75,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return RULE_FAILED, str(error)
     if isinstance(error, _COMMAND_ERROR):
         return BAD_INPUT, f"gelslim: {_first_line(error)}"
-    if name == "SpecError" or _of_ifem(error):
+    if name == "InputError" or _of_ifem(error):
         return BAD_INPUT, str(error)
     if isinstance(error, ImportError):
         return _missing(error)

@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field, model_validator
 
-from gelslim_cad.spec.base import Block
+from yaml_model.base import Block
 
 FOV_TOLERANCE = 0.05
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gelslim_cad.spec.base import Block
+from yaml_model.base import Block
 
 
 class Gel(Block):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from gelslim_cad.spec.base import Block
+from yaml_model.base import Block
 
 STIFF_GEL_MPA = 5.0
 

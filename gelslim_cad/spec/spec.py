@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from gelslim_cad.spec.base import Block
 from gelslim_cad.spec.camera import Camera
 from gelslim_cad.spec.design import Design
 from gelslim_cad.spec.manufacturing import Manufacturing
 from gelslim_cad.spec.material import Material
 from gelslim_cad.spec.mesh import Mesh
+from yaml_model.base import Block
 
 
 class Spec(Block):
     """A finger: its camera, its design, its materials, its making and its mesh."""
+
+    starting_point: ClassVar[str] = "`gelslim new` writes a spec to start from"
 
     format: Literal["gelslim-spec/1"] = Field(description="Format of this file")
     name: str = Field(

@@ -10,13 +10,13 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gelslim_cad.spec.errors import SpecError
-from gelslim_cad.spec.fields import Field, children
-from gelslim_cad.spec.phrases import range_phrase
-from gelslim_cad.spec.reader import load_bytes
-from gelslim_cad.spec.scalars import RefusedScalarError, resolve
 from gelslim_cad.spec.spec import Spec
-from gelslim_cad.spec.suggest import one_of
+from yaml_model.errors import InputError
+from yaml_model.fields import Field, children
+from yaml_model.phrases import range_phrase
+from yaml_model.reader import load_bytes
+from yaml_model.scalars import RefusedScalarError, resolve
+from yaml_model.suggest import one_of
 
 SPY_CAMERA: dict[str, Any] = {
     "camera.name": "Raspberry Pi spy camera (OV5647)",
@@ -46,7 +46,7 @@ def starter_text(
     """A complete spec called `name`: required fields filled in, all others as comments.
 
     `camera` gives values by dotted path. The text is read back before it is returned.
-    Raises `SpecError` where it would be refused, as for a `name` with spaces.
+    Raises `InputError` where it would be refused, as for a `name` with spaces.
     """
     values = {
         "format": Spec.model_fields["format"].annotation.__args__[0],  # type: ignore[union-attr]
@@ -58,9 +58,9 @@ def starter_text(
     text = _HEAD + "\n".join(_block(Spec, "", values, 0)) + "\n"
     try:
         load_bytes("gelslim new", text.encode(), Spec)
-    except SpecError as error:
+    except InputError as error:
         problems = tuple(replace(problem, line=None, column=None) for problem in error.problems)
-        raise SpecError(problems) from None
+        raise InputError(problems) from None
     return text
 
 

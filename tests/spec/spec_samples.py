@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from gelslim_cad.spec.errors import Problem, SpecError
-from gelslim_cad.spec.reader import Loaded, load_bytes
 from gelslim_cad.spec.spec import Spec
+from yaml_model.errors import InputError, Problem
+from yaml_model.reader import Loaded, load_bytes
 
 MINIMAL = """\
 format: gelslim-spec/1
@@ -37,7 +37,7 @@ def load(text: str | bytes, model: type[BaseModel] = Spec) -> Loaded[Any]:
 
 
 def problems(text: str | bytes, model: type[BaseModel] = Spec) -> tuple[Problem, ...]:
-    with pytest.raises(SpecError) as caught:
+    with pytest.raises(InputError) as caught:
         load(text, model)
     return caught.value.problems
 

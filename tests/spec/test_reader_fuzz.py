@@ -1,4 +1,4 @@
-"""Whatever the file holds, the reader answers with a model or with a SpecError that names it."""
+"""Whatever the file holds, the reader answers with a model or with a InputError that names it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from spec_samples import MINIMAL, NAME, load
 
-from gelslim_cad.spec.errors import SpecError
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
+from yaml_model.errors import InputError
 
 FUZZ = settings(
     derandomize=True,
@@ -36,11 +36,11 @@ def _is_field(line: str) -> bool:
 FULL = YAML(typ="safe", pure=True).load(_uncommented(starter_text("fuzz")))
 
 
-def check(data: str | bytes) -> SpecError | None:
+def check(data: str | bytes) -> InputError | None:
     """Reads `data`; a refusal must be well formed."""
     try:
         assert isinstance(load(data).model, Spec)
-    except SpecError as refusal:
+    except InputError as refusal:
         error = refusal
     else:
         return None

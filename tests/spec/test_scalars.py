@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gelslim_cad.spec.scalars import MAX_INT, RefusedScalarError, resolve
+from yaml_model.scalars import MAX_INT, RefusedScalarError, resolve
 
 
 @pytest.mark.parametrize(

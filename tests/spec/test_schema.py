@@ -8,11 +8,11 @@ from jsonschema import Draft202012Validator
 from ruamel.yaml import YAML
 from spec_samples import MINIMAL, load, with_length
 
-from gelslim_cad.spec.errors import SpecError
-from gelslim_cad.spec.fields import field_table
 from gelslim_cad.spec.schema import schema_text
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
+from yaml_model.errors import InputError
+from yaml_model.fields import field_table
 
 COMMITTED = Path(__file__).parents[2] / "docs" / "gelslim-spec-1.schema.json"
 SCHEMA = json.loads(schema_text())
@@ -88,5 +88,5 @@ def test_what_the_reader_accepts_the_schema_accepts(text):
 @pytest.mark.parametrize("text", REFUSED)
 def test_what_the_schema_refuses_the_reader_refuses(text):
     assert not VALIDATOR.is_valid(YAML(typ="safe", pure=True).load(text))
-    with pytest.raises(SpecError):
+    with pytest.raises(InputError):
         load(text)

@@ -5,10 +5,10 @@ import re
 import pytest
 from spec_samples import load
 
-from gelslim_cad.spec.errors import SpecError
-from gelslim_cad.spec.fields import field_table
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
+from yaml_model.errors import InputError
+from yaml_model.fields import field_table
 
 MARK = re.compile(r"^( *)# (?=[ a-z])", re.MULTILINE)
 
@@ -41,7 +41,7 @@ def test_every_field_stands_there_with_its_description():
 
 @pytest.mark.parametrize("name", ["", "two words", "a: b", "'", "../up", "x\ny: 1", "é", "#"])
 def test_a_name_that_the_spec_refuses_is_refused(name):
-    with pytest.raises(SpecError) as caught:
+    with pytest.raises(InputError) as caught:
         starter_text(name)
     assert caught.value.problems[0].field == "name"
     assert str(caught.value).startswith("gelslim new: name = ")

@@ -50,10 +50,10 @@ def run_case(spec_path: Path, last: Stage, reached: Callable[[str], None]) -> Ou
 
 
 def _of_exception(error: Exception, stage: str) -> Outcome:
-    from gelslim_cad.spec.errors import SpecError
+    from yaml_model.errors import InputError
 
-    if isinstance(error, SpecError):
-        return Outcome("refused", stage, ("SpecError",), str(error))
+    if isinstance(error, InputError):
+        return Outcome("refused", stage, ("InputError",), str(error))
     kind = type(error).__name__
     frames = traceback.extract_tb(error.__traceback__)
     own = [f for f in frames if "gelslim" in f.filename or "ifem_export" in f.filename]

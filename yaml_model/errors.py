@@ -52,12 +52,12 @@ class Problem:
         return f"{where}{sep}{parts}" + (f"; {self.remedy}" if self.remedy else "")
 
 
-class SpecError(Exception):
+class InputError(Exception):
     """An input file was refused. `str()` prints one problem per line, in file order."""
 
     def __init__(self, problems: tuple[Problem, ...], omitted: int = 0) -> None:
         if not problems:
-            raise ValueError("a SpecError carries at least one problem")
+            raise ValueError("a InputError carries at least one problem")
         super().__init__(problems, omitted)
         self.problems = problems
         self.omitted = omitted
@@ -80,13 +80,13 @@ class SpecError(Exception):
         return json.dumps(body, indent=2)
 
 
-def listed(problems: Iterable[Problem], unread: int = 0) -> SpecError:
+def listed(problems: Iterable[Problem], unread: int = 0) -> InputError:
     """The error with the first `MAX_PROBLEMS` of `problems` in file order; the rest are counted.
 
     `unread` further problems were never spelt out.
     """
     ordered = sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
-    return SpecError(tuple(ordered[:MAX_PROBLEMS]), unread + max(0, len(ordered) - MAX_PROBLEMS))
+    return InputError(tuple(ordered[:MAX_PROBLEMS]), unread + max(0, len(ordered) - MAX_PROBLEMS))
 
 
 class FieldError(ValueError):

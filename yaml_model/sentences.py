@@ -6,13 +6,13 @@ import re
 from collections.abc import Callable
 from typing import Any, get_args
 
-from gelslim_cad.spec.errors import shown
-from gelslim_cad.spec.fields import Field
-from gelslim_cad.spec.nodes import ListNode, MappingNode, Node, Scalar
-from gelslim_cad.spec.phrases import SIGNS, give, kind_phrase, number, unit_label
-from gelslim_cad.spec.place import Complaint
-from gelslim_cad.spec.suggest import one_of, suggest_choice
-from gelslim_cad.spec.texts import text_remedy
+from yaml_model.errors import shown
+from yaml_model.fields import Field
+from yaml_model.nodes import ListNode, MappingNode, Node, Scalar
+from yaml_model.phrases import SIGNS, give, kind_phrase, number, unit_label
+from yaml_model.place import Complaint
+from yaml_model.suggest import one_of, suggest_choice
+from yaml_model.texts import text_remedy
 
 _LIMIT_KINDS = {
     "greater_than": "gt",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from gelslim_cad.spec.errors import Problem, shown
-from gelslim_cad.spec.source import Position, Source
+from yaml_model.errors import Problem, shown
+from yaml_model.source import Position, Source
 
 _QUOTE = "put the value in quotes"
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gelslim_cad.spec.nodes import PathPart
-from gelslim_cad.spec.place import Complaint
+from yaml_model.nodes import PathPart
+from yaml_model.place import Complaint
 
 _LIMITS = frozenset(("greater_than", "greater_than_equal", "less_than", "less_than_equal"))
 

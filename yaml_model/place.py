@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gelslim_cad.spec.nodes import (
+from yaml_model.nodes import (
     ListNode,
     MappingNode,
     Node,
@@ -14,7 +14,7 @@ from gelslim_cad.spec.nodes import (
     entry_position,
     join_path,
 )
-from gelslim_cad.spec.source import Position
+from yaml_model.source import Position
 
 
 @dataclass(frozen=True)

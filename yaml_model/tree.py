@@ -1,6 +1,6 @@
 """YAML text parsed into nodes, with everything dangerous refused.
 
-Only what a spec needs is read: one document of mappings, lists and plain values. Anchors,
+Only what a model needs is read: one document of mappings, lists and plain values. Anchors,
 aliases, merge keys, tags, duplicate keys and keys that are not names are problems; depth and
 node count are bounded while parsing, so that a hostile file costs no more than an honest one.
 """
@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from gelslim_cad.spec.errors import Problem, SpecError, listed, shown
-from gelslim_cad.spec.nodes import Entry, ListNode, MappingNode, Node, PathPart, Scalar, join_path
-from gelslim_cad.spec.scalars import RefusedScalarError, resolve
-from gelslim_cad.spec.source import Position, Source, refusal
-from gelslim_cad.spec.syntax import syntax_error
+from yaml_model.errors import InputError, Problem, listed, shown
+from yaml_model.nodes import Entry, ListNode, MappingNode, Node, PathPart, Scalar, join_path
+from yaml_model.scalars import RefusedScalarError, resolve
+from yaml_model.source import Position, Source, refusal
+from yaml_model.syntax import syntax_error
 
 MAX_DEPTH = 24
 MAX_NODES = 20_000
@@ -141,30 +141,31 @@ class _Builder:
         return Scalar(position, value, raw)
 
 
-def parse_tree(source: Source) -> tuple[MappingNode, tuple[Problem, ...]]:
+def parse_tree(source: Source, start: str) -> tuple[MappingNode, tuple[Problem, ...]]:
     """The top-level mapping of the one document in `source`, and what it holds that is refused.
 
+    `start` is the remedy for a file that holds nothing.
     A problem with `NUMBER_REMEDY` is one about which the field's limits could say more.
-    Raises `SpecError` where there is no such mapping: syntax errors, an empty file, several
+    Raises `InputError` where there is no such mapping: syntax errors, an empty file, several
     documents, a list at the top, nesting beyond `MAX_DEPTH`, more than `MAX_NODES` values.
     """
     builder = _Builder(source)
     try:
         _build(builder)
-    except SpecError:
+    except InputError:
         raise
     except Exception as error:
         # The parser meets hostile input here; some of it raises other errors than its own.
         raise listed((*builder.problems, syntax_error(source, error, builder.last))) from None
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.raw == "" and not builder.problems):
-        raise refusal(source.path, "is empty", "`gelslim new` writes a spec to start from")
+        raise refusal(source.path, "is empty", start)
     if not isinstance(root, MappingNode):
         kind = "a list" if isinstance(root, ListNode) else "a single value"
         raise refusal(
             source.path,
             f"the top level is {kind}, must be `name: value` lines",
-            "`gelslim new` writes a spec to start from",
+            start,
             root.position,
         )
     return root, tuple(builder.problems)
@@ -192,7 +193,7 @@ def _count(builder: _Builder, event: Any) -> None:
     if builder.nodes > MAX_NODES:
         raise refusal(
             builder.source.path,
-            f"holds more than {MAX_NODES} values, the limit for a spec",
+            f"holds more than {MAX_NODES} values, the limit for such a file",
             "check that this is the right file",
             builder.last,
         )
@@ -211,7 +212,7 @@ def _check_document(source: Source, event: Any, documents: int) -> None:
         version = ".".join(str(number) for number in event.version)
         raise refusal(
             source.path,
-            f"asks for YAML {version}, specs are YAML 1.2",
+            f"asks for YAML {version}, this program reads YAML 1.2",
             "delete the %YAML line",
             Position(1, 1),
         )

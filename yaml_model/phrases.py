@@ -6,9 +6,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gelslim_cad.spec.fields import Field
-from gelslim_cad.spec.suggest import one_of
-from gelslim_cad.spec.units import split_unit
+from yaml_model.fields import Field
+from yaml_model.suggest import one_of
+from yaml_model.units import split_unit
 
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _KINDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

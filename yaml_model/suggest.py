@@ -9,9 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gelslim_cad.spec.errors import shown
-from gelslim_cad.spec.fields import Field, children, field_table, pattern
-from gelslim_cad.spec.units import converted, split_unit
+from yaml_model.errors import shown
+from yaml_model.fields import Field, children, field_table, pattern
+from yaml_model.units import converted, split_unit
 
 _CLOSE = 0.72
 _CLOSE_ELSEWHERE = 0.85

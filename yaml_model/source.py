@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from gelslim_cad.spec.errors import Problem, SpecError, shown
+from yaml_model.errors import InputError, Problem, shown
 
 MAX_BYTES = 1_000_000
 MAX_LINE = 20_000
-"""Characters in a line: longer ones are no spec, and slow the scanner down."""
+"""Characters in a line: longer ones are no input of ours, and slow the scanner down."""
 
 _WIDE_MARKS = {
     codecs.BOM_UTF32_LE: "UTF-32",
@@ -70,16 +70,16 @@ class Source:
 
 def refusal(
     path: str, message: str, remedy: str, position: Position | None = None, value: str | None = None
-) -> SpecError:
-    """A `SpecError` about the file as a whole."""
+) -> InputError:
+    """A `InputError` about the file as a whole."""
     line, column = position or (None, None)
-    return SpecError((Problem(path, line, column, "", value, message, remedy),))
+    return InputError((Problem(path, line, column, "", value, message, remedy),))
 
 
 def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES) -> Source:
     """The text of the UTF-8 file at `path`, at most `max_bytes` long; never reads further.
 
-    Raises `SpecError` where the file cannot be read, is too long or is not UTF-8 text.
+    Raises `InputError` where the file cannot be read, is too long or is not UTF-8 text.
     """
     name = os.fspath(path)
     return decode_source(name, _read_bytes(name, max_bytes), max_bytes)
@@ -105,12 +105,12 @@ def _read_bytes(name: str, max_bytes: int) -> bytes:
 def decode_source(name: str, data: bytes, max_bytes: int = MAX_BYTES) -> Source:
     """`data` as text, checked: UTF-8, printable, no endless line, at most `max_bytes`.
 
-    Raises `SpecError`.
+    Raises `InputError`.
     """
     if len(data) > max_bytes:
         raise refusal(
             name,
-            f"larger than {max_bytes / 1e6:g} MB, the limit for a spec",
+            f"larger than {max_bytes / 1e6:g} MB, the limit for such a file",
             "check that this is the right file",
         )
     for mark, encoding in _WIDE_MARKS.items():

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 from pydantic import BaseModel
 
-from gelslim_cad.spec.errors import FieldError, Problem, shown
-from gelslim_cad.spec.fields import Field, children, field_at
-from gelslim_cad.spec.nodes import ListNode, MappingNode, Scalar, join_path
-from gelslim_cad.spec.phrases import missing_remedy
-from gelslim_cad.spec.place import Complaint, Place, locate
-from gelslim_cad.spec.sentences import sentence
-from gelslim_cad.spec.source import Position
-from gelslim_cad.spec.suggest import Suggestion, suggest_key
+from yaml_model.errors import FieldError, Problem, shown
+from yaml_model.fields import Field, children, field_at
+from yaml_model.nodes import ListNode, MappingNode, Scalar, join_path
+from yaml_model.phrases import missing_remedy
+from yaml_model.place import Complaint, Place, locate
+from yaml_model.sentences import sentence
+from yaml_model.source import Position
+from yaml_model.suggest import Suggestion, suggest_key
 
 _MENTION = re.compile(r"[a-z][a-z0-9_]*(?:\[\d+\])?(?:\.[a-z][a-z0-9_]*(?:\[\d+\])?)*")
 

@@ -6,18 +6,18 @@ import re
 
 from pydantic import BaseModel
 
-from gelslim_cad.spec.errors import Problem, SpecError
-from gelslim_cad.spec.fields import field_at
-from gelslim_cad.spec.nodes import MappingNode, Scalar
-from gelslim_cad.spec.source import Source
+from yaml_model.errors import InputError, Problem
+from yaml_model.fields import field_at
+from yaml_model.nodes import MappingNode, Scalar
+from yaml_model.source import Source
 
 _FORMAT = re.compile(r"([A-Za-z0-9-]+)/([0-9]{1,9})\Z")
 
 
-def check_format(source: Source, root: MappingNode, model: type[BaseModel]) -> None:
+def check_format(source: Source, root: MappingNode, model: type[BaseModel], start: str) -> None:
     """Refuse a file whose `format:` is given and is none that `model` supports.
 
-    A missing line, or one that is no text, is left to the model. Raises `SpecError`.
+    A missing line, or one that is no text, is left to the model. Raises `InputError`.
     """
     field = field_at(model, "format")
     entry = root.entries.get("format")
@@ -26,12 +26,12 @@ def check_format(source: Source, root: MappingNode, model: type[BaseModel]) -> N
     node = entry.node
     if not isinstance(node.value, str) or node.value in field.choices:
         return
-    message, remedy = _difference(node.value, tuple(str(choice) for choice in field.choices))
+    message, remedy = _difference(node.value, tuple(str(choice) for choice in field.choices), start)
     problem = Problem(source.path, *node.position, "format", node.raw, message, remedy)
-    raise SpecError((problem,))
+    raise InputError((problem,))
 
 
-def _difference(given: str, supported: tuple[str, ...]) -> tuple[str, str]:
+def _difference(given: str, supported: tuple[str, ...], start: str) -> tuple[str, str]:
     newest = supported[-1]
     reads = f"this program reads {' and '.join(supported)}"
     name, version = newest.rsplit("/", 1)
@@ -42,5 +42,5 @@ def _difference(given: str, supported: tuple[str, ...]) -> tuple[str, str]:
         return f"newer than this program, {reads}", "update gelslim-cad"
     return (
         f"no longer supported, {reads}",
-        f"start from `gelslim new` and write `format: {newest}`",
+        f"{start}, and write `format: {newest}`",
     )

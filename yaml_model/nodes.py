@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from gelslim_cad.spec.scalars import ScalarValue
-from gelslim_cad.spec.source import Position
+from yaml_model.scalars import ScalarValue
+from yaml_model.source import Position
 
 
 @dataclass(frozen=True, slots=True)

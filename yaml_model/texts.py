@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from gelslim_cad.spec.errors import shown
-from gelslim_cad.spec.fields import Field
-from gelslim_cad.spec.scalars import RefusedScalarError, resolve
-from gelslim_cad.spec.units import UNITS, converted
+from yaml_model.errors import shown
+from yaml_model.fields import Field
+from yaml_model.scalars import RefusedScalarError, resolve
+from yaml_model.units import UNITS, converted
 
 _YES = frozenset(("yes", "y", "on", "true", "1"))
 _NO = frozenset(("no", "n", "off", "false", "0"))

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from gelslim_cad.spec.units import Unit, split_unit
+from yaml_model.units import Unit, split_unit
 
 LIMITS = ("gt", "ge", "lt", "le")
 

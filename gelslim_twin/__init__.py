@@ -1,0 +1,1 @@
+"""The digital twin: a scene planned, then simulated with only the effects it calls for."""

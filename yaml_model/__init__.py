@@ -1,0 +1,1 @@
+"""YAML read into frozen pydantic models; each fault with its line, limit and remedy."""
