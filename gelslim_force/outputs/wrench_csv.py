@@ -84,6 +84,14 @@ def header() -> str:
     return ",".join(COLUMNS) + "\n"
 
 
+def row(result: FrameResult) -> dict[str, float]:
+    """Return the numbers of a frame by column; NaN where not known."""
+    return {
+        name: value if isinstance(value, int) else float(value)
+        for name, value in zip(NUMBERS, _numbers(result), strict=True)
+    }
+
+
 def line(result: FrameResult) -> str:
     """Return the line of a frame, its newline included."""
     numbers = [_text(value) for value in _numbers(result)]

@@ -1,0 +1,202 @@
+"""The last picture and wrench in a browser, from this machine only and without the internet.
+
+`/` is the page, `/stream` the pictures (multipart JPEG), `/picture.jpg` the last one and
+`/state.json` the last frame's numbers. Only the standard library serves; OpenCV or Pillow encodes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import resources
+from types import TracebackType
+from typing import Any
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_force.outputs.output_error import OutputError, disk_error
+from gelslim_force.outputs.packed_frame import plain
+from gelslim_force.outputs.picture_file import Image, encoded
+from gelslim_force.outputs.wrench_csv import row
+
+_BOUNDARY = "gelslimframe"
+_NAMES = ("127.0.0.1", "localhost", "[::1]")
+
+
+class _Latest:
+    """The newest frame, for any number of readers; older ones are dropped."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._picture: Image | None = None
+        self._jpeg: tuple[int, bytes] = (0, b"")
+        self._state: dict[str, Any] = {"frame": None}
+        self._count = 0
+        self._closed = False
+
+    def put(self, picture: Image, state: dict[str, Any]) -> None:
+        with self._changed:
+            self._picture, self._state = picture, state
+            self._count += 1
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def state(self) -> dict[str, Any]:
+        with self._changed:
+            return self._state
+
+    def jpeg_after(self, seen: int, wait_s: float) -> tuple[int, bytes] | None:
+        """The newest picture once there is one newer than `seen`; None on time-out or close.
+
+        It is encoded here, so a view that nobody watches costs nothing.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._count > seen or self._closed, wait_s)
+            if self._closed or self._count <= seen or self._picture is None:
+                return None
+            count, picture = self._count, self._picture
+            if self._jpeg[0] == count:
+                return self._jpeg
+        data = encoded(picture, ".jpg", 85)
+        with self._changed:
+            self._jpeg = (count, data)
+        return count, data
+
+    @property
+    def closed(self) -> bool:
+        return self._closed
+
+
+class LiveView:
+    """Serves until closed.
+
+    >>> with LiveView(port=8750) as view:  # doctest: +SKIP
+    ...     view.show(picture, result)
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        """Port 0 takes a free one, see `url`. Raises OutputError where the port is taken."""
+        self._latest = _Latest()
+        latest = self._latest
+
+        class Handler(_Handler):
+            source = latest
+
+        try:
+            self._server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        except (OSError, OverflowError) as error:
+            if isinstance(error, OSError) and error.errno:
+                raise disk_error(f"port {port}", "starting the live view", error) from error
+            raise OutputError(f"port {port}: {error}; take 0 ... 65535") from error
+        self._server.daemon_threads = True
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(0.05,), name="live-view", daemon=True
+        )
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """Address to open in a browser on this machine."""
+        return f"http://127.0.0.1:{self._server.server_address[1]}/"
+
+    def show(self, picture: Image, result: FrameResult) -> None:
+        """Make an RGB picture and its frame the latest; the picture must not change later."""
+        self._latest.put(picture, live_state(result))
+
+    def close(self) -> None:
+        """Stop serving; again is harmless."""
+        self._latest.close()
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+    def __enter__(self) -> LiveView:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
+    ) -> None:
+        """Close."""
+        self.close()
+
+
+def live_state(result: FrameResult) -> dict[str, Any]:
+    """Return the frame's numbers as JSON values: columns of `wrench_csv`, null where unknown."""
+    numbers = {name: None if math.isnan(v) else v for name, v in row(result).items()}
+    stages = plain(dict(result.stage_ms))
+    return {"frame": numbers, "problems": list(result.problems), "stage_ms": stages}
+
+
+class _Handler(BaseHTTPRequestHandler):
+    source: _Latest
+    protocol_version = "HTTP/1.1"
+    server_version = "gelslim"
+
+    def do_GET(self) -> None:
+        """Answer one request."""
+        # A page elsewhere that points its own name at this machine must not read the sensor.
+        host = self.headers.get("Host", "").rpartition(":")
+        if (host[0] or host[2]) not in _NAMES:
+            self._send(403, "text/plain", b"this view answers to localhost only\n")
+            return
+        path = self.path.partition("?")[0]
+        if path == "/":
+            page = (resources.files("gelslim_force.outputs") / "live_page.html").read_bytes()
+            self._send(200, "text/html; charset=utf-8", page)
+        elif path == "/state.json":
+            body = json.dumps(self.source.state(), allow_nan=False).encode()
+            self._send(200, "application/json", body)
+        elif path == "/picture.jpg":
+            latest = self.source.jpeg_after(0, 0.0)
+            if latest is None:
+                self._send(503, "text/plain", b"no frame yet\n")
+            else:
+                self._send(200, "image/jpeg", latest[1])
+        elif path == "/stream":
+            self._stream()
+        else:
+            self._send(404, "text/plain", b"no such page\n")
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Keep quiet."""
+
+    def _send(self, status: int, kind: str, body: bytes) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.send_header("Cache-Control", "no-store")
+        self.send_header(
+            "Content-Security-Policy", "default-src 'self' 'unsafe-inline'; object-src 'none'"
+        )
+        self.end_headers()
+        self.wfile.write(body)
+
+    def _stream(self) -> None:
+        self.close_connection = True
+        self.send_response(200)
+        self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={_BOUNDARY}")
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        try:
+            for jpeg in self._pictures():
+                head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\n"
+                head += f"Content-Length: {len(jpeg)}\r\n\r\n"
+                self.wfile.write(head.encode() + jpeg + b"\r\n")
+        except (BrokenPipeError, ConnectionResetError):
+            return  # the browser left
+
+    def _pictures(self) -> Iterator[bytes]:
+        seen = 0
+        while not self.source.closed:
+            latest = self.source.jpeg_after(seen, 1.0)
+            if latest is not None:
+                seen = latest[0]
+                yield latest[1]
