@@ -14,12 +14,14 @@ from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.indenter import Flat, Indenter
 from gelslim_force.patch_outline import fit_circle, fit_strip
 from gelslim_force.patch_place import flat_patch, rim_share
-from gelslim_force.patch_shading import ShadingFit, Window, fit_shading
+from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit
 from gelslim_force.shading_change import ShadingChange, ShadingReference
 from gelslim_optics.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+STARTS = ((0.7, 0.5), (0.85, 1.5), (1.0, 4.0))
+"""Sizes, over the outline's, and decays that the fit to the shading starts from."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class PatchSettings:
 
     least_change: float = 0.02
     """Logarithmic change of light (2 %) under which nothing is a patch, however quiet the frame."""
+    largest_change: float = 0.6
+    """Change from which on the light no longer follows the slope: more counts as little more."""
     least_power: float = 6.0
     """Squared change over the noise that a patch shows, averaged over 3 x 3 bins."""
     least_bins: int = 12
@@ -76,6 +80,7 @@ class PatchFinder:
     ) -> None:
         self.settings = settings or PatchSettings()
         self.indenter = indenter
+        self._last: Array | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
         picture = np.asarray(reference)
@@ -127,22 +132,23 @@ class PatchFinder:
         """Largest group of bins whose shading changed, and its contrast."""
         s = self.settings
         power = np.einsum("cij,c->ij", light.change**2, 1 / light.noise**2) / len(light.noise)
-        size = np.sqrt((light.change**2).max(axis=0))
+        size = s.largest_change * np.tanh(np.abs(light.change).max(axis=0) / s.largest_change)
         weight = ndimage.uniform_filter(light.valid.astype(float), 3, mode="constant")
         full = np.maximum(weight, 1e-6)
         power = ndimage.uniform_filter(np.where(light.valid, power, 0.0), 3, mode="constant") / full
         size = ndimage.uniform_filter(np.where(light.valid, size, 0.0), 3, mode="constant") / full
         changed = (power > s.least_power) & (size > s.least_change) & (weight > 0.2)
+        if changed.sum() < s.least_bins:
+            return None, 0.0
+        # Faint changes far off (a lamp, a hand's shadow) are not the patch's.
+        level = s.outline_level * float(np.quantile(size[changed], 0.98))
+        strong = changed & (size >= level)
         # Ink splits a patch: groups that a bin or two keep apart are one.
-        labels, count = ndimage.label(ndimage.binary_dilation(changed, iterations=2))
+        labels, count = ndimage.label(ndimage.binary_dilation(strong, iterations=2))
         if not count:
             return None, 0.0
-        score = ndimage.sum_labels(np.where(changed, size, 0.0), labels, np.arange(1, count + 1))
-        region = (labels == 1 + int(np.argmax(score))) & changed
-        if region.sum() < s.least_bins:
-            return None, 0.0
-        level = s.outline_level * float(np.quantile(size[region], 0.9))
-        strong = region & (size >= level)
+        score = ndimage.sum_labels(np.where(strong, size**3, 0.0), labels, np.arange(1, count + 1))
+        strong = _joined(labels, score) & strong
         if strong.sum() < s.least_bins:
             return None, 0.0
         return strong, float(np.sqrt(power[strong].mean()))
@@ -173,7 +179,7 @@ class PatchFinder:
                 covariance[:3, :3] = found
         except (ValueError, np.linalg.LinAlgError):
             return None
-        if not (np.isfinite(half) and half < 3 * np.ptp(inside, axis=0).max() + 1e-9):
+        if not (np.isfinite(half) and half < 1.2 * np.ptp(inside, axis=0).max()):
             return None
         spread = (self.settings.outline_error * float(half)) ** 2
         covariance[2, 2] += spread
@@ -191,13 +197,16 @@ class PatchFinder:
         turn = np.deg2rad(start.angle_deg)
         across = start.centre_mm @ np.array([-np.sin(turn), np.cos(turn)])
         first = [across, turn] if self._strip else list(start.centre_mm)
-        begin = np.array([*first, 0.85 * start.size_mm, 0.5])
         blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
         blur = float(np.hypot(window.bin_mm / 2, blur))
-        fit = fit_shading(window, begin, self._strip, curvature, blur)
+        begins = [np.array([*first, k * start.size_mm, q]) for k, q in STARTS]
+        if self._last is not None:
+            begins = [self._last, *begins]
+        fit = best_shading_fit(window, begins, self._strip, curvature, blur)
+        self._last = None if fit is None else fit.values
         if fit is None or fit.explained < self.settings.least_explained:
             return start
-        if not 0.4 < fit.values[2] / start.size_mm < 1.8:
+        if not 0.5 < fit.values[2] / start.size_mm < 1.5:
             return start
         return self._from_fit(fit, start, curvature, window.bin_mm)
 
@@ -236,11 +245,12 @@ class PatchFinder:
         number[rows, columns] = np.arange(len(rows))
         partner = number[rows + 1, columns - 1]
         have = partner >= 0
+        most = s.largest_change
         return Window(
             self._x[rows, columns],
             self._y[rows, columns],
             self._lean[rows, columns],
-            (light.change[:, rows, columns] / light.noise[:, None]).T,
+            (most * np.tanh(light.change[:, rows, columns] / most) / light.noise[:, None]).T,
             self._local_bin(start),
             (np.flatnonzero(have), partner[have]),
         )
@@ -264,6 +274,19 @@ class PatchFinder:
 
     def _local_bin(self, patch: ContactPatch) -> float:
         return float(self._bin_mm[self._nearest(patch.centre_mm)])
+
+
+def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
+    """The strongest group, with those no less than a fifth as strong and no further than its size.
+
+    Red and green change most on two sides of a line through the middle, which stays dark.
+    """
+    best = 1 + int(np.argmax(score))
+    chosen = labels == best
+    near = ndimage.distance_transform_edt(~chosen) <= 2 * np.sqrt(chosen.sum() / np.pi)
+    others = np.unique(labels[near])
+    strong = [k for k in others if k > 0 and score[k - 1] >= 0.2 * score[best - 1]]
+    return np.isin(labels, strong)
 
 
 def strip_patch(offset: float, half: float, angle: float, near: Array) -> ContactPatch:

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LEAST_LEVEL = 8.0
 """Mean grey value of the reference under which a channel says nothing."""
+FLOOR = 5.0
 LEAST_FREE = 0.34
 """Share of a bin's pixels that must be free of ink and glare."""
 ROBUST = 1.4826
@@ -92,10 +93,9 @@ class ShadingReference:
             block_discs(self._scratch, np.asarray(markers_px, dtype=float), radius)
         sums_in_bins(self.image, picture, self._scratch, self.bin_px, self._sums, self._counts)
         free = self._counts >= LEAST_FREE * self.bin_px**2
-        # One grey value keeps a black bin's logarithm finite.
-        ratio = (self._sums[1] + self._counts[..., None]) / np.maximum(
-            self._sums[0] + self._counts[..., None], 1
-        )
+        # A few grey values keep a channel that goes black from outweighing all others.
+        floor = FLOOR * np.maximum(self._counts[..., None], 1)
+        ratio = (self._sums[1] + floor) / (self._sums[0] + floor)
         log = np.log(np.maximum(ratio[..., self._used], 1e-6))
         return _about_median(np.moveaxis(_combined(log), 2, 0), free & self.on_pad)
 

@@ -28,7 +28,7 @@ def block_discs(blocked: Any, centres: Any, radius: Any) -> None:
 def sums_in_bins(first: Any, second: Any, blocked: Any, size: Any, sums: Any, counts: Any) -> None:
     """Sums (2, rows, columns, c) of two images (h, w, c) uint8 over the same free pixels.
 
-    Blocked and saturated pixels are left out of both; `counts` (rows, columns) are those left in.
+    Blocked pixels, and those where every channel glares in one of the two, are left out of both; `counts` (rows, columns) are those left in.
     """
     _, rows, columns, channels = sums.shape
     sums[:] = 0
@@ -39,10 +39,10 @@ def sums_in_bins(first: Any, second: Any, blocked: Any, size: Any, sums: Any, co
             for j in range(column * size, (column + 1) * size):
                 if blocked[i, j]:
                     continue
-                top = 0
+                low = 255
                 for c in range(channels):
-                    top = max(top, first[i, j, c], second[i, j, c])
-                if top >= SATURATED:
+                    low = min(low, max(first[i, j, c], second[i, j, c]))
+                if low >= SATURATED:
                     continue
                 counts[row, column] += 1
                 for c in range(channels):

@@ -1,0 +1,99 @@
+"""Marker frames with the shading of a pressed gel, for the tests of the contact patch.
+
+Red light comes from -y and green from +y, both with Lambert's law at 40 degrees' elevation over a
+third of ambient light; the height field is a solved contact on an elastic layer, seen where the
+line of sight meets the sunken surface.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from bonded_layer import LayerContact, layer_contact
+from camera_rig import finger_view
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+from synthetic import Frame, Look, grid_of_dots, render
+
+Vector = NDArray[np.float64]
+ELEVATION, AMBIENT = np.deg2rad(40.0), 0.33
+GRID = grid_of_dots()
+CAMERA = finger_view()
+PAD_MM = (11.0, 10.5)
+
+
+@cache
+def contact(radius_mm: float, ball_mm: float, nu: float = 0.48) -> LayerContact:
+    def profile(r):
+        return ball_mm - np.sqrt(ball_mm**2 - r * r)
+
+    return layer_contact(profile, radius_mm, 2.0, 0.147, nu)
+
+
+@cache
+def sight() -> tuple[Vector, Vector]:
+    """Where pixels meet the rest surface (n, 2), and the motion (n, 2) per mm of height."""
+    y, x = np.mgrid[:480, :640]
+    pixels = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+    rest = CAMERA.backproject(pixels, 0.0)[:, :2]
+    below = CAMERA.backproject(pixels, -0.3)[:, :2]
+    return rest, (rest - below) / 0.3
+
+
+@cache
+def _profile(radius_mm: float, ball_mm: float, nu: float) -> tuple[Vector, Vector, Vector]:
+    r = np.linspace(0, 30, 3001)
+    truth = contact(radius_mm, ball_mm, nu)
+    inside = r <= radius_mm
+    z = np.where(
+        inside,
+        ball_mm - np.sqrt(np.maximum(ball_mm**2 - r * r, 0)) - truth.depth_mm,
+        -truth.exact_sinking(r),
+    )
+    return r, z, np.gradient(z, r)
+
+
+def pressed_heights(
+    centre_mm, radius_mm: float, ball_mm: float, nu: float = 0.48
+) -> tuple[Vector, Vector, Vector]:
+    """Slopes (n,) along x and y, and height, of the surface that each pixel sees."""
+    rest, lean = sight()
+    r, z, slope = _profile(radius_mm, ball_mm, nu)
+    height = np.zeros(len(rest))
+    for _ in range(6):
+        away = rest + lean * height[:, None] - np.asarray(centre_mm)
+        height = np.interp(np.hypot(*away.T), r, z)
+    apart = np.hypot(*away.T)
+    steep = np.interp(apart, r, slope) / np.maximum(apart, 1e-9)
+    return steep * away[:, 0], steep * away[:, 1], height
+
+
+def lit(slope_x: Vector, slope_y: Vector) -> Vector:
+    """Brightness (n, 3) over that of a level surface."""
+    size = np.sqrt(1 + slope_x**2 + slope_y**2)
+    side, up = np.cos(ELEVATION), np.sin(ELEVATION)
+    red = np.maximum((up - side * slope_y) / size, 0) / up
+    green = np.maximum((up + side * slope_y) / size, 0) / up
+    blue = np.maximum((up + 0.4 * side * slope_x) / size, 0) / up
+    return AMBIENT + (1 - AMBIENT) * np.column_stack([red, green, blue])
+
+
+def shaded(
+    slopes: tuple[Vector, Vector] | None = None,
+    *,
+    noise: float = 3.0,
+    blur: float = 1.0,
+    seed: int = 1,
+    moved_mm: Vector | None = None,
+    brightness: float = 1.0,
+) -> Frame:
+    """A 480 x 640 frame; without slopes, of a level surface."""
+    frame = render(GRID, CAMERA, Look(blur=0.0, noise=0.0, seed=7), moved_mm)
+    image = frame.image.astype(float) * brightness
+    if slopes is not None:
+        image *= lit(*slopes).reshape(480, 640, 3)
+    image = gaussian_filter(image, (blur, blur, 0))
+    image += np.random.default_rng(seed).normal(0, noise, image.shape)
+    picture = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    return Frame(picture, frame.centres_px, frame.diameter_px, frame.drawn)
