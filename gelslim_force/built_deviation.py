@@ -1,0 +1,118 @@
+"""How far a built sensor is from its design, in numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.camera_deviation import deviated_camera
+from gelslim_force.residual_bump import ResidualField
+from gelslim_optics.lens_distortion import LensDistortion
+
+if TYPE_CHECKING:
+    from gelslim_force.calibration_fit import CameraFit
+    from gelslim_optics.virtual_camera import VirtualCamera
+
+Array = NDArray[np.float64]
+_STEP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltDeviation:
+    """The fitted deviations with what follows from them on the pad."""
+
+    values: Array
+    """(11,) in the order and units of `camera_deviation.PARAMETERS`."""
+    sigma: Array
+    """(11,) their standard deviations."""
+    tolerance: Array
+    """(11,) standard deviations expected of the build."""
+    weak: tuple[tuple[float, Array], ...]
+    """See `CameraFit.weak_directions`."""
+    rotation_deg: float
+    """Angle of the whole rotation."""
+    shift_mm: float
+    """Length of the pinhole's shift."""
+    scale_percent: float
+    """Change of the picture's mean scale (px per mm) over the print."""
+    distortion_px: float
+    """Largest change of a dot's place by the change of the distortion alone."""
+    moved_px: float
+    """Median distance of the dots from where the design's camera would see them."""
+    map_sigma_mm: float
+    """Root mean square uncertainty of places on the gel, each axis, from the camera's fit."""
+    lean_sigma_mm_per_mm: float
+    """Root mean square uncertainty of the sideways motion that a press of 1 mm seems to make."""
+    noise_px: float
+    """Standard deviation of one dot along one axis: detection and print."""
+    own_mm: float
+    """The same on the gel, against the neighbours."""
+    shared_mm: float
+    """Root mean square of what neighbours are off by together."""
+
+
+def built_deviation(
+    fit: CameraFit, rest_mm: Array, points_mm: Array, residuals: ResidualField
+) -> BuiltDeviation:
+    """Return the numbers of a fit; `rest_mm` and `points_mm` (n, 2) are its dots on the gel."""
+    flat = np.column_stack([points_mm, np.zeros(len(points_mm))])
+    design, built = fit.design, fit.camera
+    was, now = (np.sqrt(np.abs(np.linalg.det(c.jacobian(flat)))) for c in (design, built))
+    place, lean = _uncertainty(fit, flat)
+    moved = built.project(np.column_stack([rest_mm, np.zeros(len(rest_mm))])) - design.project(flat)
+    return BuiltDeviation(
+        values=fit.values,
+        sigma=fit.sigma,
+        tolerance=fit.tolerance,
+        weak=tuple(fit.weak_directions),
+        rotation_deg=float(np.linalg.norm(fit.values[:3])),
+        shift_mm=float(np.linalg.norm(fit.values[3:6])),
+        scale_percent=float(100 * (np.mean(now) / np.mean(was) - 1)),
+        distortion_px=_bent_px(fit, flat),
+        moved_px=float(np.median(np.hypot(*moved.T))),
+        map_sigma_mm=place,
+        lean_sigma_mm_per_mm=lean,
+        noise_px=fit.noise_px,
+        own_mm=residuals.own_mm,
+        shared_mm=residuals.shared_mm,
+    )
+
+
+def lean_mm_per_mm(camera: VirtualCamera, flat_mm: Array) -> Array:
+    """Sideways motion (n, 2) on the rest plane that a motion of 1 mm along z looks like."""
+    motion = camera.jacobian_3d(flat_mm)
+    lean: Array = np.linalg.solve(motion[:, :, :2], motion[:, :, 2:])[:, :, 0]
+    return lean
+
+
+def _uncertainty(fit: CameraFit, flat: Array) -> tuple[float, float]:
+    """Rms standard deviation along one axis of places on the gel and of their lean."""
+    to_gel = np.linalg.inv(fit.camera.jacobian(flat))
+    places, leans = [], []
+    for k, unit in enumerate(fit.tolerance):
+        step = np.zeros(len(fit.tolerance))
+        step[k] = _STEP * unit
+        low, high = (deviated_camera(fit.design, fit.values + s * step) for s in (-1, 1))
+        image = (high.project(flat) - low.project(flat)) / (2 * step[k])
+        places.append(np.einsum("nij,nj->ni", to_gel, image))
+        leans.append((lean_mm_per_mm(high, flat) - lean_mm_per_mm(low, flat)) / (2 * step[k]))
+    return _spread(np.stack(places, -1), fit.covariance), _spread(
+        np.stack(leans, -1), fit.covariance
+    )
+
+
+def _spread(slopes: Array, covariance: Array) -> float:
+    flat = slopes.reshape(-1, slopes.shape[-1])
+    return float(np.sqrt(np.einsum("ki,ij,kj->k", flat, covariance, flat).mean()))
+
+
+def _bent_px(fit: CameraFit, flat: Array) -> float:
+    """Largest move of a dot's place where the built lens replaces the design's."""
+    straight = dataclasses.replace(fit.camera, lens=None)
+    rays = (straight.project(flat) - straight.principal_px) / straight.focal_px
+    was, now = ((c.lens or LensDistortion()).distort(rays) for c in (fit.design, fit.camera))
+    return float(fit.camera.focal_px * np.hypot(*(now - was).T).max())
