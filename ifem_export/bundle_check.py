@@ -112,7 +112,7 @@ def _stored_surface(mesh: PadMesh) -> NDArray[np.int32]:
         _fail("surface_nodes", "a node number is out of range")
     numbering = mesh.numbering
     k, j, i = np.unravel_index(numbering.positions[nodes], numbering.shape)
-    tops = column_tops(numbering)
+    tops = column_tops(np.asarray(mesh.occupancy), numbering)
     if len(nodes) != (tops >= 0).sum() or len(np.unique(j * tops.shape[1] + i)) != len(nodes):
         _fail("surface_nodes", "does not follow from the occupancy: one per column")
     top = tops[j, i]

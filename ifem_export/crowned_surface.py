@@ -23,25 +23,26 @@ from ifem_export.outline import Outline
 Array = NDArray[np.float64]
 
 
-def column_tops(numbering: Numbering) -> NDArray[np.int64]:
+def column_tops(occupancy: NDArray[np.bool_], numbering: Numbering) -> NDArray[np.int64]:
     """Level of the highest node of each column (ny + 1, nx + 1), -1 where there is none.
 
     Raises:
         MeshError: a column that does not reach from the bonded face to its top.
     """
+    if (occupancy[:, :, 1:] & ~occupancy[:, :, :-1]).any():
+        raise MeshError("a column of cells has a gap or hangs in the air: no surface over it")
     exists = numbering.node_index.reshape(numbering.shape) >= 0
-    tops = exists.shape[0] - 1 - np.argmax(exists[::-1], axis=0)
-    tops = np.where(exists.any(axis=0), tops, -1)
-    if not (exists.sum(axis=0) == tops + 1).all():
-        raise MeshError("a column of the pad has a gap or hangs in the air: no surface over it")
-    return np.asarray(tops, dtype=np.int64)
+    return np.where(exists.any(axis=0), exists.sum(axis=0) - 1, -1)
 
 
-def surface_of(numbering: Numbering, levels: Array | None) -> tuple[NDArray[np.int32], Array]:
+def surface_of(
+    occupancy: NDArray[np.bool_], numbering: Numbering, levels: Array | None
+) -> tuple[NDArray[np.int32], Array]:
     """Surface node of every column and the surface's height over it.
 
     Args:
-        numbering: nodes of the pad.
+        occupancy: (nx, ny, nz) cells of the pad.
+        numbering: its nodes.
         levels: (ny + 1, nx + 1) height of the surface over each column, in layers from the
             bonded face; None puts it on the columns' highest nodes.
 
@@ -51,7 +52,7 @@ def surface_of(numbering: Numbering, levels: Array | None) -> tuple[NDArray[np.i
     Raises:
         MeshError: columns with gaps.
     """
-    tops = column_tops(numbering)
+    tops = column_tops(occupancy, numbering)
     j, i = np.nonzero(tops >= 0)
     top = tops[j, i]
     true = top.astype(float) if levels is None else np.minimum(levels[j, i], top)

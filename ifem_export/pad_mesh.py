@@ -123,7 +123,7 @@ class PadMesh:
         `levels` (ny + 1, nx + 1) is the height of the outer surface in layers; None puts it on
         the highest nodes. Raises MeshError where a column has a gap.
         """
-        surface, shift = surface_of(self.numbering, levels)
+        surface, shift = surface_of(np.asarray(self.occupancy), self.numbering, levels)
         return replace(self, surface=surface, surface_shift=shift)
 
     @property
