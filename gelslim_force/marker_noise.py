@@ -12,13 +12,15 @@ from gelslim_force.surface_motion import SurfaceMotion
 Array = NDArray[np.float64]
 _DRAWS, _SEED = 16, 20190521
 _FEWEST = 8
+_QUARTER = 0.31864
+"""Lower quartile of the absolute value of a standard normal number."""
 
 
 def noise_px(reference: ReferenceLattice, displacement_px: Array) -> float:
     """Standard deviation in px of one marker coordinate, from one frame's displacements (n, 2).
 
     A marker's displacement less the mean of its four lattice neighbours' has 1.25 times the
-    variance of one. The median of many does not see the few that curve around a contact. NaN
+    variance of one. The lower quartile does not see those that curve around a contact. NaN
     displacements are left out; NaN where fewer than eight markers have four neighbours.
     """
     near = reference.neighbours[:, :4]
@@ -28,7 +30,7 @@ def noise_px(reference: ReferenceLattice, displacement_px: Array) -> float:
     off = off[np.isfinite(off).all(axis=1)]
     if len(off) < _FEWEST:
         return float("nan")
-    return float(np.median(np.abs(off)) / 0.6745 / np.sqrt(1.25))
+    return float(np.quantile(np.abs(off), 0.25) / _QUARTER / np.sqrt(1.25))
 
 
 def node_noise_n_per_px(law: SurfaceForce, motion: SurfaceMotion) -> Array:

@@ -23,6 +23,8 @@ from gelslim_force.reference_lattice import ReferenceLattice
 from gelslim_force.tracks import Tracks
 from ifem_export.marker_grid import ANCHOR_LARGE, MarkerGrid
 
+_LEAST_TO_FOLLOW = 0.25
+"""Share of the markers that a full search must find for the next frame to go on from it."""
 Route = Literal["near", "full", "registered"]
 """How a frame's markers were found: near predictions, in the whole frame, or by the anchors."""
 
@@ -119,7 +121,10 @@ class Tracker:
             result = self._near(image, expected)
         if result is None:
             result = self._full(image, expected)
-            self._age, self._usual = 0, int(result.tracks.tracked.sum())
+            # A frame that shows next to nothing says nothing about where to look in the next one.
+            blind = result.tracks.coverage < _LEAST_TO_FOLLOW
+            self._age = self._settings.full_every if blind else 0
+            self._usual = int(result.tracks.tracked.sum())
         self._age += 1
         self._remember(result)
         return result
