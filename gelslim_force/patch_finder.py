@@ -11,15 +11,19 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from gelslim_force.contact_patch import ContactPatch
+from gelslim_force.gel_bins import bin_sizes, gel_places, near_surface
 from gelslim_force.indenter import Flat, Indenter
 from gelslim_force.patch_outline import fit_circle, fit_strip
-from gelslim_force.patch_place import flat_patch, rim_share
+from gelslim_force.patch_place import flat_patch, rim_share, strip_covariance, strip_patch
 from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit
 from gelslim_force.shading_change import ShadingChange, ShadingReference
 from gelslim_optics.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+PASSES = 3
+CUT_ERROR = 0.05
+"""Relative error of a size of which all of the rim is hidden, over that of none."""
 STARTS = ((0.7, 0.5), (0.85, 1.5), (1.0, 4.0))
 """Sizes, over the outline's, and decays that the fit to the shading starts from."""
 
@@ -47,7 +51,7 @@ class PatchSettings:
     """Share of the change that a fit to the shading must explain, else the outline stands."""
     outline_error: float = 0.15
     """Relative error of a size that rests on the outline alone: the light changes beside it too."""
-    shading_error: float = 0.015
+    shading_error: float = 0.01
     """Relative error of a size from the shading: the law of the slope beside it is not exact."""
 
     def __post_init__(self) -> None:
@@ -87,11 +91,13 @@ class PatchFinder:
         bin_px = max(2, round(picture.shape[1] / 160)) if picture.ndim >= 2 else 2
         self._radius = np.ascontiguousarray(radius * 1.5 + 1.0)
         self._light = ShadingReference(picture, markers, self._radius, bin_px)
-        self._x, self._y, self._lean, self._growth = _places(self._light, camera, mm_per_px)
-        self._bin_mm = _bin_sizes(self._x, self._y)
+        self._x, self._y, self._lean, self._growth = gel_places(self._light, camera, mm_per_px)
+        self._bin_mm = bin_sizes(self._x, self._y)
         self._light.on_pad &= np.isfinite(self._x)
         if surface_mm is not None:
-            self._light.on_pad &= _near(self._x, self._y, np.asarray(surface_mm, dtype=float))
+            self._light.on_pad &= near_surface(
+                self._x, self._y, np.asarray(surface_mm, dtype=float)
+            )
 
     @cached_property
     def _pad(self) -> cKDTree:
@@ -172,7 +178,7 @@ class PatchFinder:
                 (offset, half, angle), found = fit_strip(points)
                 angle = self._known_axis(angle)
                 patch = strip_patch(offset, half, angle, inside.mean(axis=0))
-                covariance[:] = _strip_covariance(found, angle)
+                covariance[:] = strip_covariance(found, angle)
             else:
                 (x, y, half), found = fit_circle(points)
                 patch = ContactPatch("disc", np.array([x, y]), float(half))
@@ -188,40 +194,46 @@ class PatchFinder:
 
     def _refined(self, start: ContactPatch, light: ShadingChange) -> ContactPatch:
         """The outline's patch moved to where the shading puts its rim, if it tells."""
-        window = self._window(start, light)
-        if window is None:
-            return start
         known = getattr(self.indenter, "radius_mm", None)
         curvature = 1 / known if known else 0.0
-        # The light changes beside the patch as well: the outline lies outside the rim.
-        turn = np.deg2rad(start.angle_deg)
-        across = start.centre_mm @ np.array([-np.sin(turn), np.cos(turn)])
-        first = [across, turn] if self._strip else list(start.centre_mm)
-        blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
-        blur = float(np.hypot(window.bin_mm / 2, blur))
-        begins = [np.array([*first, k * start.size_mm, q]) for k, q in STARTS]
+        patch = start
+        begins = [_values(start, k, q) for k, q in STARTS]
         if self._last is not None:
             begins = [self._last, *begins]
-        fit = best_shading_fit(window, begins, self._strip, curvature, blur)
-        self._last = None if fit is None else fit.values
+        self._last, fit = None, None
+        for _ in range(PASSES):
+            window = self._window(patch, light)
+            if window is None:
+                return start
+            blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
+            blur = float(np.hypot(window.bin_mm / 2, blur))
+            fit = best_shading_fit(window, begins, self._strip, curvature, blur)
+            if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
+                return start
+            before, patch = patch, self._from_fit(fit, patch, curvature, window.bin_mm)
+            shift = np.linalg.norm(patch.centre_mm - before.centre_mm) / before.size_mm
+            if shift < 0.3 and 0.7 < patch.size_mm / before.size_mm < 1.15:
+                break
+            # What the edge cuts looks small at first: look again, further out.
+            begins = [fit.values, _values(patch, 1.0, 1.5), _values(patch, 1.3, 1.5)]
         if fit is None or fit.explained < self.settings.least_explained:
             return start
-        if not 0.5 < fit.values[2] / start.size_mm < 1.5:
-            return start
-        return self._from_fit(fit, start, curvature, window.bin_mm)
+        self._last = fit.values
+        return patch
 
     def _from_fit(
         self, fit: ShadingFit, start: ContactPatch, curvature: float, bin_mm: float
     ) -> ContactPatch:
         size = float(fit.values[2])
         extra = np.zeros((4, 4))
-        extra[2, 2] = (self.settings.shading_error * size) ** 2 + (0.1 * bin_mm) ** 2
-        extra[:2, :2] = np.eye(2) * ((0.01 * size) ** 2 + (0.1 * bin_mm) ** 2)
+        share = self.settings.shading_error
+        extra[2, 2] = (share * size) ** 2 + (0.05 * bin_mm) ** 2
+        extra[:2, :2] = np.eye(2) * ((0.6 * share * size) ** 2 + (0.05 * bin_mm) ** 2)
         if self._strip:
             offset, turn = float(fit.values[0]), float(fit.values[1])
             patch = strip_patch(offset, size, turn, start.centre_mm)
             found = fit.covariance[np.ix_([0, 2, 1], [0, 2, 1])]
-            covariance = _strip_covariance(found, turn) + extra
+            covariance = strip_covariance(found, turn) + extra
         else:
             patch = ContactPatch("disc", fit.values[:2].copy(), size)
             covariance = np.zeros((4, 4))
@@ -276,6 +288,15 @@ class PatchFinder:
         return float(self._bin_mm[self._nearest(patch.centre_mm)])
 
 
+def _values(patch: ContactPatch, scale: float, decay: float) -> Array:
+    """Start (4,) of the fit to the shading from a patch."""
+    if patch.kind == "disc":
+        return np.array([*patch.centre_mm, scale * patch.size_mm, decay])
+    turn = np.deg2rad(patch.angle_deg)
+    across = float(patch.centre_mm @ np.array([-np.sin(turn), np.cos(turn)]))
+    return np.array([across, turn, scale * patch.size_mm, decay])
+
+
 def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
     """The strongest group, with those no less than a fifth as strong and no further than its size.
 
@@ -287,22 +308,6 @@ def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
     others = np.unique(labels[near])
     strong = [k for k in others if k > 0 and score[k - 1] >= 0.2 * score[best - 1]]
     return np.isin(labels, strong)
-
-
-def strip_patch(offset: float, half: float, angle: float, near: Array) -> ContactPatch:
-    """Strip whose centre is the point of its middle line next to `near` (2,)."""
-    across = np.array([-np.sin(angle), np.cos(angle)])
-    centre = near + (offset - near @ across) * across
-    return ContactPatch("strip", centre, float(half), float(np.rad2deg(angle)))
-
-
-def _strip_covariance(found: Array, angle: float) -> Array:
-    """(4, 4) from that (3, 3) of offset, half-width and angle: nothing is known along the strip."""
-    across = np.array([-np.sin(angle), np.cos(angle)])
-    spread = np.zeros((4, 3))
-    spread[:2, 0] = across
-    spread[2, 1] = spread[3, 2] = 1.0
-    return np.asarray(spread @ found @ spread.T)
 
 
 def _with(
@@ -319,50 +324,9 @@ def _with(
 
 
 def _finished(patch: ContactPatch, share: float, contrast: float) -> ContactPatch:
-    return replace(patch, rim_share=share, contrast=contrast)
-
-
-def _places(
-    light: ShadingReference, camera: VirtualCamera | None, mm_per_px: float
-) -> tuple[Array, Array, Array, Array]:
-    """x, y (rows, columns) of the bins on the rest surface, lean (…, 2) and growth per mm."""
-    pixels = light.centres_px()
-    if camera is None:
-        height, width = light.image.shape[:2]
-        points = (pixels - [(width - 1) / 2, (height - 1) / 2]) * mm_per_px
-        x, y = (points[:, k].reshape(light.shape) for k in (0, 1))
-        return x, y, np.zeros((*light.shape, 2)), np.zeros(light.shape)
-    expected = (camera.image_height_px, camera.image_width_px)
-    if light.image.shape[:2] != expected:
-        raise ValueError(
-            f"the reference frame is {light.image.shape[1]} x {light.image.shape[0]} px, the "
-            f"camera's pictures are {expected[1]} x {expected[0]} px: use frames of this camera"
-        )
-    depth = 0.2
-    at_rest = camera.backproject(pixels, 0.0)[:, :2]
-    below = camera.backproject(pixels, -depth)[:, :2]
-    lean = ((at_rest - below) / depth).reshape(*light.shape, 2)
-    x, y = (at_rest[:, k].reshape(light.shape) for k in (0, 1))
-    sunk = below.reshape(*light.shape, 2)
-    before = _bin_sizes(sunk[..., 0], sunk[..., 1])
-    growth = (1 - before / _bin_sizes(x, y)) / depth
-    return x, y, lean, growth
-
-
-def _bin_sizes(x: Array, y: Array) -> Array:
-    """Side (rows, columns) of the square of a bin's area on the gel."""
-    xi, xj = np.gradient(x)
-    yi, yj = np.gradient(y)
-    return np.sqrt(np.abs(xi * yj - xj * yi))
-
-
-def _near(x: Array, y: Array, surface_mm: Array) -> Mask:
-    """Bins within half a node spacing, along both axes, of a surface node."""
-    nodes = surface_mm[:, :2]
-    steps = [np.diff(np.unique(np.round(v, 9))).min() for v in nodes.T]
-    places = np.column_stack([x.ravel(), y.ravel()]) / steps
-    finite = np.isfinite(places).all(axis=1)
-    out = np.zeros(len(places), dtype=bool)
-    apart, _ = cKDTree(nodes / steps).query(places[finite], p=np.inf)
-    out[finite] = apart <= 0.5
-    return out.reshape(x.shape)
+    """With what a hidden part of the rim adds to the errors: it bends place and size together."""
+    covariance = patch.covariance.copy()
+    if np.any(covariance[2, 2] > 0):
+        hidden = (CUT_ERROR * share * patch.size_mm) ** 2
+        covariance[:3, :3] += np.diag([hidden / 2, hidden / 2, hidden])
+    return replace(patch, covariance=covariance, rim_share=share, contrast=contrast)

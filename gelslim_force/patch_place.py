@@ -67,6 +67,22 @@ def flat_patch(punch: Flat, rim_mm: Array, inside_mm: Array) -> ContactPatch | N
     )
 
 
+def strip_patch(offset: float, half: float, angle: float, near: Array) -> ContactPatch:
+    """Strip whose centre is the point of its middle line next to `near` (2,)."""
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    centre = near + (offset - near @ across) * across
+    return ContactPatch("strip", centre, float(half), float(np.rad2deg(angle)))
+
+
+def strip_covariance(found: Array, angle: float) -> Array:
+    """(4, 4) from that (3, 3) of offset, half-width and angle: nothing is known along the strip."""
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    spread = np.zeros((4, 3))
+    spread[:2, 0] = across
+    spread[2, 1] = spread[3, 2] = 1.0
+    return np.asarray(spread @ found @ spread.T)
+
+
 def rim_points(patch: ContactPatch, reach_mm: float) -> Array:
     """Points (n, 2) along the rim; of a strip, within `reach_mm` of its centre."""
     if patch.kind == "disc":

@@ -114,7 +114,7 @@ def _settle(
             step = np.clip(step, -0.4 * theta[2] * scale, 0.4 * theta[2] * scale)
             trial = theta + step
             trial[2] = max(trial[2], 0.3 * theta[2])
-            trial[3] = min(max(trial[3], 0.0), 8.0)
+            trial[3] = min(max(trial[3], 0.0), 5.0)
             tried = _residual(window, trial, strip, curvature_per_mm, blur_mm)
             new = float((tried**2).sum())
             if new <= cost:

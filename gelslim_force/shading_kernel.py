@@ -28,7 +28,8 @@ def block_discs(blocked: Any, centres: Any, radius: Any) -> None:
 def sums_in_bins(first: Any, second: Any, blocked: Any, size: Any, sums: Any, counts: Any) -> None:
     """Sums (2, rows, columns, c) of two images (h, w, c) uint8 over the same free pixels.
 
-    Blocked pixels, and those where every channel glares in one of the two, are left out of both; `counts` (rows, columns) are those left in.
+    Blocked pixels, and those where every channel glares in one of the two, are left out of
+    both; `counts` (rows, columns) are those left in.
     """
     _, rows, columns, channels = sums.shape
     sums[:] = 0

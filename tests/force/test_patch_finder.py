@@ -1,0 +1,204 @@
+"""The contact patch recovered from drawn frames whose surface is a solved contact."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded, sight
+
+from gelslim_force.indenter import Cylinder, Flat, Sphere
+from gelslim_force.patch_finder import PatchFinder, PatchSettings
+from gelslim_force.patch_outline import circle_start, fit_circle, fit_strip
+
+BALL_MM = 10.0
+
+
+@cache
+def reference():
+    return shaded(seed=0)
+
+
+@cache
+def pad_nodes():
+    x, y = np.meshgrid(np.arange(-PAD_MM[0], PAD_MM[0] + 0.1, 0.5),
+                       np.arange(-PAD_MM[1], PAD_MM[1] + 0.1, 0.5))  # fmt: skip
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def finder(indenter=None, **kwargs):
+    frame = reference()
+    return PatchFinder(
+        CAMERA,
+        frame.image,
+        frame.centres_px,
+        marker_radius_px=frame.diameter_px / 2,
+        surface_mm=pad_nodes(),
+        indenter=indenter or Sphere(BALL_MM),
+        **kwargs,
+    )
+
+
+def rim_height(radius):
+    return BALL_MM - np.sqrt(BALL_MM**2 - radius**2) - contact(radius, BALL_MM).depth_mm
+
+
+def test_place_and_size_of_a_sphere_within_the_stated_error():
+    """Monte Carlo over place, size, noise and blur: errors over their standard deviations."""
+    rng = np.random.default_rng(4)
+    scores, errors = [], []
+    for k in range(20):
+        radius = (1.4, 2.0, 2.6, 3.2)[k % 4]
+        centre = rng.uniform(-5, 5, 2)
+        sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+        noise, blur = (2.0, 4.0, 6.0)[k % 3], (0.7, 1.5)[k % 2]
+        patch = finder().find(shaded((sx, sy), seed=k, noise=noise, blur=blur).image)
+        assert patch is not None
+        assert patch.method == "shading"
+        assert patch.rim_share < 0.05
+        patch = patch.at_height(rim_height(radius))
+        off = np.array([*(patch.centre_mm - centre), patch.size_mm - radius])
+        scores.append(off / np.sqrt(np.diag(patch.covariance)[:3]))
+        errors.append([*off[:2], off[2] / radius])
+    scores, errors = np.array(scores), np.array(errors)
+    print(np.sqrt((scores**2).mean(axis=0)), np.abs(scores).max(axis=0),
+          np.sqrt((errors**2).mean(axis=0)), errors.mean(axis=0))  # fmt: skip
+    assert np.abs(scores).max() < 3.5
+    spread = np.sqrt((scores**2).mean(axis=0))
+    assert (spread < 1.4).all()
+    assert (spread > 0.1).all()
+    assert np.sqrt((errors[:, 2] ** 2).mean()) < 0.025
+    assert np.sqrt((errors[:, :2] ** 2).mean()) < 0.05
+
+
+@pytest.mark.parametrize("noise", [1.0, 4.0, 8.0])
+def test_no_contact_no_patch(noise):
+    assert finder().find(shaded(seed=3, noise=noise).image) is None
+    assert finder().find(shaded(seed=4, noise=noise, brightness=0.8).image) is None
+    assert finder().find(shaded(seed=5, noise=noise, brightness=1.15).image) is None
+    slid = np.tile([0.15, -0.1], (len(GRID), 1))
+    frame = shaded(seed=6, noise=noise, moved_mm=slid)
+    assert finder().find(frame.image, frame.centres_px) is None
+
+
+def test_contact_in_other_light_with_moved_markers():
+    centre, radius = np.array([1.5, -2.0]), 2.2
+    sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+    away = GRID.positions_mm - centre
+    near = np.exp(-((away**2).sum(axis=1) / 8))[:, None]
+    frame = shaded((sx, sy), seed=8, brightness=0.85, moved_mm=0.3 * near * np.array([1.0, 0.3]))
+    patch = finder().find(frame.image, frame.centres_px).at_height(rim_height(radius))
+    sigma = np.sqrt(np.diag(patch.covariance))
+    assert np.abs(patch.centre_mm - centre).max() < 3 * sigma[:2].max()
+    assert abs(patch.size_mm - radius) < 3 * sigma[2]
+    assert patch.contrast > 2
+
+
+@pytest.mark.parametrize(
+    "centre", [(9.8, 1.0), (-10.4, -3.0), (2.0, 9.6), (-2.0, 9.6), (0.0, 9.0), (0.0, -9.6)]
+)
+def test_patch_cut_by_the_pads_edge(centre):
+    """Only a part is on the pad: fitted from that, with a larger error."""
+    radius = 2.4
+    sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+    inner = pressed_heights((centre[0] * 0.4, centre[1] * 0.4), radius, BALL_MM)
+    patch = finder().find(shaded((sx, sy), seed=9).image)
+    whole = finder().find(shaded(inner[:2], seed=9).image)
+    assert patch is not None
+    assert 0.1 < patch.rim_share < 0.75
+    assert whole.rim_share < patch.rim_share
+    patch = patch.at_height(rim_height(radius))
+    sigma = np.sqrt(np.diag(patch.covariance))
+    assert (np.abs(patch.centre_mm - centre) < 3.5 * sigma[:2]).all()
+    assert abs(patch.size_mm - radius) < 3.5 * sigma[2]
+    assert sigma[2] > whole.sigma_mm
+
+
+def test_strip_of_a_cylinder():
+    """Slopes of a line contact on a half-space, laid at an angle."""
+    half, offset, angle = 1.6, 0.8, np.deg2rad(20.0)
+    rest, _ = sight()
+    across = np.cos(angle) * rest[:, 1] - np.sin(angle) * rest[:, 0] - offset
+    out = np.maximum(np.abs(across) / half, 1.0)
+    ratio = np.where(np.abs(across) < half, across / half,
+                     np.sign(across) * (out - np.sqrt(out**2 - 1)))  # fmt: skip
+    slope = ratio * half / 8.0
+    frame = shaded((-np.sin(angle) * slope, np.cos(angle) * slope), seed=11)
+    patch = finder(Cylinder(8.0)).find(frame.image)
+    assert patch is not None
+    assert patch.kind == "strip"
+    sigma = np.sqrt(np.diag(patch.covariance))
+    normal = np.array([-np.sin(angle), np.cos(angle)])
+    turn = (patch.angle_deg - 20.0 + 90) % 180 - 90
+    assert abs(turn) < max(3 * np.rad2deg(sigma[3]), 1.0)
+    assert abs(patch.size_mm - half) < 3.5 * sigma[2]
+    assert (
+        abs(patch.centre_mm @ normal - offset)
+        < 3.5 * np.sqrt(normal @ patch.covariance[:2, :2] @ normal) + 0.03
+    )
+    assert sigma[2] < 0.1 * half
+
+
+def test_flat_punch_is_placed_by_its_outline():
+    """Slopes beside a rectangular punch, falling off within a gel thickness."""
+    rest, _ = sight()
+    angle, centre, a, b = np.deg2rad(30.0), np.array([1.0, 0.5]), 2.0, 3.5
+    dx, dy = (rest - centre).T
+    u = np.cos(angle) * dx + np.sin(angle) * dy
+    v = np.cos(angle) * dy - np.sin(angle) * dx
+    pu, pv = np.maximum(np.abs(u) - a, 0), np.maximum(np.abs(v) - b, 0)
+    steep = 0.5 * np.exp(-np.hypot(pu, pv) / 0.4) * (np.hypot(pu, pv) > 0)
+    size = np.maximum(np.hypot(pu, pv), 1e-9)
+    su, sv = steep * pu / size * np.sign(u), steep * pv / size * np.sign(v)
+    slopes = np.cos(angle) * su - np.sin(angle) * sv, np.sin(angle) * su + np.cos(angle) * sv
+    punch = Flat(half_sizes_mm=(a, b))
+    patch = finder(punch).find(shaded(slopes, seed=12).image)
+    assert patch is not None
+    sigma = np.sqrt(np.diag(patch.covariance))
+    assert (np.abs(patch.centre_mm - centre) < 3.5 * sigma[:2]).all()
+    turn = (patch.angle_deg - 30.0 + 90) % 180 - 90
+    assert abs(turn) < 6
+    assert (patch.size_mm, patch.length_mm) == (a, b)
+
+
+def test_circle_and_strip_fits_have_honest_errors():
+    rng = np.random.default_rng(3)
+    scores = []
+    for _ in range(60):
+        turn = rng.uniform(0, 2.2, 40)
+        points = [1.0, -2.0] + 3 * np.column_stack([np.cos(turn), np.sin(turn)])
+        values, covariance = fit_circle(points + rng.normal(0, 0.02, points.shape))
+        scores.append((values - [1.0, -2.0, 3.0]) / np.sqrt(np.diag(covariance)))
+    spread = np.sqrt(np.mean(np.square(scores), axis=0))
+    # neighbouring points are taken to err together, which these do not: 1/√2
+    assert np.allclose(spread, 0.7, atol=0.25)
+    exact = [4.0, 1.0] + 2 * np.column_stack([np.cos(turn), np.sin(turn)])
+    np.testing.assert_allclose(circle_start(exact), [4, 1, 2], rtol=1e-9)
+    along, side = rng.uniform(-8, 8, 60), rng.choice([-1.2, 1.2], 60)
+    c, s = np.cos(0.5), np.sin(0.5)
+    points = np.column_stack([c * along - s * (side + 0.4), s * along + c * (side + 0.4)])
+    values, _ = fit_strip(points + rng.normal(0, 0.01, points.shape))
+    turn = (values[2] - 0.5 + np.pi / 2) % np.pi - np.pi / 2
+    flip = np.cos(values[2] - 0.5)
+    np.testing.assert_allclose([flip * values[0], values[1], turn], [0.4, 1.2, 0], atol=0.02)
+    with pytest.raises(ValueError, match="line"):
+        circle_start(np.column_stack([np.arange(5.0), np.arange(5.0)]))
+    with pytest.raises(ValueError, match="three"):
+        circle_start(np.zeros((2, 2)))
+
+
+def test_unfit_pictures_are_refused():
+    frame = reference()
+    with pytest.raises(ValueError, match="the reference"):
+        finder().find(frame.image[::2, ::2])
+    with pytest.raises(ValueError, match="uint8"):
+        finder().find(frame.image.astype(float))
+    with pytest.raises(ValueError, match="dark"):
+        PatchFinder(CAMERA, np.zeros_like(frame.image), frame.centres_px)
+    with pytest.raises(ValueError, match="frames of this camera"):
+        PatchFinder(CAMERA, frame.image[:240, :320], frame.centres_px)
+    with pytest.raises(ValueError, match="least_change"):
+        PatchSettings(least_change=0.0)
+    assert finder().find(np.zeros_like(frame.image)) is None
+    assert finder().find(np.full_like(frame.image, 255)) is None
