@@ -32,4 +32,5 @@ def replace_file(path: str | os.PathLike[str], data: bytes) -> None:
 def json_bytes(record: Mapping[str, Any]) -> bytes:
     """Return indented UTF-8 JSON with a final newline; NaN is not allowed in it."""
     text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
-    return (text + "\n").encode("utf-8")
+    # A lone surrogate, as of a file name in another code, becomes its JSON escape.
+    return (text + "\n").encode("utf-8", "backslashreplace")

@@ -36,7 +36,7 @@ class CdrMessage:
 
     def string(self, text: str) -> None:
         """Add a string."""
-        data = text.encode("utf-8") + b"\0"
+        data = text.encode("utf-8", "backslashreplace").replace(b"\0", b"") + b"\0"
         self.uint32(len(data))
         self._parts += data
 

@@ -182,13 +182,16 @@ def _sample(canvas: Canvas, y: float, length: float, colour: Colour, text: str) 
     canvas.text((_LEFT + 102, y + 5), text, WHITE, 14)
 
 
+def _shown(text: str) -> str:
+    """Without letters that no font has."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 def _problems(canvas: Canvas, result: FrameResult, y: float, height: int) -> None:
     if not result.problems:
         return
     _rule(canvas, y - 12)
-    lines = [
-        line for problem in result.problems for line in textwrap.wrap(problem, 36) or [problem]
-    ]
+    lines = [line for problem in result.problems for line in textwrap.wrap(_shown(problem), 36)]
     room = max(1, int((height - y - 8) // 19))
     if len(lines) > room:
         lines = [*lines[: room - 1], "..."]

@@ -76,7 +76,7 @@ class McapRecording:
             for topic, data in messages.items():
                 if data is not None:
                     self._writer.add_message(
-                        self._channels[topic], stamp, data, stamp, result.index % 2**32
+                        self._channels[topic], stamp, data, stamp, int(result.index) % 2**32
                     )
             self._file.flush()
         except OSError as error:

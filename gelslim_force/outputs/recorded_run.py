@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from gelslim_force.frame_result import FrameResult
-from gelslim_force.outputs.field_chunk import FieldChunk, read_chunk, stack
+from gelslim_force.outputs.field_chunk import FieldChunk, Format, read_chunk, stack
 from gelslim_force.outputs.frame_journal import read_journal
 from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.packed_frame import PackedFrame
@@ -47,10 +48,11 @@ class RecordedRun:
     def chunks(self) -> Iterator[FieldChunk]:
         """Yield the chunks of fields in order. Raises OutputError for a damaged one."""
         for path in field_files(self.folder):
-            if path.suffix == ".part":
-                yield from _journal_chunks(path)
-            else:
-                yield read_chunk(path)
+            frames = _journal(path)[0] if path.suffix == ".part" else None
+            if frames is None:
+                yield read_chunk(_now(path))
+            elif frames:
+                yield stack(frames)
 
     def results(self) -> Iterator[FrameResult]:
         """Yield the frames in order, as they were appended, up to the precision of the run."""
@@ -96,17 +98,24 @@ def field_files(folder: Path) -> list[Path]:
     return [best[number] for number in sorted(best)]
 
 
-def _journal(path: Path) -> tuple[list[PackedFrame], bool]:
+def _now(path: Path) -> Path:
+    """The chunk that took a journal's place since it was listed, where the run still goes on."""
+    if path.suffix == ".part" and not path.exists():
+        for suffix in get_args(Format):
+            chunk = path.with_suffix(f".{suffix}")
+            if chunk.exists():
+                return chunk
+    return path
+
+
+def _journal(path: Path) -> tuple[list[PackedFrame] | None, bool]:
+    """Frames of a journal and whether its end is torn; None where its chunk has taken its place."""
     try:
         return read_journal(path)
     except OSError as error:
+        if _now(path) != path:
+            return None, False
         raise disk_error(path, "reading fields", error) from error
-
-
-def _journal_chunks(path: Path) -> Iterator[FieldChunk]:
-    frames = _journal(path)[0]
-    if frames:
-        yield stack(frames)
 
 
 def _read_stages(path: Path) -> tuple[dict[int, dict[str, float]], bool]:
@@ -122,7 +131,7 @@ def _read_stages(path: Path) -> tuple[dict[int, dict[str, float]], bool]:
         try:
             line = json.loads(text)
             index = int(line.pop("index"))
-            times[index] = {str(k): float(v) for k, v in line.items()}
+            times[index] = {str(k): math.nan if v is None else float(v) for k, v in line.items()}
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise OutputError(f"{path}, line {number}: damaged ({error})") from error
     return times, bool(rest)

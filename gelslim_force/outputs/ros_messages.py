@@ -61,7 +61,7 @@ def force_field(result: FrameResult, frame_id: str) -> bytes:
     field, tracks = result.field, result.tracks
     message = CdrMessage()
     _add_header(message, result, frame_id)
-    message.uint32(result.index % 2**32)
+    message.uint32(int(result.index) % 2**32)
     message.boolean(result.normal_known)
     message.array(_wrench(result.wrench), "<f8")
     message.array(_covariance(result.wrench), "<f8")

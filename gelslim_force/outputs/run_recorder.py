@@ -140,15 +140,15 @@ class RunRecorder:
             )
         try:
             self._writer.check()
-            self._csv.append(wrench_csv.line(result).encode())
+            self._csv.append(wrench_csv.line(result).encode("utf-8", wrench_csv.ESCAPE))
             if result.stage_ms:
-                stages = {"index": result.index, **plain(result.stage_ms)}
+                stages = {"index": int(result.index), **plain(result.stage_ms)}
                 self._stages.append((json.dumps(stages) + "\n").encode())
             if self._keep.fields:
                 self._append_fields(pack(result, self._keep.precision))
         except (OutputError, OSError) as error:
             raise self._failed(f"writing frame {result.index}", error) from error
-        self._last_index = result.index
+        self._last_index = int(result.index)
         self._counts.add(result)
 
     def finish(self, reason: str = "") -> None:

@@ -28,6 +28,8 @@ _STATUS = {
     "lost": MarkerStatus.LOST,
     "rejected": MarkerStatus.REJECTED,
 }
+ESCAPE = "backslashreplace"
+"""What becomes of letters that UTF-8 has not, such as those of a file name in another code."""
 NUMBERS = (
     "index",
     "time_s",
@@ -104,7 +106,7 @@ def line(result: FrameResult) -> str:
 def write_wrenches(path: str | os.PathLike[str], results: Iterable[FrameResult]) -> None:
     """Write a file in one go. Raises OutputError."""
     try:
-        with open(path, "w", encoding="utf-8", newline="") as out:
+        with open(path, "w", encoding="utf-8", errors=ESCAPE, newline="") as out:
             out.write(header())
             out.writelines(line(result) for result in results)
     except OSError as error:
@@ -160,7 +162,7 @@ def _numbers(result: FrameResult) -> list[float]:
             field.misfit,
         ]
     return [
-        result.index,
+        int(result.index),
         result.time_s,
         *(unknown if wrench is None else wrench.vector),
         *(unknown if wrench is None else _sigma(wrench.covariance)),

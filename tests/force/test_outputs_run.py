@@ -307,3 +307,51 @@ def test_manifest_is_strict_json(tmp_path: Path) -> None:
     )
     assert record["counts"]["first_time_s"] is None
     assert np.isnan(next(iter(read_run(folder).results())).time_s)
+
+
+def test_odd_values_do_not_stop_a_run(tmp_path: Path) -> None:
+    """Indices of NumPy, a stage time that is NaN, a file name that is not UTF-8."""
+    odd = FrameResult(
+        index=np.int64(3),  # type: ignore[arg-type]
+        time_s=np.float64(0.5),
+        stage_ms={"detect": float("nan"), "match": np.float64(1.5)},
+        problems=("b\udcff.png: not a picture",),
+        extra={"mask": np.array([True, False]), "file": Path("a"), "radius_mm": float("nan")},
+    )
+    run = read_run(recorded(tmp_path, [odd], RecorderSettings()))
+    assert (
+        (tmp_path / "wrenches.csv").read_text(encoding="utf-8").splitlines()[1].startswith("3,0.5,")
+    )
+    assert run.wrenches.problems == ("b\\udcff.png: not a picture",)
+    back = next(iter(run.results()))
+    assert back.problems == odd.problems
+    assert back.extra == {"mask": [True, False], "file": "a", "radius_mm": None}
+    assert np.isnan(back.stage_ms["detect"])
+    assert back.stage_ms["match"] == 1.5
+    assert list(run.manifest["counts"]["problems"]) == list(odd.problems)
+
+
+def test_a_run_can_be_read_while_it_goes_on(tmp_path: Path) -> None:
+    with RunRecorder(tmp_path, keep=RecorderSettings(frames_per_chunk=3)) as run:
+        for k in range(12):
+            run.append(samples.frame(k))
+            back = read_run(tmp_path)
+            assert [r.index for r in back.results()] == list(range(k + 1))
+            assert not back.complete
+    assert read_run(tmp_path).complete
+
+
+def test_a_journal_that_becomes_a_chunk_while_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The listing is from before the chunk took the journal's place."""
+    from gelslim_force.outputs import recorded_run
+
+    run = read_run(recorded(tmp_path, MIXED, RecorderSettings()))
+    listed = [tmp_path / "fields_00000.part"]
+    monkeypatch.setattr(recorded_run, "field_files", lambda _: listed)
+    assert [r.index for r in run.results()] == [0, 1, 2, 4, 5]
+    assert read_run(tmp_path).torn == ()
+    (tmp_path / "fields_00000.npz").unlink()
+    with pytest.raises(OutputError, match="reading fields; the folder is gone"):
+        list(run.results())
