@@ -83,10 +83,9 @@ def built_deviation(
 
 
 def lean_mm_per_mm(camera: VirtualCamera, flat_mm: Array) -> Array:
-    """Sideways motion (n, 2) on the rest plane that a motion of 1 mm along z looks like."""
+    """Return the motion (n, 2) on the rest plane that a motion of 1 mm along z looks like."""
     motion = camera.jacobian_3d(flat_mm)
-    lean: Array = np.linalg.solve(motion[:, :, :2], motion[:, :, 2:])[:, :, 0]
-    return lean
+    return np.asarray(np.linalg.solve(motion[:, :, :2], motion[:, :, 2:])[:, :, 0], dtype=float)
 
 
 def _uncertainty(fit: CameraFit, flat: Array) -> tuple[float, float]:
@@ -97,12 +96,11 @@ def _uncertainty(fit: CameraFit, flat: Array) -> tuple[float, float]:
         step = np.zeros(len(fit.tolerance))
         step[k] = _STEP * unit
         low, high = (deviated_camera(fit.design, fit.values + s * step) for s in (-1, 1))
-        image = (high.project(flat) - low.project(flat)) / (2 * step[k])
-        places.append(np.einsum("nij,nj->ni", to_gel, image))
+        moved = (high.project(flat) - low.project(flat)) / (2 * step[k])
+        places.append((to_gel @ moved[:, :, None])[:, :, 0])
         leans.append((lean_mm_per_mm(high, flat) - lean_mm_per_mm(low, flat)) / (2 * step[k]))
-    return _spread(np.stack(places, -1), fit.covariance), _spread(
-        np.stack(leans, -1), fit.covariance
-    )
+    place, lean = (_spread(np.stack(v, axis=-1), fit.covariance) for v in (places, leans))
+    return place, lean
 
 
 def _spread(slopes: Array, covariance: Array) -> float:

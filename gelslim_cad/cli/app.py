@@ -11,6 +11,7 @@ from gelslim_cad.cli.build import build
 from gelslim_cad.cli.bundle import bundle
 from gelslim_cad.cli.bundle_export import bundle_export
 from gelslim_cad.cli.bundle_info import bundle_info
+from gelslim_cad.cli.calibrate import calibrate
 from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
@@ -60,6 +61,7 @@ for _command in (
     bundle,
     bundle_info,
     bundle_export,
+    calibrate,
     markers,
     light,
     schema,

@@ -68,7 +68,8 @@ def test_covariance_agrees_with_the_scatter():
         noise.append(fit.noise_px)
     # Squared distances are chi-square with 11 degrees of freedom: mean 11, sd of 40's mean 0.74.
     assert 8.8 < np.mean(distance) < 13.5
-    assert np.all(np.std(pulls, axis=0) > 0.7) and np.all(np.std(pulls, axis=0) < 1.4)
+    assert np.all(np.std(pulls, axis=0) > 0.7)
+    assert np.all(np.std(pulls, axis=0) < 1.4)
     assert np.mean(noise) == pytest.approx(0.15, rel=0.02)
 
 
