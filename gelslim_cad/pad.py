@@ -8,13 +8,15 @@ import json
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.gel_shape import GelShape
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.sight import camera_record
 from gelslim_cad.spec import Spec
 from ifem_export.bundle import Bundle, build_bundle
 from ifem_export.crop import CropReport
-from ifem_export.ladder import Ladder
+from ifem_export.crown import Paraboloid
+from ifem_export.ladder import REFERENCE_LAYERS, Ladder
 from ifem_export.marker_grid import MarkerGrid, build_marker_grid
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
@@ -49,18 +51,48 @@ def marker_grid(d: Dimensions) -> MarkerGrid:
 
 def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
     """Hex-8 mesh of the pad; nodes meet the markers where the cell size allows it."""
-    outline, thickness = pad_outline(d), d["design.gel.thickness_mm"]
+    outline, shape = pad_outline(d), GelShape.of(d)
+    cut = {
+        "crown": _crown(shape),
+        "weighting": d["mesh.weighting"],
+        "floor": d["mesh.least_fill"],
+    }
     if d["mesh.cells_along"] is not None:
         cells = (d["mesh.cells_along"], d["mesh.cells_across"], d["mesh.layers"])
-        return build_pad_mesh(outline, thickness, cells=cells)
+        return build_pad_mesh(outline, shape.thickness_mm, cells=cells, **cut)
     return build_pad_mesh(
         outline,
-        thickness,
+        shape.thickness_mm,
         pitch_mm=(d["pad_mesh.cell_x_mm"], d["pad_mesh.cell_y_mm"]),
         layers=d["mesh.layers"],
         align_to_mm=grid.positions_mm,
         alignment_tolerance_mm=None,
+        **cut,
     )
+
+
+def reference_mesh(d: Dimensions, mesh: PadMesh) -> PadMesh | None:
+    """Mesh of half the pitch and eight layers to measure a cut or crowned pad against.
+
+    None where the pad's own cells can be split.
+    """
+    if mesh.fill is None and mesh.surface_shift is None:
+        return None
+    shape = GelShape.of(d)
+    return build_pad_mesh(
+        pad_outline(d),
+        shape.thickness_mm,
+        pitch_mm=(mesh.cell_size_mm[0] / 2, mesh.cell_size_mm[1] / 2),
+        layers=max(REFERENCE_LAYERS, mesh.layers),
+        align_to_mm=mesh.nodes_mm[mesh.surface[:1]],
+        crown=_crown(shape),
+        weighting="volume_fraction",
+        floor=d["mesh.least_fill"],
+    )[0]
+
+
+def _crown(shape: GelShape) -> Paraboloid | None:
+    return Paraboloid(shape.crown_mm, shape.rim_mm) if shape.crown_mm > 0 else None
 
 
 def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NearestNodes, Outline]:

@@ -46,7 +46,7 @@ def bundle(
     from gelslim_cad.cli.output import require_pad_rules, written
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.pad import gel_material, make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.pad import gel_material, make_bundle, marker_grid, pad_mesh, reference_mesh
     from gelslim_cad.spec.reader import read_spec
     from ifem_export.bundle_io import write_bundle
     from ifem_export.ladder import chosen_rung, measure_ladder
@@ -61,7 +61,14 @@ def bundle(
     if ladder or allowed is not None or time_ms is not None:
         gel, element = gel_material(loaded.spec), loaded.spec.mesh.element
         with progress_bar(quiet=as_json) as tell:
-            measured = measure_ladder(mesh, gel, element, dense=dense, progress=tell)
+            measured = measure_ladder(
+                mesh,
+                gel,
+                element,
+                dense=dense,
+                progress=tell,
+                reference=reference_mesh(d, mesh),
+            )
         chosen = chosen_rung(measured, measured.balanced().label, allowed, time_ms)
     label = chosen.label if chosen is not None else ""
     folder = out or Path("out") / f"{loaded.spec.name}-bundle"

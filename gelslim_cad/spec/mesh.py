@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gelslim_cad.spec.base import Block
+from yaml_model.base import Block
 
 Count = Annotated[int, Field(ge=1, le=400)]
 
@@ -36,6 +36,17 @@ class Mesh(Block):
         default="bbar",
         description="Hex-8 element: full 2×2×2 integration, B-bar (mean dilatation) or "
         "incompatible modes (best in bending)",
+    )
+    weighting: Literal["cell_centre", "volume_fraction"] = Field(
+        default="cell_centre",
+        description="Cells that the gel's outline or crown cuts: kept or dropped whole by their "
+        "centre, or scaled by the share of their volume that the gel fills",
+    )
+    least_fill: float = Field(
+        default=0.01,
+        gt=0,
+        le=1,
+        description="Share of its volume below which volume_fraction drops a cell",
     )
 
     @model_validator(mode="after")
