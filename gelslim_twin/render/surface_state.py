@@ -1,0 +1,108 @@
+"""How the gel's outer surface is displaced at one instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+_EVEN = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceState:
+    """Displacement `displacement_mm` (ny, nx, 3) of material points on even axes (nx,), (ny,).
+
+    In between, cubic convolution (Keys 1981): continuous slopes, exact for linear fields and at
+    the nodes. Raises ValueError for axes that are not even, other shapes, values not finite.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    displacement_mm: Array
+
+    def __post_init__(self) -> None:
+        for name in ("x_mm", "y_mm", "displacement_mm"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+        for name in ("x_mm", "y_mm"):
+            _check_even(name, getattr(self, name))
+        shape = (len(self.y_mm), len(self.x_mm), 3)
+        if self.displacement_mm.shape != shape:
+            raise ValueError(f"displacement_mm is {self.displacement_mm.shape}: must be {shape}")
+        if not np.isfinite(self.displacement_mm).all():
+            raise ValueError("displacement_mm must be finite: fill the nodes beyond the outline")
+
+    @classmethod
+    def from_nodes(cls, nodes_mm: ArrayLike, displacement_mm: ArrayLike) -> SurfaceState:
+        """State from surface nodes (n, 2 or 3) of a regular mesh, displaced by (n, 3).
+
+        Places of the lattice without a node (beyond a rounded corner) take the nearest node's
+        displacement. Raises ValueError for nodes that are no even lattice.
+        """
+        from scipy.spatial import cKDTree
+
+        places = np.asarray(nodes_mm, dtype=float)[:, :2]
+        moved = np.asarray(displacement_mm, dtype=float)
+        if moved.shape != (len(places), 3):
+            raise ValueError(f"displacement of nodes {moved.shape}: must be ({len(places)}, 3)")
+        x, y = (np.unique(np.round(places[:, k], 9)) for k in (0, 1))
+        sites = np.column_stack([a.ravel() for a in np.meshgrid(x, y)])
+        _, nearest = cKDTree(places).query(sites)
+        return cls(x, y, moved[nearest].reshape(len(y), len(x), 3))
+
+    @classmethod
+    def at_rest(cls, length_mm: float, width_mm: float) -> SurfaceState:
+        """The undeformed pad."""
+        x, y = np.linspace(-1, 1, 3) * length_mm / 2, np.linspace(-1, 1, 3) * width_mm / 2
+        return cls(x, y, np.zeros((3, 3, 3)))
+
+    @property
+    def origin_mm(self) -> Array:
+        """The first node (2,)."""
+        return np.array([self.x_mm[0], self.y_mm[0]])
+
+    @property
+    def step_mm(self) -> Array:
+        """Distance between nodes (2,) along x and y."""
+        return np.array([np.ptp(a) / (len(a) - 1) for a in (self.x_mm, self.y_mm)])
+
+    @cached_property
+    def padded_mm(self) -> Array:
+        """Displacement with a ring of ghost nodes, continued linearly."""
+        u = np.pad(self.displacement_mm, ((1, 1), (1, 1), (0, 0)))
+        u[0], u[-1] = 2 * u[1] - u[2], 2 * u[-2] - u[-3]
+        u[:, 0], u[:, -1] = 2 * u[:, 1] - u[:, 2], 2 * u[:, -2] - u[:, -3]
+        return u
+
+    @cached_property
+    def moves(self) -> bool:
+        """Whether anything is displaced at all."""
+        return bool(np.any(self.displacement_mm))
+
+    def at(self, points_mm: Array) -> Array:
+        """Displacement (n, 3) of material points (n, 2); beyond the edge, that of the edge."""
+        from gelslim_twin.render.surface_kernel import displacement
+
+        points = np.ascontiguousarray(points_mm, dtype=float)
+        out = np.zeros((len(points), 3))
+        if self.moves:
+            displacement(self.padded_mm, self.origin_mm, self.step_mm, points, out)
+        return out
+
+    def carried(self, _centres_mm: Array, rims_mm: Array) -> Array:
+        """Displacement (m, k, 3) of points (m, k, 2) on the rims of dots."""
+        return self.at(rims_mm.reshape(-1, 2)).reshape(*rims_mm.shape[:2], 3)
+
+
+def _check_even(name: str, axis: Array) -> None:
+    if axis.ndim != 1 or len(axis) < 3:
+        raise ValueError(f"{name} of a surface must be three or more values, not {axis.shape}")
+    gaps = np.diff(axis)
+    if not (np.isfinite(axis).all() and gaps.min() > 0 and np.ptp(gaps) < _EVEN * gaps.mean() * 10):
+        raise ValueError(
+            f"{name} of a surface must increase in even steps: interpolate the displacement to an "
+            "even grid first"
+        )
