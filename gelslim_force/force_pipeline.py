@@ -177,7 +177,7 @@ class ForcePipeline:
             normal_known=known,
             stage_ms=clock.stages,
             problems=problems,
-            extra={} if reading is None else {"normal": reading},
+            extra={} if reading is None else {"normal": reading.summary()},
         )
 
     def _numbered(self, time_s: float | None, **found: Any) -> FrameResult:

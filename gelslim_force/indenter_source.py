@@ -46,6 +46,20 @@ class NormalReading:
         """Whether there is a motion."""
         return not self.problem
 
+    def summary(self) -> dict[str, object]:
+        """Patch and depth as plain numbers."""
+        if self.patch is None:
+            return {"touched": False}
+        return {
+            "touched": True,
+            "kind": self.patch.kind,
+            "centre_mm": [float(v) for v in self.patch.centre_mm],
+            "size_mm": float(self.patch.size_mm),
+            "size_sigma_mm": self.patch.sigma_mm,
+            "angle_deg": float(self.patch.angle_deg),
+            "depth_mm": float(self.depth_mm) if self.known else None,
+        }
+
 
 @dataclass(frozen=True, eq=False)
 class IndenterSource:
