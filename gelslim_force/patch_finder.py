@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,8 @@ from gelslim_force.gel_bins import bin_sizes, gel_places, near_surface
 from gelslim_force.indenter import Flat, Indenter
 from gelslim_force.patch_outline import fit_circle, fit_strip
 from gelslim_force.patch_place import flat_patch, rim_share, strip_covariance, strip_patch
+from gelslim_force.patch_region import changed_region
+from gelslim_force.patch_settings import PatchSettings
 from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit
 from gelslim_force.shading_change import ShadingChange, ShadingReference
 from gelslim_optics.virtual_camera import VirtualCamera
@@ -26,38 +28,6 @@ CUT_ERROR = 0.05
 """Relative error of a size of which all of the rim is hidden, over that of none."""
 STARTS = ((0.7, 0.5), (0.85, 1.5), (1.0, 4.0))
 """Sizes, over the outline's, and decays that the fit to the shading starts from."""
-
-
-@dataclass(frozen=True)
-class PatchSettings:
-    """How sure a patch must be. Raises ValueError for values that make no sense."""
-
-    least_change: float = 0.02
-    """Logarithmic change of light (2 %) under which nothing is a patch, however quiet the frame."""
-    largest_change: float = 0.6
-    """Change from which on the light no longer follows the slope: more counts as little more."""
-    least_power: float = 6.0
-    """Squared change over the noise that a patch shows, averaged over 3 x 3 bins."""
-    least_bins: int = 12
-    outline_level: float = 0.4
-    """Share of the patch's own change at which its outline is drawn."""
-    window: float = 2.2
-    """Reach of the fit to the shading, in patch sizes."""
-    most_bins: int = 1200
-    """Bins that the fit takes part of."""
-    blur_px: float = 2.0
-    """Blur of the picture, about."""
-    least_explained: float = 0.5
-    """Share of the change that a fit to the shading must explain, else the outline stands."""
-    outline_error: float = 0.15
-    """Relative error of a size that rests on the outline alone: the light changes beside it too."""
-    shading_error: float = 0.01
-    """Relative error of a size from the shading: the law of the slope beside it is not exact."""
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"patch settings: {name} = {value!r} must be above 0")
 
 
 class PatchFinder:
@@ -84,7 +54,7 @@ class PatchFinder:
     ) -> None:
         self.settings = settings or PatchSettings()
         self.indenter = indenter
-        self._last: Array | None = None
+        self._last: tuple[ContactPatch, ShadingFit] | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
         picture = np.asarray(reference)
@@ -120,44 +90,23 @@ class PatchFinder:
     ) -> ContactPatch | None:
         """The patch in a frame, or None without contact.
 
+        The last frame's patch is followed where it fits as well as it did, for speed.
         `markers_px` (m, 2; NaN for a lost one) are the frame's markers, masked as well.
         Raises ValueError for an image of another shape than the reference.
         """
         light = self.change(image, markers_px)
-        region, contrast = self._region(light)
+        region, contrast = changed_region(light, self.settings)
         if region is None:
+            self._last = None
             return None
-        start = self._outline(region, light)
-        if start is None:
-            return None
-        patch = start if isinstance(self.indenter, Flat) else self._refined(start, light)
+        patch = self._followed(region, light)
+        if patch is None:
+            start = self._outline(region, light)
+            if start is None:
+                return None
+            patch = start if isinstance(self.indenter, Flat) else self._refined(start, light)
         share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
         return _finished(patch, share, contrast)
-
-    def _region(self, light: ShadingChange) -> tuple[Mask | None, float]:
-        """Largest group of bins whose shading changed, and its contrast."""
-        s = self.settings
-        power = np.einsum("cij,c->ij", light.change**2, 1 / light.noise**2) / len(light.noise)
-        size = s.largest_change * np.tanh(np.abs(light.change).max(axis=0) / s.largest_change)
-        weight = ndimage.uniform_filter(light.valid.astype(float), 3, mode="constant")
-        full = np.maximum(weight, 1e-6)
-        power = ndimage.uniform_filter(np.where(light.valid, power, 0.0), 3, mode="constant") / full
-        size = ndimage.uniform_filter(np.where(light.valid, size, 0.0), 3, mode="constant") / full
-        changed = (power > s.least_power) & (size > s.least_change) & (weight > 0.2)
-        if changed.sum() < s.least_bins:
-            return None, 0.0
-        # Faint changes far off (a lamp, a hand's shadow) are not the patch's.
-        level = s.outline_level * float(np.quantile(size[changed], 0.98))
-        strong = changed & (size >= level)
-        # Ink splits a patch: groups that a bin or two keep apart are one.
-        labels, count = ndimage.label(ndimage.binary_dilation(strong, iterations=2))
-        if not count:
-            return None, 0.0
-        score = ndimage.sum_labels(np.where(strong, size**3, 0.0), labels, np.arange(1, count + 1))
-        strong = _joined(labels, score) & strong
-        if strong.sum() < s.least_bins:
-            return None, 0.0
-        return strong, float(np.sqrt(power[strong].mean()))
 
     def _outline(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
         """Patch of the region's outline, from the part that the pad's edge does not cut."""
@@ -192,34 +141,56 @@ class PatchFinder:
         covariance[:2, :2] += np.eye(2) * spread / 4
         return _with(patch, covariance, "outline", *self._sight(patch.centre_mm))
 
+    def _followed(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
+        """The last frame's patch moved on, where the shading is explained as well as it was."""
+        last, self._last = self._last, None
+        if last is None:
+            return None
+        middle = np.array([self._x[region].mean(), self._y[region].mean()])
+        reach = np.sqrt((self._bin_mm[region] ** 2).sum() / np.pi) / last[0].size_mm
+        if last[0].outside_mm(*middle) > -0.3 * last[0].size_mm or not 0.6 < reach < 2.5:
+            return None
+        found = self._shading(last[0], [last[1].values], light)
+        if found is None or found[1].explained < last[1].explained - 0.03:
+            return None
+        if not _settled(last[0], found[0]):
+            return None
+        self._last = found
+        return found[0]
+
     def _refined(self, start: ContactPatch, light: ShadingChange) -> ContactPatch:
         """The outline's patch moved to where the shading puts its rim, if it tells."""
-        known = getattr(self.indenter, "radius_mm", None)
-        curvature = 1 / known if known else 0.0
-        patch = start
+        patch, found = start, None
         begins = [_values(start, k, q) for k, q in STARTS]
-        if self._last is not None:
-            begins = [self._last, *begins]
-        self._last, fit = None, None
         for _ in range(PASSES):
-            window = self._window(patch, light)
-            if window is None:
+            found = self._shading(patch, begins, light)
+            if found is None:
                 return start
-            blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
-            blur = float(np.hypot(window.bin_mm / 2, blur))
-            fit = best_shading_fit(window, begins, self._strip, curvature, blur)
-            if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
-                return start
-            before, patch = patch, self._from_fit(fit, patch, curvature, window.bin_mm)
-            shift = np.linalg.norm(patch.centre_mm - before.centre_mm) / before.size_mm
-            if shift < 0.3 and 0.7 < patch.size_mm / before.size_mm < 1.15:
+            before, patch = patch, found[0]
+            if _settled(before, patch):
                 break
             # What the edge cuts looks small at first: look again, further out.
-            begins = [fit.values, _values(patch, 1.0, 1.5), _values(patch, 1.3, 1.5)]
-        if fit is None or fit.explained < self.settings.least_explained:
+            begins = [found[1].values, _values(patch, 1.0, 1.5), _values(patch, 1.3, 1.5)]
+        if found is None or found[1].explained < self.settings.least_explained:
             return start
-        self._last = fit.values
+        self._last = found
         return patch
+
+    def _shading(
+        self, patch: ContactPatch, begins: list[Array], light: ShadingChange
+    ) -> tuple[ContactPatch, ShadingFit] | None:
+        """The fit to the shading about a patch, if it stays of that size."""
+        window = self._window(patch, light)
+        if window is None:
+            return None
+        known = getattr(self.indenter, "radius_mm", None)
+        curvature = 1 / known if known else 0.0
+        blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
+        blur = float(np.hypot(window.bin_mm / 2, blur))
+        fit = best_shading_fit(window, begins, self._strip, curvature, blur)
+        if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
+            return None
+        return self._from_fit(fit, patch, curvature, window.bin_mm), fit
 
     def _from_fit(
         self, fit: ShadingFit, start: ContactPatch, curvature: float, bin_mm: float
@@ -288,6 +259,12 @@ class PatchFinder:
         return float(self._bin_mm[self._nearest(patch.centre_mm)])
 
 
+def _settled(before: ContactPatch, after: ContactPatch) -> bool:
+    """Whether the bins about the one patch serve for the other."""
+    shift = float(np.linalg.norm(after.centre_mm - before.centre_mm)) / before.size_mm
+    return shift < 0.3 and 0.7 < after.size_mm / before.size_mm < 1.15
+
+
 def _values(patch: ContactPatch, scale: float, decay: float) -> Array:
     """Start (4,) of the fit to the shading from a patch."""
     if patch.kind == "disc":
@@ -295,19 +272,6 @@ def _values(patch: ContactPatch, scale: float, decay: float) -> Array:
     turn = np.deg2rad(patch.angle_deg)
     across = float(patch.centre_mm @ np.array([-np.sin(turn), np.cos(turn)]))
     return np.array([across, turn, scale * patch.size_mm, decay])
-
-
-def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
-    """The strongest group, with those no less than a fifth as strong and no further than its size.
-
-    Red and green change most on two sides of a line through the middle, which stays dark.
-    """
-    best = 1 + int(np.argmax(score))
-    chosen = labels == best
-    near = ndimage.distance_transform_edt(~chosen) <= 2 * np.sqrt(chosen.sum() / np.pi)
-    others = np.unique(labels[near])
-    strong = [k for k in others if k > 0 and score[k - 1] >= 0.2 * score[best - 1]]
-    return np.isin(labels, strong)
 
 
 def _with(

@@ -59,6 +59,8 @@ def best_shading_fit(
     window: Window, starts: list[Array], strip: bool, curvature_per_mm: float, blur_mm: float
 ) -> ShadingFit | None:
     """The fit from the start that leaves least after a few steps on a part of the bins."""
+    if len(starts) == 1:
+        return fit_shading(window, starts[0], strip, curvature_per_mm, blur_mm)
     part = window.thinned(LOOK_AT)
 
     def tried(start: Array) -> tuple[float, Array]:

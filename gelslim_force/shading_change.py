@@ -19,6 +19,7 @@ LEAST_LEVEL = 8.0
 FLOOR = 5.0
 LEAST_FREE = 0.34
 """Share of a bin's pixels that must be free of ink and glare."""
+MEDIAN_OF = 3000
 ROBUST = 1.4826
 """Standard deviation of a normal law over its median absolute deviation."""
 
@@ -126,8 +127,10 @@ def _about_median(change: Array, valid: Mask) -> ShadingChange:
     if not valid.any():
         return ShadingChange(np.zeros_like(change), valid, np.full(layers, np.inf))
     seen = change[:, valid]
-    seen = seen - np.median(seen, axis=1, keepdims=True)
-    noise = np.maximum(ROBUST * np.median(np.abs(seen), axis=1), 1e-4)
+    some = seen[:, :: max(1, seen.shape[1] // MEDIAN_OF)]
+    middle = np.median(some, axis=1, keepdims=True)
+    seen = seen - middle
+    noise = np.maximum(ROBUST * np.median(np.abs(some - middle), axis=1), 1e-4)
     out = np.zeros_like(change)
     out[:, valid] = seen
     return ShadingChange(out, valid, noise)

@@ -9,8 +9,9 @@ import pytest
 from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded, sight
 
 from gelslim_force.indenter import Cylinder, Flat, Sphere
-from gelslim_force.patch_finder import PatchFinder, PatchSettings
+from gelslim_force.patch_finder import PatchFinder
 from gelslim_force.patch_outline import circle_start, fit_circle, fit_strip
+from gelslim_force.patch_settings import PatchSettings
 
 BALL_MM = 10.0
 
@@ -62,8 +63,6 @@ def test_place_and_size_of_a_sphere_within_the_stated_error():
         scores.append(off / np.sqrt(np.diag(patch.covariance)[:3]))
         errors.append([*off[:2], off[2] / radius])
     scores, errors = np.array(scores), np.array(errors)
-    print(np.sqrt((scores**2).mean(axis=0)), np.abs(scores).max(axis=0),
-          np.sqrt((errors**2).mean(axis=0)), errors.mean(axis=0))  # fmt: skip
     assert np.abs(scores).max() < 3.5
     spread = np.sqrt((scores**2).mean(axis=0))
     assert (spread < 1.4).all()
@@ -113,6 +112,26 @@ def test_patch_cut_by_the_pads_edge(centre):
     assert (np.abs(patch.centre_mm - centre) < 3.5 * sigma[:2]).all()
     assert abs(patch.size_mm - radius) < 3.5 * sigma[2]
     assert sigma[2] > whole.sigma_mm
+
+
+def test_a_patch_is_followed_from_frame_to_frame():
+    """A press that grows and slides: the same errors as afresh; then it lifts off, then returns."""
+    follow = finder()
+    for k in range(6):
+        centre, radius = np.array([0.3 * k - 1, 0.2 * k]), 1.6 + 0.15 * k
+        sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+        image = shaded((sx, sy), seed=20 + k).image
+        patch, fresh = follow.find(image), finder().find(image)
+        assert np.abs(patch.centre_mm - fresh.centre_mm).max() < 0.03
+        assert abs(patch.size_mm - fresh.size_mm) < 0.05
+    assert follow.find(shaded(seed=30).image) is None
+    sx, sy, _ = pressed_heights((-4.0, -3.0), 1.5, BALL_MM)
+    back = follow.find(shaded((sx, sy), seed=31).image)
+    assert np.abs(back.centre_mm - [-4.0, -3.0]).max() < 0.1
+    sx, sy, _ = pressed_heights((4.0, 3.0), 3.0, BALL_MM)
+    leapt = follow.find(shaded((sx, sy), seed=32).image)
+    assert np.abs(leapt.centre_mm - [4.0, 3.0]).max() < 0.15
+    assert abs(leapt.size_mm - 3.0) < 4 * leapt.sigma_mm
 
 
 def test_strip_of_a_cylinder():

@@ -1,0 +1,52 @@
+"""Where in the picture the shading changed as under a contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from gelslim_force.patch_settings import PatchSettings
+from gelslim_force.shading_change import ShadingChange
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask | None, float]:
+    """Largest group of bins whose shading changed, and its contrast."""
+    s = settings
+    power = np.einsum("cij,c->ij", light.change**2, 1 / light.noise**2) / len(light.noise)
+    size = s.largest_change * np.tanh(np.abs(light.change).max(axis=0) / s.largest_change)
+    weight = ndimage.uniform_filter(light.valid.astype(float), 3, mode="constant")
+    full = np.maximum(weight, 1e-6)
+    power = ndimage.uniform_filter(np.where(light.valid, power, 0.0), 3, mode="constant") / full
+    size = ndimage.uniform_filter(np.where(light.valid, size, 0.0), 3, mode="constant") / full
+    changed = (power > s.least_power) & (size > s.least_change) & (weight > 0.2)
+    if changed.sum() < s.least_bins:
+        return None, 0.0
+    # Faint changes far off (a lamp, a hand's shadow) are not the patch's.
+    level = s.outline_level * float(np.quantile(size[changed], 0.98))
+    strong = changed & (size >= level)
+    # Ink splits a patch: groups that a bin or two keep apart are one.
+    labels, count = ndimage.label(ndimage.binary_dilation(strong, iterations=2))
+    if not count:
+        return None, 0.0
+    score = ndimage.sum_labels(np.where(strong, size**3, 0.0), labels, np.arange(1, count + 1))
+    strong = _joined(labels, score) & strong
+    if strong.sum() < s.least_bins:
+        return None, 0.0
+    return strong, float(np.sqrt(power[strong].mean()))
+
+
+def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
+    """The strongest group, with those no less than a fifth as strong and no further than its size.
+
+    Red and green change most on two sides of a line through the middle, which stays dark.
+    """
+    best = 1 + int(np.argmax(score))
+    chosen = labels == best
+    near = ndimage.distance_transform_edt(~chosen) <= 2 * np.sqrt(chosen.sum() / np.pi)
+    others = np.unique(labels[near])
+    strong = [k for k in others if k > 0 and score[k - 1] >= 0.2 * score[best - 1]]
+    return np.isin(labels, strong)
