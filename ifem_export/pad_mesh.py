@@ -220,8 +220,9 @@ def build_pad_mesh(
     z = np.asarray(np.arange(-n_layers, 1) * hz, dtype=np.float64)
     occupancy, fill = filled_cells(outline, crown, (x, y, z), weighting, floor)
     if not occupancy.any():
+        empty = "centre of" if weighting == "cell_centre" else f"filled by {floor:g} or more in"
         raise MeshError(
-            f"no cell centre of a {pitch[0]:g} x {pitch[1]:g} mm lattice is inside the outline: "
+            f"no cell {empty} a {pitch[0]:g} x {pitch[1]:g} mm lattice is inside the outline: "
             "use a finer pitch"
         )
     kept, dropped = keep_bonded_part(occupancy)

@@ -41,7 +41,7 @@ def write_vtu(
     """Write the mesh, with fields on nodes and cells, atomically.
 
     Node sets are always written as the point field `node_set` (bit 0 bonded, bit 1 surface,
-    bit 2 sides).
+    bit 2 sides), and of a partly filled pad the fractions as the cell field `fill`.
 
     Args:
         path: file to write.
@@ -53,7 +53,8 @@ def write_vtu(
         MeshError: a field's length or type does not fit.
     """
     points = {"node_set": _node_set_bits(mesh), **(point_data or {})}
-    body = "\n".join(_document(mesh, points, cell_data or {})) + "\n"
+    cells = {**_fill(mesh), **(cell_data or {})}
+    body = "\n".join(_document(mesh, points, cells)) + "\n"
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
@@ -61,6 +62,13 @@ def write_vtu(
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _fill(mesh: PadMesh) -> dict[str, NDArray[np.float64]]:
+    if mesh.fill is None:
+        return {}
+    # Cells are numbered x fastest, z slowest.
+    return {"fill": mesh.fill.transpose(2, 1, 0)[mesh.occupancy.transpose(2, 1, 0)]}
 
 
 def _node_set_bits(mesh: PadMesh) -> NDArray[np.uint8]:

@@ -228,3 +228,41 @@ def test_single_cell_pad():
 def test_arrays_are_read_only(round_pad):
     with pytest.raises(ValueError, match="read-only"):
         round_pad.nodes_mm[0, 0] = 1.0
+
+
+@pytest.mark.parametrize("weighting", ["cell_centre", "volume_fraction"])
+@pytest.mark.parametrize(
+    "outline",
+    [
+        Disc(3.3),
+        Polygon(((-3.0, -2.0), (3.1, -2.2), (0.4, 3.3))),
+        Polygon(((-3, -2), (3, -2), (3, 2), (1, 2), (1, -1), (-1, -1), (-1, 2), (-3, 2))),
+    ],
+    ids=["disc", "triangle", "u"],
+)
+def test_node_sets_of_every_outline(outline, weighting):
+    mesh, report = build_pad_mesh(outline, 1.2, pitch_mm=0.4, layers=3, weighting=weighting)
+    columns = mesh.n_nodes // 4
+    z = mesh.nodes_mm[:, 2]
+    assert np.array_equal(mesh.bonded, np.flatnonzero(z == -1.2))
+    assert np.array_equal(mesh.surface, np.flatnonzero(z == 0.0))
+    assert len(mesh.bonded) == len(mesh.surface) == columns
+    assert len(mesh.sides) % 4 == 0
+    # A node is at the side where fewer than four cells meet in its plane.
+    plan = np.pad(np.asarray(mesh.occupancy)[:, :, 0].astype(int), 1)
+    around = plan[1:, 1:] + plan[:-1, 1:] + plan[1:, :-1] + plan[:-1, :-1]
+    assert len(mesh.sides) == 4 * ((around > 0) & (around < 4)).sum()
+    assert report.dropped == ()
+    assert abs(report.area_error) < (0.06 if weighting == "cell_centre" else 0.002)
+
+
+def test_a_spike_that_volume_fractions_join_at_an_edge_is_dropped():
+    bow_tie = Polygon(((-4, -4), (-0.01, -4), (-0.01, 0.01), (4, 0.01), (4, 3), (0.01, 3),
+                       (0.01, 0.02), (-4, 0.02)))  # fmt: skip
+    _, thin = build_pad_mesh(bow_tie, 1.0, pitch_mm=1.0, weighting="volume_fraction", floor=0.1)
+    assert [(p.touches, p.bonded) for p in thin.dropped] == [("edge", True)]
+
+
+def test_nothing_filled_enough_is_refused():
+    with pytest.raises(MeshError, match="filled by 1"):
+        build_pad_mesh(Disc(0.4), 1.0, pitch_mm=1.0, weighting="volume_fraction", floor=1.0)

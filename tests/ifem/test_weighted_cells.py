@@ -18,6 +18,7 @@ from ifem_export.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.pad_system import PadSystem
 from ifem_export.solver import inner_solver, pad_solver
 from ifem_export.surface_operator import one_layer, surface_operator
+from ifem_export.vtu import write_vtu
 from ifem_export.weighted_assembly import assemble_weighted_csr, mesh_stiffness
 
 GEL = Material(0.147, 0.3223, 1070.0)
@@ -265,3 +266,12 @@ def test_what_cannot_be_meshed_is_refused():
     mesh, _ = meshed(Disc(3.03), weighting="volume_fraction")
     with pytest.raises(MeshError, match="whole cells"):
         NeoHookeanPad.of(mesh, GEL)
+
+
+def test_the_written_mesh_shows_the_fractions(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    mesh, _ = meshed(TRIANGLE, weighting="volume_fraction")
+    write_vtu(tmp_path / "pad.vtu", mesh)
+    grid = pyvista.read(tmp_path / "pad.vtu")
+    volume = (grid.compute_cell_sizes()["Volume"] * grid["fill"]).sum()
+    assert volume == pytest.approx(TRIANGLE.area_mm2 * 2.0, rel=5e-3)
