@@ -104,11 +104,14 @@ class ShadingReference:
 def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """An (h, w, c) view. Raises ValueError for another shape or type."""
     picture = np.asarray(image)
-    if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or not picture.size:
+    channels = 1 if picture.ndim == 2 else picture.shape[-1]
+    if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or channels not in (1, 3):
         raise ValueError(
             f"image of shape {picture.shape} and type {picture.dtype}: give (h, w, 3) or (h, w) "
             "uint8"
         )
+    if min(picture.shape[:2]) < 32:
+        raise ValueError(f"image of {picture.shape[1]} x {picture.shape[0]} px: 32 x 32 at least")
     return np.ascontiguousarray(picture if picture.ndim == 3 else picture[:, :, None])
 
 

@@ -43,7 +43,7 @@ def sight() -> tuple[Vector, Vector]:
 
 @cache
 def _profile(radius_mm: float, ball_mm: float, nu: float) -> tuple[Vector, Vector, Vector]:
-    r = np.linspace(0, 30, 3001)
+    r = np.linspace(0, 20, 1001)
     truth = contact(radius_mm, ball_mm, nu)
     inside = r <= radius_mm
     z = np.where(
