@@ -19,7 +19,7 @@ COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"
 @njit(**COMPILED)
 def _add_span(acc: Any, row: Any, xa: Any, xb: Any, rise: Any) -> None:
     """Add a piece of edge within one pixel row, from xa to xb, that rises by `rise`."""
-    first, last = int(math.floor(xa)), int(math.floor(xb))
+    first, last = math.floor(xa), math.floor(xb)
     if first == last:
         part = 0.5 * (xa + xb) - first
         acc[row, first] += rise * (1 - part)
@@ -58,7 +58,7 @@ def _add_polygon(acc: Any, polygon: Any, left: Any, top: Any, share: Any) -> Non
             sign = -share
         lean = (x1 - x0) / (y1 - y0)
         y, x = y0, x0
-        row = int(math.floor(y0))
+        row = math.floor(y0)
         while y < y1:
             end = min(row + 1.0, y1)
             ahead = x1 if end == y1 else x0 + lean * (end - y0)
@@ -142,8 +142,8 @@ def draw_dots(
         if high_x < -spare or high_y < -spare or low_x > width + spare or low_y > height + spare:
             continue
         left, top = math.floor(low_x + 0.5) - spare, math.floor(low_y + 0.5) - spare
-        columns = int(math.floor(high_x + 0.5) - left) + spare + 1
-        rows = int(math.floor(high_y + 0.5) - top) + spare + 1
+        columns = math.floor(high_x + 0.5) - left + spare + 1
+        rows = math.floor(high_y + 0.5) - top + spare + 1
         acc = np.zeros((rows, columns + 1))
         doubled = 0.0
         for k in range(start.shape[1]):
@@ -168,7 +168,7 @@ def draw_dots(
         patch = acc[:, :columns]
         if reach[m] > 0:
             _blurred(patch, taps[m], reach[m], np.empty((rows, columns)))
-        for y in range(max(0, int(-top)), min(rows, int(height - top))):
-            for x in range(max(0, int(-left)), min(columns, int(width - left))):
-                at = ink[y + int(top), x + int(left)] + np.float32(patch[y, x])
-                ink[y + int(top), x + int(left)] = min(at, np.float32(1.0))
+        for y in range(max(0, -top), min(rows, height - top)):
+            for x in range(max(0, -left), min(columns, width - left)):
+                at = ink[y + top, x + left] + np.float32(patch[y, x])
+                ink[y + top, x + left] = min(at, np.float32(1.0))

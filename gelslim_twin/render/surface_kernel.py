@@ -28,7 +28,7 @@ def weights(t: Any, w: Any, d: Any) -> None:
 def cell_of(at: Any, count: Any) -> Any:
     """Cell and place in it of a coordinate in cells, held to the grid."""
     held = min(max(at, 0.0), count - 1.0)
-    i = min(int(math.floor(held)), count - 2)
+    i = min(math.floor(held), count - 2)
     return i, held - i
 
 

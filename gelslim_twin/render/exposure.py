@@ -1,0 +1,37 @@
+"""From light to grey values: exposure time, gain, the camera's response curve, 8 bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Time and gain over the usual ones, and the exponent 1/gamma of the response curve.
+
+    Gamma leaves black and white and lifts what is between. Raises ValueError out of range.
+    """
+
+    time: float = 1.0
+    gain: float = 1.0
+    gamma: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, least, most in (("time", 0, 1e3), ("gain", 0, 1e3), ("gamma", 0.2, 5)):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and least < value <= most):
+                raise ValueError(f"exposure {name} = {value}: must be in {least} ... {most:g}")
+
+    @property
+    def scale(self) -> float:
+        """Factor on the light."""
+        return self.time * self.gain
+
+
+def a_priori_bound_px(dot_diameter_px: float, contrast_dn: float) -> float:
+    """Spread of a dot's centre by rounding to whole grey values (error ±1/2, variance 1/12)."""
+    from gelslim_twin.render.centre_noise import centre_noise_px
+
+    return centre_noise_px(12**-0.5, contrast_dn, dot_diameter_px)

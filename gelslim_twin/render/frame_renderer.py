@@ -1,0 +1,207 @@
+"""Frames of one sensor: what stands still is drawn once, each frame adds dots and shading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.render.dot_outlines import centroids_px, outlines_px
+from gelslim_twin.render.look import Look
+from gelslim_twin.render.printed_dots import PrintedDots
+from gelslim_twin.render.rendered_frame import RenderedFrame
+from gelslim_twin.render.sight import Sight
+from gelslim_twin.render.surface_state import SurfaceState
+from gelslim_twin.render.surroundings import Pad, still_irradiance
+
+if TYPE_CHECKING:
+    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_twin.render.light_map import LightMap
+    from gelslim_twin.render.marker_motion import MarkerMotion
+    from ifem_export.marker_grid import MarkerGrid
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+_NONE = np.zeros((0, 0, 0), dtype=np.float32)
+_CURVE_STEPS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class FrameRenderer:
+    """Draws frames of the dots of `grid` on the pad as `camera` sees them in `light`.
+
+    Frames are pure functions of the arguments: the same state and frame number give the same
+    bytes, in any order, on any number of threads.
+    """
+
+    camera: VirtualCamera
+    grid: MarkerGrid
+    light: LightMap
+    pad: Pad
+    look: Look
+
+    @cached_property
+    def dots(self) -> PrintedDots:
+        """The print, faults included."""
+        nominal = PrintedDots.nominal(self.grid)
+        faults = self.look.print_faults
+        return nominal if faults is None else faults.apply(nominal)
+
+    @cached_property
+    def sight(self) -> Sight:
+        """What every pixel sees at rest."""
+        return Sight.of(self.camera)
+
+    @cached_property
+    def still(self) -> Image:
+        """Light (h, w, k) of the pad at rest without dots: edge, dirt and blur included."""
+        light = still_irradiance(self.camera, self.sight, self.light, self.pad)
+        if self.look.dirt is not None:
+            light = self.look.dirt.apply(
+                self.camera, (self.pad.length_mm, self.pad.width_mm), light
+            )
+        if self.look.defocus is not None:
+            light = self.look.defocus.soften(self.camera, self.sight, light)
+        return light
+
+    @cached_property
+    def _glare(self) -> Image:
+        if self.look.specular is None:
+            return _NONE
+        glare = self.look.specular.glare(self.still.shape[:2], self.light.colour)
+        return glare * np.float32(self._scale)
+
+    @cached_property
+    def _shading_sight(self) -> Sight | None:
+        return None if self.look.shading is None else self.look.shading.sight(self.camera)
+
+    @cached_property
+    def _curve(self) -> NDArray[np.uint8]:
+        exposure = self.look.exposure
+        if exposure is None or exposure.gamma == 1:
+            return np.zeros(0, dtype=np.uint8)
+        share = np.arange(255 * _CURVE_STEPS + 1) / (255 * _CURVE_STEPS)
+        return np.rint(255 * share ** (1 / exposure.gamma)).astype(np.uint8)
+
+    @property
+    def _scale(self) -> float:
+        return 1.0 if self.look.exposure is None else self.look.exposure.scale
+
+    def frame(
+        self,
+        surface: SurfaceState | None = None,
+        before: SurfaceState | None = None,
+        *,
+        markers: MarkerMotion | None = None,
+        markers_before: MarkerMotion | None = None,
+        number: int = 0,
+    ) -> RenderedFrame:
+        """Frame `number` of the gel displaced by `surface` (None: at rest).
+
+        `before` is the state a frame earlier, for motion blur. `markers` gives the dots' motion
+        where it is known better than by interpolating the surface; shading is the surface's.
+        Raises ValueError for dots behind the camera.
+        """
+        start, now = self._outlines(surface, before, markers, markers_before)
+        middle = now if start is now else (start + now) / 2
+        centres, area = centroids_px(middle)
+        drawn = self.dots.present & (area * self._orientation > 0)
+        ink = self._ink(start, now, drawn, centres, np.abs(area), surface, markers)
+        image = self._developed(self.values(ink, surface), number)
+        return RenderedFrame(
+            image=image,
+            centres_px=centres,
+            diameter_px=np.sqrt(4 * np.abs(area) / np.pi),
+            drawn=drawn & self._inside(now),
+        )
+
+    def values(self, ink: Image, surface: SurfaceState | None = None) -> Image:
+        """Grey values (h, w, 3) before noise and rounding, for dots' coverage `ink` (h, w)."""
+        from gelslim_twin.render.compose_kernel import compose
+
+        gain, step = _NONE, 1
+        if self.look.shading is not None and surface is not None and surface.moves:
+            assert self._shading_sight is not None
+            gain = self.look.shading.gain(self._shading_sight, surface, self.light)
+            step = self.look.shading.pixel_step
+        colour = (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
+        out = np.empty((*ink.shape, 3), dtype=np.float32)
+        contrast = np.float32(self.look.contrast)
+        compose(self.still, gain, step, ink, contrast, colour, self._glare, out)
+        return out
+
+    def _outlines(
+        self,
+        surface: SurfaceState | None,
+        before: SurfaceState | None,
+        markers: MarkerMotion | None,
+        markers_before: MarkerMotion | None,
+    ) -> tuple[Array, Array]:
+        """Outlines when the shutter opens and closes; the same array without motion blur."""
+        rest = SurfaceState.at_rest(self.pad.length_mm, self.pad.width_mm)
+        now = outlines_px(self.camera, self.dots, markers or surface or rest)
+        earlier = markers_before or before
+        if self.look.motion_blur is None or earlier is None:
+            return now, now
+        then = outlines_px(self.camera, self.dots, earlier)
+        return self.look.motion_blur.start(then, now), now
+
+    @cached_property
+    def _orientation(self) -> float:
+        """Sign of an outline's area on a level gel: a folded-over dot has the other one."""
+        rest = SurfaceState.at_rest(self.pad.length_mm, self.pad.width_mm)
+        return float(np.sign(np.median(centroids_px(outlines_px(self.camera, self.dots, rest))[1])))
+
+    def _inside(self, outlines: Array) -> NDArray[np.bool_]:
+        low, high = outlines.min(axis=1), outlines.max(axis=1)
+        size = np.array([self.camera.image_width_px, self.camera.image_height_px])
+        inside: NDArray[np.bool_] = np.all((low >= -0.5) & (high <= size - 0.5), axis=1)
+        return inside
+
+    def _ink(
+        self,
+        start: Array,
+        now: Array,
+        drawn: NDArray[np.bool_],
+        centres: Array,
+        area: Array,
+        surface: SurfaceState | None,
+        markers: MarkerMotion | None,
+    ) -> Image:
+        from gelslim_twin.render.coverage_kernel import draw_dots
+
+        count = len(self.dots)
+        poses = np.ones(count, dtype=np.int64)
+        if self.look.motion_blur is not None and start is not now:
+            poses = self.look.motion_blur.poses(start, now)
+        taps, reach = np.ones((count, 1)), np.zeros(count, dtype=np.int64)
+        if self.look.defocus is not None and not self.look.defocus.is_null:
+            from gelslim_twin.render.defocus import kernel_taps
+
+            scale = np.sqrt(area / (np.pi * self.dots.semi_axes_mm.prod(axis=1)))
+            points = self._centres_mm(surface, markers)
+            taps, reach = kernel_taps(self.look.defocus.sigma_px(self.camera, points, scale))
+        ink = np.zeros((self.camera.image_height_px, self.camera.image_width_px), dtype=np.float32)
+        draw_dots(start, now, drawn, poses, self.look.samples, taps, reach, ink)
+        return ink
+
+    def _centres_mm(self, surface: SurfaceState | None, markers: MarkerMotion | None) -> Array:
+        centres = np.zeros((len(self.dots), 3))
+        centres[:, :2] = self.dots.centres_mm
+        moved = markers or surface
+        if moved is not None and moved.moves:
+            centres += moved.carried(self.dots.centres_mm, self.dots.centres_mm[:, None, :])[:, 0]
+        return centres
+
+    def _developed(self, values: Image, number: int) -> NDArray[np.uint8]:
+        from gelslim_twin.render.compose_kernel import develop
+
+        if self.look.noise is not None:
+            gain = 1.0 if self.look.exposure is None else self.look.exposure.gain
+            self.look.noise.apply(values, gain, number)
+        image = np.empty(values.shape, dtype=np.uint8)
+        develop(values.reshape(-1), self._curve, image.reshape(-1))
+        return image if self.look.compression is None else self.look.compression.apply(image)

@@ -1,0 +1,121 @@
+"""Light that reaches the gel's face: per source a map of irradiance and a direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LightMap:
+    """Irradiance (ny, nx, k) of k sources at axes `x_mm` (nx,), `y_mm` (ny,), 1 = usual.
+
+    Source i travels on the mean along `azimuth_deg` (k,) (0: towards +x, 90: towards +y) and
+    rises towards the gel's face at `elevation_deg` (k,) within the gel; `colour` (k, 3) is what
+    the sensor's red, green and blue make of it. Axes may be centres of a tracer's bins; beyond
+    them the map goes on as at its edge. Raises ValueError for values that are no light.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    irradiance: Array
+    azimuth_deg: Array
+    elevation_deg: Array
+    colour: Array
+
+    def __post_init__(self) -> None:
+        for name in ("x_mm", "y_mm", "irradiance", "azimuth_deg", "elevation_deg", "colour"):
+            value = np.array(getattr(self, name), dtype=float)
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} of the light must be finite")
+            object.__setattr__(self, name, value)
+        count = self.irradiance.shape[-1]
+        expected = {
+            "irradiance": (len(self.y_mm), len(self.x_mm), count),
+            "azimuth_deg": (count,),
+            "elevation_deg": (count,),
+            "colour": (count, 3),
+        }
+        for name, shape in expected.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(
+                    f"{name} {getattr(self, name).shape} of the light: must be {shape}"
+                )
+        for name in ("x_mm", "y_mm"):
+            if len(getattr(self, name)) < 2 or np.any(np.diff(getattr(self, name)) <= 0):
+                raise ValueError(f"{name} of the light must be two or more increasing values")
+        if self.irradiance.min() < 0 or self.colour.min() < 0:
+            raise ValueError("irradiance and colour of the light must not be negative")
+        if np.any((self.elevation_deg <= 0) | (self.elevation_deg > 90)):
+            raise ValueError("light must rise towards the gel: elevation_deg in 0 ... 90")
+
+    @property
+    def sources(self) -> int:
+        """How many sources there are."""
+        return len(self.elevation_deg)
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors (k, 3) along which the light travels."""
+        a, e = np.deg2rad(self.azimuth_deg), np.deg2rad(self.elevation_deg)
+        return np.column_stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+    def at(self, x_mm: Array, y_mm: Array) -> Array:
+        """Irradiance (..., k) at points of any shape, bilinear."""
+        i, u = _cell(self.x_mm, x_mm)
+        j, v = _cell(self.y_mm, y_mm)
+        e = self.irradiance
+        low = e[j, i] * (1 - u) + e[j, i + 1] * u
+        high = e[j + 1, i] * (1 - u) + e[j + 1, i + 1] * u
+        found: Array = low * (1 - v) + high * v
+        return found
+
+    def steepest_per_mm(self) -> float:
+        """Largest relative change of a source's irradiance per mm."""
+        steps = (np.diff(self.x_mm)[None, :, None], np.diff(self.y_mm)[:, None, None])
+        usual = max(float(self.irradiance.mean()), 1e-12)
+        along = np.abs(np.diff(self.irradiance, axis=1)) / steps[0]
+        across = np.abs(np.diff(self.irradiance, axis=0)) / steps[1]
+        return float(np.hypot(along.max(), across.max())) / usual
+
+
+def red_green_sides(
+    length_mm: float,
+    width_mm: float,
+    *,
+    decay_mm: float,
+    elevation_deg: float = 25.0,
+    red: float = 1.0,
+    green: float = 1.0,
+) -> LightMap:
+    """Red light from -y, green from +y, each decaying as exp(-distance / decay) across the pad.
+
+    For a sensor whose light was not traced; the mean of each map over the pad is `red`, `green`.
+    """
+    x = np.linspace(-length_mm / 2, length_mm / 2, 17)
+    y = np.linspace(-width_mm / 2, width_mm / 2, 65)
+    fall = np.exp(-(y + width_mm / 2) / decay_mm)
+    fall /= np.trapezoid(fall, y) / width_mm
+    maps = np.stack([red * fall, green * fall[::-1]], axis=1)
+    return LightMap(
+        x_mm=x,
+        y_mm=y,
+        irradiance=np.repeat(maps[:, None, :], len(x), axis=1),
+        azimuth_deg=np.array([90.0, -90.0]),
+        elevation_deg=np.array([elevation_deg, elevation_deg]),
+        colour=LED_COLOURS,
+    )
+
+
+LED_COLOURS = np.array([[1.0, 0.10, 0.04], [0.10, 1.0, 0.16]])
+"""What a Bayer sensor makes of a red (625 nm) and a green (525 nm) LED; one unit each."""
+
+
+def _cell(axis: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
+    held = np.clip(at, axis[0], axis[-1])
+    number = np.clip(np.searchsorted(axis, held, side="right") - 1, 0, len(axis) - 2)
+    return number, ((held - axis[number]) / (axis[number + 1] - axis[number]))[..., None]

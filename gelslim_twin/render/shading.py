@@ -1,0 +1,83 @@
+"""Shading of the deformed gel: each source's light changes with the slope towards it.
+
+The coat is dull (Lambert). Light that travels along d (unit) and meets a surface of outward
+normal n carries d·n per area, and nothing where that is negative: the surface lies in its own
+shadow. Part of the light has been scattered by the coat before and comes from everywhere; it does
+not mind the slope.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.render.sight import Sight
+
+if TYPE_CHECKING:
+    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_twin.render.light_map import LightMap
+    from gelslim_twin.render.surface_state import SurfaceState
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Share of light blind to the slope, and the rung: a value every `pixel_step` pixels.
+
+    `rounds` of the search for the point of the sunken surface that a ray meets.
+    """
+
+    ambient_share: float = 0.3
+    pixel_step: int = 4
+    rounds: int = 3
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.ambient_share <= 1:
+            raise ValueError(f"ambient_share = {self.ambient_share}: must be in 0 ... 1")
+        if self.pixel_step < 1 or self.rounds < 1:
+            raise ValueError("pixel_step and rounds of the shading must be at least 1")
+
+    def sight(self, camera: VirtualCamera) -> Sight:
+        """The lattice of pixels on which the shading is computed."""
+        return Sight.of(camera, self.pixel_step)
+
+    def gain(self, sight: Sight, state: SurfaceState, light: LightMap) -> NDArray[np.float32]:
+        """Light (rows, columns, k) over that of the level surface, on the lattice of `sight`."""
+        from gelslim_twin.render.surface_kernel import seen_slopes
+
+        rest = sight.rest_mm.reshape(-1, 2)
+        slopes, at = np.zeros((len(rest), 2)), np.zeros((len(rest), 3))
+        seen_slopes(
+            state.padded_mm, state.origin_mm, state.step_mm,
+            rest, sight.lean.reshape(-1, 2), self.rounds, slopes, at,
+        )  # fmt: skip
+        gain = self.of_slopes(slopes, light)
+        shape = (*sight.rest_mm.shape[:2], light.sources)
+        return np.ascontiguousarray(gain.reshape(shape), dtype=np.float32)
+
+    def of_slopes(self, slopes: Array, light: LightMap) -> Array:
+        """Light (n, k) over that of the level surface, at slopes (n, 2); exactly 1 where level."""
+        d = light.directions
+        size = np.sqrt(1 + (slopes**2).sum(axis=1))[:, None]
+        facing = (d[:, 2] - slopes[:, :1] * d[:, 0] - slopes[:, 1:] * d[:, 1]) / size
+        direct = np.maximum(facing, 0) / d[:, 2]
+        gain: Array = direct + self.ambient_share * (1 - direct)
+        return gain
+
+
+def a_priori_bound_px(
+    dot_diameter_px: float, steepest: float, bend_per_px: float, elevation_deg: float
+) -> float:
+    """Bound of a dot's centre error if the shading is left out.
+
+    Light that rises by the share g per px across a dot of diameter d shifts its centroid of
+    darkness by g d²/16 (second moment of a disc); a surface bent by `bend_per_px` changes the
+    light by bend cot(elevation) per px. Slopes up to `steepest` saturate at full shadow.
+    """
+    cot = 1 / np.tan(np.deg2rad(elevation_deg))
+    per_px = min(bend_per_px * cot, 2 * max(steepest, 0.0) * cot)
+    return float(per_px * dot_diameter_px**2 / 16)

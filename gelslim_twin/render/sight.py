@@ -1,0 +1,59 @@
+"""Which point of the gel each pixel sees: computed once per camera, then only looked up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gelslim_optics.virtual_camera import VirtualCamera
+
+Array = NDArray[np.float64]
+_PROBE_MM = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Rays of a lattice of pixels in the gel: `rest_mm` (h, w, 2) + `lean` (h, w, 2) z.
+
+    The gel has no upper end for a ray, so the ray is straight above the acrylic and the form is
+    exact. Column i and row j of the lattice are pixels i and j times `pixel_step`.
+    """
+
+    rest_mm: Array
+    lean: Array
+    pixel_step: int
+
+    @classmethod
+    def of(cls, camera: VirtualCamera, pixel_step: int = 1) -> Sight:
+        """Sight of every `pixel_step`-th pixel, the last ones beyond the picture's edge.
+
+        Raises ValueError for pixels that look away from the window, and a step below 1.
+        """
+        if pixel_step < 1:
+            raise ValueError(f"a pixel step of {pixel_step}: must be at least 1")
+        columns = -(-(camera.image_width_px - 1) // pixel_step) + 1
+        rows = -(-(camera.image_height_px - 1) // pixel_step) + 1
+        y, x = np.mgrid[:rows, :columns] * pixel_step
+        pixels = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+        rest = camera.backproject(pixels, 0.0)[:, :2]
+        below = camera.backproject(pixels, -_depth(camera))[:, :2]
+        lean = (rest - below) / _depth(camera)
+        return cls(rest.reshape(rows, columns, 2), lean.reshape(rows, columns, 2), pixel_step)
+
+    def pixel_mm(self) -> Array:
+        """Footprint (h, w) of a pixel on the gel: the root of its area, in mm."""
+        du = np.gradient(self.rest_mm, axis=1) / self.pixel_step
+        dv = np.gradient(self.rest_mm, axis=0) / self.pixel_step
+        area: Array = np.sqrt(np.abs(du[..., 0] * dv[..., 1] - du[..., 1] * dv[..., 0]))
+        return area
+
+
+def _depth(camera: VirtualCamera) -> float:
+    """A height within the gel, below its surface."""
+    if not camera.layers or camera.layers[-1].thickness_mm <= 0:
+        raise ValueError("the camera has no gel layer: its last layer must be the gel")
+    return min(_PROBE_MM, camera.layers[-1].thickness_mm / 2)

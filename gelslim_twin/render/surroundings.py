@@ -1,0 +1,103 @@
+"""What the picture shows at rest, without dots: the lit pad, its edge, the frame about it.
+
+All of it stands still, so it is drawn once per sensor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.render.random_stream import stream
+
+if TYPE_CHECKING:
+    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_twin.render.light_map import LightMap
+    from gelslim_twin.render.sight import Sight
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pad:
+    """Outline of the gel and the look of its coat and of the frame around it.
+
+    `frame_level` is the frame's brightness beside the pad over the coat's there, falling off as
+    exp(-distance / frame_decay_mm); `mottle` is the relative standard deviation of the coat's
+    brightness, in patches of `mottle_mm`; `vignetting` weighs the lens' cos⁴ (0: none, 1: full).
+    Raises ValueError for values out of range.
+    """
+
+    length_mm: float
+    width_mm: float
+    corner_radius_mm: float = 0.0
+    frame_level: float = 0.35
+    frame_decay_mm: float = 3.0
+    mottle: float = 0.0
+    mottle_mm: float = 1.5
+    vignetting: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("length_mm", "width_mm", "frame_decay_mm", "mottle_mm"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"the pad's {name} = {getattr(self, name)} must be positive")
+        if not 0 <= self.corner_radius_mm <= min(self.length_mm, self.width_mm) / 2:
+            raise ValueError(
+                f"a corner radius of {self.corner_radius_mm} mm: must be at most half a side"
+            )
+        for name, most in (("frame_level", 10.0), ("mottle", 0.5), ("vignetting", 1.0)):
+            if not 0 <= getattr(self, name) <= most:
+                raise ValueError(f"the pad's {name} = {getattr(self, name)}: in 0 ... {most:g}")
+
+    def beyond_mm(self, x_mm: Array, y_mm: Array) -> Array:
+        """Signed distance from the outline, negative on the pad."""
+        r = self.corner_radius_mm
+        a = np.abs(x_mm) - (self.length_mm / 2 - r)
+        b = np.abs(y_mm) - (self.width_mm / 2 - r)
+        outside = np.hypot(np.maximum(a, 0), np.maximum(b, 0))
+        distance: Array = outside + np.minimum(np.maximum(a, b), 0) - r
+        return distance
+
+
+def still_irradiance(
+    camera: VirtualCamera, sight: Sight, light: LightMap, pad: Pad
+) -> NDArray[np.float32]:
+    """Light (h, w, k) that each pixel receives from each source, pad at rest, no dots."""
+    x, y = sight.rest_mm[..., 0], sight.rest_mm[..., 1]
+    beyond = pad.beyond_mm(x, y)
+    on_pad = np.clip(0.5 - beyond / sight.pixel_mm(), 0.0, 1.0)
+    frame = pad.frame_level * np.exp(-np.maximum(beyond, 0) / pad.frame_decay_mm)
+    level = on_pad * _mottled(pad, x, y) + (1 - on_pad) * frame
+    if pad.vignetting > 0:
+        level = level * (1 - pad.vignetting * (1 - _cos4(camera)))
+    return np.ascontiguousarray(light.at(x, y) * level[..., None], dtype=np.float32)
+
+
+def _mottled(pad: Pad, x: Array, y: Array) -> Array:
+    """Relative brightness of the coat: even noise, smoothed on the pad, seen by each pixel."""
+    if pad.mottle == 0:
+        return np.ones_like(x)
+    from scipy.ndimage import gaussian_filter, map_coordinates
+
+    step = pad.mottle_mm / 3
+    shape = [int(np.ceil(size / step)) + 13 for size in (pad.width_mm, pad.length_mm)]
+    noise = stream(pad.seed, "coat mottle").standard_normal(shape)
+    smooth = gaussian_filter(noise, 1.5, mode="wrap") + 0.5 * gaussian_filter(noise, 5, mode="wrap")
+    smooth *= pad.mottle / smooth.std()
+    rows = (y + pad.width_mm / 2) / step + 6
+    columns = (x + pad.length_mm / 2) / step + 6
+    seen = map_coordinates(smooth, [rows, columns], order=1, mode="nearest")
+    return np.asarray(np.maximum(1 + seen, 0))
+
+
+def _cos4(camera: VirtualCamera) -> Array:
+    """Fall-off of a lens, cos⁴ of the angle to its axis (h, w)."""
+    y, x = np.mgrid[: camera.image_height_px, : camera.image_width_px]
+    u = (x - camera.principal_px[0]) / camera.focal_px
+    v = (y - camera.principal_px[1]) / camera.focal_px
+    fall: Array = (1 + u * u + v * v) ** -2
+    return fall
