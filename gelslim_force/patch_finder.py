@@ -120,7 +120,9 @@ class PatchFinder:
         if len(points) < 6:
             return None
         if isinstance(self.indenter, Flat):
-            return flat_patch(self.indenter, points, inside)
+            placed = flat_patch(self.indenter, points, inside)
+            # Its size is known, not seen: it does not grow with the height it is taken at.
+            return placed and replace(placed, lean=self._sight(placed.centre_mm)[0])
         covariance = np.zeros((4, 4))
         try:
             if self._strip:
@@ -233,7 +235,11 @@ class PatchFinder:
             self._x[rows, columns],
             self._y[rows, columns],
             self._lean[rows, columns],
-            (most * np.tanh(light.change[:, rows, columns] / most) / light.noise[:, None]).T,
+            (
+                most
+                * np.tanh(light.change[:, rows, columns].astype(float) / most)
+                / light.noise[:, None]
+            ).T,
             self._local_bin(start),
             (np.flatnonzero(have), partner[have]),
         )

@@ -27,7 +27,9 @@ def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask 
         return None, 0.0
     # Faint changes far off (a lamp, a hand's shadow) are not the patch's.
     level = s.outline_level * float(np.quantile(size[changed], 0.98))
-    strong = changed & (size >= level)
+    whole = changed & (size >= level)
+    box = _box(whole, 3)
+    strong, size = whole[box], size[box]
     # Ink splits a patch: groups that a bin or two keep apart are one.
     labels, count = ndimage.label(ndimage.binary_dilation(strong, iterations=2))
     if not count:
@@ -36,7 +38,19 @@ def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask 
     strong = _joined(labels, score) & strong
     if strong.sum() < s.least_bins:
         return None, 0.0
-    return strong, float(np.sqrt(power[strong].mean()))
+    region = np.zeros_like(whole)
+    region[box] = strong
+    return region, float(np.sqrt(power[region].mean()))
+
+
+def _box(mask: Mask, margin: int) -> tuple[slice, slice]:
+    """The smallest box about a mask, wider by a margin on each side."""
+    sides = []
+    for axis in (1, 0):
+        at = np.flatnonzero(mask.any(axis=axis))
+        low, high = (int(at[0]), int(at[-1])) if len(at) else (0, 0)
+        sides.append(slice(max(0, low - margin), high + margin + 1))
+    return sides[0], sides[1]
 
 
 def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
@@ -46,6 +60,8 @@ def _joined(labels: NDArray[np.int32], score: Array) -> Mask:
     """
     best = 1 + int(np.argmax(score))
     chosen = labels == best
+    if len(score) == 1:
+        return np.asarray(chosen)
     near = ndimage.distance_transform_edt(~chosen) <= 2 * np.sqrt(chosen.sum() / np.pi)
     others = np.unique(labels[near])
     strong = [k for k in others if k > 0 and score[k - 1] >= 0.2 * score[best - 1]]

@@ -28,7 +28,7 @@ ROBUST = 1.4826
 class ShadingChange:
     """Change of log R/G and of log brightness in the used channels, one layer per combination."""
 
-    change: Array
+    change: NDArray[np.floating]
     """(c, rows, columns) about the median over the pad; 0 where not valid."""
     valid: Mask
     """(rows, columns) bins on the pad with enough free pixels."""
@@ -96,7 +96,7 @@ class ShadingReference:
         free = self._counts >= LEAST_FREE * self.bin_px**2
         # A few grey values keep a channel that goes black from outweighing all others.
         floor = FLOOR * np.maximum(self._counts[..., None], 1)
-        ratio = (self._sums[1] + floor) / (self._sums[0] + floor)
+        ratio = ((self._sums[1] + floor) / (self._sums[0] + floor)).astype(np.float32)
         log = np.log(np.maximum(ratio[..., self._used], 1e-6))
         return _about_median(np.moveaxis(_combined(log), 2, 0), free & self.on_pad)
 
@@ -115,7 +115,7 @@ def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(picture if picture.ndim == 3 else picture[:, :, None])
 
 
-def _combined(log: Array) -> Array:
+def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
     """Log R/G first, then the brightness, then what further channels add."""
     if log.shape[2] == 1:
         return log
@@ -125,15 +125,13 @@ def _combined(log: Array) -> Array:
     return np.concatenate([ratio, bright, rest], axis=2)
 
 
-def _about_median(change: Array, valid: Mask) -> ShadingChange:
+def _about_median(change: NDArray[np.floating], valid: Mask) -> ShadingChange:
     layers = len(change)
-    if not valid.any():
+    used = np.flatnonzero(valid)
+    if not len(used):
         return ShadingChange(np.zeros_like(change), valid, np.full(layers, np.inf))
-    seen = change[:, valid]
-    some = seen[:, :: max(1, seen.shape[1] // MEDIAN_OF)]
+    some = change.reshape(layers, -1)[:, used[:: max(1, len(used) // MEDIAN_OF)]]
     middle = np.median(some, axis=1, keepdims=True)
-    seen = seen - middle
     noise = np.maximum(ROBUST * np.median(np.abs(some - middle), axis=1), 1e-4)
-    out = np.zeros_like(change)
-    out[:, valid] = seen
-    return ShadingChange(out, valid, noise)
+    seen = np.where(valid, change - middle[:, :, None], 0)
+    return ShadingChange(seen, valid, noise.astype(float))

@@ -182,6 +182,20 @@ def test_compliance_by_symmetry_is_that_of_single_solves():
     assert 0 < table.ready < 1
 
 
+@pytest.mark.parametrize("rung", ["paper", "fft", "truncated", "pcg"])
+def test_compliance_of_every_operator_is_its_own(rung):
+    mesh = PadMesh.from_occupancy(np.ones((10, 8, 2), bool), (1.0, 1.0, 1.0), (-5, -4, -2))
+    operator = surface_operator(mesh, Material(E_MPA, 0.4, 1000.0), "bbar", rung)
+    points = mesh.nodes_mm[mesh.surface]
+    model = NormalModel(operator, points)
+    motion = model.motion(disc(1.2, 0.4, 2.3), BALL)
+    assert motion.known
+    push = np.zeros((len(points), 3))
+    push[:, 2] = -motion.force_n
+    w = operator.displacement(push)[:, 2]
+    np.testing.assert_allclose(motion.w_mm, w, atol=1e-4 * motion.depth_mm)
+
+
 def test_uncertainty_is_that_of_drawn_patches():
     model = wide_model()
     sigma = np.array([0.05, 0.03, 0.04])

@@ -179,6 +179,10 @@ def test_flat_punch_is_placed_by_its_outline():
     turn = (patch.angle_deg - 30.0 + 90) % 180 - 90
     assert abs(turn) < 6
     assert (patch.size_mm, patch.length_mm) == (a, b)
+    lower = patch.at_height(-0.3)
+    assert (lower.size_mm, lower.length_mm) == (a, b)
+    seen = CAMERA.project([[*lower.centre_mm, -0.3], [*patch.centre_mm, 0.0]])
+    assert np.linalg.norm(seen[0] - seen[1]) < 0.5
 
 
 def test_circle_and_strip_fits_have_honest_errors():
