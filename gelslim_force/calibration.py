@@ -12,20 +12,24 @@ from gelslim_force.built_deviation import built_deviation
 from gelslim_force.bundle_camera import bundle_camera
 from gelslim_force.bundle_grid import bundle_grid
 from gelslim_force.calibration_error import CalibrationError
-from gelslim_force.calibration_fit import fit_camera
+from gelslim_force.calibration_fit import CameraFit, fit_camera
 from gelslim_force.calibration_report import diagnosis_lines, warning_lines
 from gelslim_force.camera_deviation import CameraTolerance
 from gelslim_force.detection import Detector
+from gelslim_force.detections import BORDER, Detections
 from gelslim_force.lattice_growth import LatticeError
 from gelslim_force.lattice_registration import Registration, register
-from gelslim_force.residual_bump import split_residuals
+from gelslim_force.residual_bump import ResidualField, split_residuals
 from gelslim_force.sensor_calibration import SensorCalibration, expected_dots
 
 if TYPE_CHECKING:
-    from gelslim_force.detections import Detections
     from gelslim_optics.virtual_camera import VirtualCamera
     from ifem_export.bundle import Bundle
     from ifem_export.marker_grid import MarkerGrid
+
+Array = NDArray[np.float64]
+_TOUCHED_PITCHES = 4.5
+"""Around a contact, dots within this are not fitted by."""
 
 
 def calibrate(
@@ -58,21 +62,20 @@ def calibrate(
     expected = checks.markers_in_view(design, grid)
     checks.require_dots(dots, expected)
     registration = _registered(dots, grid, image, design)
-    found = np.flatnonzero(registration.found)
+    found = _whole(registration, dots)
     chosen = dots.take(registration.dots[found])
     points, diameter = grid.positions_mm[found], grid.diameter_mm[found]
     flat = np.column_stack([points, np.zeros(len(points))])
     checks.require_upright(design.project(flat), chosen.centres_px)
     checks.require_print(registration, dots, expected)
     checks.require_anchors(chosen, design, grid, found)
-    fit = fit_camera(design, points, diameter, chosen.centres_px, tolerance)
-    rest = fit.camera.backproject(chosen.centres_px - fit.offset_px)[:, :2]
-    residuals = split_residuals(points, rest - points, grid.pitch_mm)
+    fit, rest, residuals = _fitted(design, points, diameter, chosen, tolerance, grid.pitch_mm)
+    checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     if not allow_contact:
         checks.require_no_contact(residuals)
-    checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     deviation = built_deviation(fit, rest, points, residuals)
-    missing = np.setdiff1d(np.flatnonzero(expected), found)
+    in_view = checks.markers_in_view(fit.camera, grid)
+    missing = np.setdiff1d(np.flatnonzero(in_view), found)
     aside = found[~fit.used]
     return SensorCalibration(
         camera=fit.camera,
@@ -84,9 +87,41 @@ def calibrate(
         detector=detector.settings,
         geometry_hash=bundle.geometry_hash,
         deviation=deviation,
-        diagnosis=diagnosis_lines(deviation, grid, found, missing, aside),
-        warnings=warning_lines(deviation, residuals, grid, expected, missing, aside),
+        diagnosis=diagnosis_lines(deviation, grid, found, missing, aside, in_view),
+        warnings=warning_lines(deviation, residuals, grid, missing, aside, in_view),
     )
+
+
+def _whole(registration: Registration, dots: Detections) -> NDArray[np.int64]:
+    """Ids of the markers found and not cut by the picture's edge."""
+    found = np.flatnonzero(registration.found)
+    cut = (dots.flags[registration.dots[found]] & BORDER) != 0
+    return found[~cut]
+
+
+def _fitted(
+    design: VirtualCamera,
+    points_mm: Array,
+    diameter_mm: Array,
+    dots: Detections,
+    tolerance: CameraTolerance | None,
+    pitch_mm: float,
+) -> tuple[CameraFit, Array, ResidualField]:
+    """Fit, places on the gel (n, 2) and their residuals; a touched place bends no camera."""
+    clean = dots.trustworthy
+    believed = clean
+    for last in (False, True):
+        fit = fit_camera(design, points_mm, diameter_mm, dots.centres_px, tolerance, believed)
+        rest = fit.camera.backproject(dots.centres_px - fit.offset_px)[:, :2]
+        residuals = split_residuals(points_mm[clean], (rest - points_mm)[clean], pitch_mm)
+        bump = checks.contact_of(residuals)
+        if last or bump is None:
+            break
+        away = np.hypot(points_mm[:, 0] - bump.x_mm, points_mm[:, 1] - bump.y_mm)
+        believed = clean & (away > _TOUCHED_PITCHES * pitch_mm)
+        if believed.mean() < 0.5:
+            break
+    return fit, rest, residuals
 
 
 def _registered(

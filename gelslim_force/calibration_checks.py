@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gelslim_force.calibration_fit import CameraFit
     from gelslim_force.detections import Detections
     from gelslim_force.lattice_registration import Registration
-    from gelslim_force.residual_bump import ResidualField
+    from gelslim_force.residual_bump import ResidualBump, ResidualField
 
 LEAST_SEEN = 0.6
 """Share of the markers in view that must be found."""
@@ -34,7 +34,6 @@ MOST_RESIDUAL_PITCH = 0.1
 LEAST_USED = 0.7
 CONTACT_MM = 0.03
 """Shared motion of a neighbourhood, if local and beyond the noise, that counts as contact."""
-LOCAL_SPREAD = 0.35
 _ANCHOR_STEP = 0.5
 
 
@@ -131,12 +130,18 @@ def require_anchors(
         )
 
 
+def contact_of(residuals: ResidualField) -> ResidualBump | None:
+    """Return the bump where it looks like contact."""
+    bump = residuals.bump
+    if bump is None or not bump.local or bump.shift_mm < CONTACT_MM:
+        return None
+    return bump
+
+
 def require_no_contact(residuals: ResidualField) -> None:
     """Refuse a place where neighbouring dots are off together."""
-    bump = residuals.bump
-    if bump is None or not bump.significant:
-        return
-    if bump.shift_mm >= CONTACT_MM and bump.spread <= LOCAL_SPREAD:
+    bump = contact_of(residuals)
+    if bump is not None:
         raise CalibrationError(
             f"something touches the gel near x = {bump.x_mm:.1f}, y = {bump.y_mm:.1f} mm: the dots "
             f"there are off by {bump.shift_mm * 1000:.0f} µm together, {bump.sigmas:.0f} times "

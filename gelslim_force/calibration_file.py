@@ -58,7 +58,6 @@ def calibration_of(record: Mapping[str, Any]) -> SensorCalibration:
         raise ValueError(f"its format is {record.get('format')!r}, only {FORMAT} is known")
     deviation = record["deviation"]
     grid, dots = record["grid"], record["dots"]
-    count = len(record["markers"])
     return SensorCalibration(
         camera=VirtualCamera.from_record(record["camera"]),
         grid=MarkerGrid(
@@ -73,10 +72,10 @@ def calibration_of(record: Mapping[str, Any]) -> SensorCalibration:
         ),
         markers=_whole(record["markers"]),
         dots=Detections(
-            centres_px=_finite(dots["centres_px"], "centres_px").reshape(count, 2),
+            centres_px=_finite(dots["centres_px"], "centres_px"),
             area_px=_finite(dots["area_px"], "area_px"),
             contrast=_finite(dots["contrast"], "contrast"),
-            moments_px2=_finite(dots["moments_px2"], "moments_px2").reshape(count, 3),
+            moments_px2=_finite(dots["moments_px2"], "moments_px2"),
             flags=_whole(dots["flags"]),
         ),
         residual_px=_floats(record["residual_px"]),
@@ -169,6 +168,8 @@ def _array(kind: type) -> Callable[[Any], NDArray[Any]]:
         array = np.array(values)
         if array.size and array.dtype.kind not in "if":
             raise ValueError(f"a list holds {array.dtype}, not numbers")
+        if kind is np.int64 and not np.array_equal(array, np.rint(array)):
+            raise ValueError("a list of ids, indices or flags holds numbers that are not whole")
         return array.astype(kind)
 
     return made

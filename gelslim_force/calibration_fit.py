@@ -27,6 +27,7 @@ _FAR = 4.5
 _STEP = 1e-4
 _WIDEST = 12.0
 _ROUNDS = 3
+_LEAST_DOTS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +77,7 @@ def fit_camera(
     diameter_mm: ArrayLike,
     centres_px: ArrayLike,
     tolerance: CameraTolerance | None = None,
+    believed: ArrayLike | None = None,
 ) -> CameraFit:
     """Fit the camera to n dots.
 
@@ -85,6 +87,7 @@ def fit_camera(
         diameter_mm: (n,) theirs.
         centres_px: (n, 2) centroids seen.
         tolerance: of the built camera.
+        believed: (n,) dots to fit by; the others get residuals only.
 
     Two rounds with a robust loss find the noise and the dots that do not belong; the last one
     is plain least squares over the others. Raises ValueError for shapes that do not fit, values
@@ -94,11 +97,14 @@ def fit_camera(
     diameter = np.asarray(diameter_mm, dtype=float)
     if points.shape != seen.shape or points.ndim != 2 or points.shape[1] != 2:
         raise ValueError(f"points {points.shape} and centres {seen.shape}: both must be (n, 2)")
-    if len(points) < 12 or not (np.isfinite(points).all() and np.isfinite(seen).all()):
-        raise ValueError(f"{len(points)} dots: a camera needs at least 12, all finite")
+    if len(points) < _LEAST_DOTS or not np.isfinite([points, seen]).all():
+        raise ValueError(f"{len(points)} dots: a camera needs at least {_LEAST_DOTS}, all finite")
     problem = _Problem(design, points, (tolerance or CameraTolerance()).sigma)
+    trusted = np.ones(len(points), dtype=bool) if believed is None else np.array(believed, bool)
+    if trusted.sum() < _LEAST_DOTS:
+        raise ValueError(f"{int(trusted.sum())} dots to fit by: at least {_LEAST_DOTS} are needed")
     unit = np.zeros(len(PARAMETERS))
-    used, noise = np.ones(len(points), dtype=bool), _FIRST_NOISE_PX
+    used, noise = trusted, _FIRST_NOISE_PX
     for turn in range(_ROUNDS):
         camera = problem.camera(unit)
         offset = centroid_offset_px(camera, points, diameter)
@@ -106,9 +112,9 @@ def fit_camera(
         unit = problem.solved(unit, seen - offset, used, noise, robust=not last)
         left = seen - offset - problem.image(unit)
         if not last:
-            noise = max(1.4826 * float(np.median(np.abs(left))), _LEAST_NOISE_PX)
-            used = np.hypot(*left.T) <= _FAR * noise
-            used = used if used.sum() >= 12 else np.ones(len(points), dtype=bool)
+            noise = max(1.4826 * float(np.median(np.abs(left[trusted]))), _LEAST_NOISE_PX)
+            used = trusted & (np.hypot(*left.T) <= _FAR * noise)
+            used = used if used.sum() >= _LEAST_DOTS else trusted
     return _judged(problem, unit, offset, left, used, noise)
 
 

@@ -41,16 +41,17 @@ def diagnosis_lines(
     found: NDArray[np.int64],
     missing: NDArray[np.int64],
     aside: NDArray[np.int64],
+    in_view: NDArray[np.bool_],
 ) -> tuple[str, ...]:
     """Lines for people: markers, camera, what is left over and what one picture cannot tell.
 
-    `found`, `missing` and `aside` are marker ids: seen, in view but not seen, seen but too far
-    off to fit by.
+    `found`, `missing` and `aside` are marker ids: seen, in view but not seen, seen but not fitted
+    by (doubtful or too far off). `in_view` (m,) are the markers the built camera sees whole.
     """
     d = deviation
     lines = [
-        f"{len(found)} of {len(grid)} markers found; missing in view: {_ids(missing)}; set aside "
-        f"in the fit: {_ids(aside)}.",
+        f"{len(found)} of {len(grid)} markers found, {int(in_view.sum())} are in view; missing "
+        f"there: {_ids(missing)}; not fitted by: {_ids(aside)}.",
         f"Against the design the camera is turned by {d.rotation_deg:.2f}° and shifted by "
         f"{d.shift_mm:.2f} mm; the picture's scale differs by {d.scale_percent:+.2f} %, its "
         f"distortion by up to {d.distortion_px:.2f} px; dots lie {d.moved_px:.1f} px from where "
@@ -83,19 +84,24 @@ def warning_lines(
     deviation: BuiltDeviation,
     residuals: ResidualField,
     grid: MarkerGrid,
-    expected: NDArray[np.bool_],
     missing: NDArray[np.int64],
     aside: NDArray[np.int64],
+    in_view: NDArray[np.bool_],
 ) -> tuple[str, ...]:
     """Return what deserves a look before the calibration is trusted."""
     lines = []
-    if len(missing) > 0.05 * expected.sum():
+    if len(missing) > 0.05 * in_view.sum():
         lines.append(
-            f"{len(missing)} of {int(expected.sum())} markers in view are missing: clean the gel "
+            f"{len(missing)} of {int(in_view.sum())} markers in view are missing: clean the gel "
             "or look at the light"
         )
+    if not in_view.all():
+        lines.append(f"{int((~in_view).sum())} markers lie outside the picture or are cut by it")
     if len(aside) > 0.05 * len(grid):
-        lines.append(f"{len(aside)} markers lie too far from the print to fit by: a poor print?")
+        lines.append(
+            f"{len(aside)} markers are doubtful or too far from the print to fit by: dirt, or a "
+            "poor print"
+        )
     for name, ratio in zip(PARAMETERS, deviation.values / deviation.tolerance, strict=True):
         if abs(ratio) > _ODD_SIGMAS:
             lines.append(f"{_WORDS[name][0]} is off by {abs(ratio):.1f} times its tolerance")

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from camera_rig import finger_view
+from typing import Any
 
+import numpy as np
+from camera_rig import finger_view
+from numpy.typing import NDArray
+from synthetic import Look, render
+
+from gelslim_force.camera_deviation import deviated_camera
 from gelslim_optics.virtual_camera import VirtualCamera
 from ifem_export.bundle import Bundle, build_bundle
 from ifem_export.marker_grid import MarkerGrid
@@ -35,3 +41,17 @@ def small_bundle(grid: MarkerGrid, camera: VirtualCamera | None = None) -> Bundl
         camera=(camera or finger_view()).to_record(),
         with_stiffness=False,
     )
+
+
+BUILD = np.array([0.8, -0.9, 0.7, 0.15, -0.2, 0.12, 1.6, -0.04, 0.01, 0.001, -0.001])
+"""Deviations of a built camera, see `camera_deviation.PARAMETERS`."""
+
+
+def seen_by(
+    grid: MarkerGrid,
+    values: NDArray[np.float64],
+    moved_mm: NDArray[np.float64] | None = None,
+    **look: Any,
+) -> NDArray[np.uint8]:
+    """A frame of the print by a camera that deviates from the finger's."""
+    return render(grid, deviated_camera(finger_view(), values), Look(**look), moved_mm).image

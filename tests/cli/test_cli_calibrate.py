@@ -1,0 +1,89 @@
+"""`gelslim calibrate`: a file from a bundle and a picture, or a refusal."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from gelslim_cad.cli import main
+from gelslim_force.bundle_camera import bundle_camera
+from gelslim_force.bundle_grid import bundle_grid
+from gelslim_force.calibration_file import read_calibration
+from gelslim_force.camera_deviation import PARAMETERS, deviated_camera
+from ifem_export.bundle_io import load_bundle
+
+SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")
+TURNED_DEG = 0.8
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bundle") / "mini20"
+    assert main(["bundle", SPEC, "-o", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def picture(bundle: Path) -> Path:
+    """Dots as dark discs about their projections; the camera is turned about y."""
+    sensor = load_bundle(bundle)
+    grid = bundle_grid(sensor)
+    values = np.zeros(len(PARAMETERS))
+    values[PARAMETERS.index("rotation_y_deg")] = TURNED_DEG
+    camera = deviated_camera(bundle_camera(sensor), values)
+    flat = np.column_stack([grid.positions_mm, np.zeros(len(grid))])
+    y, x = np.mgrid[: camera.image_height_px, : camera.image_width_px].astype(float)
+    image = np.full(x.shape, 160.0)
+    to_gel = np.linalg.inv(camera.jacobian(flat))
+    for place, inverse, size in zip(camera.project(flat), to_gel, grid.diameter_mm, strict=True):
+        u, v = x - place[0], y - place[1]
+        away = np.hypot(
+            inverse[0, 0] * u + inverse[0, 1] * v, inverse[1, 0] * u + inverse[1, 1] * v
+        )
+        image = np.where(away < size / 2, 40.0, image)
+    file = bundle.parent / "reference.npy"
+    np.save(file, np.rint(gaussian_filter(image, 0.7)).astype(np.uint8))
+    return file
+
+
+def test_a_calibration_is_written_and_told(
+    bundle: Path, picture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "made" / "sensor.json"
+    assert main(["calibrate", str(bundle), str(picture), "-o", str(out)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for words in ("of 256 markers found", "rotation about y: +0.8", "focal length", "Wrote"):
+        assert words in said
+    found = read_calibration(out)
+    found.require_bundle(load_bundle(bundle))
+    turned = found.deviation.values[PARAMETERS.index("rotation_y_deg")]
+    assert turned == pytest.approx(TURNED_DEG, abs=0.05)
+    assert main(["calibrate", str(bundle), str(picture), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(out.read_text(encoding="utf-8"))
+    assert main(["calibrate", str(bundle), str(picture)]) == 0
+    assert "Not kept" in capsys.readouterr().out
+
+
+def test_refusals_write_nothing(
+    bundle: Path, picture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frame = np.load(picture)
+    out = tmp_path / "sensor.json"
+    for name, changed, words in (
+        ("mirrored", frame[:, ::-1], "mirrored left to right"),
+        ("small", frame[::2, ::2], "320 x 240 px"),
+        ("dark", frame * 0, "dots are seen"),
+    ):
+        np.save(tmp_path / f"{name}.npy", changed)
+        arguments = ["calibrate", str(bundle), str(tmp_path / f"{name}.npy"), "-o", str(out)]
+        assert main(arguments) == 2
+        said = capsys.readouterr()
+        assert words in said.err
+        assert "Traceback" not in said.err
+    assert main(["calibrate", str(bundle), str(tmp_path / "none.png")]) == 2
+    assert main(["calibrate", str(tmp_path), str(picture)]) == 2
+    assert not out.exists()

@@ -1,0 +1,160 @@
+"""Calibrations written and read: the same again, or a clear refusal."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from calibration_samples import BUILD, seen_by, small_bundle
+
+from gelslim_force.calibration import calibrate
+from gelslim_force.calibration_error import CalibrationError
+from gelslim_force.calibration_file import (
+    calibration_of,
+    calibration_record,
+    read_calibration,
+    write_calibration,
+)
+from gelslim_force.reference_picture import read_reference
+from ifem_export.marker_grid import build_marker_grid
+
+GRID = build_marker_grid(12, 11, 1.3, 0.5)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return calibrate(small_bundle(GRID), seen_by(GRID, BUILD, noise=4, missing=0.03))
+
+
+def test_a_file_gives_the_same_calibration_again(found, tmp_path):
+    path = tmp_path / "sensor.json"
+    write_calibration(found, path)
+    again = read_calibration(path)
+    assert again.camera.to_record() == found.camera.to_record()
+    for name in ("markers", "reference_px", "residual_px", "rest_mm", "residual_mm", "missing"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
+    for name in ("area_px", "contrast", "moments_px2", "flags"):
+        np.testing.assert_array_equal(getattr(again.dots, name), getattr(found.dots, name))
+    for name in ("positions_mm", "kind", "diameter_mm", "omitted"):
+        np.testing.assert_array_equal(getattr(again.grid, name), getattr(found.grid, name))
+    assert again.detector == found.detector
+    assert again.diagnosis == found.diagnosis
+    assert again.warnings == found.warnings
+    for field in dataclasses.fields(found.deviation):
+        old, new = getattr(found.deviation, field.name), getattr(again.deviation, field.name)
+        assert np.array_equal(old, new) or field.name == "weak"
+    assert len(again.deviation.weak) == len(found.deviation.weak)
+    write_calibration(again, tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+
+
+def test_a_bare_calibration_is_kept_too(found):
+    bare = dataclasses.replace(found, deviation=None)
+    record = json.loads(json.dumps(calibration_record(bare)))
+    assert calibration_of(record).deviation is None
+
+
+def _without(name):
+    return lambda r: r.pop(name)
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (_without("camera"), "camera is missing"),
+        (lambda r: r.update(format="gelslim-calibration/2"), "only gelslim-calibration/1"),
+        (lambda r: r["markers"].append(3), "must be|dots for"),
+        (lambda r: r["markers"].__setitem__(0, 4000), "rise|not among"),
+        (lambda r: r["rest_mm"].pop(), "rest_mm"),
+        (lambda r: r["rest_mm"].__setitem__(2, ["a", "b"]), "not numbers"),
+        (lambda r: r["rest_mm"].__setitem__(2, [float("nan"), 0.0]), "finite"),
+        (lambda r: r["dots"]["area_px"].pop(), "centres_px has shape"),
+        (lambda r: r["dots"]["flags"].__setitem__(0, 0.5), "whole"),
+        (lambda r: r["grid"]["row"].__setitem__(0, 7), "marker grid"),
+        (lambda r: r["camera"].update(focal_px=-1), "focal_px"),
+        (lambda r: r["detector"].update(colour=1), "colour"),
+        (lambda r: r["deviation"]["values"].pop("k1"), "k1 is missing"),
+        (lambda r: r.update(grid=3), "no calibration"),
+    ],
+)
+def test_damaged_records_are_named(found, tmp_path, damage, words):
+    record = json.loads(json.dumps(calibration_record(found)))
+    damage(record)
+    path = tmp_path / "damaged.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(CalibrationError, match=words):
+        read_calibration(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"", "no JSON"), (b"{", "no JSON"), (b"\xff\xfe", "no JSON"), (b"[1]", "no record")],
+)
+def test_rubbish_is_named(tmp_path, content, words):
+    path = tmp_path / "rubbish.json"
+    path.write_bytes(content)
+    with pytest.raises(CalibrationError, match=words):
+        read_calibration(path)
+    with pytest.raises(CalibrationError, match="no such file"):
+        read_calibration(tmp_path / "none.json")
+    with pytest.raises(CalibrationError, match="directory"):
+        read_calibration(tmp_path)
+
+
+def test_reference_pictures(tmp_path):
+    rng = np.random.default_rng(0)
+    frames = rng.integers(0, 255, (4, 20, 30, 3)).astype(np.uint8)
+    np.save(tmp_path / "one.npy", frames[0])
+    np.save(tmp_path / "all.npy", frames)
+    np.testing.assert_array_equal(read_reference(tmp_path / "one.npy"), frames[0])
+    mean = np.rint(frames.mean(axis=0)).astype(np.uint8)
+    np.testing.assert_array_equal(read_reference(tmp_path / "all.npy"), mean)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for k, frame in enumerate(frames):
+        np.save(folder / f"{k}.npy", frame)
+    np.testing.assert_array_equal(read_reference(folder), mean)
+    np.save(folder / "5.npy", frames[0, :10])
+    with pytest.raises(CalibrationError, match="different sizes"):
+        read_reference(folder)
+
+
+def test_pictures_keep_their_colours(tmp_path):
+    cv = pytest.importorskip("cv2")
+    frame = np.zeros((20, 30, 3), np.uint8)
+    frame[:, :, 0] = 200
+    cv.imwrite(str(tmp_path / "red.png"), frame[:, :, ::-1])
+    np.testing.assert_array_equal(read_reference(tmp_path / "red.png"), frame)
+
+
+def test_what_is_no_picture_is_named(tmp_path):
+    (tmp_path / "empty.png").write_bytes(b"")
+    (tmp_path / "text.png").write_text("no picture")
+    (tmp_path / "bad.npy").write_bytes(b"\x93NUMPY")
+    np.save(tmp_path / "float.npy", np.zeros((20, 30)))
+    np.save(tmp_path / "object.npy", np.array([{}], dtype=object), allow_pickle=True)
+    (tmp_path / "none").mkdir()
+    pytest.importorskip("cv2")
+    for name, words in (
+        ("empty.png", "no picture"),
+        ("text.png", "no picture"),
+        ("bad.npy", "no NumPy array"),
+        ("object.npy", "no NumPy array"),
+        ("float.npy", "float64"),
+        ("none", "no pictures in it"),
+        ("absent.png", "no such file"),
+    ):
+        with pytest.raises(CalibrationError, match=words):
+            read_reference(tmp_path / name)
+
+
+def test_missing_opencv_names_the_extra(tmp_path, monkeypatch):
+    import sys
+
+    (tmp_path / "picture.png").write_bytes(b"x")
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    with pytest.raises(CalibrationError, match="gelslim-cad\\[vision\\]"):
+        read_reference(tmp_path / "picture.png")
