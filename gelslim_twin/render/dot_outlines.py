@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
-RIM_POINTS = 12
+RIM_POINTS = 8
 CORNERS = 48
 
 
@@ -46,19 +46,20 @@ def outlines_px(
     projected = camera.project(points).reshape(len(dots), rim_points, 2)
     if rim_points == corners:
         return projected
-    return np.ascontiguousarray(np.einsum("ck,mkd->mcd", _series(rim_points, corners), projected))
+    from gelslim_twin.render.outline_kernel import expand
+
+    out = np.empty((len(dots), corners, 2))
+    expand(projected, _series(rim_points, corners), out)
+    return out
 
 
 def centroids_px(outlines: Array) -> tuple[Array, Array]:
     """Area centroids (m, 2) and signed areas (m,) of outlines (m, k, 2), by Green's theorem."""
-    middle = outlines.mean(axis=1, keepdims=True)
-    here = outlines - middle
-    after = np.roll(here, -1, axis=1)
-    cross = here[..., 0] * after[..., 1] - after[..., 0] * here[..., 1]
-    area = cross.sum(axis=1) / 2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        moment = ((here + after) * cross[..., None]).sum(axis=1) / (6 * area[:, None])
-    return middle[:, 0] + moment, area
+    from gelslim_twin.render.outline_kernel import centroids
+
+    centres, area = np.empty((len(outlines), 2)), np.empty(len(outlines))
+    centroids(np.ascontiguousarray(outlines), centres, area)
+    return centres, area
 
 
 def a_priori_bound_px(scale_px_per_mm: float, largest_displacement_mm: float) -> float:

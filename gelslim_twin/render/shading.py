@@ -22,18 +22,19 @@ if TYPE_CHECKING:
     from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
+_NEAR_MM = 1e-3
 
 
 @dataclass(frozen=True)
 class Shading:
     """Share of light blind to the slope, and the rung: a value every `pixel_step` pixels.
 
-    `rounds` of the search for the point of the sunken surface that a ray meets.
+    At most `rounds` of the search for the point of the sunken surface that a ray meets.
     """
 
     ambient_share: float = 0.3
     pixel_step: int = 4
-    rounds: int = 3
+    rounds: int = 8
 
     def __post_init__(self) -> None:
         if not 0 <= self.ambient_share <= 1:
@@ -50,10 +51,10 @@ class Shading:
         from gelslim_twin.render.surface_kernel import seen_slopes
 
         rest = sight.rest_mm.reshape(-1, 2)
-        slopes, at = np.zeros((len(rest), 2)), np.zeros((len(rest), 3))
+        slopes = np.zeros((len(rest), 2))
         seen_slopes(
             state.padded_mm, state.origin_mm, state.step_mm,
-            rest, sight.lean.reshape(-1, 2), self.rounds, slopes, at,
+            rest, sight.lean.reshape(-1, 2), self.rounds, _NEAR_MM, slopes,
         )  # fmt: skip
         gain = self.of_slopes(slopes, light)
         shape = (*sight.rest_mm.shape[:2], light.sources)

@@ -56,43 +56,55 @@ def displacement(padded: Any, origin: Any, step: Any, points: Any, out: Any) -> 
 
 
 @njit(**COMPILED)
+def _here(padded: Any, j: Any, i: Any, wy: Any, wx: Any) -> Any:
+    """Displacement at weights `wy`, `wx` (4,) of the nodes about cell j, i."""
+    a = b = c = 0.0
+    for q in range(4):
+        row = padded[j + q]
+        e = f = g = 0.0
+        for p in range(4):
+            e += wx[p] * row[i + p, 0]
+            f += wx[p] * row[i + p, 1]
+            g += wx[p] * row[i + p, 2]
+        a += wy[q] * e
+        b += wy[q] * f
+        c += wy[q] * g
+    return a, b, c
+
+
+@njit(**COMPILED)
 def seen_slopes(
-    padded: Any, origin: Any, step: Any, rest: Any, lean: Any, rounds: Any, slopes: Any, at: Any
+    padded: Any, origin: Any, step: Any, rest: Any, lean: Any, rounds: Any, near: Any, slopes: Any
 ) -> None:
-    """Write the slopes (n, 2) of the deformed surface where rays meet it, and the points (n, 3).
+    """Write the slopes (n, 2) of the deformed surface where rays meet it.
 
     A ray is at rest (n, 2) + lean (n, 2) z. The material point X with X + u(X) on the ray is
-    found by `rounds` of X = rest + lean u_z(X) - u_xy(X). The slope of the surface carried along
-    is (I + du_xy/dX)^-T du_z/dX.
+    found by X = rest + lean u_z(X) - u_xy(X), `rounds` times or until it moves less than `near`.
+    The slope of the surface carried along is (I + du_xy/dX)^-T du_z/dX.
     """
     ny, nx = padded.shape[0] - 2, padded.shape[1] - 2
     wx, wy, dx, dy = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
-    u, gx, gy = np.empty(3), np.empty(3), np.empty(3)
     for n in range(rest.shape[0]):
         x, y = rest[n, 0], rest[n, 1]
-        for k in range(rounds + 1):
+        i, s = cell_of((x - origin[0]) / step[0], nx)
+        j, t = cell_of((y - origin[1]) / step[1], ny)
+        weights(s, wx, dx)
+        weights(t, wy, dy)
+        for _ in range(rounds):
+            a, b, c = _here(padded, j, i, wy, wx)
+            moved_x, moved_y = rest[n, 0] + lean[n, 0] * c - a, rest[n, 1] + lean[n, 1] * c - b
+            left = abs(moved_x - x) + abs(moved_y - y)
+            x, y = moved_x, moved_y
             i, s = cell_of((x - origin[0]) / step[0], nx)
             j, t = cell_of((y - origin[1]) / step[1], ny)
             weights(s, wx, dx)
             weights(t, wy, dy)
-            u[:] = 0.0
-            gx[:] = 0.0
-            gy[:] = 0.0
-            for q in range(4):
-                for p in range(4):
-                    for c in range(3):
-                        value = padded[j + q, i + p, c]
-                        u[c] += wy[q] * wx[p] * value
-                        if k == rounds:
-                            gx[c] += wy[q] * dx[p] * value
-                            gy[c] += dy[q] * wx[p] * value
-            if k < rounds:
-                x = rest[n, 0] + lean[n, 0] * u[2] - u[0]
-                y = rest[n, 1] + lean[n, 1] * u[2] - u[1]
-        xx, xy = 1 + gx[0] / step[0], gy[0] / step[1]
-        yx, yy = gx[1] / step[0], 1 + gy[1] / step[1]
-        zx, zy = gx[2] / step[0], gy[2] / step[1]
+            if left < near:
+                break
+        xx, yx, zx = _here(padded, j, i, wy, dx)
+        xy, yy, zy = _here(padded, j, i, dy, wx)
+        xx, yx, zx = 1 + xx / step[0], yx / step[0], zx / step[0]
+        xy, yy, zy = xy / step[1], 1 + yy / step[1], zy / step[1]
         det = xx * yy - xy * yx
         slopes[n, 0] = (zx * yy - zy * yx) / det
         slopes[n, 1] = (zy * xx - zx * xy) / det
-        at[n, 0], at[n, 1], at[n, 2] = x + u[0], y + u[1], u[2]
