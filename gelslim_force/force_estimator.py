@@ -78,7 +78,7 @@ class ForceEstimator:
     @cached_property
     def points_mm(self) -> Array:
         """(c, 3) at rest."""
-        return np.asarray(self.mesh.nodes_mm)[self.mesh.surface]
+        return np.asarray(self.mesh.surface_mm)
 
     @cached_property
     def area_mm2(self) -> Array:

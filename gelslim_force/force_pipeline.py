@@ -72,7 +72,8 @@ class ForcePipeline:
         calibration.require_bundle(bundle)
         self.bundle, self.calibration = bundle, calibration
         self.settings = settings or PipelineSettings()
-        self._normal = normal
+        self.normal = normal
+        """May be set later; the patch finder of an indenter needs the pipeline's nodes."""
         self._tracker = calibration.tracker()
         reference = self._tracker.reference
         markers = bundle.markers
@@ -197,20 +198,20 @@ class ForcePipeline:
     ) -> tuple[NormalReading | None, Array]:
         """Normal motion, and the motion (n, 3) of the reference's markers."""
         motion_of = self._motion.of_markers
-        if given is not None or self._normal is None:
+        if given is not None or self.normal is None:
             reading = None if given is None else self._given(given)
             motion = motion_of(places_px, reading)
             clock.stage("displace")
             return reading, motion
-        seen = self._normal.look(image, places_px)
+        seen = self.normal.look(image, places_px)
         clock.stage("look")
-        reading = self._normal.motion(seen)
+        reading = self.normal.motion(seen)
         clock.stage("normal")
         motion = motion_of(places_px, reading)
         clock.stage("displace")
         lateral = self._motion.of_touched(motion, reading)
         if lateral is not None:
-            reading = self._normal.motion(seen, lateral)
+            reading = self.normal.motion(seen, lateral)
             clock.stage("normal")
             motion = motion_of(places_px, reading)
             clock.stage("displace")

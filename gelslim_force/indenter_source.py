@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.indenter import Indenter
 from gelslim_force.normal_motion import NormalModel
+
+if TYPE_CHECKING:
+    from gelslim_force.force_pipeline import ForcePipeline
 
 Array = NDArray[np.float64]
 
@@ -95,3 +98,31 @@ class IndenterSource:
         return NormalReading(
             found.w_mm, found.sigma_mm, found.patch, patch, found.depth_mm, found.problem
         )
+
+
+def indenter_source(
+    pipeline: ForcePipeline,
+    reference: NDArray[np.uint8],
+    indenter: Indenter,
+    depth_mm: float | None = None,
+) -> IndenterSource:
+    """Source for a pipeline's sensor; `reference` is its no-contact frame.
+
+    Raises ValueError for a reference that cannot show a patch, such as a grey one.
+    """
+    from gelslim_force.patch_finder import PatchFinder
+
+    built = pipeline.calibration
+    followed = built.reference
+    radius = np.sqrt(np.abs(built.dots.moments_px2).max(axis=1)) * 2
+    index = np.searchsorted(built.markers, followed.markers)
+    finder = PatchFinder(
+        built.camera,
+        reference,
+        followed.places_px,
+        marker_radius_px=radius[index],
+        surface_mm=pipeline.points_mm,
+        indenter=indenter,
+    )
+    model = NormalModel(pipeline.settings.compliance(pipeline.bundle), pipeline.points_mm)
+    return IndenterSource(finder, model, indenter, depth_mm)
