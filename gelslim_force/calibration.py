@@ -69,7 +69,13 @@ def calibrate(
     checks.require_upright(design.project(flat), chosen.centres_px)
     checks.require_print(registration, dots, expected)
     checks.require_anchors(chosen, design, grid, found)
-    fit, rest, residuals = _fitted(design, points, diameter, chosen, tolerance, grid.pitch_mm)
+    try:
+        fit, rest, residuals = _fitted(design, points, diameter, chosen, tolerance, grid.pitch_mm)
+    except ValueError as error:
+        raise CalibrationError(
+            f"no camera within reason puts the print where the dots are: {error}; use the bundle "
+            "of the sensor that took the picture"
+        ) from error
     checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     if not allow_contact:
         checks.require_no_contact(residuals)
