@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ Mask = NDArray[np.bool_]
 
 SELF_SHARE = 0.5
 """Part of a node's own compliance that grows as only a share of its area is loaded."""
+SHIFTS = ((0.25, 0.25), (0.25, -0.25), (-0.25, 0.25), (-0.25, -0.25))
 STEPS = 40
 DISCRETE = 0.2
 """Relative error of the depth at a patch one node spacing in size; falls with the square."""
@@ -142,15 +143,23 @@ class NormalModel:
         return NormalMotion(nan, nan, none, np.nan, np.nan, nan, problem)
 
     def depth_mm(self, patch: ContactPatch, indenter: Indenter) -> float:
-        """Depth at which the pressure falls to zero at the patch's rim; NaN where there is none."""
+        """Depth at which the pressure falls to zero at the patch's rim; NaN where there is none.
+
+        Taken with the patch shifted by a quarter of the node spacing in four directions, which
+        evens out where the rim passes between the nodes.
+        """
         if not np.isfinite(self._rim_profile(patch, indenter)):
             return np.nan
-        outside = patch.outside_mm(*self.points_mm.T)
-        profile = self._profile(patch, indenter)
-        step = self.pitch_mm / 2
-        more, less = (self._punch(outside - by, profile) for by in (step, -step))
-        gained = more[0] - less[0]
-        return float((more[1] - less[1]) / gained) if gained > 0 else np.nan
+        gained, saved = 0.0, 0.0
+        for shift in SHIFTS:
+            moved = replace(patch, centre_mm=patch.centre_mm + self.pitch_mm * np.array(shift))
+            outside = moved.outside_mm(*self.points_mm.T)
+            profile = self._profile(moved, indenter)
+            for sign in (1, -1):
+                stiffness, force = self._punch(outside - sign * self.pitch_mm / 2, profile)
+                gained += sign * stiffness
+                saved += sign * force
+        return saved / gained if gained > 0 else np.nan
 
     def _settled(
         self, patch: ContactPatch, indenter: Indenter

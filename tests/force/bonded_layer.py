@@ -45,6 +45,40 @@ def hankel(k: Array, spectrum: Array, r: Array) -> Array:
     )
 
 
+def stiffness_factor(x: Array, nu: float) -> Array:
+    """L(kh) of a layer that is bonded below and free of shear above."""
+    x = np.minimum(x, 300.0)
+    kappa = 3 - 4 * nu
+    e = np.exp(-2 * x)
+    return (kappa * (1 - e * e) - 4 * x * e) / (
+        kappa * (1 + e * e) + (1 + kappa**2 + 4 * x * x) * e
+    )
+
+
+def strip_contact(
+    profile, half_mm: float, thickness_mm: float, youngs_mpa: float, nu: float, terms: int = 6
+) -> tuple[float, float]:
+    """Depth (mm) and force per length (N/mm) of a line contact in plane strain.
+
+    Sinking 2 (1 - ν²)/(π E) ∫ L(kh)/k p~(k) cos kx dk, p~ of (1 - x²/b²)^(m - 1/2) by Poisson's
+    integral of the Bessel function J_m.
+    """
+    k = (np.arange(12000) + 0.5) * (0.025 / max(half_mm, thickness_mm))
+    weight = stiffness_factor(k * thickness_mm, nu) / k * 2 * (1 - nu**2) / (np.pi * youngs_mpa)
+    orders = np.arange(1, terms + 1)
+    t = half_mm * k
+    parts = np.array(
+        [half_mm * np.sqrt(np.pi) * gamma(m + 0.5) * (2 / t) ** m * jv(m, t) for m in orders]
+    )
+    x = half_mm * (np.arange(24) + 0.5) / 24
+    columns = np.cos(np.outer(x, k)) @ (parts * weight * (k[1] - k[0])).T
+    solution, *_ = np.linalg.lstsq(
+        np.column_stack([columns, -np.ones_like(x)]), -profile(x), rcond=None
+    )
+    whole = half_mm * np.sqrt(np.pi) * gamma(orders + 0.5) / gamma(orders + 1)
+    return float(solution[-1]), float(solution[:-1] @ whole)
+
+
 def layer_contact(
     profile, radius_mm: float, thickness_mm: float, youngs_mpa: float, nu: float, terms: int = 6
 ) -> LayerContact:
@@ -53,12 +87,7 @@ def layer_contact(
     count = int(12000 * max(1.0, thickness_mm / a))
     k = np.arange(count + 1) * (0.025 / max(a, thickness_mm))
     k[0] = 1e-9
-    x = np.minimum(k * thickness_mm, 300.0)
-    kappa = 3 - 4 * nu
-    e = np.exp(-2 * x)
-    factor = (kappa * (1 - e * e) - 4 * x * e) / (
-        kappa * (1 + e * e) + (1 + kappa**2 + 4 * x * x) * e
-    )
+    factor = stiffness_factor(k * thickness_mm, nu)
     parts = []
     for m in range(1, terms + 1):
         mu = m - 0.5

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from bonded_layer import layer_contact
+from bonded_layer import layer_contact, strip_contact
 from scipy.linalg import cholesky
 from scipy.optimize import nnls
 
@@ -93,9 +93,9 @@ def test_depth_motion_and_force_of_a_sphere(radius, nu):
         beside = (r > 1.25 * radius) & (r < radius + 4)
         bulge.append(np.abs(motion.w_mm - exact)[beside].max() / truth.depth_mm)
         assert abs(motion.depth_mm - truth.depth_mm) < 4 * motion.depth_sigma_mm
-    assert abs(np.mean(depth)) < 0.02
-    assert np.abs(depth).max() < 0.055
-    assert np.abs(force).max() < 0.13
+    assert abs(np.mean(depth)) < 0.03
+    assert np.abs(depth).max() < 0.04
+    assert np.abs(force).max() < 0.08
     assert abs(np.mean(force)) < 0.05
     assert np.max(field) < 0.12
     assert np.max(bulge) < 0.03
@@ -147,19 +147,17 @@ def test_depth_at_the_pads_edge():
     assert motion.push_n == pytest.approx(push.sum(), rel=0.16)
 
 
-def test_depth_of_a_cylinder():
-    """A strip lies shallower than a disc of its half-width and does not depend on its angle."""
+@pytest.mark.parametrize("half", [1.4, 2.3])
+def test_depth_and_force_of_a_cylinder(half):
+    """Line contact on a bonded layer in plane strain; the pad's ends make a small difference."""
     model = wide_model()
-    straight, turned = (
-        model.motion(ContactPatch("strip", np.zeros(2), 1.8, angle_deg=a), Cylinder(10.0))
-        for a in (0.0, 90.0)
-    )
-    assert straight.depth_mm == pytest.approx(turned.depth_mm, rel=1e-6)
-    oblique = model.motion(ContactPatch("strip", np.zeros(2), 1.8, angle_deg=33.0), Cylinder(10.0))
-    assert oblique.depth_mm == pytest.approx(straight.depth_mm, rel=0.04)
-    ball = model.motion(disc(a=1.8), BALL)
-    rim = BALL.profile(1.8, 0.0)
-    assert rim < straight.depth_mm * 1.6 < ball.depth_mm * 2.2
+    depth, line = strip_contact(lambda x: BALL.profile(x, 0 * x), half, THICK_MM, E_MPA, 0.48)
+    for angle, y in ((0.0, 0.0), (0.0, 0.1), (90.0, 0.0), (33.0, 0.2)):
+        patch = ContactPatch("strip", np.array([0.0, y]), half, angle_deg=angle)
+        motion = model.motion(patch, Cylinder(10.0))
+        length = 22.0 / max(abs(np.cos(np.deg2rad(angle))), abs(np.sin(np.deg2rad(angle))))
+        assert motion.depth_mm == pytest.approx(depth, rel=0.08)
+        assert motion.push_n == pytest.approx(line * length, rel=0.15)
 
 
 def test_compliance_by_symmetry_is_that_of_single_solves():
@@ -211,7 +209,7 @@ def test_uncertainty_is_that_of_drawn_patches():
     clear = seen > 0.3 * seen.max()
     assert np.median(stated[clear] / seen[clear]) == pytest.approx(1.0, abs=0.2)
     # nodes that only some draws touch move by a law of their own
-    assert (stated[clear] > 0.6 * seen[clear]).mean() > 0.95
+    assert (stated[clear] > 0.6 * seen[clear]).mean() > 0.9
 
 
 def test_height_of_the_rim_moves_the_patch_along_the_line_of_sight():
