@@ -1,0 +1,127 @@
+"""What bounds and costs of effects are computed from: figures of sensor, motion and touch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+from gelslim_twin.effects.parameters import EffectParameters
+from gelslim_twin.effects.touch import Footprint, Touch, touch
+
+P = TypeVar("P", bound=EffectParameters)
+
+
+@dataclass(frozen=True)
+class SensorFigures:
+    """The few numbers of a sensor that planning needs; lengths mm, moduli MPa."""
+
+    length_mm: float
+    width_mm: float
+    thickness_mm: float
+    youngs_modulus_mpa: float
+    poissons_ratio: float
+    surface_nodes: int
+    layers: int
+    markers: int
+    marker_pitch_mm: float
+    marker_diameter_mm: float
+    focal_px: float
+    image_width_px: int
+    image_height_px: int
+    near_mm: float
+    """Apparent distance from the lens to the nearest point of the gel, along the axis."""
+    far_mm: float
+    half_view_px: float
+    """Largest distance of the gel's image from the principal point."""
+    layers_mm: tuple[tuple[float, float], ...]
+    """Thickness and refractive index of each flat layer above the air."""
+    aperture_mm: float = 0.0
+    """Diameter of the lens opening, 0 for a pinhole."""
+    focus_mm: float = 0.0
+    """Distance of best focus, 0 for a pinhole."""
+    lens_distortion: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def px_per_mm(self) -> float:
+        """Scale of the image at the near edge, where it is largest."""
+        return self.focal_px / self.near_mm
+
+    @property
+    def frame_px(self) -> int:
+        """Pixels of a frame."""
+        return self.image_width_px * self.image_height_px
+
+    @property
+    def apparent_lift_mm(self) -> float:
+        """How much nearer the layers make the gel look: sum of h (1 - 1/n)."""
+        return sum(h * (1 - 1 / n) for h, n in self.layers_mm)
+
+
+@dataclass(frozen=True)
+class MotionFigures:
+    """Extremes of a motion while the tool is below the undeformed surface."""
+
+    poses: int = 1
+    depth_mm: float = 0.0
+    lateral_mm: float = 0.0
+    """Length of the sideways path in contact."""
+    twist_deg: float = 0.0
+    """Sum of the absolute turns in contact."""
+    tilt_deg: float = 0.0
+    contact_s: float = 0.0
+    """From first contact to the end of the motion."""
+    speed_mm_s: float = 0.0
+    """Largest speed of any point of the contact region, in contact."""
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """Sensor, motion, footprint, friction and the parameters of every effect."""
+
+    sensor: SensorFigures
+    motion: MotionFigures
+    footprint: Footprint
+    friction: float
+    parameters: Mapping[str, EffectParameters]
+
+    def given(self, effect: str, kind: type[P]) -> P:
+        """The parameters of `effect`."""
+        found = self.parameters[effect]
+        if not isinstance(found, kind):
+            raise TypeError(f"{effect} has parameters of {type(found).__name__}")
+        return found
+
+    @cached_property
+    def touch(self) -> Touch:
+        """Size and force of the deepest contact."""
+        s = self.sensor
+        return touch(
+            self.footprint,
+            self.motion.depth_mm,
+            s.thickness_mm,
+            s.youngs_modulus_mpa,
+            s.poissons_ratio,
+        )
+
+    @property
+    def blur_px(self) -> float:
+        """Diameter of the blur disc where it is largest: f A |Z - s| / (Z s), in pixels."""
+        s = self.sensor
+        if not s.aperture_mm or not s.focus_mm:
+            return 0.0
+        return max(
+            s.focal_px * s.aperture_mm * abs(z - s.focus_mm) / (z * s.focus_mm)
+            for z in (s.near_mm, s.far_mm)
+        )
+
+    @property
+    def edge_px(self) -> float:
+        """Width over which the edge of a dot turns from dark to bright: blur, at least a pixel."""
+        return math.hypot(1.0, self.blur_px)
+
+    def edge_shift_px(self, grey_share: float) -> float:
+        """Edge shift that changes grey values by `grey_share` of the contrast of dots."""
+        return grey_share * self.edge_px

@@ -1,0 +1,30 @@
+"""The dots drawn: the picture itself."""
+
+from __future__ import annotations
+
+from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.effect import Bound, Effect, Rung, never_null, picture
+from gelslim_twin.effects.parameters import EffectParameters
+
+
+class DrawingParameters(EffectParameters):
+    """The dots as area of ink in each pixel."""
+
+
+def bound(c: Circumstances) -> Bound:
+    """Without it there is no picture."""
+    return picture(c.sensor.marker_diameter_mm * c.sensor.px_per_mm)
+
+
+EFFECT = Effect(
+    name="drawing",
+    title="Dots drawn",
+    parameters=DrawingParameters,
+    bound=bound,
+    formula="diameter of a dot",
+    ladder=lambda c: (Rung("exact area", Bound(), 2.0 * c.sensor.frame_px / 307200),),
+    is_null=never_null,
+    implementation="gelslim_twin.render.coverage",
+    needs=("markers",),
+    provides=("image",),
+)

@@ -1,0 +1,64 @@
+"""Coulomb friction: stick and slip between indenter and gel."""
+
+from __future__ import annotations
+
+import math
+
+from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
+from gelslim_twin.effects.parameters import EffectParameters
+
+
+class FrictionParameters(EffectParameters):
+    """Stick and slip; the coefficient stands under contact."""
+
+
+def dragged_mm(c: Circumstances) -> float:
+    """How far the surface is dragged at most: the tool's way, its turn, and half of the depth.
+
+    A frictionless press moves the surface sideways by up to about half its depth, which
+    friction hinders.
+    """
+    turn = math.radians(c.motion.twist_deg) * c.touch.radius_mm
+    tilt = math.radians(c.motion.tilt_deg) * c.touch.depth_mm
+    return c.motion.lateral_mm + turn + tilt + c.touch.depth_mm / 2
+
+
+def bound(c: Circumstances) -> Bound:
+    """Tangential force: the friction limit, or full stick if that is less; stiffer layer too."""
+    t, mu = c.touch, c.friction
+    if mu == 0 or t.normal_n == 0:
+        return Bound()
+    tangential = min(mu * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
+    stiffer = min(mu, 1.0) * (t.stick_n - t.normal_n)
+    moved = min(dragged_mm(c), tangential / t.shear_n_per_mm)
+    return geometry(moved * c.sensor.px_per_mm, math.hypot(tangential, stiffer))
+
+
+def ladder(c: Circumstances) -> tuple[Rung, ...]:
+    """Tolerance of the block Gauss-Seidel sweeps."""
+    whole = bound(c)
+    nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
+    return tuple(
+        Rung(
+            name,
+            geometry(t * whole.displacement_px, t * whole.force_n),
+            ms * nodes,
+            {"tolerance": t},
+        )
+        for name, t, ms in (("coarse", 1e-2, 4.0), ("medium", 1e-3, 7.0), ("fine", 1e-5, 15.0))
+    )
+
+
+EFFECT = Effect(
+    name="friction",
+    title="Coulomb friction, stick and slip",
+    parameters=FrictionParameters,
+    bound=bound,
+    formula="hypot(min(mu F, (G A/h + 8 G a/(2-nu)) s), min(mu, 1) (F_stick - F)); s + depth/2",
+    ladder=ladder,
+    is_null=lambda c: c.friction == 0,
+    implementation="gelslim_twin.contact.friction",
+    needs=("poses",),
+    refines=("displacement", "force"),
+)

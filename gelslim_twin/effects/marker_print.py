@@ -1,0 +1,51 @@
+"""Faults of the marker print: dots off their places, missing, of odd size."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.effect import Bound, Effect, Rung, optics
+from gelslim_twin.effects.parameters import EffectParameters
+
+
+class MarkerPrintParameters(EffectParameters):
+    """Faults of the print; all nil is a perfect print."""
+
+    jitter_mm: float = Field(
+        default=0.0, ge=0, le=1, description="Standard deviation of a dot's place, per axis"
+    )
+    missing_percent: float = Field(default=0.0, ge=0, le=90, description="Dots that are missing")
+    odd_percent: float = Field(default=0.0, ge=0, le=100, description="Dots of odd size and shape")
+
+
+def is_null(c: Circumstances) -> bool:
+    """Whether the print is perfect."""
+    p = c.given("marker_print", MarkerPrintParameters)
+    return p.jitter_mm == 0 and p.missing_percent == 0 and p.odd_percent == 0
+
+
+def bound(c: Circumstances) -> Bound:
+    """Four standard deviations of a dot's place; a whole pitch where dots are missing.
+
+    Odd dots keep their centres: they change their edges by up to half a radius.
+    """
+    p, scale = c.given("marker_print", MarkerPrintParameters), c.sensor.px_per_mm
+    moved = 4 * p.jitter_mm * scale
+    if p.missing_percent > 0:
+        moved = max(moved, c.sensor.marker_pitch_mm * scale)
+    edge = c.sensor.marker_diameter_mm / 4 * scale if p.odd_percent > 0 else 0.0
+    return Bound(markers_px=moved, image_px=max(moved, edge))
+
+
+EFFECT = Effect(
+    name="marker_print",
+    title="Marker print: jitter, missing and odd dots",
+    parameters=MarkerPrintParameters,
+    bound=bound,
+    formula="4 sigma f/Z; a pitch where dots are missing; d/4 at the edge of odd ones",
+    ladder=lambda c: (Rung("drawn", optics(0.0), 0.05 * c.sensor.markers / 575),),
+    is_null=is_null,
+    implementation="gelslim_twin.render.print_faults",
+    refines=("markers",),
+)

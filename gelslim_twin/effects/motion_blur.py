@@ -1,0 +1,51 @@
+"""Motion blur: the tool moves while the shutter is open."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
+from gelslim_twin.effects.parameters import EffectParameters
+
+
+class MotionBlurParameters(EffectParameters):
+    """Smear over the exposure."""
+
+    shutter_ms: float = Field(
+        default=5.0, ge=0, le=1000, description="Time the shutter is open, up to the pose's time"
+    )
+
+
+def smear_px(c: Circumstances) -> float:
+    """How far a dot moves while the shutter is open."""
+    open_s = c.given("motion_blur", MotionBlurParameters).shutter_ms / 1000
+    return c.motion.speed_mm_s * open_s * c.sensor.px_per_mm
+
+
+def bound(c: Circumstances) -> Bound:
+    """Half the smear: how far the middle of the smeared dot lags behind."""
+    return picture(smear_px(c) / 2)
+
+
+def ladder(c: Circumstances) -> tuple[Rung, ...]:
+    """Instants averaged: n of them leave a staircase of 1/(4 n) of the smear."""
+    size = c.sensor.frame_px / 307200
+    return tuple(
+        Rung(f"{n} instants", picture(smear_px(c) / (4 * n)), 2.5 * n * size, {"instants": n})
+        for n in (2, 4, 8, 16)
+    )
+
+
+EFFECT = Effect(
+    name="motion_blur",
+    title="Motion blur",
+    parameters=MotionBlurParameters,
+    bound=bound,
+    formula="v t f/(2 Z)",
+    ladder=ladder,
+    is_null=lambda c: smear_px(c) == 0,
+    implementation="gelslim_twin.render.motion_blur",
+    refines=("image",),
+    after=("shading", "dirt", "defocus"),
+)

@@ -1,0 +1,41 @@
+"""Normal contact: without it nothing moves and nothing presses."""
+
+from __future__ import annotations
+
+from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.effect import Bound, Effect, Rung, never_null
+from gelslim_twin.effects.parameters import EffectParameters
+
+
+class NormalContactParameters(EffectParameters):
+    """Contact of rigid indenters with the gel."""
+
+
+def bound(c: Circumstances) -> Bound:
+    """All the force, and a surface pushed in by the whole depth."""
+    px = c.touch.depth_mm * c.sensor.px_per_mm
+    return Bound(c.touch.normal_n, px, px, px)
+
+
+def ladder(c: Circumstances) -> tuple[Rung, ...]:
+    """Tolerance of the active set and of the gel's inner solve, relative to the force."""
+    nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
+    force, px = c.touch.normal_n, c.touch.depth_mm * c.sensor.px_per_mm
+    return tuple(
+        Rung(name, Bound(t * force, t * px, t * px, t * px), ms * nodes, {"tolerance": t})
+        for name, t, ms in (("coarse", 1e-2, 1.5), ("medium", 1e-3, 2.2), ("fine", 1e-5, 3.0))
+    )
+
+
+EFFECT = Effect(
+    name="normal_contact",
+    title="Normal contact",
+    parameters=NormalContactParameters,
+    bound=bound,
+    formula="F = 2 E* a V/A + bonded layer (M V/h in series with 3 G V A/(8 pi h^3)); depth f/Z",
+    ladder=ladder,
+    is_null=never_null,
+    implementation="gelslim_twin.contact.solver",
+    needs=("poses",),
+    provides=("displacement", "force"),
+)

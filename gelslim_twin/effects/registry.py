@@ -1,0 +1,45 @@
+"""All effects, in the order in which light and force meet them."""
+
+from __future__ import annotations
+
+from gelslim_twin.effects import (
+    compression,
+    defocus,
+    dirt,
+    drawing,
+    exposure,
+    friction,
+    lens_distortion,
+    marker_print,
+    motion_blur,
+    nonlinearity,
+    normal_contact,
+    perspective,
+    refraction,
+    relaxation,
+    sensor_noise,
+    shading,
+)
+from gelslim_twin.effects.effect import Effect
+
+EFFECTS: tuple[Effect, ...] = tuple(
+    module.EFFECT
+    for module in (
+        normal_contact,
+        friction,
+        nonlinearity,
+        relaxation,
+        perspective,
+        refraction,
+        lens_distortion,
+        marker_print,
+        drawing,
+        shading,
+        dirt,
+        defocus,
+        motion_blur,
+        exposure,
+        sensor_noise,
+        compression,
+    )
+)

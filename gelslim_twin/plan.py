@@ -1,0 +1,153 @@
+"""A plan: what a scene's simulation consists of and why."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from gelslim_twin.effects.effect import Bound, unit_of
+
+FORMAT = "gelslim-plan/1"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One effect, in or out, and why."""
+
+    effect: str
+    title: str
+    included: bool
+    why: str
+    bound: Bound
+    """Largest error of leaving it out."""
+    shares: tuple[tuple[str, float], ...]
+    """Per observable, what it may cost of the tolerance; empty where nothing depends on it."""
+    error: Bound
+    """What it does cost: the bound where left out, the error of its rung where simulated."""
+    formula: str = ""
+    rung: str = ""
+    rung_parameters: tuple[tuple[str, Any], ...] = ()
+    predicted_ms: float = 0.0
+    """Per pose."""
+    implementation: str = ""
+    """Module to import; empty where left out."""
+
+    @property
+    def over_share(self) -> tuple[str, ...]:
+        """Observables that it spoils by more than its share."""
+        return tuple(o for o, share in self.shares if self.error.of(o) > share)
+
+    def telling(self, bound: Bound) -> tuple[float, str]:
+        """The value of `bound` that is largest against its share, with its unit, N or px."""
+
+        def against(pair: tuple[str, float]) -> float:
+            observable, share = pair
+            return bound.of(observable) / share if share > 0 else bound.of(observable)
+
+        if not self.shares:
+            value = bound.force_n
+            pixels = max(bound.displacement_px, bound.markers_px, bound.image_px)
+            return (value, "N") if value > 0 and pixels == 0 else (pixels, "px")
+        observable = max(self.shares, key=against)[0]
+        return bound.of(observable), "N" if unit_of(observable) == "n" else "px"
+
+    def to_record(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "effect": self.effect,
+            "included": self.included,
+            "why": self.why,
+            "bound": self.bound.to_record(),
+            "formula": self.formula,
+            "share": dict(self.shares),
+            "error": self.error.to_record(),
+            "rung": self.rung,
+            "rung_parameters": dict(self.rung_parameters),
+            "predicted_ms": self.predicted_ms,
+            "implementation": self.implementation,
+        }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The choices for every effect and the order of those that are in."""
+
+    scene: str
+    observe: tuple[str, ...]
+    force_n: float
+    image_px: float
+    choices: tuple[Choice, ...]
+    order: tuple[str, ...]
+    poses: int
+
+    @property
+    def included(self) -> tuple[Choice, ...]:
+        """The effects that are simulated, in order."""
+        by_name = {choice.effect: choice for choice in self.choices}
+        return tuple(by_name[name] for name in self.order)
+
+    def choice(self, effect: str) -> Choice:
+        """The choice about one effect. Raises KeyError."""
+        for choice in self.choices:
+            if choice.effect == effect:
+                return choice
+        raise KeyError(effect)
+
+    @property
+    def predicted_ms(self) -> float:
+        """Per pose."""
+        return sum(choice.predicted_ms for choice in self.included)
+
+    def error(self, observable: str) -> float:
+        """Sum of what all effects cost, in N or px: no more than the tolerance is exceeded by."""
+        return sum(c.error.of(observable) for c in self.choices if dict(c.shares))
+
+    @property
+    def over_tolerance(self) -> tuple[tuple[str, float], ...]:
+        """Observables whose summed error exceeds the tolerance, with that error."""
+        allowed = {o: self.force_n if unit_of(o) == "n" else self.image_px for o in self.observe}
+        # The shares add up to the tolerance but for rounding.
+        return tuple(
+            (o, self.error(o)) for o in self.observe if self.error(o) > allowed[o] * (1 + 1e-12)
+        )
+
+    def to_record(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "format": FORMAT,
+            "scene": self.scene,
+            "observe": list(self.observe),
+            "tolerance": {"force_n": self.force_n, "image_px": self.image_px},
+            "poses": self.poses,
+            "order": list(self.order),
+            "predicted_ms_per_pose": self.predicted_ms,
+            "error": {f"{o}_{unit_of(o)}": self.error(o) for o in self.observe},
+            "over_tolerance": [o for o, _ in self.over_tolerance],
+            "effects": [choice.to_record() for choice in self.choices],
+        }
+
+    def to_json(self) -> str:
+        """The same as JSON text; equal plans give equal bytes."""
+        return json.dumps(self.to_record(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def __str__(self) -> str:
+        """A table for people."""
+        rows = [("effect", "", "bound", "rung", "ms", "why")]
+        for c in self.choices:
+            value, unit = c.telling(c.bound)
+            time = f"{c.predicted_ms:.3g}" if c.included else ""
+            state = "in" if c.included else "out"
+            size = f"{value:.3g} {unit}" if value else "0"
+            rows.append((c.effect, state, size, c.rung, time, c.why))
+        widths = [max(len(row[k]) for row in rows) for k in range(5)]
+        lines = [
+            "  ".join(cell.ljust(w) for cell, w in zip(row[:5], widths, strict=True))
+            + f"  {row[5]}"
+            for row in rows
+        ]
+        lines.append(
+            f"{self.predicted_ms:.3g} ms per pose, {self.poses} poses: "
+            f"{self.predicted_ms * self.poses / 1000:.3g} s"
+        )
+        return "\n".join(lines)

@@ -1,0 +1,218 @@
+"""Which effects a scene calls for: back from what is observed, by what leaving one out costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
+from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.plan import Choice, Plan
+
+
+class PlanError(ValueError):
+    """A scene that cannot be planned; `effect` is the one whose override is to blame."""
+
+    def __init__(self, effect: str, message: str, remedy: str) -> None:
+        super().__init__(f"{message}; {remedy}")
+        self.effect = effect
+        self.message = message
+        self.remedy = remedy
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a plan: observables, tolerances in N and px, and the circumstances."""
+
+    name: str
+    observe: tuple[str, ...]
+    force_n: float
+    image_px: float
+    circumstances: Circumstances
+
+    def tolerance(self, observable: str) -> float:
+        """Of one observable, in its unit."""
+        return self.force_n if unit_of(observable) == "n" else self.image_px
+
+    def use(self, effect: Effect) -> str:
+        """`auto`, `on` or `off`."""
+        return self.circumstances.parameters[effect.name].use
+
+
+def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
+    """The plan: each effect in or out, why, and the cheapest rung that is good enough.
+
+    Per observable the tolerance is shared evenly among the effects that could spoil it. One left
+    out costs its bound, one simulated the error of its rung, neither more than a share: the sum
+    keeps the tolerance, but for effects that the scene switches off or whose best rung errs more,
+    which `Plan.over_tolerance` lists.
+
+    Raises:
+        PlanError: a provider of something needed is switched off and nothing else provides it.
+    """
+    decided: dict[str, Choice] = {}
+    needed = frozenset(question.observe)
+    while True:
+        needed = _closure(question, effects, needed, decided)
+        relevant = [e for e in effects if needed & {*e.provides, *e.refines}]
+        shares = _shares(question, relevant)
+        decided = {e.name: _decide(question, e, e in relevant, shares) for e in effects}
+        wanted = needed.union(*(e.needs for e in effects if decided[e.name].included)) - GIVEN
+        if wanted == needed:
+            break
+        needed = wanted
+    order = _ordered([e for e in effects if decided[e.name].included])
+    return Plan(
+        question.name,
+        question.observe,
+        question.force_n,
+        question.image_px,
+        tuple(decided[e.name] for e in effects),
+        tuple(e.name for e in order),
+        question.circumstances.motion.poses,
+    )
+
+
+def _closure(
+    question: Question,
+    effects: Sequence[Effect],
+    needed: frozenset[str],
+    decided: dict[str, Choice],
+) -> frozenset[str]:
+    """`needed` and all that its providers need in turn."""
+    todo, found = sorted(needed), set(needed)
+    while todo:
+        datum = todo.pop()
+        provider = _provider(question, effects, datum)
+        new = set(provider.needs) - GIVEN - found
+        found |= new
+        todo += sorted(new)
+    return frozenset(found)
+
+
+def _provider(question: Question, effects: Sequence[Effect], datum: str) -> Effect:
+    able = [e for e in effects if datum in e.provides]
+    left = [e for e in able if question.use(e) != "off"]
+    if left:
+        return left[0]
+    if not able:
+        raise PlanError("", f"no effect provides {datum}", "observe something else")
+    name, seen = able[0].name, ", ".join(question.observe)
+    raise PlanError(
+        name,
+        f"switched off, but it alone provides the {datum} that observing {seen} needs",
+        f"write `{name}: auto`, or observe less",
+    )
+
+
+def _shares(question: Question, relevant: Iterable[Effect]) -> dict[str, float]:
+    """Per observable, the tolerance over the number of effects that could spoil it."""
+    shares = {}
+    bounds = [_bound(question, e) for e in relevant]
+    for observable in question.observe:
+        count = sum(bound.of(observable) > 0 for bound in bounds)
+        shares[observable] = question.tolerance(observable) / max(1, count)
+    return shares
+
+
+def _bound(question: Question, effect: Effect) -> Bound:
+    c = question.circumstances
+    return Bound() if effect.is_null(c) else effect.bound(c)
+
+
+def _within(error: Bound, shares: dict[str, float]) -> bool:
+    return all(error.of(observable) <= share for observable, share in shares.items())
+
+
+def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str, float]) -> Choice:
+    c, use = question.circumstances, question.use(effect)
+    bound = _bound(question, effect)
+    if use == "off":
+        cost = "nothing observed depends on it" if not relevant else "switched off by the scene"
+        return _out(effect, bound, cost, shares if relevant else {})
+    if not relevant:
+        return _out(effect, bound, "nothing observed depends on it", {})
+    if use == "on":
+        return _in(effect, c, bound, "switched on by the scene", shares)
+    if effect.provides:
+        made = ", ".join(effect.provides)
+        return _in(effect, c, bound, f"provides {made}", shares)
+    if effect.is_null(c):
+        return _out(effect, bound, "nothing to do: its parameters are nil", shares)
+    if _within(bound, shares):
+        return _out(effect, bound, "below its share of the tolerance", shares)
+    worst = max(shares, key=lambda o: _excess(bound.of(o), shares[o]))
+    return _in(effect, c, bound, f"without it {worst} errs more than its share", shares)
+
+
+def _excess(error: float, share: float) -> float:
+    return error / share if share > 0 else (float("inf") if error > 0 else 0.0)
+
+
+def _out(effect: Effect, bound: Bound, why: str, shares: dict[str, float]) -> Choice:
+    return Choice(
+        effect.name, effect.title, False, why, bound, _as_pairs(shares), bound,
+        formula=effect.formula,
+    )  # fmt: skip
+
+
+def _in(
+    effect: Effect, c: Circumstances, bound: Bound, why: str, shares: dict[str, float]
+) -> Choice:
+    rung = _rung(effect.ladder(c), shares)
+    return Choice(
+        effect.name,
+        effect.title,
+        True,
+        why,
+        bound,
+        _as_pairs(shares),
+        rung.error,
+        formula=effect.formula,
+        rung=rung.name,
+        rung_parameters=tuple(sorted(rung.parameters.items())),
+        predicted_ms=rung.milliseconds,
+        implementation=effect.implementation,
+    )
+
+
+def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
+    """The cheapest within the shares, else the one that exceeds them least."""
+    able = [rung for rung in ladder if _within(rung.error, shares)]
+    if able:
+        return min(able, key=lambda rung: rung.milliseconds)
+    return min(
+        ladder,
+        key=lambda rung: max((_excess(rung.error.of(o), s) for o, s in shares.items()), default=0),
+    )
+
+
+def _as_pairs(shares: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(shares.items())
+
+
+def _ordered(effects: Sequence[Effect]) -> list[Effect]:
+    """Providers before refinements before users, and `after` kept; else as registered.
+
+    Raises ValueError where the declarations go in a circle.
+    """
+    before = {e.name: {o.name for o in effects if o is not e and _precedes(o, e)} for e in effects}
+    left, order = list(effects), list[Effect]()
+    done: set[str] = set()
+    while left:
+        ready = next((e for e in left if before[e.name] <= done), None)
+        if ready is None:
+            raise ValueError(f"effects in a circle: {', '.join(e.name for e in left)}")
+        left.remove(ready)
+        order.append(ready)
+        done.add(ready.name)
+    return order
+
+
+def _precedes(one: Effect, other: Effect) -> bool:
+    if one.name in other.after:
+        return True
+    if set(one.provides) & {*other.needs, *other.refines}:
+        return True
+    return bool(set(one.refines) & (set(other.needs) - set(other.refines)))

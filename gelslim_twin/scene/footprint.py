@@ -1,0 +1,118 @@
+"""Area and volume of an indenter below the gel's undeformed surface, in closed form by depth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from gelslim_twin.effects.touch import Footprint
+from gelslim_twin.scene.indenter import (
+    Cone,
+    Cylinder,
+    FlatPunch,
+    Indenter,
+    Ring,
+    Sphere,
+    Stl,
+    TexturedPlane,
+    Wedge,
+)
+from gelslim_twin.scene.stl_extent import footprint_mm
+
+Pair = Callable[[float], tuple[float, float]]
+"""Area in mm² and volume in mm³ at a depth above 0."""
+
+
+def tool_footprint(indenters: Sequence[Indenter], folder: Path, pad_mm2: float) -> Footprint:
+    """Sum over the indenters of a tool, held to a pad of `pad_mm2`; overlaps count twice.
+
+    Raises ValueError or OSError for an STL file (in `folder`) that cannot be read.
+    """
+    shapes = [(_pair(one, folder), one.raised_mm) for one in indenters]
+
+    def total(depth: float) -> tuple[float, float]:
+        parts = [shape(depth - raised) for shape, raised in shapes if depth > raised]
+        area = sum(a for a, _ in parts)
+        held = min(1.0, pad_mm2 / area) if area > 0 else 0.0
+        return held * area, held * sum(v for _, v in parts)
+
+    return Footprint(lambda d: total(d)[0], lambda d: total(d)[1])
+
+
+def _pair(indenter: Indenter, folder: Path) -> Pair:
+    match indenter:
+        case Sphere():
+            return lambda d: _round_cap(indenter.radius_mm, d)
+        case Cylinder():
+            return lambda d: _along(_round_section(indenter.radius_mm, d), indenter.length_mm)
+        case Ring():
+            return _prism(math.pi * (indenter.outer_radius_mm**2 - indenter.inner_radius_mm**2))
+        case FlatPunch():
+            r, a, b = indenter.radius_mm, indenter.length_mm, indenter.width_mm
+            return _prism(math.pi * r * r if r is not None else (a or 0.0) * (b or 0.0))
+        case Wedge():
+            tip, half = indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
+            return lambda d: _along(_wedge_section(tip, half, d), indenter.length_mm)
+        case Cone():
+            tip, half = indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
+            return lambda d: _cone(tip, half, d)
+        case TexturedPlane():
+            plane = indenter.length_mm * indenter.width_mm
+            return lambda d: _waves(plane, indenter.relief_mm, d)
+        case Stl():
+            a, b = footprint_mm(folder / indenter.file, indenter.down, indenter.scale)
+            return _prism(a * b)
+
+
+def _prism(area: float) -> Pair:
+    return lambda d: (area, area * d)
+
+
+def _along(section: tuple[float, float], length: float) -> tuple[float, float]:
+    """Half width and area of a section, drawn out."""
+    return 2 * section[0] * length, section[1] * length
+
+
+def _round_cap(r: float, d: float) -> tuple[float, float]:
+    if d >= r:
+        return math.pi * r * r, math.pi * r * r * (2 * r / 3 + (d - r))
+    return math.pi * (2 * r * d - d * d), math.pi * d * d * (r - d / 3)
+
+
+def _round_section(r: float, d: float) -> tuple[float, float]:
+    if d >= r:
+        return r, math.pi * r * r / 2 + 2 * r * (d - r)
+    w = math.sqrt(2 * r * d - d * d)
+    return w, r * r * math.acos((r - d) / r) - (r - d) * w
+
+
+def _tangent(tip: float, half: float) -> tuple[float, float]:
+    """Depth and half width where the rounded tip goes over into the flank."""
+    return tip * (1 - math.sin(half)), tip * math.cos(half)
+
+
+def _wedge_section(tip: float, half: float, d: float) -> tuple[float, float]:
+    d0, w0 = _tangent(tip, half)
+    if d <= d0:
+        return _round_section(tip, d)
+    w = w0 + (d - d0) * math.tan(half)
+    round_part = _round_section(tip, d0)[1] if d0 > 0 else 0.0
+    return w, round_part + (w0 + w) * (d - d0)
+
+
+def _cone(tip: float, half: float, d: float) -> tuple[float, float]:
+    d0, w0 = _tangent(tip, half)
+    if d <= d0:
+        return _round_cap(tip, d)
+    w = w0 + (d - d0) * math.tan(half)
+    frustum = math.pi / 3 * (d - d0) * (w0 * w0 + w0 * w + w * w)
+    return math.pi * w * w, (_round_cap(tip, d0)[1] if d0 > 0 else 0.0) + frustum
+
+
+def _waves(plane: float, relief: float, d: float) -> tuple[float, float]:
+    """Sine waves with their crests down; bumps and rough planes touch with less."""
+    if d >= relief:
+        return plane, plane * (d - relief / 2)
+    t = math.acos(1 - 2 * d / relief)
+    return plane * t / math.pi, plane / math.pi * ((d - relief / 2) * t + relief / 2 * math.sin(t))

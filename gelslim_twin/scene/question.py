@@ -1,0 +1,89 @@
+"""A scene as a question to the planner: its figures, and what is asked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from gelslim_twin.effects.circumstances import Circumstances, MotionFigures, SensorFigures
+from gelslim_twin.effects.touch import Footprint
+from gelslim_twin.plan import Plan
+from gelslim_twin.planner import PlanError, Question, make_plan
+from gelslim_twin.scene.footprint import tool_footprint
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.reader import LoadedScene
+
+
+def plan_scene(loaded: LoadedScene, sensor: SensorFigures) -> Plan:
+    """The plan of a scene.
+
+    Raises `InputError` on the line of an override that leaves something observed unprovided.
+    """
+    try:
+        return make_plan(question(loaded, sensor))
+    except PlanError as error:
+        name = f"effects.{error.effect}" if error.effect else "observe"
+        used = f"{name}.use" if f"{name}.use" in loaded.source_map else name
+        raise loaded.problem(used, "off", error.message, error.remedy) from None
+
+
+def question(loaded: LoadedScene, sensor: SensorFigures) -> Question:
+    """What the scene asks of a plan."""
+    scene = loaded.scene
+    footprint = tool_footprint(scene.indenters, loaded.folder, sensor.length_mm * sensor.width_mm)
+    return Question(
+        scene.name,
+        scene.observe,
+        scene.tolerance.force_n,
+        scene.tolerance.image_px,
+        Circumstances(
+            sensor,
+            motion_figures(loaded.poses, footprint),
+            footprint,
+            scene.contact.friction,
+            scene.effects.parameters(),
+        ),
+    )
+
+
+def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures:
+    """Extremes of a motion while the tool is below the undeformed surface.
+
+    A tilted tool reaches deeper on one side, by the radius of the contact times the slope.
+    """
+    depths = [_reach(pose, footprint) for pose in poses]
+    touching = [i for i, depth in enumerate(depths) if depth > 0]
+    if not touching:
+        return MotionFigures(len(poses))
+    radius = math.sqrt(footprint.area_mm2(max(depths)) / math.pi)
+    lateral = turned = speed = 0.0
+    for (i, a), (j, b) in pairwise(enumerate(poses)):
+        if depths[i] <= 0 and depths[j] <= 0:
+            continue
+        side, turn = math.hypot(b.x_mm - a.x_mm, b.y_mm - a.y_mm), abs(b.twist_deg - a.twist_deg)
+        lateral, turned = lateral + side, turned + turn
+        angle = math.radians(turn + _tilt(a, b))
+        way = math.hypot(side, b.depth_mm - a.depth_mm) + angle * radius
+        speed = max(speed, way / (b.time_s - a.time_s))
+    return MotionFigures(
+        poses=len(poses),
+        depth_mm=max(depths),
+        lateral_mm=lateral,
+        twist_deg=turned,
+        tilt_deg=max(math.hypot(p.tilt_x_deg, p.tilt_y_deg) for p in poses),
+        contact_s=poses[-1].time_s - poses[max(0, touching[0] - 1)].time_s,
+        speed_mm_s=speed,
+    )
+
+
+def _tilt(a: Pose, b: Pose) -> float:
+    return math.hypot(b.tilt_x_deg - a.tilt_x_deg, b.tilt_y_deg - a.tilt_y_deg)
+
+
+def _reach(pose: Pose, footprint: Footprint) -> float:
+    if pose.depth_mm <= 0:
+        return pose.depth_mm
+    radius = math.sqrt(footprint.area_mm2(pose.depth_mm) / math.pi)
+    slope = math.tan(math.radians(math.hypot(pose.tilt_x_deg, pose.tilt_y_deg)))
+    return pose.depth_mm + radius * slope

@@ -1,0 +1,91 @@
+"""Read a scene: its YAML file, and the files that it names."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from gelslim_twin.scene.motion_csv import read_motion_csv
+from gelslim_twin.scene.pose import Pose, poses
+from gelslim_twin.scene.scene import FORMAT, Scene
+from gelslim_twin.scene.stl_extent import footprint_mm
+from yaml_model.errors import InputError, Problem, shown
+from yaml_model.reader import Loaded, read_model
+from yaml_model.schema import schema_text
+
+
+@dataclass(frozen=True)
+class LoadedScene(Loaded[Scene]):
+    """A scene read from a file, with its poses."""
+
+    poses: tuple[Pose, ...]
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self.model
+
+    @property
+    def folder(self) -> Path:
+        """The folder that paths in the scene are relative to."""
+        return Path(self.path).parent
+
+    @property
+    def sensor_path(self) -> Path:
+        """The spec or bundle of the sensor."""
+        return self.folder / (self.scene.sensor.spec or self.scene.sensor.bundle or "")
+
+    def problem(self, field: str, value: str | None, message: str, remedy: str) -> InputError:
+        """An error about a field of the scene, on its line or on that of the block it is in."""
+        position, near = self.source_map.get(field), field
+        while position is None and near:
+            near = near.rpartition(".")[0]
+            position = self.source_map.get(near)
+        line, column = position or (None, None)
+        return InputError((Problem(self.path, line, column, field, value, message, remedy),))
+
+
+def read_scene(path: str | os.PathLike[str]) -> LoadedScene:
+    """The scene in the YAML file at `path`, with the poses of its motion.
+
+    Raises `InputError` with every problem found in it, or in a file that it names. The sensor
+    need not be there yet: whoever uses it says so.
+    """
+    loaded = read_model(path, Scene)
+    motion, folder = loaded.model.motion, Path(loaded.path).parent
+    found = poses(motion) if motion.csv is None else read_motion_csv(folder / motion.csv)
+    scene = LoadedScene(
+        loaded.model,
+        loaded.source_map,
+        loaded.sha256,
+        loaded.text,
+        loaded.path,
+        loaded.defaulted,
+        found,
+    )
+    _check_meshes(scene)
+    return scene
+
+
+def _check_meshes(loaded: LoadedScene) -> None:
+    for index, indenter in enumerate(loaded.scene.indenters):
+        if indenter.shape != "stl":
+            continue
+        field = f"indenters[{index}].file"
+        try:
+            footprint_mm(loaded.folder / indenter.file, indenter.down, indenter.scale)
+        except ValueError as error:
+            raise loaded.problem(
+                field, shown(indenter.file), str(error), "name an STL file, binary or ASCII"
+            ) from None
+        except OSError as error:
+            reason = (error.strerror or type(error).__name__).lower()
+            raise loaded.problem(
+                field, shown(indenter.file), reason, "paths are relative to the scene's file"
+            ) from None
+
+
+def scene_schema_text() -> str:
+    """The JSON Schema (draft 2020-12) of scenes as text."""
+    return schema_text(Scene, FORMAT)
