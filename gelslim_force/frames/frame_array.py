@@ -1,0 +1,104 @@
+"""NumPy arrays as frames: in memory, `.npy` (not read as a whole) and `.npz`."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext
+from gelslim_force.frames.picture import as_picture
+
+_KEYS = ("frames", "images", "image", "frame")
+_TIMES = ("time_s", "times_s")
+
+
+class FrameArray(SourceContext):
+    """Frames of an array (n, h, w[, 1 | 3 | 4]) or of one picture (h, w[, 3 | 4]), uint8."""
+
+    live = False
+
+    def __init__(
+        self,
+        frames: NDArray[np.uint8],
+        time_s: ArrayLike | None = None,
+        frames_per_s: float | None = None,
+        name: str = "array",
+    ) -> None:
+        """`time_s` (n,) when each frame was taken.
+
+        Raises FrameSourceError for another kind of array, and for times that do not fit.
+        """
+        single = frames.ndim == 2 or (frames.ndim == 3 and frames.shape[2] <= 4)
+        stack = frames[None] if single else frames
+        right = stack.ndim == 3 or (stack.ndim == 4 and stack.shape[3] in (1, 3, 4))
+        if stack.dtype != np.uint8 or not right or 0 in stack.shape:
+            raise FrameSourceError(
+                f"{name}: an array of {frames.dtype} {frames.shape} holds no frames; give uint8 "
+                "(n, h, w) or (n, h, w, 3), levels 0 ... 255"
+            )
+        self._frames, self.frames_per_s = stack, frames_per_s
+        self._times = None if time_s is None else np.asarray(time_s)
+        if self._times is not None and (
+            self._times.shape != (len(stack),)
+            or self._times.dtype.kind not in "iuf"
+            or not np.isfinite(self._times).all()
+        ):
+            raise FrameSourceError(
+                f"{name}: times of {self._times.dtype} {self._times.shape} for {len(stack)} "
+                f"frames; need ({len(stack)},) finite numbers"
+            )
+
+    @property
+    def count(self) -> int:
+        """Number of frames."""
+        return len(self._frames)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield each frame, copied."""
+        for index in range(len(self._frames)):
+            time_s = index / (self.frames_per_s or 1.0)
+            if self._times is not None:
+                time_s = float(self._times[index])
+            yield Frame(index, time_s, as_picture(np.array(self._frames[index])))
+
+
+def read_frame_array(path: str | os.PathLike[str], frames_per_s: float | None = None) -> FrameArray:
+    """Return the frames of an `.npy` or `.npz` file.
+
+    In an `.npz`, frames are the array called frames or images, or the only one of 3 or 4 axes;
+    time_s, if there, holds their times. Raises FrameSourceError for what holds no frames.
+    """
+    file = Path(path)
+    try:
+        if file.suffix.lower() == ".npy":
+            loaded = np.load(file, allow_pickle=False, mmap_mode="r")
+            return FrameArray(loaded, None, frames_per_s, str(file))
+        with np.load(file, allow_pickle=False) as archive:
+            key = _frames_key(archive, file)
+            times = next((archive[k] for k in _TIMES if k in archive.files), None)
+            return FrameArray(archive[key], times, frames_per_s, str(file))
+    except FrameSourceError:
+        raise
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
+        raise FrameSourceError(f"{file}: no NumPy file that can be read: {reason}") from error
+
+
+def _frames_key(archive: Any, file: Path) -> str:
+    for key in _KEYS:
+        if key in archive.files:
+            return key
+    deep = [k for k in archive.files if archive[k].ndim >= 3 and archive[k].dtype == np.uint8]
+    if len(deep) == 1:
+        return str(deep[0])
+    raise FrameSourceError(
+        f"{file}: which of its arrays ({', '.join(archive.files) or 'none'}) holds the frames? "
+        "Call it 'frames'"
+    )

@@ -1,0 +1,78 @@
+"""A folder of pictures as frames, in natural order of their names."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext, size_problem
+from gelslim_force.frames.natural_order import natural_key
+from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
+
+_LOOKED_AT = 5
+
+
+class PictureFolder(SourceContext):
+    """Pictures of one folder, or one picture; a file that is no whole picture is flagged."""
+
+    live = False
+
+    def __init__(self, path: str | os.PathLike[str], frames_per_s: float | None = None) -> None:
+        """List the pictures and settle their size: that of most of the first five readable.
+
+        Raises FrameSourceError where there is no picture, or none that can be read.
+        """
+        place = Path(path)
+        self.frames_per_s = frames_per_s
+        self.files = [place] if place.is_file() else _pictures(place)
+        self.shape = self._usual_shape(place)
+
+    @property
+    def count(self) -> int:
+        """Number of files."""
+        return len(self.files)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield a frame per file."""
+        for index, file in enumerate(self.files):
+            time_s = index / (self.frames_per_s or 1.0)
+            try:
+                image = read_picture(file)
+                problem = size_problem(image, self.shape)
+            except PictureError as error:
+                problem = str(error)
+            if problem:
+                yield Frame(index, time_s, None, f"{file.name}: {problem}", file.name)
+            else:
+                yield Frame(index, time_s, image, name=file.name)
+
+    def _usual_shape(self, place: Path) -> tuple[int, ...]:
+        shapes: list[tuple[int, ...]] = []
+        first_problem = ""
+        for file in self.files:
+            try:
+                shapes.append(read_picture(file).shape)
+            except PictureError as error:
+                first_problem = first_problem or f"{file.name} {error}"
+            if len(shapes) == _LOOKED_AT:
+                break
+        if not shapes:
+            raise FrameSourceError(
+                f"{place}: none of the {len(self.files)} pictures can be read ({first_problem})"
+            )
+        return Counter(shapes).most_common(1)[0][0]
+
+
+def _pictures(folder: Path) -> list[Path]:
+    try:
+        names = [entry.name for entry in os.scandir(folder) if entry.is_file()]
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FrameSourceError(f"{folder}: {reason}; give a folder of pictures") from error
+    # Hidden files are what file managers and copying leave behind.
+    chosen = [n for n in names if n.lower().endswith(PICTURE_ENDINGS) and not n.startswith(".")]
+    if not chosen:
+        raise FrameSourceError(f"{folder}: no pictures in it ({', '.join(PICTURE_ENDINGS)})")
+    return [folder / name for name in sorted(chosen, key=natural_key)]

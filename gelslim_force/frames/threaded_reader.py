@@ -1,0 +1,100 @@
+"""A source read ahead in a thread: live frames go stale and are dropped, recorded ones never."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from threading import Condition, Thread
+
+from gelslim_force.frames.frame import Frame, FrameSource, SourceContext
+
+_JOIN_S = 5.0
+
+
+class ThreadedReader(SourceContext):
+    """Reads a source in a thread of its own, so that decoding and computing overlap.
+
+    A live source's newest frame replaces one that nobody has taken yet; a recorded source waits
+    while `ahead` frames are in store. Iterate once.
+    """
+
+    def __init__(self, source: FrameSource, ahead: int = 4) -> None:
+        """Reading starts with the first `next`. Raises ValueError for `ahead` under 1."""
+        if ahead < 1:
+            raise ValueError(f"ahead = {ahead}: must be at least 1")
+        self.source = source
+        self._ahead = 1 if source.live else ahead
+        self._store: deque[Frame] = deque()
+        self._changed = Condition()
+        self._error: BaseException | None = None
+        self._ended = self._stopped = False
+        self._thread: Thread | None = None
+        self.dropped = 0
+        """Frames nobody took in time."""
+
+    @property
+    def count(self) -> int | None:
+        """Frames expected; None where that is not known."""
+        return self.source.count
+
+    @property
+    def frames_per_s(self) -> float | None:
+        """Rate; None where that is not known."""
+        return self.source.frames_per_s
+
+    @property
+    def live(self) -> bool:
+        """Whether stale frames are dropped."""
+        return self.source.live
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield frames; an error of the source is raised once what came before it is taken."""
+        if self._thread is None:
+            self._thread = Thread(target=self._read, name="frames", daemon=True)
+            self._thread.start()
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._store or self._ended or self._stopped)
+                if self._stopped:
+                    return
+                if not self._store:
+                    if self._error is not None:
+                        raise self._error
+                    return
+                frame = self._store.popleft()
+                self._changed.notify_all()
+            yield frame
+
+    def close(self) -> None:
+        """Stop the thread and close the source."""
+        with self._changed:
+            self._stopped = True
+            self._changed.notify_all()
+        self.source.close()
+        if self._thread is not None:
+            self._thread.join(_JOIN_S)
+
+    def _read(self) -> None:
+        try:
+            for frame in self.source:
+                if not self._stored(frame):
+                    break
+        except BaseException as error:
+            self._error = error
+        finally:
+            with self._changed:
+                self._ended = True
+                self._changed.notify_all()
+
+    def _stored(self, frame: Frame) -> bool:
+        with self._changed:
+            if not self.live:
+                self._changed.wait_for(lambda: self._stopped or len(self._store) < self._ahead)
+            elif self._store:
+                self._store.popleft()
+                self.dropped += 1
+            if self._stopped:
+                return False
+            self._store.append(frame)
+            self._changed.notify_all()
+            return True

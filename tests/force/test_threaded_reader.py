@@ -1,0 +1,162 @@
+"""Reading ahead: live frames go stale, recorded ones wait; cameras that fail, errors, closing."""
+
+from threading import Event
+
+import numpy as np
+import pytest
+
+from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext
+from gelslim_force.frames.live_camera import LiveCamera
+from gelslim_force.frames.threaded_reader import ThreadedReader
+
+
+class Scripted(SourceContext):
+    """Frames 0 ... count-1; tells when so many were read, and waits to be told to go on."""
+
+    def __init__(self, count, live, fails_at=None, holds_at=None):
+        self.count, self.live, self.frames_per_s = count, live, 90.0
+        self.fails_at, self.holds_at = fails_at, holds_at
+        self.read, self.closed = 0, 0
+        self.arrived, self.go_on = Event(), Event()
+
+    def __iter__(self):
+        for k in range(self.count):
+            if k == self.fails_at:
+                raise FrameSourceError("the disk is gone")
+            if k == self.holds_at:
+                self.arrived.set()
+                assert self.go_on.wait(20)
+            self.read += 1
+            yield Frame(k, k / 90, np.zeros((4, 4), np.uint8))
+        self.arrived.set()
+
+    def close(self):
+        self.closed += 1
+
+
+def test_live_frames_that_nobody_took_are_dropped_and_the_newest_is_kept():
+    source = Scripted(100, live=True, holds_at=1)
+    with ThreadedReader(source) as reader:
+        frames = iter(reader)
+        assert next(frames).index == 0
+        source.go_on.set()
+        source.arrived.clear()
+        assert source.arrived.wait(20), "all frames came while the first was in work"
+        # All came while the first was in work; only the newest is worth anything.
+        later = [f.index for f in frames]
+        assert later == [99]
+        assert reader.dropped == 98
+        assert reader.live
+
+
+def test_recorded_frames_are_never_dropped_and_not_read_far_ahead():
+    source = Scripted(100, live=False)
+    with ThreadedReader(source, ahead=4) as reader:
+        seen = []
+        for frame in reader:
+            seen.append(frame.index)
+            assert source.read <= len(seen) + 4 + 1
+        assert seen == list(range(100))
+        assert reader.dropped == 0
+        assert (reader.count, reader.frames_per_s) == (100, 90.0)
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_an_error_of_the_source_comes_after_what_was_read(live):
+    source = Scripted(10, live=live, fails_at=3)
+    reader = ThreadedReader(source)
+    seen = []
+    with pytest.raises(FrameSourceError, match="disk"):  # noqa: PT012
+        for frame in reader:
+            seen.append(frame.index)
+    assert seen == [0, 1, 2] if not live else seen[-1] == 2
+    reader.close()
+    assert source.closed >= 1
+
+
+def test_leaving_early_ends_the_thread():
+    source = Scripted(10**9, live=False)
+    with ThreadedReader(source, ahead=3) as reader:
+        for frame in reader:
+            if frame.index == 5:
+                break
+    assert reader._thread is not None
+    assert not reader._thread.is_alive()
+    assert source.read < 12
+    assert source.closed >= 1
+    reader.close()
+
+
+def test_ahead_must_be_one_at_least():
+    with pytest.raises(ValueError, match="ahead"):
+        ThreadedReader(Scripted(3, live=False), ahead=0)
+
+
+class FakeCapture:
+    """A camera: pictures of these sizes, None where a read fails."""
+
+    def __init__(self, script, opened=True):
+        self.script, self.opened, self.at = script, opened, 0
+        self.released, self.asked = 0, {}
+
+    def isOpened(self):
+        return self.opened
+
+    def read(self):
+        shape = self.script[min(self.at, len(self.script) - 1)]
+        self.at += 1
+        if shape is None:
+            return False, None
+        image = np.zeros((*shape, 3), np.uint8)
+        image[..., 2] = 250
+        return True, image
+
+    def get(self, prop):
+        return 90.0 if prop == 5 else 0.0
+
+    def set(self, prop, value):
+        self.asked[prop] = value
+        return True
+
+    def release(self):
+        self.released += 1
+
+
+def test_a_camera_that_stumbles_goes_on_and_one_that_is_gone_ends():
+    capture = FakeCapture([(48, 64)] * 3 + [None] * 2 + [(48, 64), (24, 32), (48, 64), None])
+    ticks = iter(np.arange(1000) * 0.5)
+    camera = LiveCamera(0, capture=lambda device: capture, clock=lambda: float(next(ticks)))
+    assert (camera.live, camera.frames_per_s, camera.count) == (True, 90.0, None)
+    found = list(camera)
+    good = [f.index for f in found if f.image is not None]
+    assert good == [0, 1, 2, 5, 7]
+    assert "32 x 24 px" in found[6].problem
+    assert len(found) == 8 + 30
+    assert "gone" in found[-1].problem
+    assert [f.time_s for f in found[:3]] == [0.0, 0.5, 1.0]
+    assert np.all(found[0].image[..., 0] == 250), "blue, green, red becomes red, green, blue"
+    assert capture.released == 1
+
+
+def test_a_camera_is_asked_for_its_size_and_refused_when_it_does_not_open():
+    capture = FakeCapture([(48, 64)])
+    camera = LiveCamera(2, (640, 480), 90.0, capture=lambda device: capture)
+    assert capture.asked == {3: 640, 4: 480, 5: 90.0}
+    first = next(iter(camera))
+    assert first.image is None
+    assert "640 x 480" in first.problem
+    with pytest.raises(FrameSourceError, match="camera 7: does not open"):
+        LiveCamera(7, capture=lambda device: FakeCapture([], opened=False))
+
+
+def test_a_live_camera_through_the_reader_stops_when_left():
+    capture = FakeCapture([(48, 64)])
+    with ThreadedReader(LiveCamera(0, capture=lambda device: capture)) as reader:
+        last = -1
+        for frame in reader:
+            assert frame.index > last
+            last = frame.index
+            if last > 20:
+                break
+    assert not reader._thread.is_alive()
+    assert capture.released >= 1
