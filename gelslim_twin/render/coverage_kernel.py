@@ -151,7 +151,7 @@ def draw_dots(
             doubled += end[m, k, 0] * end[m, n, 1] - end[m, n, 0] * end[m, k, 1]
         share = (-1.0 if doubled > 0 else 1.0) / poses[m]
         for pose in range(poses[m]):
-            t = (pose + 0.5) / poses[m] if poses[m] > 1 else 1.0
+            t = (pose + 0.5) / poses[m]
             for k in range(polygon.shape[0]):
                 polygon[k, 0] = start[m, k, 0] + t * (end[m, k, 0] - start[m, k, 0]) + 0.5
                 polygon[k, 1] = start[m, k, 1] + t * (end[m, k, 1] - start[m, k, 1]) + 0.5

@@ -9,6 +9,7 @@ even, so that no dot's centre moves.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -110,11 +111,9 @@ def kernel_taps(sigma_px: Array) -> tuple[Array, NDArray[np.int64]]:
     most = float(sigma.max(initial=0.0))
     if most == 0:
         return np.ones((len(sigma), 1)), np.zeros(len(sigma), dtype=np.int64)
-    from scipy.special import ive
-
-    reach = int(np.ceil(3.9 * most)) + 1
-    grid = np.linspace(0.0, most**2, _TABLE)
-    table = ive(np.arange(reach + 1)[None, :], grid[:, None])
+    most = np.ceil(2 * most) / 2
+    table = _kernels(float(most))
+    reach = table.shape[1] - 1
     place = sigma**2 / most**2 * (_TABLE - 1)
     low = np.minimum(place.astype(int), _TABLE - 2)
     part = (place - low)[:, None]
@@ -124,6 +123,16 @@ def kernel_taps(sigma_px: Array) -> tuple[Array, NDArray[np.int64]]:
     taps[np.arange(reach + 1)[None, :] > reaches[:, None]] = 0.0
     taps /= taps[:, :1] + 2 * taps[:, 1:].sum(axis=1, keepdims=True)
     return taps, reaches.astype(np.int64)
+
+
+@cache
+def _kernels(most_px: float) -> Array:
+    """Half kernels (table, t) at even steps of variance up to `most_px`²."""
+    from scipy.special import ive
+
+    reach = int(np.ceil(3.9 * most_px)) + 1
+    variance = np.linspace(0.0, most_px**2, _TABLE)
+    return np.asarray(ive(np.arange(reach + 1)[None, :], variance[:, None]))
 
 
 def a_priori_bound_px(sigma_px: float, light_change_per_px: float) -> float:

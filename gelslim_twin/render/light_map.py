@@ -53,6 +53,39 @@ class LightMap:
         if np.any((self.elevation_deg <= 0) | (self.elevation_deg > 90)):
             raise ValueError("light must rise towards the gel: elevation_deg in 0 ... 90")
 
+    @classmethod
+    def from_bins(
+        cls,
+        bins: Array,
+        length_mm: float,
+        width_mm: float,
+        *,
+        azimuth_deg: Array,
+        elevation_deg: Array,
+        colour: Array,
+        smooth_mm: float = 0.0,
+    ) -> LightMap:
+        """Light from a tracer's maps (k, x bins, y bins) of one pad, over their common mean.
+
+        `smooth_mm` is the standard deviation of a Gaussian that takes out the tracer's scatter.
+        Raises ValueError for maps without light.
+        """
+        maps = np.asarray(bins, dtype=float)
+        if maps.ndim != 3 or not maps.mean() > 0:
+            raise ValueError(f"irradiance bins {maps.shape}: must be (k, x, y) and hold light")
+        steps = length_mm / maps.shape[1], width_mm / maps.shape[2]
+        if smooth_mm > 0:
+            from scipy.ndimage import gaussian_filter
+
+            spread = (0.0, smooth_mm / steps[0], smooth_mm / steps[1])
+            maps = gaussian_filter(maps, spread, mode="nearest")
+        x, y = (
+            (np.arange(count) + 0.5) * step - count * step / 2
+            for count, step in zip(maps.shape[1:], steps, strict=True)
+        )
+        irradiance = np.transpose(maps, (2, 1, 0)) / maps.mean()
+        return cls(x, y, irradiance, azimuth_deg, elevation_deg, colour)
+
     @property
     def sources(self) -> int:
         """How many sources there are."""

@@ -57,16 +57,14 @@ class Shading:
             rest, sight.lean.reshape(-1, 2), self.rounds, _NEAR_MM, slopes,
         )  # fmt: skip
         gain = self.of_slopes(slopes, light)
-        shape = (*sight.rest_mm.shape[:2], light.sources)
-        return np.ascontiguousarray(gain.reshape(shape), dtype=np.float32)
+        return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
 
-    def of_slopes(self, slopes: Array, light: LightMap) -> Array:
+    def of_slopes(self, slopes: Array, light: LightMap) -> NDArray[np.float32]:
         """Light (n, k) over that of the level surface, at slopes (n, 2); exactly 1 where level."""
-        d = light.directions
-        size = np.sqrt(1 + (slopes**2).sum(axis=1))[:, None]
-        facing = (d[:, 2] - slopes[:, :1] * d[:, 0] - slopes[:, 1:] * d[:, 1]) / size
-        direct = np.maximum(facing, 0) / d[:, 2]
-        gain: Array = direct + self.ambient_share * (1 - direct)
+        from gelslim_twin.render.surface_kernel import lambert
+
+        gain = np.empty((len(slopes), light.sources), dtype=np.float32)
+        lambert(np.ascontiguousarray(slopes), light.directions, self.ambient_share, gain)
         return gain
 
 

@@ -108,3 +108,19 @@ def seen_slopes(
         det = xx * yy - xy * yx
         slopes[n, 0] = (zx * yy - zy * yx) / det
         slopes[n, 1] = (zy * xx - zx * xy) / det
+
+
+@njit(**COMPILED)
+def lambert(slopes: Any, directions: Any, ambient: Any, out: Any) -> None:
+    """Write light (n, k) float32 over that of a level surface, at slopes (n, 2).
+
+    Sources travel along unit `directions` (k, 3); the share `ambient` is blind to the slope.
+    """
+    for n in range(slopes.shape[0]):
+        a, b = slopes[n, 0], slopes[n, 1]
+        size = math.sqrt(1.0 + a * a + b * b)
+        for k in range(directions.shape[0]):
+            up = directions[k, 2]
+            facing = (up - a * directions[k, 0] - b * directions[k, 1]) / (size * up)
+            direct = max(facing, 0.0)
+            out[n, k] = direct + ambient * (1.0 - direct)
