@@ -17,7 +17,7 @@ RMS_STEP = 67.1
 class CompressionParameters(EffectParameters):
     """None unless a quality is given."""
 
-    quality: int | None = Field(default=None, ge=1, le=100, description="JPEG quality")
+    quality: int | None = Field(default=None, ge=1, le=95, description="JPEG quality")
 
 
 def grey_levels(quality: int) -> float:
@@ -46,5 +46,5 @@ EFFECT = Effect(
     is_null=lambda c: c.given("compression", CompressionParameters).quality is None,
     implementation="gelslim_twin.render.compression",
     refines=("image",),
-    after=("shading", "dirt", "defocus", "motion_blur", "exposure", "sensor_noise"),
+    after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure", "sensor_noise"),
 )

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
+from pydantic import Field
+
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
@@ -10,29 +14,27 @@ from gelslim_twin.effects.parameters import EffectParameters
 class DefocusParameters(EffectParameters):
     """Blur by defocus; aperture and focus stand in the sensor."""
 
-
-def bound(c: Circumstances) -> Bound:
-    """A disc of diameter b spreads an edge over ±b/2: a mean shift of b/4."""
-    return picture(c.blur_px / 4)
-
-
-def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """One disc for the whole frame, or its own for every dot."""
-    size = c.sensor.frame_px / 307200
-    return (
-        Rung("one disc", picture(c.blur_px / 4), 1.0 * size, {"varying": False}),
-        Rung("disc per dot", Bound(), 2.5 * size, {"varying": True}),
+    still_px: float = Field(
+        default=0.0,
+        ge=0,
+        le=8,
+        description="Blur in focus too, a standard deviation: aberrations, diffraction",
     )
+
+
+def diameter_px(c: Circumstances) -> float:
+    """Diameter of the disc with the spread of both, four standard deviations."""
+    return math.hypot(c.blur_px, 4 * c.given("defocus", DefocusParameters).still_px)
 
 
 EFFECT = Effect(
     name="defocus",
     title="Defocus",
     parameters=DefocusParameters,
-    bound=bound,
-    formula="b/4, b = f A |Z - s|/(Z s); it falls to 0 at best focus, so one disc errs as much",
-    ladder=ladder,
-    is_null=lambda c: c.blur_px == 0,
+    bound=lambda c: picture(diameter_px(c) / 4),
+    formula="b/4: a disc of diameter b = f A |Z - s|/(Z s) spreads an edge over b",
+    ladder=lambda c: (Rung("own blur per dot", Bound(), 0.5 + 1.0 * c.sensor.frame_px / 307200),),
+    is_null=lambda c: diameter_px(c) == 0,
     implementation="gelslim_twin.render.defocus",
     refines=("image",),
     after=("shading", "dirt"),

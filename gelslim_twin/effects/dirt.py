@@ -1,4 +1,4 @@
-"""Dirt on the gel and bright reflections of the LEDs."""
+"""Specks and hairs between gel and camera."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from gelslim_twin.effects.parameters import EffectParameters
 
 
 class DirtParameters(EffectParameters):
-    """Specks and glints; none by default."""
+    """None unless specks or hairs are given."""
 
-    specks: int = Field(default=0, ge=0, le=10_000, description="Dark specks on the gel")
-    speck_mm: float = Field(default=0.15, gt=0, le=5, description="Mean diameter of a speck")
-    glint_percent: float = Field(
-        default=0.0, ge=0, le=100, description="Brightness of the LEDs' reflections"
-    )
+    specks: int = Field(default=0, ge=0, le=10_000, description="Dark specks")
+    hairs: int = Field(default=0, ge=0, le=10_000, description="Dark hairs")
+    speck_mm: float = Field(default=0.25, gt=0, le=5, description="Largest diameter of a speck")
+    hair_mm: float = Field(default=2.5, gt=0, le=50, description="Length of a hair")
+    opacity: float = Field(default=0.6, ge=0, le=1, description="Share of the light they take")
 
 
 def bound(c: Circumstances) -> Bound:
-    """A speck hides as much as a dot's edge of its own diameter; a glint adds its brightness."""
+    """What a speck hides, its diameter; a hair is a tenth of a speck wide."""
     p = c.given("dirt", DirtParameters)
-    speck = p.speck_mm * c.sensor.px_per_mm if p.specks else 0.0
-    return picture(max(speck, c.edge_shift_px(p.glint_percent / 100)))
+    wide = p.speck_mm if p.specks else p.speck_mm / 10 if p.hairs else 0.0
+    return picture(p.opacity * wide * c.sensor.px_per_mm)
 
 
 EFFECT = Effect(
     name="dirt",
-    title="Dirt and specular reflections",
+    title="Dirt",
     parameters=DirtParameters,
     bound=bound,
-    formula="diameter of a speck, or brightness of a glint x width of an edge",
-    ladder=lambda c: (Rung("drawn", Bound(), 0.8 * c.sensor.frame_px / 307200),),
+    formula="opacity x diameter of a speck x f/Z",
+    ladder=lambda c: (Rung("drawn once", Bound(), 0.01),),
     is_null=lambda c: bound(c).image_px == 0,
     implementation="gelslim_twin.render.dirt",
     refines=("image",),

@@ -1,4 +1,4 @@
-"""Exposure: how bright the picture is, where it saturates, and its tone curve."""
+"""Exposure: how bright the picture is, where it saturates, and the camera's response."""
 
 from __future__ import annotations
 
@@ -10,31 +10,34 @@ from gelslim_twin.effects.parameters import EffectParameters
 
 
 class ExposureParameters(EffectParameters):
-    """A gain of 1 and a gamma of 1 leave the picture as it is."""
+    """All of them 1 leave the picture as it is."""
 
-    gain: float = Field(default=1.0, gt=0, le=100, description="Brightness, 1 as drawn")
-    gamma: float = Field(default=1.0, ge=0.2, le=5, description="Exponent of the tone curve")
+    time: float = Field(default=1.0, gt=0, le=1000, description="Exposure time over the usual one")
+    gain: float = Field(default=1.0, gt=0, le=1000, description="Amplification, of noise as well")
+    gamma: float = Field(
+        default=1.0, ge=0.2, le=5, description="The response has the exponent 1/gamma"
+    )
 
 
 def bound(c: Circumstances) -> Bound:
-    """Grey share: |gain - 1|, at most all, and the tone curve's largest |v^g - v|."""
+    """Grey share: |time gain - 1|, at most all, and the largest |v^e - v| of the response."""
     p = c.given("exposure", ExposureParameters)
-    tone = 0.0
-    if p.gamma != 1:
-        v = p.gamma ** (1 / (1 - p.gamma))
-        tone = abs(v**p.gamma - v)
-    return picture(c.edge_shift_px(min(1.0, abs(p.gain - 1)) + tone))
+    tone, exponent = 0.0, 1 / p.gamma
+    if exponent != 1:
+        v = exponent ** (1 / (1 - exponent))
+        tone = abs(v**exponent - v)
+    return picture(c.edge_shift_px(min(1.0, abs(p.time * p.gain - 1)) + tone))
 
 
 EFFECT = Effect(
     name="exposure",
-    title="Exposure, saturation and tone curve",
+    title="Exposure, saturation and response",
     parameters=ExposureParameters,
     bound=bound,
-    formula="(min(1, |gain - 1|) + largest |v^gamma - v|) of the grey range x width of an edge",
+    formula="(min(1, |time gain - 1|) + largest |v^(1/gamma) - v|) of the grey range x edge",
     ladder=lambda c: (Rung("per pixel", Bound(), 0.4 * c.sensor.frame_px / 307200),),
     is_null=lambda c: bound(c).image_px == 0,
     implementation="gelslim_twin.render.exposure",
     refines=("image",),
-    after=("shading", "dirt", "defocus", "motion_blur"),
+    after=("shading", "dirt", "defocus", "specular", "motion_blur"),
 )

@@ -32,7 +32,7 @@ EFFECT = Effect(
     formula="f (|k1| rho³ + |k2| rho⁵ + |k3| rho⁷ + 3 |p| rho²) at the farthest point of the gel",
     ladder=lambda c: (Rung("exact", Bound(), 0.02 * c.sensor.markers / 575),),
     is_null=lambda c: not any(value for _, value in c.sensor.lens_distortion),
-    implementation="gelslim_twin.render.projection",
+    implementation="gelslim_twin.view.lens_distortion",
     refines=("markers",),
     after=("refraction",),
 )

@@ -16,31 +16,15 @@ def bound(c: Circumstances) -> Bound:
     return optics(2 * c.sensor.half_view_px)
 
 
-def affine_px(c: Circumstances) -> float:
-    """What one scale for all of the gel misses: the scale varies by ±(k-1)/(k+1) about its mean."""
-    keystone = c.sensor.far_mm / c.sensor.near_mm
-    lift = c.touch.depth_mm / c.sensor.near_mm
-    return c.sensor.half_view_px * ((keystone - 1) / (keystone + 1) + lift)
-
-
-def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """One affine map, or a pinhole for every dot."""
-    dots = c.sensor.markers / 575
-    return (
-        Rung("affine", optics(affine_px(c)), 0.02 * dots, {"map": "affine"}),
-        Rung("pinhole", Bound(), 0.05 * dots, {"map": "pinhole"}),
-    )
-
-
 EFFECT = Effect(
     name="perspective",
     title="Folded-mirror perspective",
     parameters=PerspectiveParameters,
     bound=bound,
-    formula="width of the gel's image; one scale for all misses r ((k-1)/(k+1) + depth/Z)",
-    ladder=ladder,
+    formula="width of the gel's image",
+    ladder=lambda c: (Rung("pinhole", Bound(), 0.05 * c.sensor.markers / 575),),
     is_null=never_null,
-    implementation="gelslim_twin.render.projection",
+    implementation="gelslim_twin.view.perspective",
     needs=("displacement",),
     provides=("markers",),
 )

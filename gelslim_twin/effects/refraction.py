@@ -17,14 +17,16 @@ def bound(c: Circumstances) -> Bound:
 
 
 def paraxial_px(c: Circumstances) -> float:
-    """What the apparent depth misses: its next term, h (n²-1)/(2 n³) tan²θ, in the image.
+    """What the apparent depth misses, in the image.
 
-    tan θ0 of the air ray; from sin θ0 = n sin θ, tan θ = tan θ0/n (1 - (1 - 1/n²) tan²θ0/2 + ...).
+    Its next term, h (n² - 1)/(2 n³) tan²θ0, from sin θ0 = n sin θ; and the depth of a press,
+    which looks shallower by 1/n in the gel.
     """
     s = c.sensor
     slope = s.half_view_px / s.focal_px + (s.far_mm - s.near_mm) / max(s.length_mm, 1e-9)
     missed = sum(h / n * (1 - 1 / n**2) / 2 * slope**2 for h, n in s.layers_mm)
-    return s.half_view_px * missed / s.near_mm
+    pressed = c.touch.depth_mm * (1 - 1 / max((n for _, n in s.layers_mm), default=1.0))
+    return s.half_view_px * (missed + pressed) / s.near_mm
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
@@ -44,6 +46,6 @@ EFFECT = Effect(
     formula="r/Z x sum of h (1 - 1/n); apparent depths miss r/Z x sum of h (n²-1)/(2 n³) tan²",
     ladder=ladder,
     is_null=lambda c: all(h == 0 or n == 1 for h, n in c.sensor.layers_mm),
-    implementation="gelslim_twin.render.projection",
+    implementation="gelslim_twin.view.refraction",
     refines=("markers",),
 )

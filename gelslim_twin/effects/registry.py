@@ -19,6 +19,7 @@ from gelslim_twin.effects import (
     relaxation,
     sensor_noise,
     shading,
+    specular,
 )
 from gelslim_twin.effects.effect import Effect
 
@@ -37,6 +38,7 @@ EFFECTS: tuple[Effect, ...] = tuple(
         shading,
         dirt,
         defocus,
+        specular,
         motion_blur,
         exposure,
         sensor_noise,

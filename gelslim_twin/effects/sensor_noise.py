@@ -44,5 +44,5 @@ EFFECT = Effect(
     is_null=lambda c: sigma_share(c) == 0,
     implementation="gelslim_twin.render.sensor_noise",
     refines=("image",),
-    after=("shading", "dirt", "defocus", "motion_blur", "exposure"),
+    after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure"),
 )

@@ -1,4 +1,4 @@
-"""Red and green light from the sides, falling on a surface that is no longer flat."""
+"""Light from the sides on a surface that is no longer flat: its slopes brighten and darken."""
 
 from __future__ import annotations
 
@@ -7,50 +7,51 @@ import math
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
-from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
+from gelslim_twin.effects.effect import Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
+
+GRAZING = 1 / math.tan(math.radians(18.9))
+"""Light enters the gel at 18.9° above its face or more (total reflection acrylic to gel): a slope
+s changes what falls on the surface by at most s / tan of that."""
 
 
 class ShadingParameters(EffectParameters):
-    """Red from -y, green from +y."""
+    """The coat is dull; part of the light comes from everywhere."""
 
-    unevenness: float = Field(
-        default=0.5, ge=0, le=1, description="How much the light varies over the undeformed gel"
-    )
-    relief: float = Field(
-        default=1.0, ge=0, le=4, description="Change of brightness per unit of surface slope"
+    ambient_share: float = Field(
+        default=0.3, ge=0, le=1, description="Share of the light that does not mind the slope"
     )
 
 
-def slope(c: Circumstances) -> float:
-    """Slope of the surface at the rim of the contact: depth over the decay length of the pad."""
-    return c.touch.depth_mm / c.sensor.thickness_mm
-
-
-def bound(c: Circumstances) -> Bound:
-    """Grey share of an even picture that the light takes away, as a shift of edges."""
+def grey_share(c: Circumstances) -> float:
+    """Share of the light that the steepest slope, depth over thickness, adds or takes away."""
     p = c.given("shading", ShadingParameters)
-    return picture(c.edge_shift_px(math.hypot(p.unevenness, p.relief * slope(c))))
+    slope = c.touch.depth_mm / c.sensor.thickness_mm
+    return (1 - p.ambient_share) * min(1.0, slope * GRAZING)
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """The light on the flat gel, or on the deformed surface with its normals."""
-    p, size = c.given("shading", ShadingParameters), c.sensor.frame_px / 307200
-    flat = picture(c.edge_shift_px(p.relief * slope(c)))
-    return (
-        Rung("flat gel", flat, 0.6 * size, {"normals": False}),
-        Rung("surface normals", Bound(), 2.0 * size, {"normals": True}),
+    """A value every few pixels; slopes vary over the thickness h: p² / (8 (h f/Z)²) is missed."""
+    size, reach = c.sensor.frame_px / 307200, c.sensor.thickness_mm * c.sensor.px_per_mm
+    return tuple(
+        Rung(
+            f"every {p} px",
+            picture(c.edge_shift_px(grey_share(c) * p * p / (8 * reach * reach))),
+            (0.6 + 40 / p**2) * size,
+            {"pixel_step": p},
+        )
+        for p in (8, 4, 2, 1)
     )
 
 
 EFFECT = Effect(
     name="shading",
-    title="Red and green shading",
+    title="Red and green shading of the slopes",
     parameters=ShadingParameters,
-    bound=bound,
-    formula="hypot(unevenness, relief x depth/h) of the grey range x width of an edge",
+    bound=lambda c: picture(c.edge_shift_px(grey_share(c))),
+    formula="(1 - ambient) min(1, depth/(h tan 18.9 deg)) of the grey range x width of an edge",
     ladder=ladder,
-    is_null=lambda c: bound(c).image_px == 0,
+    is_null=lambda c: grey_share(c) == 0,
     implementation="gelslim_twin.render.shading",
     needs=("displacement",),
     refines=("image",),

@@ -21,6 +21,7 @@ from gelslim_twin.effects.refraction import RefractionParameters
 from gelslim_twin.effects.relaxation import RelaxationParameters
 from gelslim_twin.effects.sensor_noise import SensorNoiseParameters
 from gelslim_twin.effects.shading import ShadingParameters
+from gelslim_twin.effects.specular import SpecularParameters
 from yaml_model.base import Block
 
 
@@ -51,8 +52,11 @@ class Effects(Block):
     )
     drawing: Use | DrawingParameters = Field(default="auto", description="The dots drawn")
     shading: Use | ShadingParameters = Field(default="auto", description="Red and green light")
-    dirt: Use | DirtParameters = Field(default="auto", description="Specks and reflections")
+    dirt: Use | DirtParameters = Field(default="auto", description="Specks and hairs")
     defocus: Use | DefocusParameters = Field(default="auto", description="Blur by defocus")
+    specular: Use | SpecularParameters = Field(
+        default="auto", description="Reflections of the lamps"
+    )
     motion_blur: Use | MotionBlurParameters = Field(default="auto", description="Blur by motion")
     exposure: Use | ExposureParameters = Field(
         default="auto", description="Brightness and tone curve"

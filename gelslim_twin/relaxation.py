@@ -1,0 +1,133 @@
+"""Viscoelastic relaxation of the nodal forces: a Prony series in recursive internal variables.
+
+The gel is linear viscoelastic with one relaxation function for all moduli, so that for prescribed
+displacements the force is the hereditary integral of the elastic one (Christensen, Theory of
+Viscoelasticity, 1.2):
+
+    F(t) = F_e(t) - sum of g_i (F_e(t) - q_i(t)),   q_i' = F_e' - q_i / tau_i.
+
+Between two poses the elastic force runs straight, for which the update of q_i is exact (Taylor,
+Pister and Goudreau 1970), whatever the step. The surface is taken to follow the elastic solution:
+exact while nodes in contact stay in contact. A node that the indenter leaves carries no force at
+once, where the real surface would follow for a moment; a force that would pull is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PronySeries:
+    """g(t) = 1 - sum of fractions (1 - exp(-t / times)); no terms: an elastic gel.
+
+    Raises ValueError for fractions outside 0 ... 1 or with a sum of 1 or more, for times that are
+    not positive, or for lists of different lengths.
+    """
+
+    fractions: tuple[float, ...] = ()
+    times_s: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.fractions) != len(self.times_s):
+            raise ValueError(
+                f"{len(self.fractions)} fractions for {len(self.times_s)} times: give one of each"
+            )
+        if not all(math.isfinite(g) and g >= 0 for g in self.fractions) or self.lost >= 1:
+            raise ValueError(f"fractions {self.fractions}: none below 0, their sum below 1")
+        if not all(math.isfinite(t) and t > 0 for t in self.times_s):
+            raise ValueError(f"times {self.times_s} s: must be positive")
+
+    @property
+    def lost(self) -> float:
+        """Share of the force that decays in the end."""
+        return math.fsum(self.fractions)
+
+    @property
+    def is_null(self) -> bool:
+        """Whether nothing decays."""
+        return not any(self.fractions)
+
+    def modulus(self, time_s: ArrayLike) -> Array:
+        """g(t): stiffness over the instantaneous one, a time after a step."""
+        t = np.asarray(time_s, dtype=float)
+        decay = [g * -np.expm1(-t / tau) for g, tau in self._terms()]
+        return np.asarray(1.0 - sum(decay, np.zeros_like(t)))
+
+    def _terms(self) -> Sequence[tuple[float, float]]:
+        return tuple(zip(self.fractions, self.times_s, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class RelaxationState:
+    """What the gel remembers: the elastic force (n, 3) in N and q_i (k, n, 3), one per term."""
+
+    elastic_n: Array
+    internal_n: Array
+
+
+def at_rest(series: PronySeries, nodes: int) -> RelaxationState:
+    """The state of a gel that has not been touched."""
+    return RelaxationState(np.zeros((nodes, 3)), np.zeros((len(series.fractions), nodes, 3)))
+
+
+def relax(
+    series: PronySeries, state: RelaxationState, elastic_n: ArrayLike, step_s: float
+) -> tuple[Array, RelaxationState]:
+    """The relaxed force (n, 3) after a step of `step_s` seconds to the elastic force (n, 3).
+
+    A step of 0 s is a jump. Returns the force on the gel and the state for the next step; without
+    relaxation the force is the elastic one bit for bit.
+
+    Raises:
+        ValueError: another shape than the state's, or a negative step.
+    """
+    new = np.asarray(elastic_n, dtype=float)
+    if new.shape != state.elastic_n.shape:
+        raise ValueError(f"forces of shape {new.shape}: must be {state.elastic_n.shape}")
+    if not (math.isfinite(step_s) and step_s >= 0):
+        raise ValueError(f"a step of {step_s} s: must not be negative")
+    change = new - state.elastic_n
+    internal = np.empty_like(state.internal_n)
+    force = new.copy()
+    for k, (g, tau) in enumerate(zip(series.fractions, series.times_s, strict=True)):
+        ratio = step_s / tau
+        # (1 - exp(-x)) / x is 1 at 0.
+        mean = -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
+        internal[k] = math.exp(-ratio) * state.internal_n[k] + mean * change
+        if g:
+            force -= g * (new - internal[k])
+    return _held(force, new), RelaxationState(new.copy(), internal)
+
+
+def _held(force: Array, elastic: Array) -> Array:
+    """`force` without nodes that are not touched, or that would be pulled where they are pushed."""
+    pulled = (force[:, 2] > 0) & (elastic[:, 2] <= 0)
+    free = ~elastic.any(axis=1)
+    force[pulled | free] = 0.0
+    return force
+
+
+def apply(series: PronySeries, times_s: ArrayLike, elastic_n: ArrayLike) -> Array:
+    """Relaxed forces (t, n, 3) from elastic ones (t, n, 3) at increasing times (t,).
+
+    Before the first time the gel is at rest; the first force is a jump.
+
+    Raises:
+        ValueError: shapes that do not fit, or times that fall.
+    """
+    times, elastic = np.asarray(times_s, dtype=float), np.asarray(elastic_n, dtype=float)
+    if elastic.ndim != 3 or elastic.shape[2] != 3 or times.shape != elastic.shape[:1]:
+        raise ValueError(f"times {times.shape} and forces {elastic.shape}: must be (t,), (t, n, 3)")
+    out = np.empty_like(elastic)
+    state = at_rest(series, elastic.shape[1])
+    for k, step in enumerate(np.diff(times, prepend=times[:1])):
+        out[k], state = relax(series, state, elastic[k], float(step))
+    return out

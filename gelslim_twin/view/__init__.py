@@ -1,0 +1,1 @@
+"""The camera of a scene, put together from the optical effects that a plan keeps."""

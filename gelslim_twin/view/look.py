@@ -1,0 +1,123 @@
+"""The look of a plan's frames: the scene's parameters as the renderer takes them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from gelslim_twin.effects.drawing import DrawingParameters
+from gelslim_twin.effects.parameters import EffectParameters
+
+if TYPE_CHECKING:
+    from gelslim_twin.plan import Plan
+    from gelslim_twin.render.look import Look
+
+WHITE_DN = 255.0
+
+SLOTS: Mapping[str, tuple[str, str]] = {
+    "marker_print": ("print_faults", "PrintFaults"),
+    "shading": ("shading", "Shading"),
+    "dirt": ("dirt", "Dirt"),
+    "defocus": ("defocus", "Defocus"),
+    "specular": ("specular", "Specular"),
+    "motion_blur": ("motion_blur", "MotionBlur"),
+    "exposure": ("exposure", "Exposure"),
+    "sensor_noise": ("noise", "SensorNoise"),
+    "compression": ("compression", "Compression"),
+}
+"""Effect to the field of `Look` and the class in the effect's module."""
+
+
+def plan_look(
+    plan: Plan,
+    parameters: Mapping[str, EffectParameters],
+    camera_record: Mapping[str, Any],
+    seed: int,
+    step_s: float,
+) -> Look:
+    """What the renderer draws.
+
+    Args:
+        plan: of the scene; only its effects are imported.
+        parameters: of every effect by name, `scene.effects.parameters()`.
+        camera_record: the bundle's, for aperture and focus.
+        seed: of everything random.
+        step_s: time from frame to frame, of which the shutter is open a part.
+
+    Raises:
+        ValueError: the plan draws no picture, or the renderer refuses a value.
+    """
+    from gelslim_twin.render.look import Look
+
+    drawing = parameters["drawing"]
+    if "drawing" not in plan.order or not isinstance(drawing, DrawingParameters):
+        raise ValueError(f"the plan of {plan.scene} draws no picture")
+    slots: dict[str, Any] = {}
+    for choice in plan.included:
+        if choice.effect not in SLOTS:
+            continue
+        slot, name = SLOTS[choice.effect]
+        kind = getattr(import_module(choice.implementation), name)
+        given = parameters[choice.effect].model_dump(exclude={"use"})
+        translated = _TRANSLATE.get(choice.effect, _as_it_is)(given, camera_record, step_s)
+        values = {**translated, **dict(choice.rung_parameters)}
+        if "seed" in {field.name for field in dataclasses.fields(kind)}:
+            values["seed"] = seed
+        slots[slot] = kind(**values)
+    return Look(level_dn=drawing.level_dn, contrast=drawing.contrast, **slots)
+
+
+Values = dict[str, Any]
+
+
+def _as_it_is(given: Values, _record: Mapping[str, Any], _step_s: float) -> Values:
+    return given
+
+
+def _marker_print(given: Values, _record: Mapping[str, Any], _step_s: float) -> Values:
+    return {
+        "jitter_mm": given["jitter_mm"],
+        "missing_share": given["missing_percent"] / 100,
+        "odd_share": given["odd_percent"] / 100,
+    }
+
+
+def _defocus(given: Values, record: Mapping[str, Any], _step_s: float) -> Values:
+    aperture, focus = record.get("aperture_mm") or 0.0, record.get("focus_mm") or 0.0
+    # A pinhole is sharp wherever it is focused.
+    return {**given, "aperture_mm": aperture if focus else 0.0, "focus_mm": focus or 1.0}
+
+
+def _specular(given: Values, _record: Mapping[str, Any], _step_s: float) -> Values:
+    level = given["brightness_percent"] / 100 * WHITE_DN
+    return {"spots": given["spots"], "level_dn": level, "radius_px": given["radius_px"]}
+
+
+def _motion_blur(given: Values, _record: Mapping[str, Any], step_s: float) -> Values:
+    if step_s <= 0:
+        return {"open_share": 0.0}
+    return {"open_share": min(1.0, given["shutter_ms"] / 1000 / step_s)}
+
+
+def _sensor_noise(given: Values, _record: Mapping[str, Any], _step_s: float) -> Values:
+    electrons = given["full_well_electrons"]
+    if electrons == 0:
+        return {"read_dn": 0.0}
+    per_dn = electrons / WHITE_DN
+    return {"electrons_per_dn": per_dn, "read_dn": given["read_noise_electrons"] / per_dn}
+
+
+def _compression(given: Values, _record: Mapping[str, Any], _step_s: float) -> Values:
+    return given if given["quality"] is not None else {"quality": 95}
+
+
+_TRANSLATE: Mapping[str, Callable[[Values, Mapping[str, Any], float], Values]] = {
+    "marker_print": _marker_print,
+    "defocus": _defocus,
+    "specular": _specular,
+    "motion_blur": _motion_blur,
+    "sensor_noise": _sensor_noise,
+    "compression": _compression,
+}
