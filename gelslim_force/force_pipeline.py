@@ -8,6 +8,7 @@ the stream goes on.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -33,6 +34,7 @@ from ifem_export.marker_interpolation import FilledInterpolation
 
 Array = NDArray[np.float64]
 _CONTACT_SIGMAS = 5.0
+_UNSEEN = "the markers move, but no contact patch is seen"
 
 
 class NormalSource(Protocol):
@@ -189,8 +191,10 @@ class ForcePipeline:
         camera = self.calibration.camera
         size = (camera.image_height_px, camera.image_width_px)
         if not isinstance(image, np.ndarray) or image.shape[:2] != size:
-            got = getattr(image, "shape", type(image).__name__)
-            return f"frame of shape {got}: this sensor's are {size[1]} x {size[0]} px"
+            got = type(image).__name__
+            if isinstance(image, np.ndarray) and image.ndim >= 2:
+                got = f"{image.shape[1]} x {image.shape[0]} px"
+            return f"frame of {got}: this sensor's are {size[1]} x {size[0]} px"
         return ""
 
     def _motions(
@@ -209,6 +213,9 @@ class ForcePipeline:
         clock.stage("normal")
         motion = motion_of(places_px, reading)
         clock.stage("displace")
+        if seen is None and self._motion.moved(motion):
+            # Nothing shows, yet the gel moves: no force at all would be a false statement.
+            return replace(reading, problem=_UNSEEN), motion_of(places_px, None)
         lateral = self._motion.of_touched(motion, reading)
         if lateral is not None:
             reading = self.normal.motion(seen, lateral)

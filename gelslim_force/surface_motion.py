@@ -17,6 +17,9 @@ from ifem_export.marker_interpolation import FilledInterpolation
 
 Array = NDArray[np.float64]
 _SMALL_MM = 1e-3
+_MOVED_MM = 0.03
+_FEW = 4
+"""Markers that must move: one or two may be mistaken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +79,23 @@ class SurfaceMotion:
         u[:, 2] = reading.w_mm if reading is not None and reading.known else np.nan
         return operator, u
 
+    def moved(self, motion_mm: Array) -> bool:
+        """Whether the gel moves sideways somewhere, beyond what noise and a drift of heat make."""
+        size = np.hypot(motion_mm[:, 0], motion_mm[:, 1])
+        size = size[np.isfinite(size)]
+        if len(size) == 0:
+            return False
+        far = np.partition(size, -_FEW)[-_FEW] if len(size) > _FEW else size.max()
+        return bool(far > _MOVED_MM)
+
     def apparent_motion(self, motion_mm: Array, normal_mm: float) -> Array:
         """(k, 2) motion that markers seem to make if the gel sinks by `normal_mm` unseen.
 
-        Where the gel moves sideways it is taken to sink too, in proportion.
+        Where the gel moves sideways it is taken to sink too, in proportion, and by no more than
+        three times as far: a press moves the gel beside it by about a third of its depth.
         """
         size = np.nan_to_num(np.hypot(motion_mm[:, 0], motion_mm[:, 1]))
-        share = self._of_all(size / max(float(size.max()), 1e-9), 0.0)
+        share = self._of_all(size / max(float(size.max()), normal_mm / 3, 1e-9), 0.0)
         return np.asarray(-normal_mm * share[:, None] * self.apparent_per_mm)
 
     def covariance_mm2(self, known: NDArray[np.bool_], noise_px: float) -> Array:

@@ -16,6 +16,7 @@ from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
 from gelslim_cad.cli.explain import explain
+from gelslim_cad.cli.force import force
 from gelslim_cad.cli.light import light
 from gelslim_cad.cli.markers import markers
 from gelslim_cad.cli.new import new
@@ -62,6 +63,7 @@ for _command in (
     bundle_info,
     bundle_export,
     calibrate,
+    force,
     markers,
     light,
     schema,

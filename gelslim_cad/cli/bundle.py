@@ -51,7 +51,7 @@ def bundle(
     from ifem_export.bundle_io import write_bundle
     from ifem_export.ladder import chosen_rung, measure_ladder
 
-    allowed = None if error is None else _share(error)
+    allowed = None if error is None else share(error)
     loaded = read_spec(spec)
     d = derive(loaded.spec)
     require_pad_rules(d, "gelslim bundle", force)
@@ -117,7 +117,7 @@ def print_ladder(ladder: Ladder, chosen: str) -> None:
     print(f"Against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")
 
 
-def _share(text: str) -> float:
+def share(text: str) -> float:
     """3% or 0.03 as 0.03; raises CommandError for anything else."""
     from gelslim_cad.cli.failure import CommandError
     from gelslim_cad.cli.status import BAD_INPUT

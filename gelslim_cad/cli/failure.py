@@ -75,7 +75,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return RULE_FAILED, str(error)
     if isinstance(error, _COMMAND_ERROR):
         return BAD_INPUT, f"gelslim: {_first_line(error)}"
-    if name == "InputError" or _of_ifem(error):
+    if name == "InputError" or _of_ifem(error) or _of_force(error):
         return BAD_INPUT, str(error)
     if isinstance(error, ImportError):
         return _missing(error)
@@ -92,6 +92,11 @@ def _judge(error: BaseException) -> tuple[int, str]:
 
 def _of_ifem(error: BaseException) -> bool:
     return any(c.__module__ == "ifem_export.errors" for c in type(error).__mro__)
+
+
+def _of_force(error: BaseException) -> bool:
+    """Errors that the force pipeline words for its users are classes of their own."""
+    return isinstance(error, ValueError) and type(error).__module__.startswith("gelslim_force.")
 
 
 def _missing(error: ImportError) -> tuple[int, str]:

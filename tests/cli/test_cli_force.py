@@ -1,0 +1,132 @@
+"""`gelslim force` as a user runs it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
+from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, stream
+
+from gelslim_cad.cli.main import main
+from gelslim_force.outputs.picture_file import encoded
+from gelslim_force.outputs.recorded_run import read_run
+from ifem_export.bundle_io import write_bundle
+
+
+@pytest.fixture(scope="module")
+def sensor(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("sensor with spaces é")
+    write_bundle(place / "bundle", sensor_bundle())
+    (place / "reference.png").write_bytes(encoded(frame(0.0).image, ".png"))
+    (place / "frames").mkdir()
+    for k, seen in enumerate(stream(5)):
+        (place / "frames" / f"f{k}.png").write_bytes(encoded(seen.image, ".png"))
+    return place
+
+
+def run(sensor: Path, *more: str, frames: str = "frames") -> int:
+    given = [str(sensor / "bundle"), str(sensor / frames), "-r", str(sensor / "reference.png")]
+    return main(["force", *given, *more])
+
+
+def test_run_folder_and_answer(sensor: Path, tmp_path: Path, capsys) -> None:
+    assert run(sensor, "-o", str(tmp_path / "run"), "--pictures", "2", "--json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["frames"] == answer["frames_with_forces"] == 5
+    assert len(answer["pictures"]) == 2
+    assert all(Path(p).stat().st_size > 10_000 for p in answer["pictures"])
+    recorded = read_run(tmp_path / "run")
+    assert recorded.complete
+    last = list(recorded.results())[-1]
+    off = np.abs(last.wrench.force_n[:2] - SHEAR_N)
+    assert (off < 3 * last.wrench.standard_deviation[:2]).all()
+    assert np.isnan(last.wrench.force_n[2])
+
+
+def test_depth_maps_give_the_normal_force(sensor: Path, tmp_path: Path, capsys) -> None:
+    from scipy.interpolate import griddata
+
+    from gelslim_optics.virtual_camera import VirtualCamera
+
+    bundle = sensor_bundle()
+    camera = VirtualCamera.from_record(bundle.camera)
+    nodes = np.asarray(bundle.mesh.surface_mm)
+    rows, columns = np.mgrid[:480, :640]
+    maps = []
+    for share in np.linspace(0, 1, 5):
+        w = share * press().nodes_mm[:, 2]
+        places = camera.project(nodes + np.column_stack([0 * w, 0 * w, w]))
+        seen = griddata(places, w, (columns, rows), method="linear")
+        maps.append(seen.astype(np.float32))
+    np.save(tmp_path / "maps.npy", np.stack(maps))
+    given = ("-o", str(tmp_path / "run"), "--pictures", "0", "--json")
+    assert run(sensor, *given, "--depth-maps", str(tmp_path / "maps.npy")) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["last_wrench"][:3] == pytest.approx([*SHEAR_N, -NORMAL_N], abs=0.05)
+
+
+def test_moving_markers_without_a_patch_leave_the_normal_force_unknown(
+    sensor: Path, tmp_path: Path, capsys
+) -> None:
+    """These frames are not shaded, so no patch can be seen while the markers move."""
+    given = ("-o", str(tmp_path / "run"), "--pictures", "0", "--json")
+    assert run(sensor, *given, "--indenter", "sphere:10") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["last_wrench"][2] is None
+    assert answer["last_wrench"][0] == pytest.approx(SHEAR_N[0], abs=0.3)
+    assert any("no contact patch" in p for p in answer["problems"])
+
+
+def test_video_and_recording(sensor: Path, tmp_path: Path, capsys) -> None:
+    pytest.importorskip("cv2")
+    pytest.importorskip("mcap")
+    given = ("-o", str(tmp_path / "run"), "--video", str(tmp_path / "v.mp4"))
+    assert run(sensor, *given, "--mcap", str(tmp_path / "r.mcap"), "--pictures", "0") == 0
+    assert (tmp_path / "v.mp4").stat().st_size > 1000
+    assert (tmp_path / "r.mcap").stat().st_size > 1000
+    assert "5 frames, 5 with forces" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--method", "magic"), "magic"),
+        (("--operator", "spline"), "spline"),
+        (("--error", "1%"), "no measured ladder"),
+        (("--indenter", "cube:3"), "cube"),
+        (("--fields", "xml"), "npz, parquet or none"),
+        (("--video", "a.txt"), ".mp4 or .avi"),
+        (("--indenter", "sphere:3", "--depth-maps", "m.npy"), "not both"),
+    ],
+)
+def test_bad_options_are_refused_in_words(sensor, tmp_path, capsys, more, words) -> None:
+    assert run(sensor, "-o", str(tmp_path / "run"), *more) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_missing_reference_and_wrong_frames(sensor: Path, tmp_path: Path, capsys) -> None:
+    assert main(["force", str(sensor / "bundle"), str(sensor / "frames")]) == 2
+    assert "--reference" in capsys.readouterr().err
+    (sensor / "small").mkdir(exist_ok=True)
+    small = np.full((240, 320, 3), 120, np.uint8)
+    (sensor / "small" / "a.png").write_bytes(encoded(small, ".png"))
+    assert run(sensor, "-o", str(tmp_path / "run"), frames="small") == 2
+    assert "320 x 240 px" in read_run(tmp_path / "run").wrenches.problems[0]
+
+
+def test_an_earlier_run_is_kept_unless_told(sensor: Path, tmp_path: Path, capsys) -> None:
+    given = ("-o", str(tmp_path / "run"), "--pictures", "0", "--frames", "1")
+    assert run(sensor, *given) == 0
+    before = (tmp_path / "run" / "wrenches.csv").read_bytes()
+    assert run(sensor, *given) == 2
+    assert "holds a run" in capsys.readouterr().err
+    assert (tmp_path / "run" / "wrenches.csv").read_bytes() == before
+    assert run(sensor, *given, "--force") == 0
