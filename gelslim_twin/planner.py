@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gelslim_twin.effects.circumstances import Circumstances
@@ -43,7 +43,7 @@ class Question:
 def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
     """The plan: each effect in or out, why, and the cheapest rung that is good enough.
 
-    Per observable the tolerance is shared evenly among the effects that could spoil it. One left
+    Per observable the tolerance is shared evenly among the effects that could use it up. One left
     out costs its bound, one simulated the error of its rung, neither more than a share: the sum
     keeps the tolerance, but for effects that the scene switches off or whose best rung errs more,
     which `Plan.over_tolerance` lists.
@@ -106,14 +106,24 @@ def _provider(question: Question, effects: Sequence[Effect], datum: str) -> Effe
     )
 
 
-def _shares(question: Question, relevant: Iterable[Effect]) -> dict[str, float]:
-    """Per observable, the tolerance over the number of effects that could spoil it."""
-    shares = {}
-    bounds = [_bound(question, e) for e in relevant]
-    for observable in question.observe:
-        count = sum(bound.of(observable) > 0 for bound in bounds)
-        shares[observable] = question.tolerance(observable) / max(1, count)
-    return shares
+def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
+    """Per observable, the tolerance over the number of effects that could use up some of it."""
+    return {
+        observable: question.tolerance(observable)
+        / max(1, sum(_may_cost(question, e, observable) for e in relevant))
+        for observable in question.observe
+    }
+
+
+def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
+    """Whether an effect may be left out at a price, or be simulated with an error.
+
+    One that must be in and has none but exact rungs costs nothing.
+    """
+    lost = _bound(question, effect).of(observable)
+    may_go = not effect.provides and lost <= question.tolerance(observable)
+    inexact = any(r.error.of(observable) > 0 for r in effect.ladder(question.circumstances))
+    return lost > 0 and (may_go or inexact)
 
 
 def _bound(question: Question, effect: Effect) -> Bound:
@@ -129,21 +139,21 @@ def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str
     c, use = question.circumstances, question.use(effect)
     bound = _bound(question, effect)
     if use == "off":
-        cost = "nothing observed depends on it" if not relevant else "switched off by the scene"
+        cost = "not observed" if not relevant else "switched off"
         return _out(effect, bound, cost, shares if relevant else {})
     if not relevant:
-        return _out(effect, bound, "nothing observed depends on it", {})
+        return _out(effect, bound, "not observed", {})
     if use == "on":
-        return _in(effect, c, bound, "switched on by the scene", shares)
+        return _in(effect, c, bound, "switched on", shares)
     if effect.provides:
         made = ", ".join(effect.provides)
         return _in(effect, c, bound, f"provides {made}", shares)
     if effect.is_null(c):
-        return _out(effect, bound, "nothing to do: its parameters are nil", shares)
+        return _out(effect, bound, "parameters nil", shares)
     if _within(bound, shares):
-        return _out(effect, bound, "below its share of the tolerance", shares)
+        return _out(effect, bound, "below its share", shares)
     worst = max(shares, key=lambda o: _excess(bound.of(o), shares[o]))
-    return _in(effect, c, bound, f"without it {worst} errs more than its share", shares)
+    return _in(effect, c, bound, f"matters to {worst}", shares)
 
 
 def _excess(error: float, share: float) -> float:

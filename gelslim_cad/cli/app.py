@@ -20,6 +20,7 @@ from gelslim_cad.cli.force import force
 from gelslim_cad.cli.light import light
 from gelslim_cad.cli.markers import markers
 from gelslim_cad.cli.new import new
+from gelslim_cad.cli.plan import plan
 from gelslim_cad.cli.schema import schema
 
 EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
@@ -66,6 +67,7 @@ for _command in (
     force,
     markers,
     light,
+    plan,
     schema,
 ):
     app.command()(carried(_command))

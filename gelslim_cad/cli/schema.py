@@ -1,4 +1,4 @@
-"""`gelslim schema`: the JSON Schema of the spec."""
+"""`gelslim schema`: the JSON Schema of the spec, or of scenes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ def schema(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Write to this file instead.")
     ] = None,
+    scene: Annotated[
+        bool, typer.Option("--scene", help="Of contact scenes instead of specs.")
+    ] = False,
 ) -> int:
     """Print the JSON Schema of the spec.
 
     Editors check and complete the YAML by it.
     """
-    from gelslim_cad.spec.schema import schema_text
-
-    text = schema_text()
+    text = _text(scene)
     if out is None:
         print(text, end="")
         return 0
@@ -28,3 +29,13 @@ def schema(
     replace_file(out, text.encode())
     print(f"Wrote {out}. In VS Code, name it in the setting yaml.schemas.")
     return 0
+
+
+def _text(scene: bool) -> str:
+    if scene:
+        from gelslim_twin.scene.reader import scene_schema_text
+
+        return scene_schema_text()
+    from gelslim_cad.spec.schema import schema_text
+
+    return schema_text()

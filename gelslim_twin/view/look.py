@@ -56,11 +56,12 @@ def plan_look(
         raise ValueError(f"the plan of {plan.scene} draws no picture")
     slots: dict[str, Any] = {}
     for choice in plan.included:
-        if choice.effect not in SLOTS:
+        given = parameters[choice.effect].model_dump(exclude={"use"})
+        # Switched on without a quality there is nothing to compress.
+        if choice.effect not in SLOTS or given.get("quality", 0) is None:
             continue
         slot, name = SLOTS[choice.effect]
         kind = getattr(import_module(choice.implementation), name)
-        given = parameters[choice.effect].model_dump(exclude={"use"})
         translated = _TRANSLATE.get(choice.effect, _as_it_is)(given, camera_record, step_s)
         values = {**translated, **dict(choice.rung_parameters)}
         if "seed" in {field.name for field in dataclasses.fields(kind)}:
@@ -109,15 +110,10 @@ def _sensor_noise(given: Values, _record: Mapping[str, Any], _step_s: float) -> 
     return {"electrons_per_dn": per_dn, "read_dn": given["read_noise_electrons"] / per_dn}
 
 
-def _compression(given: Values, _record: Mapping[str, Any], _step_s: float) -> Values:
-    return given if given["quality"] is not None else {"quality": 95}
-
-
 _TRANSLATE: Mapping[str, Callable[[Values, Mapping[str, Any], float], Values]] = {
     "marker_print": _marker_print,
     "defocus": _defocus,
     "specular": _specular,
     "motion_blur": _motion_blur,
     "sensor_noise": _sensor_noise,
-    "compression": _compression,
 }

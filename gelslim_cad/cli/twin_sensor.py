@@ -1,0 +1,89 @@
+"""The sensor that a scene names, resolved: from its spec, or from a bundle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gelslim_twin.effects.circumstances import SensorFigures
+    from gelslim_twin.scene.reader import LoadedScene
+    from ifem_export.bundle import Bundle
+    from yaml_model.errors import InputError
+
+
+def sensor_figures(loaded: LoadedScene) -> SensorFigures:
+    """The figures that planning needs, without a stiffness.
+
+    Raises `InputError` for a sensor that is missing or a spec with faults, IfemError for a folder
+    that is no bundle.
+    """
+    from gelslim_twin.sensor_figures import bundle_figures
+
+    _require_present(loaded)
+    if loaded.scene.sensor.bundle is not None:
+        return bundle_figures(loaded.sensor_path)
+    return _spec_figures(loaded)
+
+
+def sensor_bundle(loaded: LoadedScene) -> Bundle:
+    """The stiffness bundle of the scene's sensor: read, or made from the spec without a ladder.
+
+    Raises as `sensor_figures`.
+    """
+    _require_present(loaded)
+    if loaded.scene.sensor.bundle is not None:
+        from ifem_export.bundle_io import load_bundle
+
+        return load_bundle(loaded.sensor_path)
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.spec.reader import read_spec
+
+    spec = read_spec(loaded.sensor_path).spec
+    d = derive(spec)
+    grid = marker_grid(d)
+    return make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
+
+
+def _require_present(loaded: LoadedScene) -> None:
+    sensor, path = loaded.scene.sensor, loaded.sensor_path
+    if sensor.spec is not None and not path.is_file():
+        raise _missing(loaded, "sensor.spec", sensor.spec, "no such file")
+    if sensor.bundle is not None and not path.is_dir():
+        raise _missing(loaded, "sensor.bundle", sensor.bundle, "no such folder")
+
+
+def _missing(loaded: LoadedScene, field: str, value: str, message: str) -> InputError:
+    from yaml_model.errors import shown
+
+    return loaded.problem(
+        field, shown(value), message, f"paths are relative to the scene's folder, {loaded.folder}"
+    )
+
+
+def _spec_figures(loaded: LoadedScene) -> SensorFigures:
+    import numpy as np
+
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.pad import marker_grid, pad_mesh
+    from gelslim_cad.sight import camera_record
+    from gelslim_cad.spec.reader import read_spec
+    from gelslim_twin.sensor_figures import figures
+
+    spec = read_spec(loaded.sensor_path).spec
+    d = derive(spec)
+    grid = marker_grid(d)
+    mesh, _ = pad_mesh(d, grid)
+    cells = mesh.occupancy.shape
+    size = tuple(n * h for n, h in zip(cells, mesh.cell_size_mm, strict=True))
+    gel = spec.material.gel
+    return figures(
+        camera_record(d),
+        size_mm=(float(size[0]), float(size[1]), float(size[2])),
+        material=(gel.youngs_modulus_mpa, gel.poissons_ratio),
+        surface_nodes=len(mesh.surface),
+        layers=mesh.layers,
+        markers=len(grid),
+        marker_pitch_mm=float(d["design.markers.pitch_mm"]),
+        marker_diameter_mm=float(np.median(grid.diameter_mm)),
+    )
