@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_optics.height_field import HeightGrid
+
 if TYPE_CHECKING:
     from gelslim_optics.virtual_camera import VirtualCamera
     from gelslim_twin.render.sight import Sight
@@ -24,7 +26,8 @@ _LEFT_OUT = 1e-4
 _LARGEST_PX = 8.0
 _TABLE = 321
 _LEVELS = 6
-_GRID_MM = 1.0
+_NODES = 49
+_SUNKEN_MM = 0.5
 
 
 @dataclass(frozen=True)
@@ -52,19 +55,20 @@ class Defocus:
         """Whether nothing is blurred."""
         return self.aperture_mm == 0 and self.still_px == 0
 
-    def sigma_px(self, camera: VirtualCamera, points_mm: Array, scale_px_per_mm: Array) -> Array:
+    def field(self, camera: VirtualCamera, length_mm: float, width_mm: float) -> BlurField:
+        """Blur diameters over a pad, to be looked up frame by frame."""
+        return BlurField.of(camera, self.aperture_mm, self.focus_mm, (length_mm, width_mm))
+
+    def sigma_px(self, field: BlurField, points_mm: Array, scale_px_per_mm: Array) -> Array:
         """Standard deviation (n,) in px at points (n, 3) where the picture has that scale (n,)."""
-        still = np.full(len(points_mm), self.still_px**2)
-        if self.aperture_mm > 0:
-            blur = camera.blur_on_gel_mm(points_mm, self.aperture_mm, self.focus_mm)
-            still += (blur * scale_px_per_mm / 4) ** 2
-        sigma: Array = np.minimum(np.sqrt(still), _LARGEST_PX)
+        spread = field.at(points_mm[:, 0], points_mm[:, 1], points_mm[:, 2]) * scale_px_per_mm / 4
+        sigma: Array = np.minimum(np.sqrt(self.still_px**2 + spread**2), _LARGEST_PX)
         return sigma
 
     def soften(
-        self, camera: VirtualCamera, sight: Sight, planes: NDArray[np.float32]
+        self, field: BlurField, sight: Sight, planes: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Blur a still picture (h, w, c) as sharp as each place is, by `blur_map`.
+        """Blur a still picture (h, w, c) as sharp as each place at rest is.
 
         Between a few blurs of the whole picture, mixed by variance: exact for second moments.
         """
@@ -72,7 +76,9 @@ class Defocus:
             return planes
         from scipy.ndimage import gaussian_filter
 
-        variance = self._variance_map(camera, sight)
+        x, y = sight.rest_mm[..., 0], sight.rest_mm[..., 1]
+        spread = field.at(x, y, 0.0) / sight.pixel_mm() / 4
+        variance = np.minimum(self.still_px**2 + spread**2, _LARGEST_PX**2)
         levels = np.linspace(variance.min(), variance.max(), _LEVELS)
         if np.ptp(levels) < 1e-3:
             levels = levels[:1]
@@ -86,19 +92,35 @@ class Defocus:
             out += share[..., None].astype(np.float32) * blurred
         return out
 
-    def _variance_map(self, camera: VirtualCamera, sight: Sight) -> Array:
-        variance = np.full(sight.rest_mm.shape[:2], self.still_px**2)
-        if self.aperture_mm == 0:
-            return variance
-        from scipy.ndimage import map_coordinates
 
-        x, y = sight.rest_mm[..., 0], sight.rest_mm[..., 1]
-        axes = [np.arange(a.min(), a.max() + _GRID_MM, _GRID_MM) for a in (x, y)]
-        blur = camera.blur_map(axes[0], axes[1], self.aperture_mm, self.focus_mm)
-        places = [(y - axes[1][0]) / _GRID_MM, (x - axes[0][0]) / _GRID_MM]
-        seen = map_coordinates(blur, places, order=1, mode="nearest")
-        variance += (seen / sight.pixel_mm() / 4) ** 2
-        return np.asarray(np.minimum(variance, _LARGEST_PX**2))
+@dataclass(frozen=True)
+class BlurField:
+    """Blur diameter over the pad at two heights, from `VirtualCamera.blur_map`; between, linear.
+
+    Beyond the grid, which reaches half a pad further than the pad, it is that of its edge.
+    """
+
+    level: HeightGrid
+    sunken: HeightGrid
+
+    @classmethod
+    def of(
+        cls, camera: VirtualCamera, aperture_mm: float, focus_mm: float, pad_mm: tuple[float, float]
+    ) -> BlurField:
+        """The field of a lens of pupil `aperture_mm` focused at `focus_mm`."""
+        x, y = (np.linspace(-side, side, _NODES) for side in pad_mm)
+        if aperture_mm == 0:
+            sharp = HeightGrid(x, y, np.zeros((_NODES, _NODES)))
+            return cls(sharp, sharp)
+        maps = [camera.blur_map(x, y, aperture_mm, focus_mm, z) for z in (0.0, -_SUNKEN_MM)]
+        return cls(HeightGrid(x, y, maps[0]), HeightGrid(x, y, maps[1]))
+
+    def at(self, x_mm: Array, y_mm: Array, z_mm: Array | float) -> Array:
+        """Blur diameter in mm at points of any shape."""
+        level = self.level(x_mm, y_mm)
+        change = self.sunken(x_mm, y_mm) - level if np.any(z_mm) else 0.0
+        blur: Array = np.maximum(level - np.asarray(z_mm) / _SUNKEN_MM * change, 0.0)
+        return blur
 
 
 def kernel_taps(sigma_px: Array) -> tuple[Array, NDArray[np.int64]]:

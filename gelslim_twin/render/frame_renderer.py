@@ -19,6 +19,7 @@ from gelslim_twin.render.surroundings import Pad, still_irradiance
 
 if TYPE_CHECKING:
     from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_twin.render.defocus import BlurField
     from gelslim_twin.render.light_map import LightMap
     from gelslim_twin.render.marker_motion import MarkerMotion
     from ifem_export.marker_grid import MarkerGrid
@@ -64,8 +65,13 @@ class FrameRenderer:
                 self.camera, (self.pad.length_mm, self.pad.width_mm), light
             )
         if self.look.defocus is not None:
-            light = self.look.defocus.soften(self.camera, self.sight, light)
+            light = self.look.defocus.soften(self._blur_field, self.sight, light)
         return light
+
+    @cached_property
+    def _blur_field(self) -> BlurField:
+        assert self.look.defocus is not None
+        return self.look.defocus.field(self.camera, self.pad.length_mm, self.pad.width_mm)
 
     @cached_property
     def _glare(self) -> Image:
@@ -183,7 +189,7 @@ class FrameRenderer:
 
             scale = np.sqrt(area / (np.pi * self.dots.semi_axes_mm.prod(axis=1)))
             points = self._centres_mm(surface, markers)
-            taps, reach = kernel_taps(self.look.defocus.sigma_px(self.camera, points, scale))
+            taps, reach = kernel_taps(self.look.defocus.sigma_px(self._blur_field, points, scale))
         ink = np.zeros((self.camera.image_height_px, self.camera.image_width_px), dtype=np.float32)
         draw_dots(start, now, drawn, poses, self.look.samples, taps, reach, ink)
         return ink
