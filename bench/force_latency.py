@@ -1,0 +1,282 @@
+"""Latency of the force pipeline per stage, beside the paper's own choices, in one run.
+
+    python bench/force_latency.py                    # table, writes docs/data/force_latency.json
+    python bench/force_latency.py --quick            # fewer frames, prints only
+    python bench/force_latency.py --frames 100000    # and a soak: memory and time over that many
+
+640 x 480 frames of a push with shear and its release, on one core; set OMP_NUM_THREADS=1. The
+paper's chain searches every frame whole, takes the nearest dot, corrects by the printed formula,
+interpolates by Delaunay triangles (scipy's griddata) and multiplies by the stiffness of one layer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator
+from itertools import cycle, islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from force_rig import SEED, Rig, large_rig, machine, shares, small_rig
+from numpy.typing import NDArray
+
+from gelslim_force.calibration import calibrate
+from gelslim_force.force_pipeline import ForcePipeline
+from gelslim_force.indenter_source import indenter_source
+from gelslim_force.pipeline_settings import PipelineSettings
+from gelslim_force.sensor_calibration import SensorCalibration
+
+Array = NDArray[np.float64]
+ROOT = Path(__file__).parents[1]
+CYCLE = 48
+WARM_UP = 2 * CYCLE
+SOAK_REPORTS = 10
+Chain = Callable[[int], dict[str, float]]
+"""Runs frame k of the cycle and returns the time per stage in ms."""
+
+
+def main() -> None:
+    """Measure, print, and write JSON."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer frames, nothing written")
+    parser.add_argument("--frames", type=int, default=0, help="frames of the soak")
+    parser.add_argument("--timed", type=int, default=960, help="frames timed per chain")
+    options = parser.parse_args()
+    timed = 240 if options.quick else options.timed
+    keep_to_one_core()
+    data: dict[str, Any] = {"seed": SEED, **machine(), "frames": timed, "chains": []}
+    for rig in (small_rig(), large_rig()):
+        data["chains"] += [
+            {"markers": len(rig.grid), "nodes": len(rig.bundle.mesh.surface_mm), **row}
+            for row in measured(rig, timed)
+        ]
+    for row in data["chains"]:
+        print(line(row))
+    data["first_frame"] = first_frame(large_rig())
+    print("first frame in a fresh process: {ready_s:.2f} s, of which imports {imports_s:.2f} s, "
+          "bundle {bundle_s:.2f} s, pipeline {pipeline_s:.2f} s, frame {frame_s:.2f} s"
+          .format(**data["first_frame"]))  # fmt: skip
+    if options.frames:
+        data["soak"] = soak(large_rig(), options.frames)
+    if options.quick:
+        return
+    target = ROOT / "docs" / "data" / "force_latency.json"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+def keep_to_one_core() -> None:
+    """Pin this process where the system can."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def measured(rig: Rig, timed: int) -> list[dict[str, Any]]:
+    """Stage times of every chain on one sensor; chains take turns, so that all see the same
+    load of the machine."""
+    frames = [f.image for f in rig.stream(CYCLE)]
+    calibration = calibrate(rig.bundle, frames[0])
+    chains = dict(all_chains(rig, frames, calibration))
+    found: dict[str, list[dict[str, float]]] = {name: [] for name in chains}
+    for chain in chains.values():
+        for k in range(WARM_UP):
+            chain(k % CYCLE)
+    for start in range(0, timed, CYCLE):
+        for name, chain in chains.items():
+            found[name] += [chain(k) for k in range(min(CYCLE, timed - start))]
+    return [{"chain": name, **summary(times)} for name, times in found.items()]
+
+
+def all_chains(
+    rig: Rig, frames: list[NDArray[np.uint8]], calibration: SensorCalibration
+) -> Iterator[tuple[str, Chain]]:
+    """The chains compared, by name."""
+    known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
+    yield "tangential", pipeline_chain(ForcePipeline(rig.bundle, calibration), frames)
+    yield "depth given", pipeline_chain(ForcePipeline(rig.bundle, calibration), frames, known)
+    quick = PipelineSettings(time_ms=0.5)
+    yield (
+        "depth given, quick operator",
+        pipeline_chain(ForcePipeline(rig.bundle, calibration, quick), frames, known),
+    )
+    seen = ForcePipeline(rig.bundle, calibration)
+    seen.normal = indenter_source(seen, frames[0], rig.press.sphere)
+    yield "sphere seen", pipeline_chain(seen, frames)
+    yield "paper's choices", paper_chain(rig, calibration, frames, known)
+
+
+def pipeline_chain(
+    pipeline: ForcePipeline, frames: list[NDArray[np.uint8]], normal_mm: list[Array] | None = None
+) -> Chain:
+    """Our chain; with the depth given, or from the pipeline's own source, or none."""
+
+    def run(k: int) -> dict[str, float]:
+        started = time.perf_counter()
+        result = pipeline.process(frames[k], normal_mm=None if normal_mm is None else normal_mm[k])
+        total = (time.perf_counter() - started) * 1000
+        if result.field is None:
+            raise SystemExit(f"frame {k} gave no forces: {'; '.join(result.problems)}")
+        return {**result.stage_ms, "total": total}
+
+    return run
+
+
+def paper_chain(
+    rig: Rig,
+    calibration: SensorCalibration,
+    frames: list[NDArray[np.uint8]],
+    normal_mm: list[Array],
+) -> Chain:
+    """The paper's choices with our detector: no verification, no low-pass, no covariance."""
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    from gelslim_force.detection import Detector
+    from gelslim_force.marker_motion import MarkerView
+    from gelslim_force.matching import match
+    from gelslim_force.wrench import resultant
+    from ifem_export.interpolation import marker_to_node
+
+    reference = calibration.reference
+    view = MarkerView(calibration.camera, reference.places_px)
+    detector = Detector(calibration.detector)
+    operator = rig.bundle.surface_operator("paper")
+    nodes = np.asarray(rig.bundle.mesh.surface_mm)
+    to_markers = marker_to_node(nodes, view.rest_mm)
+    last = [reference.places_px]
+
+    def run(k: int) -> dict[str, float]:
+        marks = [time.perf_counter()]
+        dots = detector.detect(frames[k])
+        tracks = match(reference, dots.centres_px, last[0], "nearest")
+        last[0] = tracks.places_px
+        marks.append(time.perf_counter())
+        lateral = view.lateral_motion(tracks.places_px, to_markers @ normal_mm[k], "printed")
+        marks.append(time.perf_counter())
+        u = np.empty_like(nodes)
+        rest = view.rest_mm[:, :2]
+        inside = LinearNDInterpolator(rest, lateral)(nodes[:, :2])
+        beyond = NearestNDInterpolator(rest, lateral)(nodes[:, :2])
+        u[:, :2] = np.where(np.isnan(inside), beyond, inside)
+        u[:, 2] = normal_mm[k]
+        marks.append(time.perf_counter())
+        force = operator.force(u)
+        marks.append(time.perf_counter())
+        resultant(nodes, force)
+        marks.append(time.perf_counter())
+        steps = np.diff(marks) * 1000
+        names = ("track", "displace", "interpolate", "force", "wrench")
+        return {**dict(zip(names, map(float, steps), strict=True)), "total": float(steps.sum())}
+
+    return run
+
+
+def summary(times: list[dict[str, float]]) -> dict[str, Any]:
+    """Median, 95th and 99th percentile per stage in ms; stages that a frame skips count 0."""
+    names = list(dict.fromkeys(name for t in times for name in t))
+    table = {name: np.array([t.get(name, 0.0) for t in times]) for name in names}
+    return {
+        name: dict(zip(("median", "p95", "p99"), map(float, np.percentile(v, (50, 95, 99))),
+                       strict=True))
+        for name, v in table.items()
+    }  # fmt: skip
+
+
+def line(row: dict[str, Any]) -> str:
+    """One chain as text."""
+    total = row["total"]
+    stages = ", ".join(
+        f"{name} {v['median']:.2f}"
+        for name, v in row.items()
+        if isinstance(v, dict) and name != "total"
+    )
+    return (
+        f"{row['markers']:4d} markers  {row['chain']:28s} "
+        f"{total['median']:6.2f} ms, p95 {total['p95']:6.2f}, p99 {total['p99']:6.2f}  ({stages})"
+    )
+
+
+CHILD = """
+import time; begun = time.perf_counter()
+import sys
+import numpy as np
+from gelslim_force.calibration_file import read_calibration
+from gelslim_force.force_pipeline import ForcePipeline
+from ifem_export.bundle_io import load_bundle
+marks = [time.perf_counter()]
+bundle = load_bundle(sys.argv[1] + "/bundle"); marks.append(time.perf_counter())
+built = read_calibration(sys.argv[1] + "/calibration.npz")
+pipeline = ForcePipeline(bundle, built); marks.append(time.perf_counter())
+result = pipeline.process(np.load(sys.argv[1] + "/frame.npy")); marks.append(time.perf_counter())
+assert result.wrench is not None, result.problems
+print(*np.diff([begun, *marks]))
+"""
+
+
+def first_frame(rig: Rig) -> dict[str, float]:
+    """Seconds from the start of a process to the wrench of its first frame, compiled before."""
+    from gelslim_force.calibration_file import write_calibration
+    from ifem_export.bundle_io import write_bundle
+
+    frame = rig.stream(2)[1].image
+    with tempfile.TemporaryDirectory() as folder:
+        write_bundle(Path(folder) / "bundle", rig.bundle)
+        write_calibration(calibrate(rig.bundle, rig.stream(1)[0].image),
+                          Path(folder) / "calibration.npz")  # fmt: skip
+        np.save(Path(folder) / "frame.npy", frame)
+        for _ in range(2):
+            started = time.perf_counter()
+            told = subprocess.run(
+                [sys.executable, "-c", CHILD, folder],
+                check=True, capture_output=True, text=True, cwd=ROOT,
+            ).stdout  # fmt: skip
+            ready = time.perf_counter() - started
+    names = ("imports_s", "bundle_s", "pipeline_s", "frame_s")
+    return {"ready_s": ready, **dict(zip(names, map(float, told.split()), strict=True))}
+
+
+def soak(rig: Rig, count: int) -> dict[str, Any]:
+    """Memory and time over many frames with the depth given; the first tenth is warm-up."""
+    images = [f.image for f in rig.stream(CYCLE)]
+    pipeline = ForcePipeline(rig.bundle, calibrate(rig.bundle, images[0]))
+    known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
+    pairs: Iterable[tuple[NDArray[np.uint8], Array]] = islice(
+        cycle(zip(images, known, strict=True)), count
+    )
+    step = max(count // SOAK_REPORTS, 1)
+    memory, medians, times = [], [], []
+    for k, (image, normal) in enumerate(pairs, 1):
+        started = time.perf_counter()
+        result = pipeline.process(image, normal_mm=normal)
+        times.append((time.perf_counter() - started) * 1000)
+        if result.wrench is None:
+            raise SystemExit(f"frame {k} of the soak gave no forces: {'; '.join(result.problems)}")
+        if k % step == 0:
+            memory.append(resident_mb())
+            medians.append(float(np.median(times)))
+            times.clear()
+            print(f"soak {k:7d} frames: {memory[-1]:.1f} MB, median {medians[-1]:.2f} ms")
+    growth = memory[-1] - memory[0]
+    print(f"soak: memory grew by {growth:+.2f} MB after the first {step} of {count} frames")
+    return {"frames": count, "growth_mb": growth, "resident_mb": memory, "median_ms": medians}
+
+
+def resident_mb() -> float:
+    """Resident memory of this process; NaN where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
+    except OSError:
+        return float("nan")
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+if __name__ == "__main__":
+    main()
