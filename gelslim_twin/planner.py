@@ -192,10 +192,13 @@ def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
     able = [rung for rung in ladder if _within(rung.error, shares)]
     if able:
         return min(able, key=lambda rung: rung.milliseconds)
-    return min(
-        ladder,
-        key=lambda rung: max((_excess(rung.error.of(o), s) for o, s in shares.items()), default=0),
-    )
+
+    def excess(rung: Rung) -> tuple[float, float]:
+        errors = [(rung.error.of(o), share) for o, share in shares.items()]
+        worst = max((_excess(error, share) for error, share in errors), default=0.0)
+        return worst, sum(error for error, _ in errors)
+
+    return min(ladder, key=excess)
 
 
 def _as_pairs(shares: dict[str, float]) -> tuple[tuple[str, float], ...]:

@@ -38,6 +38,8 @@ class Field:
     """Pairs such as ("gt", 0.0)."""
     item_limits: tuple[tuple[str, float], ...]
     """The same for the items of a list."""
+    item_choices: tuple[Any, ...] = ()
+    """Literal values allowed for the items of a list."""
 
     @property
     def unit(self) -> Unit | None:
@@ -120,6 +122,7 @@ def _walk(model: type[BaseModel], prefix: str, parents: tuple[type, ...]) -> Ite
             shape.nullable,
             shape.limits,
             item.limits,
+            item.choices,
         )
         for kinds, below in ((shape.types, f"{path}."), (item.types, f"{path}[].")):
             for kind in kinds:

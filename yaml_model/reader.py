@@ -102,6 +102,7 @@ def _problems(
     """The problems behind `error`, the first of them in file order, and how many more there are."""
     complaints = [_complaint(root, item) for item in error.errors(include_url=False)]
     heard = [c for c in complaints if not _answered(c, {p.field for p in refused})]
+    heard = [c for c in heard if not _follows(c, heard)]
     translator = Translator(source.path, root, model)
     ordered = sorted(settle_unions(heard), key=lambda complaint: complaint.place.position)
     # Suggestions compare a key with every field: a file of nonsense pays for the listed ones only.
@@ -128,6 +129,12 @@ def _answered(complaint: Complaint, refused: set[str]) -> bool:
     if complaint.kind in ("value_error", "assertion_error"):
         return any(not path or field.startswith((f"{path}.", f"{path}[")) for field in refused)
     return False
+
+
+def _follows(complaint: Complaint, others: list[Complaint]) -> bool:
+    """Whether a list is only called too short because its items were refused."""
+    items = f"{complaint.place.path}["
+    return complaint.kind == "too_short" and any(c.place.path.startswith(items) for c in others)
 
 
 def _defaulted(model: BaseModel, prefix: tuple[str | int, ...] = ()) -> Iterator[str]:

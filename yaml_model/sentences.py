@@ -30,7 +30,7 @@ def sentence(complaint: Complaint, field: Field | None, is_item: bool) -> tuple[
     if kind.startswith("union_tag"):
         return _tag(detail, field, place.node)
     if kind in ("literal_error", "enum"):
-        return _choice(complaint, field)
+        return _choice(complaint, field, is_item)
     if kind in ("too_short", "too_long"):
         return _length(kind, detail)
     if kind in _TEXT_RULES:
@@ -40,8 +40,11 @@ def sentence(complaint: Complaint, field: Field | None, is_item: bool) -> tuple[
     return shown(complaint.text, 200), give(field, is_item)
 
 
-def _choice(complaint: Complaint, field: Field | None) -> tuple[str, str]:
+def _choice(complaint: Complaint, field: Field | None, is_item: bool) -> tuple[str, str]:
     node = complaint.place.node
+    if is_item and field is not None and field.item_choices and isinstance(node, Scalar):
+        allowed = field.item_choices
+        return f"must be {one_of(allowed)}", suggest_choice(node.value, allowed)
     if field is None or not field.choices:
         expected = str(complaint.detail.get("expected", "another value"))
         return f"must be {expected.replace(chr(39), '')}", "write one of these"

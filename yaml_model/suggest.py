@@ -69,6 +69,11 @@ def _elsewhere(
     return tuple(sorted(others, key=distance))
 
 
+def _distinct(fields: tuple[Field, ...]) -> tuple[Field, ...]:
+    """Each path once: the members of a union may have fields of the same name."""
+    return tuple({field.path: field for field in reversed(fields)}.values())[::-1]
+
+
 def suggest_key(model: type[BaseModel], parent: str, key: str, value: Any) -> Suggestion:
     """What to write instead of the unknown `key` in the block at `parent`.
 
@@ -76,7 +81,7 @@ def suggest_key(model: type[BaseModel], parent: str, key: str, value: Any) -> Su
     block, a similar name here, a similar name elsewhere; failing all, the fields of the block.
     """
     name = _snake(key[:80])
-    siblings = children(model, parent)
+    siblings = _distinct(children(model, parent))
     others = _elsewhere(model, parent, siblings)
     dotted = tuple(field for field in others if field.path == key)
     if dotted:

@@ -49,7 +49,9 @@ def _meant(base: tuple[PathPart, ...], members: list[list[Complaint]]) -> list[C
 
 
 def _is_deep(base: tuple[PathPart, ...], complaint: Complaint) -> bool:
-    return len(complaint.place.parts) > len(base) or complaint.kind == "missing"
+    # A rule of a member is only looked at when all else of it fits.
+    deep_kinds = ("missing", "value_error", "assertion_error")
+    return len(complaint.place.parts) > len(base) or complaint.kind in deep_kinds
 
 
 def _wrong_kinds(member: list[Complaint]) -> int:

@@ -42,9 +42,9 @@ def print_plan(made: Plan) -> None:
     from gelslim_twin.effects.effect import unit_of
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for title in ("effect", "", "if left out", "share", "rung", "ms"):
+    for title in ("effect", "", "if left out", "rung", "ms"):
         table.add_column(title, no_wrap=True)
-    table.add_column("why", overflow="fold")
+    table.add_column("why")
     for choice in made.choices:
         table.add_row(*_row(choice), style=None if choice.included else "dim")
     console().print(table)
@@ -64,12 +64,10 @@ def print_plan(made: Plan) -> None:
 
 def _row(choice: Choice) -> tuple[str, ...]:
     value, unit = choice.telling(choice.bound)
-    shares = [share for o, share in choice.shares if (o == "force") == (unit == "N")]
     return (
         choice.effect,
         "in" if choice.included else "out",
         f"{value:.3g} {unit}" if value else "0",
-        f"{min(shares):.2g} {unit}" if shares and value else "",
         choice.rung,
         f"{choice.predicted_ms:.3g}" if choice.included else "",
         choice.why,

@@ -1,0 +1,102 @@
+"""A plan imports what it keeps and nothing else; planning itself imports nothing heavy."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+
+import pytest
+from scene_samples import GALLERY, ROOT
+
+from gelslim_twin.effects.registry import EFFECTS
+
+HEAVY = (
+    "numba", "scipy", "cadquery", "OCP", "vtk", "matplotlib", "cv2", "PIL",
+    "gelslim_cad", "gelslim_force", "gelslim_optics",
+)  # fmt: skip
+SCENE = str(next(p for p in GALLERY if p.stem == "press_sphere"))
+
+
+def fresh(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, 'tests/twin')\n{code}"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_planning_imports_no_implementation_and_nothing_heavy():
+    watched = tuple(sorted({*HEAVY, *(e.implementation for e in EFFECTS)}))
+    # The samples of tests import pytest; the plan is made without them.
+    code = (
+        "from gelslim_twin.effects.circumstances import SensorFigures\n"
+        "from gelslim_twin.scene.reader import read_scene\n"
+        "from gelslim_twin.scene.question import plan_scene\n"
+        "s = SensorFigures(28., 28., 2., .147, .3223, 1849, 4, 575, 1., .5, 635., 640, 480,"
+        " 32., 40.5, 364., ((2.5, 1.49), (2., 1.41)), 1.24, 35.8)\n"
+        f"assert plan_scene(read_scene({SCENE!r}), s).order\n"
+        f"print([m for m in {watched!r} if m in sys.modules])"
+    )
+    assert fresh(code) == "[]"
+
+
+def test_an_absent_effect_is_not_in_memory_after_a_run(tmp_path):
+    """A stub pipeline of modules that note when they are imported and run."""
+    names = ("ink", "base", "kept", "dropped", "forbidden")
+    for name in names:
+        (tmp_path / f"stub_{name}.py").write_text(
+            f"def apply(x, **knobs):\n    return x + ['{name}' + str(sorted(knobs.items()))]\n"
+        )
+    code = f"""
+sys.path.insert(0, {str(tmp_path)!r})
+from test_planner import _ask, _effect
+from gelslim_twin.planner import make_plan
+from gelslim_twin.stages import load_stages
+effects = (
+    _effect("ink", 9.0, ((0.0, 1.0),), provides=("ink",)),
+    _effect("base", 9.0, ((0.0, 1.0),), needs=("ink",), provides=("image",)),
+    _effect("kept", 5.0, ((0.0, 1.0),), refines=("image",)),
+    _effect("dropped", 0.01, ((0.0, 1.0),), refines=("image",)),
+    _effect("forbidden", 5.0, ((0.0, 1.0),), refines=("image",)),
+)
+plan = make_plan(_ask(effects, 1.0, forbidden="off"), effects)
+data = []
+for stage in load_stages(plan):
+    data = stage.module.apply(data, **stage.rung_parameters)
+print(data, sorted(m for m in sys.modules if m.startswith("stub_")))
+"""
+    assert fresh(code) == "['ink[]', 'base[]', 'kept[]'] ['stub_base', 'stub_ink', 'stub_kept']"
+
+
+def test_a_picture_loads_the_modules_of_its_effects_only():
+    code = f"""
+from scene_samples import SENSOR
+from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.view.look import plan_look
+loaded = read_scene({SCENE!r})
+plan = plan_scene(loaded, SENSOR)
+record = {{"aperture_mm": 1.24, "focus_mm": 35.8}}
+plan_look(plan, loaded.scene.effects.parameters(), record, 1, 0.05)
+out = [c.effect for c in plan.choices if not c.included]
+names = {{e: plan.choice(e).implementation for e in plan.order}}
+from gelslim_twin.effects.registry import EFFECTS
+absent = [e.implementation for e in EFFECTS if e.name in out]
+assert "gelslim_twin.render.compression" in absent and "gelslim_twin.render.dirt" in absent
+kept = ["gelslim_twin.render.defocus", "gelslim_twin.render.sensor_noise"]
+print([m for m in absent if m in sys.modules], all(m in sys.modules for m in kept))
+"""
+    assert fresh(code) == "[] True"
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.name)
+def test_every_implementation_is_there(effect):
+    package, _, _ = effect.implementation.rpartition(".")
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{package} is not there")
+    assert importlib.util.find_spec(effect.implementation) is not None
