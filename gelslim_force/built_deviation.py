@@ -26,11 +26,11 @@ class BuiltDeviation:
     """The fitted deviations with what follows from them on the pad."""
 
     values: Array
-    """(11,) in the order and units of `camera_deviation.PARAMETERS`."""
+    """(13,) in the order and units of `camera_deviation.PARAMETERS`."""
     sigma: Array
-    """(11,) their standard deviations."""
+    """(13,) their standard deviations."""
     tolerance: Array
-    """(11,) standard deviations expected of the build."""
+    """(13,) standard deviations expected of the build."""
     weak: tuple[tuple[float, Array], ...]
     """See `CameraFit.weak_directions`."""
     rotation_deg: float

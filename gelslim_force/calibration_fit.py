@@ -37,13 +37,13 @@ class CameraFit:
     design: VirtualCamera
     camera: VirtualCamera
     values: Array
-    """(11,) deviations, see `PARAMETERS`."""
+    """(13,) deviations, see `PARAMETERS`."""
     covariance: Array
-    """(11, 11) of the values, prior included."""
+    """(13, 13) of the values, prior included."""
     information: Array
-    """(11, 11) inverse covariance that the picture alone gives."""
+    """(13, 13) inverse covariance that the picture alone gives."""
     tolerance: Array
-    """(11,) prior standard deviations."""
+    """(13,) prior standard deviations."""
     offset_px: Array
     """(n, 2) centroid of each dot's image minus image of the dot's centre."""
     residual_px: Array
@@ -55,14 +55,14 @@ class CameraFit:
 
     @cached_property
     def sigma(self) -> Array:
-        """(11,) standard deviations of the values."""
+        """(13,) standard deviations of the values."""
         return np.sqrt(np.diag(self.covariance))
 
     @cached_property
     def weak_directions(self) -> list[tuple[float, Array]]:
         """Combinations of deviations that the picture tells less of than the tolerances do.
 
-        Each with the share of the prior variance that is left (1/2 ... 1) and its direction (11,)
+        Each with the share of the prior variance that is left (1/2 ... 1) and its direction (13,)
         in units of the tolerances, unit length, weakest first.
         """
         scaled = self.information * np.outer(self.tolerance, self.tolerance)
@@ -99,7 +99,7 @@ def fit_camera(
         raise ValueError(f"points {points.shape} and centres {seen.shape}: both must be (n, 2)")
     if len(points) < _LEAST_DOTS or not np.isfinite([points, seen]).all():
         raise ValueError(f"{len(points)} dots: a camera needs at least {_LEAST_DOTS}, all finite")
-    problem = _Problem(design, points, (tolerance or CameraTolerance()).sigma)
+    problem = _Problem(design, points, (tolerance or CameraTolerance()).sigma(design))
     trusted = np.ones(len(points), dtype=bool) if believed is None else np.array(believed, bool)
     if trusted.sum() < _LEAST_DOTS:
         raise ValueError(f"{int(trusted.sum())} dots to fit by: at least {_LEAST_DOTS} are needed")
@@ -134,7 +134,7 @@ class _Problem:
         return self.camera(unit).project(flat)
 
     def jacobian(self, unit: Array) -> Array:
-        """(2 n, 11) of the image by central differences."""
+        """(2 n, 13) of the image by central differences."""
         columns = []
         for k in range(len(unit)):
             step = np.zeros(len(unit))

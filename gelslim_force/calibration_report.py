@@ -27,6 +27,8 @@ _WORDS = {
     "k2": ("distortion k2", "", 4),
     "p1": ("distortion p1", "", 5),
     "p2": ("distortion p2", "", 5),
+    "principal_x_px": ("lens off the picture's middle, along its rows", " px", 1),
+    "principal_y_px": ("lens off the picture's middle, along its columns", " px", 1),
 }
 _LISTED = 12
 _PART = 0.3

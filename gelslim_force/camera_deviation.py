@@ -1,4 +1,4 @@
-"""How a built camera may differ from its design, in eleven numbers with their tolerances."""
+"""How a built camera may differ from its design, in thirteen numbers with their tolerances."""
 
 from __future__ import annotations
 
@@ -25,9 +25,12 @@ PARAMETERS = (
     "k2",
     "p1",
     "p2",
+    "principal_x_px",
+    "principal_y_px",
 )
 """Order of the values: the virtual camera's rotation vector and shift in the sensor frame, the
-change of its focal length, and what is added to the design's distortion coefficients."""
+change of its focal length, and what is added to the design's distortion coefficients and to the
+place where its axis meets the picture."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class CameraTolerance:
 
     Shift along x and y and rotation about z hold the placement of the print on the gel too: flat
     layers look alike from everywhere, so one picture cannot tell a shifted print from a shifted
-    camera. The tangential terms stand in for a principal point off the picture's middle.
+    camera.
     """
 
     tilt_deg: float = 1.0
@@ -51,26 +54,29 @@ class CameraTolerance:
     k2: float = 0.02
     tangential: float = 0.004
     """p1 and p2."""
+    principal_share: float = 0.002
+    """Offset of the lens from the picture's middle, as a share of the picture's width. Small, as
+    tilt does nearly the same: a larger offset is found all the same where the picture shows it."""
 
     def __post_init__(self) -> None:
         for name, value in dataclasses.asdict(self).items():
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"camera tolerance {name} = {value!r}: must be a number > 0")
 
-    @property
-    def sigma(self) -> Array:
-        """Standard deviations (11,) in the order and units of `PARAMETERS`."""
+    def sigma(self, design: VirtualCamera) -> Array:
+        """Standard deviations (13,) in the order and units of `PARAMETERS`."""
         return np.array(
             [self.tilt_deg] * 2
             + [self.turn_deg]
             + [self.lateral_mm] * 2
             + [self.height_mm, self.focal_percent, self.k1, self.k2]
             + [self.tangential] * 2
+            + [self.principal_share * design.image_width_px] * 2
         )
 
 
 def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
-    """Return the design's camera changed by `values` (11,), see `PARAMETERS`.
+    """Return the design's camera changed by `values` (13,), see `PARAMETERS`.
 
     The camera turns about its own pinhole. Raises ValueError for values that make no camera.
     """
@@ -82,8 +88,10 @@ def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
     bent = LensDistortion(
         k1=lens.k1 + v[7], k2=lens.k2 + v[8], p1=lens.p1 + v[9], p2=lens.p2 + v[10], k3=lens.k3
     )
+    x, y = design.principal_offset_px
     return dataclasses.replace(
         design,
+        principal_offset_px=(x + v[11], y + v[12]),
         position_mm=design.position_mm + v[3:6],
         right=turned[0],
         down=turned[1],

@@ -20,7 +20,7 @@ COUNTS = ("image_width_px", "image_height_px")
 
 
 def camera_to_record(camera: VirtualCamera) -> dict[str, object]:
-    """Numbers, lists and dicts only; `lens_distortion` only where the lens has any."""
+    """Numbers, lists and dicts; `lens_distortion` and `principal_offset_px` only if there is any."""
     record: dict[str, object] = {"model": MODEL}
     record |= {name: getattr(camera, name).tolist() for name in VECTORS}
     record |= {"focal_px": float(camera.focal_px)}
@@ -33,6 +33,8 @@ def camera_to_record(camera: VirtualCamera) -> dict[str, object]:
     }
     if camera.lens is not None:
         record["lens_distortion"] = camera.lens.to_record()
+    if any(camera.principal_offset_px):
+        record["principal_offset_px"] = list(camera.principal_offset_px)
     return record
 
 
@@ -61,6 +63,8 @@ def camera_from_record(record: Mapping[str, object]) -> dict[str, Any]:
         if not isinstance(lens, Mapping):
             raise ValueError("the camera record's lens_distortion must give coefficients by name")
         values["lens"] = LensDistortion.from_record(lens)
+    if "principal_offset_px" in record:
+        values["principal_offset_px"] = tuple(_vector(record, "principal_offset_px", 2))
     return values
 
 
@@ -77,8 +81,8 @@ def _number(record: Mapping[str, object], name: str) -> float:
     return float(value)
 
 
-def _vector(record: Mapping[str, object], name: str) -> list[float]:
+def _vector(record: Mapping[str, object], name: str, count: int = 3) -> list[float]:
     value = _entry(record, name)
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise ValueError(f"the camera record's {name} = {value!r} must be three numbers")
+    if not isinstance(value, list | tuple) or len(value) != count:
+        raise ValueError(f"the camera record's {name} = {value!r} must be {count} numbers")
     return [_number({name: v}, name) for v in value]

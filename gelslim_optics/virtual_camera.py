@@ -54,6 +54,8 @@ class VirtualCamera:
     window_bottom_z_mm: float
     layers: tuple[Layer, ...]
     lens: LensDistortion | None = None
+    principal_offset_px: tuple[float, float] = (0.0, 0.0)
+    """Where the axis meets the image, from the image's middle: a real lens sits off centre."""
 
     def __post_init__(self) -> None:
         for name in ("position_mm", "right", "down", "forward"):
@@ -67,6 +69,10 @@ class VirtualCamera:
         for name in ("focal_px", "image_width_px", "image_height_px"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ValueError(f"the camera's {name} = {getattr(self, name)} must be positive")
+        offset = tuple(float(v) for v in self.principal_offset_px)
+        if len(offset) != 2 or not np.isfinite(offset).all():
+            raise ValueError(f"principal_offset_px = {offset} must be two finite numbers")
+        object.__setattr__(self, "principal_offset_px", offset)
         if not (np.isfinite(self.air_height_mm) and self.air_height_mm > 0):
             raise ValueError(
                 f"the virtual pinhole at z = {self.position_mm[2]:g} mm must lie below the "
@@ -123,8 +129,9 @@ class VirtualCamera:
 
     @property
     def principal_px(self) -> Vector:
-        """Where the axis meets the image (2,): its middle, pixel centres at integers."""
-        return np.array([(self.image_width_px - 1) / 2, (self.image_height_px - 1) / 2])
+        """Where the axis meets the image (2,), pixel centres at integers."""
+        middle = np.array([(self.image_width_px - 1) / 2, (self.image_height_px - 1) / 2])
+        return middle + self.principal_offset_px
 
     @cached_property
     def stack(self) -> LayerStack:

@@ -61,7 +61,7 @@ def test_a_calibration_is_written_and_told(
     found = read_calibration(out)
     found.require_bundle(load_bundle(bundle))
     turned = found.deviation.values[PARAMETERS.index("rotation_y_deg")]
-    assert turned == pytest.approx(TURNED_DEG, abs=0.05)
+    assert turned == pytest.approx(TURNED_DEG, abs=0.12)
     assert main(["calibrate", str(bundle), str(picture), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(out.read_text(encoding="utf-8"))
     assert main(["calibrate", str(bundle), str(picture)]) == 0

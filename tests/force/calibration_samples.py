@@ -43,7 +43,7 @@ def small_bundle(grid: MarkerGrid, camera: VirtualCamera | None = None) -> Bundl
     )
 
 
-BUILD = np.array([0.8, -0.9, 0.7, 0.15, -0.2, 0.12, 1.6, -0.04, 0.01, 0.001, -0.001])
+BUILD = np.array([0.8, -0.9, 0.7, 0.15, -0.2, 0.12, 1.6, -0.04, 0.01, 0.001, -0.001, 0.9, -1.2])
 """Deviations of a built camera, see `camera_deviation.PARAMETERS`."""
 
 

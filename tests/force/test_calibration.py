@@ -39,7 +39,7 @@ def test_clean_frame_gives_the_camera_to_a_hundredth_of_a_pixel():
     assert np.hypot(*_map_error_mm(found, camera).T).max() < 1e-3
     # The built camera is about 10 px off: without calibration nothing would fit.
     assert found.deviation.moved_px > 5
-    assert found.deviation.rotation_deg == pytest.approx(np.linalg.norm(BUILD[:3]), abs=0.05)
+    assert found.deviation.rotation_deg == pytest.approx(np.linalg.norm(BUILD[:3]), abs=0.1)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -53,7 +53,7 @@ def test_print_errors_noise_and_missing_dots(seed):
     d = found.deviation
     error = _map_error_mm(found, camera)[found.markers]
     assert np.sqrt((error**2).mean()) < 2.5 * d.map_sigma_mm
-    assert np.hypot(*error.T).max() < 0.008
+    assert np.hypot(*error.T).max() < 0.010
     assert d.map_sigma_mm < 0.002
     assert d.own_mm == pytest.approx(0.010, rel=0.2)
     pulls = (d.values - _deviation_of(camera)) / d.sigma
@@ -78,7 +78,8 @@ def _deviation_of(camera):
     lens = camera.lens
     focal = 100 * (camera.focal_px / design.focal_px - 1)
     shift = camera.position_mm - design.position_mm
-    return np.array([*turn, *shift, focal, lens.k1, lens.k2, lens.p1, lens.p2])
+    bent = (lens.k1, lens.k2, lens.p1, lens.p2)
+    return np.array([*turn, *shift, focal, *bent, *camera.principal_offset_px])
 
 
 def test_truth_of_these_tests():

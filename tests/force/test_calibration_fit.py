@@ -17,7 +17,7 @@ from ifem_export.marker_grid import build_marker_grid
 DESIGN = finger_view()
 GRID = grid_of_dots()
 FLAT = np.column_stack([GRID.positions_mm, np.zeros(len(GRID))])
-SIGMA = CameraTolerance().sigma
+SIGMA = CameraTolerance().sigma(DESIGN)
 
 
 def _seen(camera, noise=0.0, seed=0):
@@ -47,7 +47,7 @@ def test_offset_left_out_would_bias_the_camera():
 
 
 def test_exact_dots_give_the_exact_camera():
-    values = np.array([0.8, -1.0, 1.2, 0.2, -0.2, 0.15, 2.0, -0.05, 0.01, 0.002, -0.002])
+    values = np.array([0.8, -1.0, 1.2, 0.2, -0.2, 0.15, 2.0, -0.05, 0.01, 0.002, -0.002, 1.0, -0.8])
     fit = _fit(_seen(deviated_camera(DESIGN, values)))
     assert np.abs(fit.residual_px).max() < 2e-3
     back = fit.camera.backproject(deviated_camera(DESIGN, values).project(FLAT))[:, :2]
@@ -66,8 +66,8 @@ def test_covariance_agrees_with_the_scatter():
         distance.append(error @ np.linalg.solve(fit.covariance, error))
         pulls.append(error / fit.sigma)
         noise.append(fit.noise_px)
-    # Squared distances are chi-square with 11 degrees of freedom: mean 11, sd of 30's mean 0.86.
-    assert 8.4 < np.mean(distance) < 13.6
+    # Squared distances are chi-square with 13 degrees of freedom: mean 13, sd of 30's mean 0.93.
+    assert 10.2 < np.mean(distance) < 15.8
     assert np.all(np.std(pulls, axis=0) > 0.7)
     assert np.all(np.std(pulls, axis=0) < 1.4)
     assert np.mean(noise) == pytest.approx(0.15, rel=0.02)
@@ -85,14 +85,13 @@ def test_stray_dots_are_set_aside():
     assert np.sqrt((back**2).sum(axis=1).mean()) < 2e-3
 
 
-def test_principal_point_off_the_middle_is_absorbed():
-    """The model has none: tilt takes most of it up, 0.1 px and 20 µm at the rim are left."""
+def test_principal_point_off_the_middle_is_found():
     off = np.array([9.0, -7.0])
-    seen = _seen(DESIGN) + off
-    fit = _fit(seen)
-    assert np.sqrt((fit.residual_px**2).mean()) < 0.12
+    fit = _fit(_seen(DESIGN) + off)
+    assert np.sqrt((fit.residual_px**2).mean()) < 1e-3
     back = fit.camera.backproject(DESIGN.project(FLAT) + off)[:, :2] - GRID.positions_mm
-    assert np.hypot(*back.T).max() < 0.02
+    assert np.hypot(*back.T).max() < 2e-4
+    np.testing.assert_allclose(fit.values[-2:], off, atol=1.5)
 
 
 def test_a_picture_of_little_names_what_it_cannot_tell():
@@ -108,7 +107,11 @@ def test_a_picture_of_little_names_what_it_cannot_tell():
         informed = along @ fit.information @ along
         assert informed == pytest.approx(1 / left - 1, abs=1e-6)
     assert np.all(fit.sigma <= SIGMA * 1.000001)
-    assert not _fit(_seen(DESIGN, noise=0.1)).weak_directions
+    # A whole print leaves one thing open: tilt about y against the lens' offset along the finger.
+    (_, direction), *more = _fit(_seen(DESIGN, noise=0.1)).weak_directions
+    assert not more
+    strongest = {PARAMETERS[k] for k in np.argsort(-np.abs(direction))[:4]}
+    assert "principal_y_px" in strongest
 
 
 def test_lens_of_the_design_is_kept_and_changed():
@@ -141,6 +144,6 @@ def test_impossible_input_is_refused():
 
 def test_tolerance_is_in_the_order_of_the_parameters():
     one = dataclasses.replace(CameraTolerance(), height_mm=9.0, focal_percent=7.0)
-    assert one.sigma[PARAMETERS.index("shift_z_mm")] == 9.0
-    assert one.sigma[PARAMETERS.index("focal_percent")] == 7.0
-    assert len(one.sigma) == len(PARAMETERS)
+    assert one.sigma(DESIGN)[PARAMETERS.index("shift_z_mm")] == 9.0
+    assert one.sigma(DESIGN)[PARAMETERS.index("focal_percent")] == 7.0
+    assert len(one.sigma(DESIGN)) == len(PARAMETERS)

@@ -42,7 +42,7 @@ def test_numpy_values_become_plain() -> None:
     ("change", "message"),
     [
         ({"model": "fisheye"}, "fisheye"),
-        ({"position_mm": [0, 0]}, "three numbers"),
+        ({"position_mm": [0, 0]}, "3 numbers"),
         ({"right": [0, "1", 0]}, "finite number"),
         ({"focal_px": None}, "focal_px"),
         ({"focal_px": float("nan")}, "focal_px"),
@@ -67,3 +67,17 @@ def test_a_record_that_lacks_something_is_refused() -> None:
         part = {k: v for k, v in record.items() if k != key}
         with pytest.raises(ValueError, match=key if key != "model" else "model None"):
             VirtualCamera.from_record(part)
+
+
+def test_a_lens_off_centre_shifts_the_picture_and_comes_back() -> None:
+    camera = finger_camera()
+    off = replace(camera, principal_offset_px=(7.0, -4.5))
+    points = np.array([[0.0, 0.0, 0.0], [3.0, -2.0, -0.3]])
+    assert off.project(points) - camera.project(points) == pytest.approx(
+        np.array([[7.0, -4.5]] * 2), abs=1e-12
+    )
+    assert off.backproject(off.project(points[:1]))[0] == pytest.approx(points[0], abs=1e-9)
+    assert "principal_offset_px" not in camera.to_record()
+    assert VirtualCamera.from_record(off.to_record()).principal_offset_px == (7.0, -4.5)
+    with pytest.raises(ValueError, match="principal_offset_px"):
+        replace(camera, principal_offset_px=(float("nan"), 0.0))
