@@ -20,7 +20,7 @@ COUNTS = ("image_width_px", "image_height_px")
 
 
 def camera_to_record(camera: VirtualCamera) -> dict[str, object]:
-    """Numbers, lists and dicts; `lens_distortion` and `principal_offset_px` only if there is any."""
+    """Numbers, lists and dicts; `lens_distortion` and `principal_offset_px` only where any."""
     record: dict[str, object] = {"model": MODEL}
     record |= {name: getattr(camera, name).tolist() for name in VECTORS}
     record |= {"focal_px": float(camera.focal_px)}
