@@ -29,6 +29,8 @@ _FITS = 2
 """Windows for which the light is fitted anew; later ones have hardly moved."""
 _SPARE = 3
 _REST2 = 4e-6
+_SETTLED = 0.04
+"""Share by which a window's second moments may still change when it has come to rest."""
 
 
 @njit(**COMPILED)
@@ -284,14 +286,17 @@ def _weigh_one(
         y0 += dy
         if x0 < 0 or y0 < 0 or x0 > width - 1 or y0 > height - 1:
             return False
+        grown = 0.0
         if step > 0:
+            grown = mxx + myy
             mxx = 0.5 * (mxx + max(sums[5] / area - dx * dx, 0.25))
             mxy = 0.5 * (mxy + sums[6] / area - dx * dy)
             myy = 0.5 * (myy + max(sums[7] / area - dy * dy, 0.25))
+            grown = abs(mxx + myy - grown) / grown
         out[CX], out[CY], out[AREA], out[CONTRAST] = x0, y0, area, contrast
         out[MXX], out[MXY], out[MYY] = mxx, mxy, myy
         out[STEPS], out[SKEW] = step + 1, math.sqrt(dx * dx + dy * dy)
-        if step >= _FITS and dx * dx + dy * dy < _REST2:
+        if step >= _FITS and dx * dx + dy * dy < _REST2 and grown < _SETTLED:
             break
     return True
 

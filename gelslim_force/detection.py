@@ -28,9 +28,11 @@ from gelslim_force.detector_settings import DetectorSettings
 _NOISE_SHARE = 1.5
 _MOST_ASPECT = 3.0
 _NEIGHBOURS = 8
-_STEPS = 10
+_STEPS = 16
 _REST_PX = 0.01
 _FLOOR = 8.0
+_FIRST_LEVEL, _NEXT_LEVEL = 0.7, 1.6
+"""The lowest cut through the darkness, of the least contrast, and the factor to the next."""
 
 
 @dataclass(frozen=True)
@@ -110,23 +112,8 @@ def _candidates(
     """Places (n, 2) and second moments (n, 3) of dark components of a dot's size."""
     from gelslim_force import component_kernel as ck
 
-    dark = darkness_of(planes, settings)
-    height, width = dark.shape
-    least = settings.least_contrast
-    table = ck.components(dark, 0, 0, width, height, least * 0.7)
-    limit = settings.largest_diameter_px
-    wide = np.maximum(
-        table[:, ck.RIGHT] - table[:, ck.LEFT], table[:, ck.BOTTOM] - table[:, ck.TOP]
-    )
-    pieces = [table[wide < limit]]
-    for row in table[wide >= limit]:
-        if row[ck.PEAK] < 2 * least:
-            continue
-        left, right, top, bottom = row[ck.LEFT : ck.BOTTOM + 1].astype(int)
-        pieces.append(
-            ck.components(dark, left, top, right + 1, bottom + 1, max(0.5 * row[ck.PEAK], least))
-        )
-    table = np.vstack(pieces)
+    least, limit = settings.least_contrast, settings.largest_diameter_px
+    table = _components(darkness_of(planes, settings), least, limit)
     size = np.pi / 4 * settings.smallest_diameter_px**2
     keep = (table[:, ck.PEAK] > least) & (table[:, ck.AREA] >= 0.4 * size)
     keep &= table[:, ck.AREA] <= 1.3 * np.pi / 4 * limit**2
@@ -135,6 +122,43 @@ def _candidates(
     moments = np.ascontiguousarray(table[:, [ck.XX, ck.XY, ck.YY]])
     moments[:, [0, 2]] = np.maximum(moments[:, [0, 2]], floor)
     return np.ascontiguousarray(table[:, [ck.X, ck.Y]]), moments
+
+
+def _components(dark: NDArray[np.float32], least: float, limit: float) -> NDArray[np.float64]:
+    """Rows of `component_kernel` for what is darker than `least` and narrower than `limit`.
+
+    What is wide, as a dot in a shadow or two that touch, is cut anew at rising levels.
+    """
+    from gelslim_force import component_kernel as ck
+
+    height, width = dark.shape
+    boxes = [(0, 0, width, height)]
+    kept = np.zeros((0, ck.COLUMNS))
+    level = _FIRST_LEVEL * least
+    while boxes and level < 1.0:
+        table = np.vstack([ck.components(dark, *box, level) for box in boxes])
+        across = table[:, ck.RIGHT] - table[:, ck.LEFT]
+        wide = np.maximum(across, table[:, ck.BOTTOM] - table[:, ck.TOP]) >= limit
+        kept = np.vstack([kept, _new(table[~wide & (table[:, ck.PEAK] > least)], kept)])
+        level = max(_NEXT_LEVEL * level, least)
+        wide &= table[:, ck.PEAK] > level
+        ends = table[wide][:, [ck.LEFT, ck.TOP, ck.RIGHT, ck.BOTTOM]].astype(int)
+        ends[:, 2:] += 1
+        boxes = [(int(a), int(b), int(c), int(d)) for a, b, c, d in np.unique(ends, axis=0)]
+    return kept
+
+
+def _new(table: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Components that do not lie in the box of one kept at a lower level."""
+    from gelslim_force import component_kernel as ck
+
+    if len(table) == 0 or len(kept) == 0:
+        return table
+    _, near = cKDTree(kept[:, [ck.X, ck.Y]]).query(table[:, [ck.X, ck.Y]])
+    box = kept[near]
+    inside = (table[:, ck.X] >= box[:, ck.LEFT]) & (table[:, ck.X] <= box[:, ck.RIGHT])
+    inside &= (table[:, ck.Y] >= box[:, ck.TOP]) & (table[:, ck.Y] <= box[:, ck.BOTTOM])
+    return table[~inside]
 
 
 def darkness_of(planes: NDArray[np.uint8], settings: DetectorSettings) -> NDArray[np.float32]:

@@ -205,7 +205,7 @@ def _misfits(
 
 
 def _finished(points: NDArray[np.float64], placed: dict[tuple[int, int], int]) -> Lattice:
-    placed = _upright(points, placed)
+    placed = _without_lone_rims(_upright(points, placed))
     order = sorted(placed)
     sites = np.array(order, dtype=np.int64)
     dots = np.array([placed[site] for site in order], dtype=np.int64)
@@ -217,6 +217,21 @@ def _finished(points: NDArray[np.float64], placed: dict[tuple[int, int], int]) -
         residual_px=residual,
         pitch_px=float(np.median(np.hypot(*steps.T))),
     )
+
+
+def _without_lone_rims(placed: dict[tuple[int, int], int]) -> dict[tuple[int, int], int]:
+    """Take off outermost rows and columns of a single dot: dirt beside the print fits as well."""
+    while True:
+        sites = np.array(list(placed))
+        lone: set[tuple[int, int]] = set()
+        for axis in (0, 1):
+            for rim in (sites[:, axis].min(), sites[:, axis].max()):
+                on = sites[sites[:, axis] == rim]
+                if len(on) == 1:
+                    lone.add((int(on[0, 0]), int(on[0, 1])))
+        if not lone:
+            return placed
+        placed = {site: dot for site, dot in placed.items() if site not in lone}
 
 
 def _steps(
