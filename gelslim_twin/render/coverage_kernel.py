@@ -93,27 +93,34 @@ def _sample_polygon(cover: Any, polygon: Any, left: Any, top: Any, share: Any, n
 
 
 @njit(**COMPILED)
-def _blurred(patch: Any, taps: Any, reach: Any, work: Any) -> None:
-    """Convolve `patch` in place along both axes with the even kernel `taps` (reach + 1,)."""
-    rows, columns = patch.shape
-    for y in range(rows):
+def _blurred(cover: Any, taps: Any, reach: Any) -> Any:
+    """Convolve `cover` along both axes with the even kernel `taps` (reach + 1,).
+
+    The outer `reach` rows of `cover` are empty and are not read.
+    """
+    rows, columns = cover.shape
+    across = np.zeros((rows, columns), dtype=np.float32)
+    out = np.empty((rows, columns), dtype=np.float32)
+    for y in range(reach, rows - reach):
+        line, row = across[y], cover[y]
         for x in range(columns):
-            work[y, x] = taps[0] * patch[y, x]
+            line[x] = np.float32(taps[0] * row[x])
         for r in range(1, reach + 1):
-            for x in range(columns - r):
-                work[y, x] += taps[r] * patch[y, x + r]
-            for x in range(r, columns):
-                work[y, x] += taps[r] * patch[y, x - r]
+            tap = np.float32(taps[r])
+            for x in range(r, columns - r):
+                line[x] += tap * np.float32(row[x + r] + row[x - r])
+            for x in range(min(r, columns - r)):
+                line[x] += tap * np.float32(row[x + r])
+                line[columns - 1 - x] += tap * np.float32(row[columns - 1 - x - r])
+    first, last = reach, rows - reach - 1
     for y in range(rows):
-        for x in range(columns):
-            patch[y, x] = taps[0] * work[y, x]
-        for r in range(1, reach + 1):
-            if y + r < rows:
-                for x in range(columns):
-                    patch[y, x] += taps[r] * work[y + r, x]
-            if y - r >= 0:
-                for x in range(columns):
-                    patch[y, x] += taps[r] * work[y - r, x]
+        line = out[y]
+        line[:] = 0
+        for k in range(max(first, y - reach), min(last, y + reach) + 1):
+            tap = np.float32(taps[abs(k - y)])
+            for x in range(columns):
+                line[x] += tap * across[k, x]
+    return out
 
 
 @njit(**COMPILED)
@@ -165,10 +172,10 @@ def draw_dots(
                 for x in range(columns):
                     running += acc[y, x]
                     acc[y, x] = running
-        patch = acc[:, :columns]
+        patch = acc[:, :columns].astype(np.float32)
         if reach[m] > 0:
-            _blurred(patch, taps[m], reach[m], np.empty((rows, columns)))
+            patch = _blurred(patch, taps[m], reach[m])
         for y in range(max(0, -top), min(rows, height - top)):
             for x in range(max(0, -left), min(columns, width - left)):
-                at = ink[y + top, x + left] + np.float32(patch[y, x])
+                at = ink[y + top, x + left] + patch[y, x]
                 ink[y + top, x + left] = min(at, np.float32(1.0))

@@ -144,8 +144,8 @@ def red_green_sides(
     )
 
 
-LED_COLOURS = np.array([[1.0, 0.10, 0.04], [0.10, 1.0, 0.16]])
-"""What a Bayer sensor makes of a red (625 nm) and a green (525 nm) LED; one unit each."""
+LED_COLOURS = np.array([[1.0, 0.05, 0.01], [0.02, 1.0, 0.04]])
+"""A red (625 nm) and a green (525 nm) LED in a camera's colours, its colour matrix applied."""
 
 
 def _cell(axis: Array, at: Array) -> tuple[NDArray[np.intp], Array]:

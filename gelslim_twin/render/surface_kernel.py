@@ -80,12 +80,19 @@ def seen_slopes(
 
     A ray is at rest (n, 2) + lean (n, 2) z. The material point X with X + u(X) on the ray is
     found by X = rest + lean u_z(X) - u_xy(X), `rounds` times or until it moves less than `near`.
-    The slope of the surface carried along is (I + du_xy/dX)^-T du_z/dX.
+    The slope of the surface carried along is (I + du_xy/dX)^-T du_z/dX; rays that meet the rest
+    plane three cells beyond the grid are taken to see a level surface.
     """
     ny, nx = padded.shape[0] - 2, padded.shape[1] - 2
     wx, wy, dx, dy = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     for n in range(rest.shape[0]):
         x, y = rest[n, 0], rest[n, 1]
+        if (
+            abs(2 * (x - origin[0]) / step[0] - nx + 1) > nx + 5
+            or abs(2 * (y - origin[1]) / step[1] - ny + 1) > ny + 5
+        ):
+            slopes[n, 0] = slopes[n, 1] = 0.0
+            continue
         i, s = cell_of((x - origin[0]) / step[0], nx)
         j, t = cell_of((y - origin[1]) / step[1], ny)
         weights(s, wx, dx)

@@ -25,17 +25,18 @@ Array = NDArray[np.float64]
 class Pad:
     """Outline of the gel and the look of its coat and of the frame around it.
 
-    `frame_level` is the frame's brightness beside the pad over the coat's there, falling off as
-    exp(-distance / frame_decay_mm); `mottle` is the relative standard deviation of the coat's
-    brightness, in patches of `mottle_mm`; `vignetting` weighs the lens' cos⁴ (0: none, 1: full).
+    `frame_level` is the frame's brightness beside the pad over the coat's halfway to the middle,
+    falling off as exp(-distance / frame_decay_mm); `mottle` is the relative standard deviation of
+    the coat's brightness, in patches of `mottle_mm`; `vignetting` weighs the lens' cos⁴ (0: none,
+    1: full).
     Raises ValueError for values out of range.
     """
 
     length_mm: float
     width_mm: float
     corner_radius_mm: float = 0.0
-    frame_level: float = 0.35
-    frame_decay_mm: float = 3.0
+    frame_level: float = 0.5
+    frame_decay_mm: float = 6.0
     mottle: float = 0.0
     mottle_mm: float = 1.5
     vignetting: float = 0.0
@@ -71,10 +72,12 @@ def still_irradiance(
     beyond = pad.beyond_mm(x, y)
     on_pad = np.clip(0.5 - beyond / sight.pixel_mm(), 0.0, 1.0)
     frame = pad.frame_level * np.exp(-np.maximum(beyond, 0) / pad.frame_decay_mm)
-    level = on_pad * _mottled(pad, x, y) + (1 - on_pad) * frame
+    coat = light.at(x, y) * (on_pad * _mottled(pad, x, y))[..., None]
+    halfway = [np.clip(v, -s / 2, s / 2) / 2 for v, s in ((x, pad.length_mm), (y, pad.width_mm))]
+    seen = coat + light.at(*halfway) * ((1 - on_pad) * frame)[..., None]
     if pad.vignetting > 0:
-        level = level * (1 - pad.vignetting * (1 - _cos4(camera)))
-    return np.ascontiguousarray(light.at(x, y) * level[..., None], dtype=np.float32)
+        seen = seen * (1 - pad.vignetting * (1 - _cos4(camera)))[..., None]
+    return np.ascontiguousarray(seen, dtype=np.float32)
 
 
 def _mottled(pad: Pad, x: Array, y: Array) -> Array:
