@@ -58,12 +58,15 @@ class Detector:
         image: NDArray[np.uint8],
         places_px: NDArray[np.float64],
         moments_px2: NDArray[np.float64],
+        *,
+        compare: bool = True,
     ) -> Detections:
         """Return the dots near predicted places (n, 2), in that order: the fast path.
 
         `moments_px2` (n, 3) are the shapes last seen. A dot is found when the place is less than
         about its radius off; `found` is false elsewhere, and where two places lead to one dot
         only the nearer one has it. Centres equal those of `detect` where both find the dot.
+        Without `compare` no dot is flagged against its neighbours, which saves a tenth of a frame.
         Raises ValueError for an image of another kind or arrays of other shapes.
         """
         planes = as_planes(image)
@@ -84,7 +87,7 @@ class Detector:
         lost = ~_believable(dots, self.settings) | ~(moved <= reach)
         lost |= _taken_twice(dots, moved, lost)
         dots[lost, 2:] = 0.0
-        return _judged(dots)
+        return _judged(dots, compare)
 
 
 def as_planes(image: Any) -> NDArray[np.uint8]:
@@ -250,11 +253,11 @@ def _without_repeats(dots: NDArray[np.float64]) -> NDArray[np.float64]:
     return dots[~drop]
 
 
-def _judged(dots: NDArray[np.float64]) -> Detections:
+def _judged(dots: NDArray[np.float64], compare: bool = True) -> Detections:
     area, contrast = dots[:, 2], dots[:, 3]
     flags = np.zeros(len(dots), dtype=np.int64)
     seen = np.flatnonzero(area > 0)
-    if len(seen) > _NEIGHBOURS:
+    if compare and len(seen) > _NEIGHBOURS:
         _, near = cKDTree(dots[seen, :2]).query(dots[seen, :2], _NEIGHBOURS + 1)
         usual_area = np.median(area[seen][near], axis=1)
         usual_contrast = np.median(contrast[seen][near], axis=1)

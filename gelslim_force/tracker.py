@@ -132,7 +132,7 @@ class Tracker:
     def _near(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame | None:
         known = np.isfinite(expected).all(axis=1, keepdims=True)
         places = np.where(known, expected, -1.0)
-        dots = self._detector.detect_near(image, places, self._moments)
+        dots = self._detector.detect_near(image, places, self._moments, compare=False)
         dots = dots.take(dots.found)
         tracks = match(self._reference, dots.centres_px, expected)
         if tracks.tracked.sum() < self._settings.least_coverage * self._usual:

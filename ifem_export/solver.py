@@ -68,7 +68,9 @@ class ConjugateGradients:
         if size == 0.0:
             return Solution(np.zeros_like(right), 0.0, 0, time.perf_counter() - started)
         x, trail = _iterate(self.matrix, right, self._guess, rtol * size, self.most_iterations)
-        residual, before = self._residual(right, x) / size, np.inf
+        # Without a step the residual is already computed from x.
+        last = trail[-1] if len(trail) == 1 else self._residual(right, x)
+        residual, before = last / size, np.inf
         # The updated residual drifts from the true one: go on from the true one where it did.
         while rtol < residual < STALLED * before and len(trail) <= self.most_iterations:
             left = self.most_iterations + 1 - len(trail)
