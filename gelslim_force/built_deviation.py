@@ -58,12 +58,12 @@ class BuiltDeviation:
 def built_deviation(
     fit: CameraFit, rest_mm: Array, points_mm: Array, residuals: ResidualField
 ) -> BuiltDeviation:
-    """Return the numbers of a fit; `rest_mm` and `points_mm` (n, 2) are its dots on the gel."""
-    flat = np.column_stack([points_mm, np.zeros(len(points_mm))])
+    """Return the numbers of a fit; `rest_mm` (n, 2) and `points_mm` (n, 3) are its dots."""
     design, built = fit.design, fit.camera
-    was, now = (np.sqrt(np.abs(np.linalg.det(c.jacobian(flat)))) for c in (design, built))
-    place, lean = _uncertainty(fit, flat)
-    moved = built.project(np.column_stack([rest_mm, np.zeros(len(rest_mm))])) - design.project(flat)
+    was, now = (np.sqrt(np.abs(np.linalg.det(c.jacobian(points_mm)))) for c in (design, built))
+    place, lean = _uncertainty(fit, points_mm)
+    seen = built.project(np.column_stack([rest_mm, points_mm[:, 2]]))
+    moved = seen - design.project(points_mm)
     return BuiltDeviation(
         values=fit.values,
         sigma=fit.sigma,
@@ -72,7 +72,7 @@ def built_deviation(
         rotation_deg=float(np.linalg.norm(fit.values[:3])),
         shift_mm=float(np.linalg.norm(fit.values[3:6])),
         scale_percent=float(100 * (np.mean(now) / np.mean(was) - 1)),
-        distortion_px=_bent_px(fit, flat),
+        distortion_px=_bent_px(fit, points_mm),
         moved_px=float(np.median(np.hypot(*moved.T))),
         map_sigma_mm=place,
         lean_sigma_mm_per_mm=lean,

@@ -19,8 +19,11 @@ from gelslim_force.detection import Detector
 from gelslim_force.detections import BORDER, Detections
 from gelslim_force.lattice_growth import LatticeError
 from gelslim_force.lattice_registration import Registration, register
+from gelslim_force.marker_heights import marker_heights_mm
 from gelslim_force.residual_bump import ResidualField, split_residuals
 from gelslim_force.sensor_calibration import SensorCalibration, expected_dots
+from gelslim_optics.back_projection import pixel_slopes
+from gelslim_optics.camera_rays import points_along
 
 if TYPE_CHECKING:
     from gelslim_optics.virtual_camera import VirtualCamera
@@ -65,12 +68,13 @@ def calibrate(
     found = _whole(registration, dots)
     chosen = dots.take(registration.dots[found])
     points, diameter = grid.positions_mm[found], grid.diameter_mm[found]
-    flat = np.column_stack([points, np.zeros(len(points))])
+    heights = marker_heights_mm(bundle)[found]
+    flat = np.column_stack([points, heights])
     checks.require_upright(design.project(flat), chosen.centres_px)
     checks.require_print(registration, dots, expected)
     checks.require_anchors(chosen, design, grid, found)
     try:
-        fit, rest, residuals = _fitted(design, points, diameter, chosen, tolerance, grid.pitch_mm)
+        fit, rest, residuals = _fitted(design, flat, diameter, chosen, tolerance, grid.pitch_mm)
     except ValueError as error:
         raise CalibrationError(
             f"no camera within reason puts the print where the dots are: {error}; use the bundle "
@@ -79,7 +83,7 @@ def calibrate(
     checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     if not allow_contact:
         checks.require_no_contact(residuals)
-    deviation = built_deviation(fit, rest, points, residuals)
+    deviation = built_deviation(fit, rest, flat, residuals)
     in_view = checks.markers_in_view(fit.camera, grid)
     missing = np.setdiff1d(np.flatnonzero(in_view), found)
     aside = found[~fit.used]
@@ -113,17 +117,22 @@ def _fitted(
     tolerance: CameraTolerance | None,
     pitch_mm: float,
 ) -> tuple[CameraFit, Array, ResidualField]:
-    """Fit, places on the gel (n, 2) and their residuals; a touched place bends no camera."""
+    """Fit, places (n, 2) on the gel and their residuals; a touched place bends no camera.
+
+    `points_mm` (n, 3) are the print on the gel at rest.
+    """
+    points, heights = points_mm[:, :2], points_mm[:, 2]
     clean = dots.trustworthy
     believed = clean
     for last in (False, True):
-        fit = fit_camera(design, points_mm, diameter_mm, dots.centres_px, tolerance, believed)
-        rest = fit.camera.backproject(dots.centres_px - fit.offset_px)[:, :2]
-        residuals = split_residuals(points_mm[clean], (rest - points_mm)[clean], pitch_mm)
+        fit = fit_camera(design, points, diameter_mm, dots.centres_px, tolerance, believed, heights)
+        slopes = pixel_slopes(fit.camera, dots.centres_px - fit.offset_px)
+        rest = points_along(fit.camera, slopes, heights)[:, :2]
+        residuals = split_residuals(points[clean], (rest - points)[clean], pitch_mm)
         bump = checks.contact_of(residuals)
         if last or bump is None:
             break
-        away = np.hypot(points_mm[:, 0] - bump.x_mm, points_mm[:, 1] - bump.y_mm)
+        away = np.hypot(points[:, 0] - bump.x_mm, points[:, 1] - bump.y_mm)
         believed = clean & (away > _TOUCHED_PITCHES * pitch_mm)
         if believed.mean() < 0.5:
             break

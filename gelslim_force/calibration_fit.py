@@ -78,6 +78,7 @@ def fit_camera(
     centres_px: ArrayLike,
     tolerance: CameraTolerance | None = None,
     believed: ArrayLike | None = None,
+    heights_mm: ArrayLike = 0.0,
 ) -> CameraFit:
     """Fit the camera to n dots.
 
@@ -88,6 +89,7 @@ def fit_camera(
         centres_px: (n, 2) centroids seen.
         tolerance: of the built camera.
         believed: (n,) dots to fit by; the others get residuals only.
+        heights_mm: one or (n,), of the gel under the dots.
 
     Two rounds with a robust loss find the noise and the dots that do not belong; the last one
     is plain least squares over the others. Raises ValueError for shapes that do not fit, values
@@ -99,7 +101,9 @@ def fit_camera(
         raise ValueError(f"points {points.shape} and centres {seen.shape}: both must be (n, 2)")
     if len(points) < _LEAST_DOTS or not np.isfinite([points, seen]).all():
         raise ValueError(f"{len(points)} dots: a camera needs at least {_LEAST_DOTS}, all finite")
-    problem = _Problem(design, points, (tolerance or CameraTolerance()).sigma(design))
+    heights = np.broadcast_to(np.asarray(heights_mm, dtype=float), len(points))
+    solid = np.column_stack([points, heights])
+    problem = _Problem(design, solid, (tolerance or CameraTolerance()).sigma(design))
     trusted = np.ones(len(points), dtype=bool) if believed is None else np.array(believed, bool)
     if trusted.sum() < _LEAST_DOTS:
         raise ValueError(f"{int(trusted.sum())} dots to fit by: at least {_LEAST_DOTS} are needed")
@@ -120,7 +124,7 @@ def fit_camera(
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Dots on the rest plane and a camera in units of its tolerances."""
+    """Dots (n, 3) at rest and a camera in units of its tolerances."""
 
     design: VirtualCamera
     points_mm: Array
@@ -130,8 +134,7 @@ class _Problem:
         return deviated_camera(self.design, unit * self.tolerance)
 
     def image(self, unit: Array) -> Array:
-        flat = np.column_stack([self.points_mm, np.zeros(len(self.points_mm))])
-        return self.camera(unit).project(flat)
+        return self.camera(unit).project(self.points_mm)
 
     def jacobian(self, unit: Array) -> Array:
         """(2 n, 13) of the image by central differences."""

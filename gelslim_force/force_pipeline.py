@@ -19,6 +19,7 @@ from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_force.force_estimator import ForceEstimator
 from gelslim_force.frame_result import ForceField, FrameResult
 from gelslim_force.indenter_source import NormalReading
+from gelslim_force.marker_heights import marker_heights_mm
 from gelslim_force.marker_motion import MarkerView
 from gelslim_force.marker_noise import node_noise_n_per_px, noise_px
 from gelslim_force.pipeline_settings import PipelineSettings
@@ -87,7 +88,11 @@ class ForcePipeline:
         )
         self._wrench = WrenchNoise.of(operator, self.points_mm)
         self._motion = SurfaceMotion(
-            MarkerView(calibration.camera, reference.places_px),
+            MarkerView(
+                calibration.camera,
+                reference.places_px,
+                marker_heights_mm(bundle)[reference.markers],
+            ),
             reference.markers,
             markers.sparse if self.settings.interpolation == "sparse" else markers.thin_plate,
             self.points_mm,

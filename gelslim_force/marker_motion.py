@@ -34,6 +34,8 @@ class MarkerView:
     camera: VirtualCamera
     reference_px: Array
     """(n, 2)."""
+    rest_height_mm: Array | float = 0.0
+    """One or (n,): heights of the gel there at rest."""
 
     def __post_init__(self) -> None:
         places = np.array(self.reference_px, dtype=float)
@@ -41,6 +43,8 @@ class MarkerView:
             raise ValueError(f"reference places {places.shape} must be (n, 2) and finite")
         places.setflags(write=False)
         object.__setattr__(self, "reference_px", places)
+        heights = np.array(np.broadcast_to(self.rest_height_mm, len(places)), dtype=float)
+        object.__setattr__(self, "rest_height_mm", heights)
 
     def __len__(self) -> int:
         """Return the number of markers."""
@@ -48,8 +52,8 @@ class MarkerView:
 
     @cached_property
     def rest_mm(self) -> Array:
-        """(n, 3) where the markers are at rest, on z = 0."""
-        return self._at(self.reference_px, np.zeros(len(self)))
+        """(n, 3) where the markers are at rest."""
+        return self._at(self.reference_px, np.asarray(self.rest_height_mm))
 
     @cached_property
     def mm_per_px(self) -> Array:
@@ -83,8 +87,8 @@ class MarkerView:
         if not known.any():
             return motion
         rest = self.rest_mm[known]
-        height = w[known] if compensation == "exact" else np.zeros(int(known.sum()))
-        now = self._at(places[known], height)
+        sunk = w[known] if compensation == "exact" else 0.0
+        now = self._at(places[known], rest[:, 2] + sunk)
         motion[known] = now[:, :2] - rest[:, :2]
         if compensation in ("printed", "arctan"):
             motion[known] -= projection_error_mm(self.camera, rest, w[known], compensation)

@@ -16,8 +16,11 @@ from gelslim_force.detection import Detector
 from gelslim_force.detections import Detections
 from gelslim_force.detector_settings import DetectorSettings
 from gelslim_force.disc_centroid import centroid_offset_px
+from gelslim_force.marker_heights import marker_heights_mm
 from gelslim_force.reference_lattice import ReferenceLattice
 from gelslim_force.tracker import Tracker, TrackerSettings
+from gelslim_optics.back_projection import pixel_slopes
+from gelslim_optics.camera_rays import points_along
 from gelslim_optics.virtual_camera import VirtualCamera
 from ifem_export.marker_grid import MarkerGrid
 
@@ -137,14 +140,16 @@ class SensorCalibration:
         dots = detections.take(registration.dots[found])
         points, diameter = grid.positions_mm[found], grid.diameter_mm[found]
         offset = centroid_offset_px(camera, points, diameter)
-        flat = np.column_stack([points, np.zeros(len(points))])
+        heights = marker_heights_mm(bundle)[found]
+        at_rest = np.column_stack([points, heights])
+        slopes = pixel_slopes(camera, dots.centres_px - offset)
         return cls(
             camera=camera,
             grid=grid,
             markers=found,
             dots=dots,
-            residual_px=dots.centres_px - offset - camera.project(flat),
-            rest_mm=camera.backproject(dots.centres_px - offset)[:, :2],
+            residual_px=dots.centres_px - offset - camera.project(at_rest),
+            rest_mm=points_along(camera, slopes, heights)[:, :2],
             detector=(detector or Detector(expected_dots(camera, grid))).settings,
             geometry_hash=bundle.geometry_hash,
             diagnosis=("The design's camera, not fitted to this sensor.",),
