@@ -15,6 +15,7 @@ from gelslim_cad.cli.calibrate import calibrate
 from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
+from gelslim_cad.cli.diff import diff
 from gelslim_cad.cli.explain import explain
 from gelslim_cad.cli.force import force
 from gelslim_cad.cli.light import light
@@ -59,6 +60,7 @@ for _command in (
     check,
     derive,
     explain,
+    diff,
     build,
     bundle,
     bundle_info,

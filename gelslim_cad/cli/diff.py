@@ -1,0 +1,190 @@
+"""`gelslim diff`: what changes from one spec to another."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim_cad.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gelslim_cad.compare.comparison import Change, Comparison
+    from gelslim_cad.compare.part_change import PartChanges
+
+STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
+FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
+WIDE = 100
+"""From this width on the table says what each dimension is."""
+
+
+def diff(
+    first: SpecFile,
+    second: SpecFile,
+    parts: Annotated[
+        bool, typer.Option(help="Compare the solids too (some seconds; needs the cad extra).")
+    ] = True,
+    as_json: AsJson = False,
+) -> int:
+    """Compare two specs: fields, dimensions, rules, parts, bundle.
+
+    Nothing is built. Exit status 0 whether or not they differ.
+    """
+    from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.compare.comparison import compare
+    from gelslim_cad.spec.reader import read_spec
+
+    one, two = read_spec(first), read_spec(second)
+    found = compare(one.spec, two.spec)
+    made, note = _parts(one, two) if parts and not found.same else (None, "")
+    if as_json:
+        print_json(_record(str(first), str(second), found, made, note))
+        return 0
+    _report(str(first), str(second), found)
+    _report_parts(made, note)
+    return 0
+
+
+def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
+    """Changed parts, or why they could not be compared."""
+    from gelslim_cad.extras import installed
+
+    if not installed("cadquery"):
+        return None, "not compared: cadquery is missing; run: pip install 'gelslim-cad[cad]'"
+    from gelslim_cad.compare.part_change import part_changes
+    from gelslim_cad.solids.shapes import SolidError
+
+    try:
+        return part_changes(one, two), ""
+    except SolidError as error:
+        return None, f"not compared: {error}"
+
+
+def _record(
+    first: str, second: str, found: Comparison, made: PartChanges | None, note: str
+) -> dict[str, Any]:
+    return {
+        "format": "gelslim-diff/1",
+        "first": first,
+        "second": second,
+        "same": found.same,
+        "fields": [{**asdict(c), "difference": c.difference} for c in found.fields],
+        "dimensions": [{**asdict(c), "difference": c.difference} for c in found.dimensions],
+        "rules": [
+            {"id": c.id, "verdict": c.verdict, "before": asdict(c.before), "after": asdict(c.after)}
+            for c in found.rules
+        ],
+        "bundle": [asdict(c) for c in found.bundle],
+        "parts": None if made is None else asdict(made),
+        "parts_note": note,
+    }
+
+
+def _report(first: str, second: str, found: Comparison) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from gelslim_cad.cli.answer import console, number, say
+
+    if found.same:
+        say(f"{first} and {second} give the same finger.")
+        return
+    _changes("fields of the spec", found.fields)
+    _changes("dimensions that follow", found.dimensions)
+    if found.rules:
+        table = Table("design rules", box=None, pad_edge=False)
+        for column in ("before", "after", "limit", "margin", ""):
+            table.add_column(column, justify="right" if column else "left", no_wrap=True)
+        order = list(STYLE)
+        for c in sorted(found.rules, key=lambda c: order.index(c.verdict)):
+            b, a = c.before, c.after
+            table.add_row(
+                c.id,
+                number(b.value),
+                number(a.value, a.unit),
+                _limit(b.limit, a.limit),
+                "" if a.margin is None else number(a.margin),
+                Text(f"{b.status} → {a.status}" if b.status != a.status else a.status)
+                if not STYLE[c.verdict]
+                else Text(f"{b.status} → {a.status}, {c.verdict}", style=STYLE[c.verdict]),
+            )
+        console().print(table)
+        print()
+    for block in found.bundle:
+        words = f"{block.before} → {block.after}" if block.before != block.after else block.after
+        say(f"bundle, {block.block}: {words}")
+
+
+def _limit(before: float | None, after: float | None) -> str:
+    from gelslim_cad.cli.answer import number
+    from gelslim_cad.compare.comparison import differ
+
+    if differ(before, after):
+        return f"{number(before)} → {number(after)}"
+    return number(after)
+
+
+def _changes(title: str, changes: Sequence[Change]) -> None:
+    from rich.table import Table
+
+    from gelslim_cad.cli.answer import console, number
+
+    if not changes:
+        return
+    screen = console()
+    table = Table(box=None, pad_edge=False)
+    table.add_column(title, no_wrap=True)
+    for column in ("before", "after", "difference"):
+        table.add_column(column, justify="right", overflow="fold")
+    told = screen.width >= WIDE
+    if told:
+        table.add_column("", style="dim", overflow="fold")
+    for c in sorted(changes, key=lambda c: c.name not in FIRST):
+        step = c.difference
+        cells = (
+            c.name,
+            number(c.before, c.unit),
+            number(c.after, c.unit),
+            "" if step is None else f"{'+' if step > 0 else ''}{number(step, c.unit)}",
+            c.meaning,
+        )
+        table.add_row(*cells[: 5 if told else 4])
+    screen.print(table)
+    print()
+
+
+def _report_parts(made: PartChanges | None, note: str) -> None:
+    from rich.table import Table
+
+    from gelslim_cad.cli.answer import console, number, say
+
+    if note:
+        say(f"parts: {note}")
+    if made is None:
+        return
+    table = Table("parts", "", box=None, pad_edge=False)
+    for column in ("volume before", "after", "size after"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for c in (c for c in made.changed if c.how != "moved"):
+        table.add_row(
+            c.name,
+            c.how,
+            "" if c.volume_before_mm3 is None else number(c.volume_before_mm3, "mm³"),
+            "" if c.volume_after_mm3 is None else number(c.volume_after_mm3, "mm³"),
+            _size(c.size_after_mm),
+        )
+    print()
+    console().print(table)
+    moved = [c.name for c in made.changed if c.how == "moved"]
+    if moved:
+        say(f"Only moved: {', '.join(moved)}.")
+    if made.kept:
+        say(f"Unchanged: {', '.join(made.kept)}.")
+    say(f"A build does {len(made.units)} units of work again.")
+
+
+def _size(sides: tuple[float, float, float] | None) -> str:
+    return "" if sides is None else " × ".join(f"{s:.1f}" for s in sides)

@@ -1,0 +1,1 @@
+"""What changes between two specs: fields, dimensions, rules, parts, bundle."""
