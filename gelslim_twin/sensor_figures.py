@@ -81,7 +81,7 @@ def figures(
     """
     stack = tuple((float(v["thickness_mm"]), float(v["index"])) for v in camera["layers"])
     lift = sum(h * (1 - 1 / n) for h, n in stack)
-    corners = product(*((-side / 2, side / 2) for side in size_mm[:2]))
+    corners = list(product(*((-side / 2, side / 2) for side in size_mm[:2])))
     seen = [_seen(camera, (x, y, -lift)) for x, y in corners]
     distances = [z for z, _ in seen]
     return SensorFigures(
@@ -101,6 +101,8 @@ def figures(
         near_mm=min(distances),
         far_mm=max(distances),
         half_view_px=max(r for _, r in seen) * float(camera["focal_px"]),
+        tilt_deg=math.degrees(math.acos(min(1.0, float(camera["forward"][2])))),
+        oblique_deg=max(_oblique_deg(camera, (x, y, -lift)) for x, y in corners),
         layers_mm=stack,
         aperture_mm=float(camera.get("aperture_mm") or 0.0),
         focus_mm=float(camera.get("focus_mm") or 0.0),
@@ -117,3 +119,9 @@ def _seen(camera: Mapping[str, Any], point: Vector) -> tuple[float, float]:
     along = sum(a * b for a, b in zip(way, camera["forward"], strict=True))
     across = math.sqrt(max(0.0, sum(a * a for a in way) - along * along))
     return along, across / along
+
+
+def _oblique_deg(camera: Mapping[str, Any], point: Vector) -> float:
+    """Angle in air of the ray to an apparent point, from the gel's normal."""
+    x, y, z = (a - b for a, b in zip(point, camera["position_mm"], strict=True))
+    return math.degrees(math.atan2(math.hypot(x, y), z))

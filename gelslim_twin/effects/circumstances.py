@@ -36,6 +36,10 @@ class SensorFigures:
     far_mm: float
     half_view_px: float
     """Largest distance of the gel's image from the principal point."""
+    tilt_deg: float
+    """Of the camera's axis from the gel's normal."""
+    oblique_deg: float
+    """Largest angle in air of a ray to the gel, from the gel's normal."""
     layers_mm: tuple[tuple[float, float], ...]
     """Thickness and refractive index of each flat layer above the air."""
     aperture_mm: float = 0.0
@@ -54,10 +58,24 @@ class SensorFigures:
         """Pixels of a frame."""
         return self.image_width_px * self.image_height_px
 
-    @property
-    def apparent_lift_mm(self) -> float:
-        """How much nearer the layers make the gel look: sum of h (1 - 1/n)."""
-        return sum(h * (1 - 1 / n) for h, n in self.layers_mm)
+    def lift_mm(self, angle_deg: float) -> float:
+        """How much nearer the layers make the gel look, along its normal.
+
+        For a ray that meets it at that angle in air: h (1 - tan of the ray within over tan
+        without) = h (1 - cos / sqrt(n² - sin²)), summed over the layers; exact.
+        """
+        sine, cosine = math.sin(math.radians(angle_deg)), math.cos(math.radians(angle_deg))
+        return sum(h * (1 - cosine / math.sqrt(n * n - sine * sine)) for h, n in self.layers_mm)
+
+    def lifted_px(self, lift_mm: float) -> float:
+        """How far a point moves in the image that looks `lift_mm` higher along the gel's normal.
+
+        At most f/Z lift (sin of the camera's tilt + r/f): across its axis and along it.
+        """
+        slope = self.half_view_px / self.focal_px
+        nearest = self.near_mm - self.lift_mm(self.oblique_deg) + self.lift_mm(0.0)
+        across = math.sin(math.radians(self.tilt_deg))
+        return self.focal_px / nearest * lift_mm * (across + slope)
 
 
 @dataclass(frozen=True)
@@ -105,6 +123,12 @@ class Circumstances:
             s.youngs_modulus_mpa,
             s.poissons_ratio,
         )
+
+    @property
+    def force_n(self) -> float:
+        """Of the deepest contact, normal and tangential together, with this friction."""
+        t, mu = self.touch, self.friction
+        return math.hypot(1.0, mu) * (t.normal_n + min(mu, 1.0) * (t.stick_n - t.normal_n))
 
     @property
     def blur_px(self) -> float:

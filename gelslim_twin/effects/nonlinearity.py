@@ -18,10 +18,9 @@ def bound(c: Circumstances) -> Bound:
     Under the indenter the depth is prescribed; sideways, where it is not, the surface moves by
     at most about half of the depth, which errs by the same share.
     """
-    t, mu = c.touch, c.friction
-    excess = nonlinear_excess(t.indentation)
-    force = excess * max(t.normal_n, min(mu, 1.0) * t.stick_n)
-    return geometry(excess * t.depth_mm / 2 * c.sensor.px_per_mm, force)
+    excess = nonlinear_excess(c.touch.indentation)
+    sideways = excess * c.touch.depth_mm / 2 * c.sensor.px_per_mm
+    return geometry(sideways, excess * c.force_n)
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:

@@ -12,21 +12,20 @@ class RefractionParameters(EffectParameters):
 
 
 def bound(c: Circumstances) -> Bound:
-    """Straight rays see the gel farther off by the sum of h (1 - 1/n): r times that over Z."""
-    return optics(c.sensor.half_view_px * c.sensor.apparent_lift_mm / c.sensor.near_mm)
+    """Straight rays see the gel farther off by what the layers lift it."""
+    s = c.sensor
+    return optics(s.lifted_px(s.lift_mm(s.oblique_deg)))
 
 
 def paraxial_px(c: Circumstances) -> float:
-    """What the apparent depth misses, in the image.
+    """What the apparent depth misses: the further lift of oblique rays, and pressed-in gel.
 
-    Its next term, h (n² - 1)/(2 n³) tan²θ0, from sin θ0 = n sin θ; and the depth of a press,
-    which looks shallower by 1/n in the gel.
+    Gel that is pressed away lifts no more. Never worse than straight rays.
     """
     s = c.sensor
-    slope = s.half_view_px / s.focal_px + (s.far_mm - s.near_mm) / max(s.length_mm, 1e-9)
-    missed = sum(h / n * (1 - 1 / n**2) / 2 * slope**2 for h, n in s.layers_mm)
-    pressed = c.touch.depth_mm * (1 - 1 / max((n for _, n in s.layers_mm), default=1.0))
-    return s.half_view_px * (missed + pressed) / s.near_mm
+    missed = s.lift_mm(s.oblique_deg) - s.lift_mm(0.0)
+    pressed = c.touch.depth_mm / s.thickness_mm * s.lift_mm(s.oblique_deg)
+    return s.lifted_px(min(missed + pressed, s.lift_mm(s.oblique_deg)))
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
@@ -43,7 +42,7 @@ EFFECT = Effect(
     title="Refraction in acrylic and gel",
     parameters=RefractionParameters,
     bound=bound,
-    formula="r/Z x sum of h (1 - 1/n); apparent depths miss r/Z x sum of h (n²-1)/(2 n³) tan²",
+    formula="f/Z lift (sin tilt + r/f), lift = sum of h (1 - cos/sqrt(n² - sin²)) of the ray",
     ladder=ladder,
     is_null=lambda c: all(h == 0 or n == 1 for h, n in c.sensor.layers_mm),
     implementation="gelslim_twin.view.refraction",

@@ -47,8 +47,7 @@ def bound(c: Circumstances) -> Bound:
     """
     terms = c.given("relaxation", RelaxationParameters).terms
     lost = sum(t.fraction * -math.expm1(-c.motion.contact_s / t.time_s) for t in terms)
-    force = max(c.touch.normal_n, min(c.friction, 1.0) * c.touch.stick_n)
-    return Bound(force_n=lost * force * (1 + c.friction))
+    return Bound(force_n=lost * c.force_n)
 
 
 EFFECT = Effect(
@@ -56,7 +55,7 @@ EFFECT = Effect(
     title="Viscoelastic relaxation, Prony series",
     parameters=RelaxationParameters,
     bound=bound,
-    formula="F (1 + mu) x sum of g (1 - exp(-T/tau)), T from first contact to the end",
+    formula="F x sum of g (1 - exp(-T/tau)), T from first contact to the end",
     ladder=lambda c: (Rung("recursive", Bound(), 0.01 + 1e-5 * c.sensor.surface_nodes),),
     is_null=lambda c: all(
         t.fraction == 0 for t in c.given("relaxation", RelaxationParameters).terms

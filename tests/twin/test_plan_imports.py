@@ -38,7 +38,7 @@ def test_planning_imports_no_implementation_and_nothing_heavy():
         "from gelslim_twin.scene.reader import read_scene\n"
         "from gelslim_twin.scene.question import plan_scene\n"
         "s = SensorFigures(28., 28., 2., .147, .3223, 1849, 4, 575, 1., .5, 635., 640, 480,"
-        " 32., 40.5, 364., ((2.5, 1.49), (2., 1.41)), 1.24, 35.8)\n"
+        " 32., 40.5, 364., 17.7, 43., ((2.5, 1.49), (2., 1.41)), 1.24, 35.8)\n"
         f"assert plan_scene(read_scene({SCENE!r}), s).order\n"
         f"print([m for m in {watched!r} if m in sys.modules])"
     )
