@@ -167,7 +167,7 @@ def stage_rows(sensor: Sensor, repeats: int) -> list[dict[str, Any]]:
     centres, area = centroids_px(outlines)
     ink = r._ink(outlines, outlines, r.dots.present, centres, np.abs(area), now, None)
     values = r.values(ink, now)
-    image = np.empty(values.size, dtype=np.uint8)
+    noisy, image = values.copy(), np.empty(values.size, dtype=np.uint8)
     work: dict[str, Callable[[], Any]] = {
         "outlines": lambda: outlines_px(r.camera, r.dots, now),
         "ink, blurred": lambda: r._ink(
@@ -175,7 +175,7 @@ def stage_rows(sensor: Sensor, repeats: int) -> list[dict[str, Any]]:
         ),
         "light and shading": lambda: r.values(ink, now),
         "light, level gel": lambda: r.values(ink),
-        "noise": lambda: look.noise.apply(values) if look.noise else None,
+        "noise": lambda: look.noise.apply(noisy) if look.noise else None,
         "rounding": lambda: develop(values.reshape(-1), r._curve, image),
         "whole frame": lambda: r.frame(now, before),
         "whole frame, dots alone": sensor.renderer(Look()).frame,

@@ -12,25 +12,21 @@ COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"
 
 @njit(**COMPILED)
 def compose(
-    irradiance: Any,
-    gain: Any,
-    step: Any,
-    ink: Any,
-    contrast: Any,
-    colour: Any,
-    glare: Any,
-    out: Any,
-) -> None:
-    """Write grey values (h, w, 3) float32: sum over sources of colour · light · (1 - c ink).
+    irradiance: Any, gain: Any, step: Any, ink: Any, contrast: Any, colour: Any, glare: Any,
+    top: Any, out: Any,
+) -> None:  # fmt: skip
+    """Write rows `top` and on of the grey values: sum over sources of colour · light · (1 - c ink).
 
+    `out` (rows, w, 3) float32 says how many; all else has the whole picture's size (h, w).
     `irradiance` (h, w, k); `gain` (r, c, k) on every `step`-th pixel, bilinear between, or empty
     for a level surface; `glare` (h, w, 3) is added, or empty.
     """
-    height, width, count = irradiance.shape
+    width, count = irradiance.shape[1:]
     shaded, spots = gain.size > 0, glare.size > 0
     one = np.float32(1)
     row = np.ones((width, count), dtype=np.float32)
-    for y in range(height):
+    for n in range(out.shape[0]):
+        y = top + n
         if shaded:
             j = min(y // step, gain.shape[0] - 2)
             v = np.float32((y - j * step) / step)
@@ -52,12 +48,12 @@ def compose(
                 a += colour[k, 0] * light
                 b += colour[k, 1] * light
                 c += colour[k, 2] * light
-            out[y, x, 0] = a * left_over
-            out[y, x, 1] = b * left_over
-            out[y, x, 2] = c * left_over
+            out[n, x, 0] = a * left_over
+            out[n, x, 1] = b * left_over
+            out[n, x, 2] = c * left_over
             if spots:
-                for n in range(3):
-                    out[y, x, n] += glare[y, x, n]
+                for m in range(3):
+                    out[n, x, m] += glare[y, x, m]
 
 
 @njit(**COMPILED)
@@ -66,13 +62,10 @@ def develop(values: Any, curve: Any, image: Any) -> None:
 
     `curve` holds the response at steps of 1/16, or is empty for the straight one.
     """
-    for n in range(values.size):
-        value = values[n]
-        if value > np.float32(255):
-            value = np.float32(255)
-        elif not value > np.float32(0):
-            value = np.float32(0)
-        if curve.size > 0:
-            image[n] = curve[int(value * np.float32(16) + np.float32(0.5))]
-        else:
-            image[n] = np.uint8(value + np.float32(0.5))
+    zero, most, half = np.float32(0), np.float32(255), np.float32(0.5)
+    if curve.size == 0:
+        for n in range(values.size):
+            image[n] = np.uint8(min(max(values[n], zero), most) + half)
+    else:
+        for n in range(values.size):
+            image[n] = curve[int(min(max(values[n], zero), most) * np.float32(16) + half)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 _NONE = np.zeros((0, 0, 0), dtype=np.float32)
 _CURVE_STEPS = 16
+_STRIP = 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +118,8 @@ class FrameRenderer:
         centres, area = centroids_px(middle)
         drawn = self.dots.present & (area * self._orientation > 0)
         ink = self._ink(start, now, drawn, centres, np.abs(area), surface, markers)
-        image = self._developed(self.values(ink, surface), number)
         return RenderedFrame(
-            image=image,
+            image=self._picture(ink, surface, number),
             centres_px=centres,
             diameter_px=np.sqrt(4 * np.abs(area) / np.pi),
             drawn=drawn & self._inside(now),
@@ -126,6 +127,12 @@ class FrameRenderer:
 
     def values(self, ink: Image, surface: SurfaceState | None = None) -> Image:
         """Grey values (h, w, 3) before noise and rounding, for dots' coverage `ink` (h, w)."""
+        out = np.empty((*ink.shape, 3), dtype=np.float32)
+        self._composer(ink, surface)(0, out)
+        return out
+
+    def _composer(self, ink: Image, surface: SurfaceState | None) -> Callable[[int, Image], None]:
+        """A function that writes the grey values of rows from a first one on."""
         from gelslim_twin.render.compose_kernel import compose
 
         gain, step = _NONE, 1
@@ -134,10 +141,29 @@ class FrameRenderer:
             gain = self.look.shading.gain(self._shading_sight, surface, self.light)
             step = self.look.shading.pixel_step
         colour = (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
-        out = np.empty((*ink.shape, 3), dtype=np.float32)
         contrast = np.float32(self.look.contrast)
-        compose(self.still, gain, step, ink, contrast, colour, self._glare, out)
-        return out
+
+        def write(top: int, out: Image) -> None:
+            compose(self.still, gain, step, ink, contrast, colour, self._glare, top, out)
+
+        return write
+
+    def _picture(self, ink: Image, surface: SurfaceState | None, number: int) -> NDArray[np.uint8]:
+        """The frame, made in strips that stay in the processor's cache."""
+        from gelslim_twin.render.compose_kernel import develop
+
+        height, width = ink.shape
+        write, noise = self._composer(ink, surface), self.look.noise
+        gain = 1.0 if self.look.exposure is None else self.look.exposure.gain
+        image = np.empty((height, width, 3), dtype=np.uint8)
+        strip = np.empty((_STRIP, width, 3), dtype=np.float32)
+        for top in range(0, height, _STRIP):
+            rows = strip[: min(_STRIP, height - top)]
+            write(top, rows)
+            if noise is not None:
+                noise.apply(rows, gain, number, top * width)
+            develop(rows.reshape(-1), self._curve, image[top : top + _STRIP].reshape(-1))
+        return image if self.look.compression is None else self.look.compression.apply(image)
 
     def _outlines(
         self,
@@ -147,8 +173,8 @@ class FrameRenderer:
         markers_before: MarkerMotion | None,
     ) -> tuple[Array, Array]:
         """Outlines when the shutter opens and closes; the same array without motion blur."""
-        rest = SurfaceState.at_rest(self.pad.length_mm, self.pad.width_mm)
-        now = outlines_px(self.camera, self.dots, markers or surface or rest)
+        given = markers or surface
+        now = outlines_px(self.camera, self.dots, given) if given else self._rest_outlines
         earlier = markers_before or before
         if self.look.motion_blur is None or earlier is None:
             return now, now
@@ -156,15 +182,20 @@ class FrameRenderer:
         return self.look.motion_blur.start(then, now), now
 
     @cached_property
+    def _rest_outlines(self) -> Array:
+        rest = SurfaceState.at_rest(self.pad.length_mm, self.pad.width_mm)
+        return outlines_px(self.camera, self.dots, rest)
+
+    @cached_property
     def _orientation(self) -> float:
         """Sign of an outline's area on a level gel: a folded-over dot has the other one."""
-        rest = SurfaceState.at_rest(self.pad.length_mm, self.pad.width_mm)
-        return float(np.sign(np.median(centroids_px(outlines_px(self.camera, self.dots, rest))[1])))
+        return float(np.sign(np.median(centroids_px(self._rest_outlines)[1])))
 
     def _inside(self, outlines: Array) -> NDArray[np.bool_]:
-        low, high = outlines.min(axis=1), outlines.max(axis=1)
-        size = np.array([self.camera.image_width_px, self.camera.image_height_px])
-        inside: NDArray[np.bool_] = np.all((low >= -0.5) & (high <= size - 0.5), axis=1)
+        from gelslim_twin.render.outline_kernel import within
+
+        inside = np.empty(len(outlines), dtype=bool)
+        within(outlines, self.camera.image_width_px, self.camera.image_height_px, inside)
         return inside
 
     def _ink(
@@ -201,13 +232,3 @@ class FrameRenderer:
         if moved is not None and moved.moves:
             centres += moved.carried(self.dots.centres_mm, self.dots.centres_mm[:, None, :])[:, 0]
         return centres
-
-    def _developed(self, values: Image, number: int) -> NDArray[np.uint8]:
-        from gelslim_twin.render.compose_kernel import develop
-
-        if self.look.noise is not None:
-            gain = 1.0 if self.look.exposure is None else self.look.exposure.gain
-            self.look.noise.apply(values, gain, number)
-        image = np.empty(values.shape, dtype=np.uint8)
-        develop(values.reshape(-1), self._curve, image.reshape(-1))
-        return image if self.look.compression is None else self.look.compression.apply(image)

@@ -37,9 +37,11 @@ class MotionBlur:
 
     def poses(self, start: Array, now: Array) -> NDArray[np.int64]:
         """How many poses (m,) to draw of each dot; 1 for a dot that stands still."""
-        with np.errstate(invalid="ignore"):
-            path = np.sqrt(((now - start) ** 2).sum(axis=2)).max(axis=1)
-            wanted = np.ceil(np.nan_to_num(path) / self.px_per_pose)
+        from gelslim_twin.render.outline_kernel import farthest
+
+        path = np.empty(len(now))
+        farthest(start, now, path)
+        wanted = np.ceil(path / self.px_per_pose)
         return np.clip(wanted, 1, self.most_poses).astype(np.int64)
 
     def a_priori_bound_px(self, step_px: float) -> float:

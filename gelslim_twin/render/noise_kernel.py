@@ -25,15 +25,16 @@ def mixed(value: Any) -> Any:
 
 
 @njit(**COMPILED)
-def add_noise(image: Any, key: Any, table: Any, read2: Any, shot: Any) -> None:
+def add_noise(image: Any, first: Any, key: Any, table: Any, read2: Any, shot: Any) -> None:
     """Add to `image` (n, 3) float32 noise of variance read2 + shot · value, in place.
 
-    `table` (2 ** BITS,) holds values of unit normal distribution in equal shares.
+    `first` is the number of the first pixel in the whole picture; `table` (2 ** BITS,) holds
+    values of the unit normal distribution in equal shares.
     """
     golden, mask = np.uint64(0x9E3779B97F4A7C15), np.uint64((1 << BITS) - 1)
     zero = np.float32(0)
     for n in range(image.shape[0]):
-        word = mixed(key + golden * np.uint64(n + 1))
+        word = mixed(key + golden * np.uint64(first + n + 1))
         for c in range(3):
             value = image[n, c]
             spread = math.sqrt(read2 + shot * max(value, zero))

@@ -42,3 +42,26 @@ def centroids(outlines: Any, centres: Any, area: Any) -> None:
             centres[m, 0], centres[m, 1] = x0 + sx / (3 * doubled), y0 + sy / (3 * doubled)
         else:
             centres[m, 0] = centres[m, 1] = np.nan
+
+
+@njit(**COMPILED)
+def within(outlines: Any, width: Any, height: Any, inside: Any) -> None:
+    """Write whether every corner of an outline (m, k, 2) lies in a picture, to `inside` (m,)."""
+    for m in range(outlines.shape[0]):
+        inside[m] = True
+        for k in range(outlines.shape[1]):
+            x, y = outlines[m, k, 0], outlines[m, k, 1]
+            if not (x >= -0.5 and y >= -0.5 and x <= width - 0.5 and y <= height - 0.5):
+                inside[m] = False
+                break
+
+
+@njit(**COMPILED)
+def farthest(start: Any, end: Any, path: Any) -> None:
+    """Write the longest way of a corner from outlines `start` to `end` (m, k, 2) to `path` (m,)."""
+    for m in range(start.shape[0]):
+        most = 0.0
+        for k in range(start.shape[1]):
+            dx, dy = end[m, k, 0] - start[m, k, 0], end[m, k, 1] - start[m, k, 1]
+            most = max(most, dx * dx + dy * dy)
+        path[m] = np.sqrt(most)

@@ -33,8 +33,13 @@ class SensorNoise:
         """Standard deviation at a grey value."""
         return float(np.sqrt((gain * self.read_dn) ** 2 + gain * value_dn / self.electrons_per_dn))
 
-    def apply(self, image: NDArray[np.float32], gain: float = 1.0, frame: int = 0) -> None:
-        """Add the noise of frame number `frame` to `image` (h, w, 3), in place."""
+    def apply(
+        self, image: NDArray[np.float32], gain: float = 1.0, frame: int = 0, first: int = 0
+    ) -> None:
+        """Add the noise of frame number `frame` to `image` (h, w, 3), in place.
+
+        A strip of a picture has the picture's noise if `first` is the number of its first pixel.
+        """
         shot = gain / self.electrons_per_dn
         if self.read_dn == 0 and shot == 0:
             return
@@ -42,6 +47,7 @@ class SensorNoise:
 
         add_noise(
             image.reshape(-1, 3),
+            first,
             stream_key(self.seed, "sensor noise", frame),
             normal_table(),
             np.float32((gain * self.read_dn) ** 2),

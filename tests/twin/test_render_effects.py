@@ -303,3 +303,13 @@ def test_light_of_other_colours_gives_three_sources():
     )
     image = renderer(Look(shading=Shading()), light=three).frame(dent(0.4)).image
     assert image[240, 320, 2] > renderer().frame().image[240, 320, 2] + 20
+
+
+def test_noise_of_strips_is_the_noise_of_the_picture():
+    whole = np.full((30, 40, 3), 60, np.float32)
+    strips = whole.copy()
+    noise = SensorNoise(2.0, 30.0, seed=9)
+    noise.apply(whole, frame=4)
+    for top in (0, 11, 22):
+        noise.apply(strips[top : top + 11], frame=4, first=top * 40)
+    assert np.array_equal(whole, strips)
