@@ -20,10 +20,12 @@ from gelslim_force.tracks import MarkerStatus, Tracks
 MatchMode = Literal["robust", "nearest"]
 _GATE = 0.45
 _AGREES = 0.15
-_ALIKE = 0.15
+_ALIKE = (0.15, 0.08, 0.04)
+"""Motion between neighbours, per distance, that one patch may have; the first is tried first:
+a thin bridge may join markers mistaken by a pitch to the rest."""
 _GROWS = 0.33
 _ROUNDS = 4
-_CLEAN = 0.9
+_CLEAN = 0.97
 _PATCHES = 6
 _SMALLEST_PATCH = 6
 _SHIFTS = 2
@@ -88,7 +90,7 @@ def _robust(
     status = np.where(trusted, MarkerStatus.TRACKED, MarkerStatus.LOST).astype(np.int64)
     guess = np.full((len(reference), 2), np.nan)
     for i in np.flatnonzero(~trusted):
-        x, y, support = mk.local_affine(i, rest, near, points, dots, trusted)
+        x, y, support = mk.local_place(i, rest, near, pitch, points, dots, trusted)
         if support >= 4:
             guess[i] = x, y
             status[i] = MarkerStatus.PREDICTED
@@ -110,21 +112,22 @@ def _grown(
     from gelslim_force import matching_kernel as mk
 
     rest, near, pitch = reference.places_px, reference.neighbours, reference.pitch_px
-    patch = mk.patches(rest, near, pitch, points, dots, trusted, _ALIKE)
-    sizes = np.bincount(patch[patch >= 0], minlength=1)
+    enough = _CLEAN * min(len(reference), len(points))
     best, most = (dots.copy(), np.zeros_like(trusted)), -1
-    for which in np.argsort(-sizes, kind="stable")[:_PATCHES]:
-        if sizes[which] < _SMALLEST_PATCH:
-            break
-        tried, held = dots.copy(), patch == which
-        mk.grow(rest, near, pitch, points, tried, held, _GROWS)
-        mk.verify(rest, near, pitch, points, tried, held, _AGREES, 2)
-        mk.grow(rest, near, pitch, points, tried, held, _GROWS)
-        count = mk.verify(rest, near, pitch, points, tried, held, _AGREES, 2)
-        if count > most:
-            best, most = (tried, held), count
-        if count > _CLEAN * min(len(reference), len(points)):
-            break
+    for alike in _ALIKE:
+        patch = mk.patches(rest, near, pitch, points, dots, trusted, alike)
+        sizes = np.bincount(patch[patch >= 0], minlength=1)
+        for which in np.argsort(-sizes, kind="stable")[:_PATCHES]:
+            if sizes[which] < _SMALLEST_PATCH:
+                break
+            tried, held = dots.copy(), patch == which
+            for _ in range(2):
+                mk.grow(rest, near, pitch, points, tried, held, _GROWS)
+                count = mk.verify(rest, near, pitch, points, tried, held, _AGREES, 2)
+            if count > most:
+                best, most = (tried, held), count
+            if count >= enough:
+                return best
     return best
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from gelslim_force.darkness_kernel import COMPILED
+from gelslim_force.local_motion_kernel import local_affine, local_place, local_quadratic
 
 _LEVELS = 12
 
@@ -28,50 +29,6 @@ def nearest(points: Any, x: Any, y: Any) -> Any:
         if gap < least:
             best, least = k, gap
     return best, least
-
-
-@njit(**COMPILED)
-def local_affine(i: Any, reference: Any, near: Any, points: Any, match: Any, trusted: Any) -> Any:
-    """Place of marker i by the affine motion of its trusted neighbours, and their number.
-
-    The number is 0 where fewer than 3 stand off one line.
-    """
-    n = 0
-    su = sv = suu = suv = svv = sx = sy = sux = svx = suy = svy = total = 0.0
-    for k in range(near.shape[1]):
-        j = near[i, k]
-        if j < 0 or not trusted[j]:
-            continue
-        u = reference[j, 0] - reference[i, 0]
-        v = reference[j, 1] - reference[i, 1]
-        dx = points[match[j], 0] - reference[j, 0]
-        dy = points[match[j], 1] - reference[j, 1]
-        w = 1.0 / (u * u + v * v)
-        n += 1
-        total += w
-        su += w * u
-        sv += w * v
-        suu += w * u * u
-        suv += w * u * v
-        svv += w * v * v
-        sx += w * dx
-        sy += w * dy
-        sux += w * u * dx
-        svx += w * v * dx
-        suy += w * u * dy
-        svy += w * v * dy
-    if n < 3:
-        return 0.0, 0.0, 0
-    mu, mv, mx, my = su / total, sv / total, sx / total, sy / total
-    auu, auv, avv = suu / total - mu * mu, suv / total - mu * mv, svv / total - mv * mv
-    det = auu * avv - auv * auv
-    if det <= 0.05 * auu * avv or auu <= 0 or avv <= 0:
-        return 0.0, 0.0, 0
-    bux, bvx = sux / total - mu * mx, svx / total - mv * mx
-    buy, bvy = suy / total - mu * my, svy / total - mv * my
-    x = mx - (mu * (bux * avv - bvx * auv) + mv * (bvx * auu - bux * auv)) / det
-    y = my - (mu * (buy * avv - bvy * auv) + mv * (bvy * auu - buy * auv)) / det
-    return reference[i, 0] + x, reference[i, 1] + y, n
 
 
 @njit(**COMPILED)
@@ -111,10 +68,14 @@ def verify(
             agrees[i] = False
             if match[i] < 0:
                 continue
+            limit = (gate * pitch[i]) ** 2
             x, y, n = local_affine(i, reference, near, points, match, trusted)
-            if n >= 4:
+            dx, dy = points[match[i], 0] - x, points[match[i], 1] - y
+            agrees[i] = n >= 4 and dx * dx + dy * dy < limit
+            if not agrees[i]:
+                x, y, n = local_quadratic(i, reference, near, pitch, points, match, trusted)
                 dx, dy = points[match[i], 0] - x, points[match[i], 1] - y
-                agrees[i] = dx * dx + dy * dy < (gate * pitch[i]) ** 2
+                agrees[i] = n >= 4 and dx * dx + dy * dy < limit
         for i in range(reference.shape[0]):
             changed |= agrees[i] != trusted[i]
             trusted[i] = agrees[i]
@@ -186,7 +147,7 @@ def grow(
             offer[i] = -1
             if trusted[i]:
                 continue
-            x, y, support = local_affine(i, reference, near, points, match, trusted)
+            x, y, support = local_place(i, reference, near, pitch, points, match, trusted)
             if support < max(fewest, 4):
                 continue
             k, gap = nearest(points, x, y)
