@@ -225,3 +225,15 @@ def test_motion_of_another_number_of_markers_is_refused():
     few = MarkerMotion(np.ones((3, 3)), np.zeros((3, 3, 2)))
     with pytest.raises(ValueError, match="3 markers for"):
         renderer().frame(markers=few)
+
+
+def test_a_small_picture_is_the_middle_of_the_large_one():
+    """Another size of picture, no multiple of the strips that frames are made in."""
+    small = replace(CAMERA, image_width_px=202, image_height_px=150)
+    a, b = renderer().frame(dent(0.5)), renderer(camera=small).frame(dent(0.5))
+    assert b.image.shape == (150, 202, 3)
+    cut = a.image[165:315, 219:421].astype(int)
+    assert np.abs(cut - b.image)[2:-2, 2:-2].max() <= 1
+    assert 0 < b.drawn.sum() < a.drawn.sum()
+    shift = (a.centres_px - b.centres_px)[b.drawn]
+    assert shift == pytest.approx(np.tile([219.0, 165.0], (len(shift), 1)), abs=1e-9)
