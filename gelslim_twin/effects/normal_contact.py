@@ -32,7 +32,7 @@ EFFECT = Effect(
     title="Normal contact",
     parameters=NormalContactParameters,
     bound=bound,
-    formula="F = 2 E* a V/A + bonded layer (M V/h in series with 3 G V A/(8 pi h^3)); depth f/Z",
+    formula="F = 2.2 E* a V/A + bonded layer (M V/h in series with squeeze)); depth f/Z",
     ladder=ladder,
     is_null=never_null,
     implementation="gelslim_twin.contact.solver",

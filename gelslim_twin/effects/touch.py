@@ -60,10 +60,11 @@ def touch(
 
     The normal force adds the half-space under a flat punch, 2 E* a δ (Boussinesq; δ the mean
     overlap V/A), which is all there is on a thick gel, to that of a thin bonded layer, which
-    compresses, M V / h, and squeezes out sideways, 3 G V A / (8 π h³) (lubrication with a free
+    compresses, M V/h, and squeezes out sideways, 3 G V A / (8 π h³) (lubrication with a free
     upper face; four times as much where it sticks): the softer of the two governs, so they act
-    in series. With the whole thickness h under it the half-space part cannot exceed that of a
-    layer, hence the sum errs high.
+    in series. The gel around the contact is in the way of what is squeezed out, as if the radius
+    were larger by 1.2 h, or 0.5 h where it sticks. These two are fitted to solved contacts
+    (ν 0.32 to 0.495, radius over thickness 0.7 to 3): the sum is 1.0 to 1.9 times those.
     """
     d = max(0.0, depth_mm)
     area = footprint.area_mm2(d) if d > 0 else 0.0
@@ -77,17 +78,19 @@ def touch(
     half_space = 2 * e / (1 - nu * nu) * a * volume / area
     squeeze = 3 * g * volume * area / (8 * math.pi * h**3)
 
-    def layer(squeeze_n: float) -> float:
-        # A thin layer cannot be softer than in uniaxial stress, E V / h.
+    def layer(stronger: float, further: float) -> float:
+        out = stronger * squeeze * (1 + further * h / a) ** 4
         compress = confined * volume / h
-        return max(e * volume / h, compress * squeeze_n / (compress + squeeze_n))
+        # A thin layer cannot be softer than in uniaxial stress, E V / h.
+        return max(e * volume / h, compress * out / (compress + out))
 
+    normal = 1.1 * half_space + layer(1.0, 1.2)
     return Touch(
         d,
         d / h,
         area,
         a,
-        half_space + layer(squeeze),
-        1.1 * half_space + layer(4 * squeeze),
+        normal,
+        max(normal, 1.1 * half_space + layer(4.0, 0.5)),
         g * area / h + 8 * g * a / (2 - nu),
     )
