@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 class Look:
     """Effects by their parameters; None leaves one out, and its module unloaded.
 
-    `level_dn` is the grey value that unit irradiance gives in a lamp's own colour; `contrast` the
-    share of light that ink takes. `samples` 0 fills dots by exact area, n > 0 by n x n samples
-    per pixel. Raises ValueError for values out of range.
+    `level_dn` is the grey value that unit irradiance gives in a lamp's own colour; where a place
+    gets three times the mean light, the usual one just saturates, and saturation moves dots'
+    centres. `contrast` is the share of light that ink takes. `samples` 0 fills dots by exact area,
+    n > 0 by n x n samples per pixel. Raises ValueError for values out of range.
     """
 
-    level_dn: float = 130.0
+    level_dn: float = 80.0
     contrast: float = 0.8
     samples: int = 0
     shading: Shading | None = None

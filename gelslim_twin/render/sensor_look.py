@@ -20,7 +20,7 @@ def sensor_look(aperture_mm: float, focus_mm: float, seed: int = 0) -> Look:
     it depends on how the frames travel. Each effect draws from its own stream of `seed`.
     """
     return Look(
-        level_dn=105.0,
+        level_dn=80.0,
         contrast=0.85,
         shading=Shading(),
         defocus=Defocus(aperture_mm, focus_mm, still_px=0.7),

@@ -127,7 +127,7 @@ def test_red_is_left_and_green_right_and_the_dent_shows_both_flanks():
     image = renderer().frame().image.astype(int)
     assert image[240, 120, 0] > 1.5 * image[240, 120, 1]
     assert image[240, 520, 1] > 1.5 * image[240, 520, 0]
-    blank = Look(shading=Shading(), contrast=0.0)
+    blank = Look(level_dn=130.0, shading=Shading(), contrast=0.0)
     change = renderer(blank).frame(dent(0.6, 0, 0)).image.astype(int)
     change -= renderer(blank).frame().image
     assert change[..., 0].min() < -20
