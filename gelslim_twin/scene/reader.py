@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from pydantic import ValidationError
 
 from gelslim_twin.scene.motion_csv import read_motion_csv
 from gelslim_twin.scene.pose import Pose, poses
 from gelslim_twin.scene.scene import FORMAT, Scene
 from gelslim_twin.scene.stl_extent import footprint_mm
+from gelslim_twin.scene.varied import varied
 from yaml_model.errors import InputError, Problem, shown
 from yaml_model.reader import Loaded, read_model
 from yaml_model.schema import schema_text
@@ -35,6 +38,24 @@ class LoadedScene(Loaded[Scene]):
     def sensor_path(self) -> Path:
         """The spec or bundle of the sensor."""
         return self.folder / (self.scene.sensor.spec or self.scene.sensor.bundle or "")
+
+    def numbered(self, number: int) -> LoadedScene:
+        """Scene `number` of the data set that this scene's `vary` describes.
+
+        Raises `InputError` on the line of `vary` where a value drawn leaves the scene's limits.
+        """
+        try:
+            scene = varied(self.scene, number)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(str(part) for part in first["loc"])
+            message = f"scene {number}: {where} = {first['input']}: {first['msg'].lower()}"
+            raise self.problem("vary", None, message, "narrow the ranges") from None
+        except ValueError as error:
+            message, _, remedy = str(error).partition("; ")
+            raise self.problem("vary", None, message, remedy or "correct it") from None
+        moved = self.poses if scene.motion.csv is not None else poses(scene.motion)
+        return replace(self, model=scene, poses=moved)
 
     def problem(self, field: str, value: str | None, message: str, remedy: str) -> InputError:
         """An error about a field of the scene, on its line or on that of the block it is in."""

@@ -10,6 +10,7 @@ from gelslim_twin.scene.effects import Effects
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.motion import Motion
 from gelslim_twin.scene.sensor import Sensor
+from gelslim_twin.scene.variation import Variation
 from yaml_model.base import Block
 from yaml_model.errors import FieldError
 
@@ -71,6 +72,9 @@ class Scene(Block):
     camera: SceneCamera = Field(default=SceneCamera(), description="How frames are taken")
     effects: Effects = Field(
         default=Effects(), description="Effects forced on or off, and their parameters"
+    )
+    vary: Variation = Field(
+        default=Variation(), description="Ranges that `simulate --count` draws scenes from"
     )
     seed: int = Field(default=0, ge=0, le=2**53, description="Of everything random")
 
