@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ifem_export.contact_inverse import _projected, masked_force, smoothed_force, smoothing
+from ifem_export.contact_inverse import (
+    MARGIN,
+    _largest,
+    _projected,
+    masked_force,
+    smoothed_force,
+    smoothing,
+)
 from ifem_export.errors import IfemError
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
@@ -128,3 +136,22 @@ def test_edge_cases_and_bad_input(press: Press) -> None:
         masked_force(press.quick, press.noisy * np.nan, press.mask)
     with pytest.raises(IfemError, match="width_mm"):
         smoothing(press.points, 0.0)
+
+
+def test_step_size_comes_from_the_largest_eigenvalue(press: Press) -> None:
+    """The estimate with its margin bounds the exact eigenvalue, whatever the mask."""
+    away = np.hypot(press.points[:, 0] - 1.0, press.points[:, 1] + 1.5)
+    for radius in (0.6, 1.2, 3.3, 30.0):
+        mask = away < radius
+        size = 3 * int(mask.sum())
+
+        def twice(values: np.ndarray, mask: np.ndarray = mask) -> np.ndarray:
+            spread = np.zeros_like(press.points)
+            spread[mask] = values.reshape(-1, 3)
+            found = press.quick.displacement(press.quick.displacement(spread))
+            return found[mask].ravel()
+
+        exact = eigsh(LinearOperator((size, size), twice), k=1, return_eigenvectors=False)[0]
+        estimate = _largest(press.quick, mask)
+        assert estimate <= exact * (1 + 1e-9)
+        assert MARGIN * estimate >= exact
