@@ -125,6 +125,8 @@ def f():
         "gelslim_cad.sight",
         "gelslim_optics.virtual_camera",
         "ifem_export.bundle_io",
+        "gelslim_twin.planner",
+        "gelslim_twin.scene.question",
     ],
 )
 def test_light_modules_load_no_cad(module: str) -> None:
