@@ -31,6 +31,30 @@ def check_batch(d: Dimensions) -> Mapping[str, NDArray[np.bool_]]:
     return failed
 
 
+def margins_batch(d: Dimensions) -> Mapping[str, NDArray[np.float64]]:
+    """For each rule its margin (n,) as a part of its limit; below 0 exactly where it fails.
+
+    Limits below 1 in the rule's unit count as 1; infinite where a design has no limit, minus
+    infinity where a value is not a number.
+    """
+    count = np.size(d["finger.thickness_mm"])
+    margins = {}
+    for entry in RULES.values():
+        found = _find(entry, d)
+        value, limit = np.asarray(found.value, dtype=float), np.asarray(found.limit, dtype=float)
+        with np.errstate(invalid="ignore"):
+            room = (value - limit if found.least else limit - value) / np.maximum(
+                np.abs(limit), 1.0
+            )
+        room = np.where(np.isinf(limit), np.inf, room)
+        failed = _missed(found) & (not found.advisory)
+        least = np.finfo(float).tiny
+        kept = np.where(np.isnan(room), 0.0, np.maximum(room, 0.0))
+        missed = np.where(np.isnan(room), -np.inf, np.minimum(room, -least))
+        margins[entry.id] = np.broadcast_to(np.where(failed, missed, kept).ravel(), (count,))
+    return margins
+
+
 def _find(entry: Rule, d: Dimensions) -> Finding:
     return entry.judge(*(d.argument(p)[1] for p in entry.inputs))
 

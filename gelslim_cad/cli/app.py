@@ -17,6 +17,7 @@ from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
 from gelslim_cad.cli.diff import diff
 from gelslim_cad.cli.explain import explain
+from gelslim_cad.cli.explore import explore
 from gelslim_cad.cli.force import force
 from gelslim_cad.cli.light import light
 from gelslim_cad.cli.markers import markers
@@ -61,6 +62,7 @@ for _command in (
     derive,
     explain,
     diff,
+    explore,
     build,
     bundle,
     bundle_info,

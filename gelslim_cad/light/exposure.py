@@ -42,9 +42,13 @@ def exposure(d: Lookup, light: LightResult, colour: str) -> Exposure:
     (distant object; no vignetting). Light of other colours than the sensor's filter is not
     counted.
     """
+    return exposure_at(d, float(light.irradiance(colour).mean()), colour)
+
+
+def exposure_at(d: Lookup, irradiance_per_w: float, colour: str) -> Exposure:
+    """As `exposure`, for a mean irradiance of the coat in W/mm² per W of the LEDs."""
     watts = d["design.leds.radiant_flux_mw"] / 1000 * d["led.count"]
-    bins = light.irradiance(colour)
-    arriving = watts * float(bins.mean())
+    arriving = watts * irradiance_per_w
     radiance = _to_air(d) * d["material.gel.coat_reflectance"] * arriving / math.pi
     on_sensor = math.pi * d["camera.lens_transmission"] * radiance / (4 * d["camera.f_number"] ** 2)
     photon_j = PLANCK_J_S * LIGHT_M_S / (d[f"design.leds.{colour}_wavelength_nm"] * 1e-9)

@@ -1,0 +1,1 @@
+"""Thousands of designs at once: their dimensions, rules, light and force error."""

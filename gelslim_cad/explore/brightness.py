@@ -1,0 +1,58 @@
+"""Light of a design: the share that reaches the coat, its irradiance, and the frame rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gelslim_cad.light.exposure import exposure_at
+from gelslim_cad.light.inputs import NAMES
+from gelslim_cad.lookup import Lookup
+
+EXPOSED = (
+    "camera.f_number",
+    "camera.frame_rate_hz",
+    "camera.full_well_e_um2",
+    "camera.lens_transmission",
+    "camera.quantum_efficiency",
+    "design.leds.radiant_flux_mw",
+)
+"""What sets the exposure but not where the light goes."""
+TRACED = tuple(n for n in NAMES if n not in EXPOSED)
+COLOURS = ("red", "green")
+RAYS = 1 << 13
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What one trace tells: share on the coat, W/mm² per W of the LEDs of each colour."""
+
+    on_coat: float
+    red_per_w: float
+    green_per_w: float
+
+
+def trace(values: Mapping[str, Any], rays: int) -> Traced:
+    """Trace the guide of a design given by `TRACED`; a fixed seed, so the same rays for all."""
+    from gelslim_cad.guide_section import guide_profile
+    from gelslim_cad.light.scene import light_scene
+    from gelslim_optics.trace import trace_light
+
+    light = trace_light(light_scene(values, guide_profile(values)), rays, threads=1)
+    red, green = (float(light.irradiance(c).mean()) for c in COLOURS)
+    return Traced(light.value("delivered"), red, green)
+
+
+def light_columns(d: Lookup, traced: Traced) -> dict[str, float]:
+    """Share on the coat, µW/mm² on it (darker colour), exposure and frame rate (slower colour)."""
+    found = [
+        exposure_at(d, per_w, colour)
+        for colour, per_w in zip(COLOURS, (traced.red_per_w, traced.green_per_w), strict=True)
+    ]
+    return {
+        "light.on_coat": traced.on_coat,
+        "light.irradiance_uw_mm2": min(e.irradiance_uw_mm2 for e in found),
+        "light.exposure_ms": max(e.exposure_ms for e in found),
+        "light.frame_rate_hz": min(e.frame_rate_hz for e in found),
+    }

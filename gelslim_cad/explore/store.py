@@ -1,0 +1,84 @@
+"""Results of finished tasks, one file each: a killed run goes on where it stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gelslim_cad.build.folder import locked
+from gelslim_cad.explore.error import ExploreError
+from gelslim_cad.explore.task import Task
+
+MARK = "explore.json"
+CHUNKS = "chunks"
+
+
+@dataclass(frozen=True)
+class Store:
+    """The folder of one exploration."""
+
+    folder: Path
+
+    @classmethod
+    @contextlib.contextmanager
+    def opened(cls, folder: Path) -> Iterator[Store]:
+        """The store, locked against another run on the same folder, which waits.
+
+        Raises ExploreError where the folder holds something else, OSError where it cannot be
+        written.
+        """
+        target = Path(os.path.abspath(folder))
+        with locked(target):
+            strange = target.exists() and (not target.is_dir() or _foreign(target))
+            if strange:
+                raise ExploreError(
+                    f"{folder} exists and holds no exploration; give another -o or remove it"
+                )
+            (target / CHUNKS).mkdir(parents=True, exist_ok=True)
+            if not (target / MARK).exists():
+                whole_file(target / MARK, b"{}\n")
+            yield cls(target)
+
+    def read(self, task: Task) -> dict[str, Any] | None:
+        """The stored result; None where there is none or the file is damaged."""
+        try:
+            found = json.loads(self._place(task).read_bytes())
+        except (OSError, ValueError):
+            return None
+        whole = isinstance(found, dict) and found.get("key") == task.key
+        return found["result"] if whole else None
+
+    def write(self, task: Task, result: dict[str, Any]) -> None:
+        """Store a result in one step."""
+        record = {"key": task.key, "result": result}
+        whole_file(self._place(task), json.dumps(record, separators=(",", ":")).encode())
+
+    def keep_only(self, tasks: Iterable[Task]) -> None:
+        """Remove results of other tasks and what a killed run left half-written."""
+        wanted = {self._place(t).name for t in tasks}
+        for path in (self.folder / CHUNKS).iterdir():
+            if path.name not in wanted:
+                path.unlink(missing_ok=True)
+
+    def _place(self, task: Task) -> Path:
+        return self.folder / CHUNKS / f"{task.kind}-{task.key[:20]}.json"
+
+
+def whole_file(target: Path, data: bytes) -> None:
+    """Write a file beside its place, then move it there. Raises OSError."""
+    part = target.with_name(f".{target.name}.part")
+    try:
+        part.write_bytes(data)
+        os.replace(part, target)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _foreign(folder: Path) -> bool:
+    return any(folder.iterdir()) and not (folder / MARK).is_file()

@@ -1,0 +1,69 @@
+"""Tasks that a worker can do anywhere: plain data in, plain data out, the same wherever done."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from gelslim_cad.build.fingerprint import code_hash, combined
+from gelslim_cad.explore.axis import Axis
+from gelslim_cad.explore.brightness import trace
+from gelslim_cad.explore.force_error import Patch, patch_error
+from gelslim_cad.explore.judge import judge
+from gelslim_cad.spec import Spec
+
+Kind = Literal["designs", "light", "force"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One piece of work; `payload` is canonical JSON, so tasks compare and hash by content."""
+
+    kind: Kind
+    payload: str
+
+    @classmethod
+    def of(cls, kind: Kind, content: dict[str, Any]) -> Task:
+        """A task of plain content."""
+        return cls(kind, json.dumps(content, sort_keys=True, separators=(",", ":")))
+
+    @property
+    def key(self) -> str:
+        """Digest of the content and of the code and libraries that would do it."""
+        return combined(code_hash(), self.kind, self.payload)
+
+
+def perform(task: Task) -> dict[str, Any]:
+    """Do a task on one thread. Raises what the model raises."""
+    from threadpoolctl import threadpool_limits
+
+    content = json.loads(task.payload)
+    # One thread: the sums of more come in another order, and workers are processes already.
+    with threadpool_limits(1):
+        if task.kind == "designs":
+            return _designs(content)
+        if task.kind == "light":
+            return {"traced": [asdict(trace(v, content["rays"])) for v in content["scenes"]]}
+        return asdict(patch_error(Patch(**content)))
+
+
+def _designs(content: dict[str, Any]) -> dict[str, Any]:
+    axes = [Axis(path, tuple(values)) for path, values in content["axes"]]
+    spec = Spec.model_validate_json(json.dumps(content["spec"]))
+    rows = [tuple(row) for row in content["rows"]]
+    columns = judge(spec, axes, rows, content["also"])
+    return {"columns": {name: _packed(values) for name, values in columns.items()}}
+
+
+def _packed(values: list[Any]) -> Any:
+    """A column that is one value throughout as that value alone."""
+    alone = all(v == values[0] and type(v) is type(values[0]) for v in values)
+    return {"all": values[0]} if alone else {"each": values}
+
+
+def unpacked(packed: dict[str, Any], count: int) -> list[Any]:
+    """The column again."""
+    if "all" in packed:
+        return [packed["all"]] * count
+    return list(packed["each"])
