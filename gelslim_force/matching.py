@@ -25,6 +25,8 @@ _ALIKE = (0.15, 0.08, 0.04)
 a thin bridge may join markers mistaken by a pitch to the rest."""
 _GROWS = 0.33
 _ROUNDS = 4
+_STRAIN = 0.5
+"""Change of the vector between direct neighbours, per length, that a contact's rim may cause."""
 _CLEAN = 0.97
 _PATCHES = 6
 _SMALLEST_PATCH = 6
@@ -75,6 +77,7 @@ def _robust(
     reference: ReferenceLattice, points: NDArray[np.float64], expected: NDArray[np.float64]
 ) -> Tracks:
     from gelslim_force import matching_kernel as mk
+    from gelslim_force.steep_kernel import settle
 
     rest, near, pitch = reference.places_px, reference.neighbours, reference.pitch_px
     dots = np.full(len(reference), -1, dtype=np.int64)
@@ -86,6 +89,7 @@ def _robust(
     if sure < _CLEAN * min(len(reference), len(points)):
         dots, trusted = _shifted(reference, points, expected, dots, trusted)
     mk.verify(rest, near, pitch, points, dots, trusted, _AGREES, 2)
+    settle(rest, near, pitch, points, dots, trusted, _GATE, _STRAIN)
     dots[~trusted] = -1
     status = np.where(trusted, MarkerStatus.TRACKED, MarkerStatus.LOST).astype(np.int64)
     guess = np.full((len(reference), 2), np.nan)
