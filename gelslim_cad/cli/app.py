@@ -22,6 +22,7 @@ from gelslim_cad.cli.force import force
 from gelslim_cad.cli.light import light
 from gelslim_cad.cli.markers import markers
 from gelslim_cad.cli.new import new
+from gelslim_cad.cli.optimise import optimise
 from gelslim_cad.cli.plan import plan
 from gelslim_cad.cli.schema import schema
 
@@ -63,6 +64,7 @@ for _command in (
     explain,
     diff,
     explore,
+    optimise,
     build,
     bundle,
     bundle_info,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gelslim_cad.checks import RULES
 from gelslim_cad.explore.axis import Axis, shown
 from gelslim_cad.explore.pareto import THICKNESS, TRADES, Goal, front
 from gelslim_cad.explore.study import Exploration
@@ -21,7 +22,7 @@ PALETTE = (
     "#a6761d", "#666666", "#e7969c", "#17becf",
 )  # fmt: skip
 """Colours of what binds; green is kept for feasible cells."""
-MOST_TICKS = 12
+MOST_TICKS = 9
 MOST_PANELS = 9
 
 
@@ -64,7 +65,7 @@ def _trade(panel: Axes, found: Exploration, goal: Goal) -> None:
         line = [rows[k] for k in best]
         panel.plot(
             [x[k] for k in line], [y[k] for k in line], "o-", color=FRONT, ms=4, mfc="none",
-            label="Pareto front",
+            drawstyle="steps-post", label="Pareto front",
         )  # fmt: skip
         _focus(panel, [x[k] for k in rows], [y[k] for k in rows])
         panel.legend(loc="best", fontsize=8, framealpha=0.9)
@@ -113,12 +114,17 @@ def feasibility_png(found: Exploration) -> bytes:
             label = panels_over.path.removeprefix("design.")
             panel.set_title(f"{label} = {shown(panels_over.values[k])}", fontsize=9)
     marks = [Patch(color="#2e9e5b", label="feasible")]
-    marks += [Patch(color=colours[n], label=n) for n in names]
+    marks += [Patch(color=colours[n], label=_told(n)) for n in names]
     figure.legend(
         handles=marks, loc="outside lower center", ncols=min(3, len(marks)), fontsize=8,
         title="feasible, or what binds",
     )  # fmt: skip
     return as_png(figure)
+
+
+def _told(binding: str) -> str:
+    """A rule by its title, anything else as it is."""
+    return f"{RULES[binding].title} ({binding})" if binding in RULES else binding
 
 
 def _cells(found: Exploration) -> Any:
@@ -157,5 +163,5 @@ def _map(panel: Axes, cells: Any, axes: tuple[Axis, ...], colours: dict[str, str
 
 def _ticks(put: Any, axis: Axis) -> None:
     count = len(axis.values)
-    places = sorted({round(p) for p in np.linspace(0, count - 1, min(count, MOST_TICKS))})
+    places = range(0, count, -(-count // MOST_TICKS))
     put(places, [shown(axis.values[p]) for p in places], fontsize=8)

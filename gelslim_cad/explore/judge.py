@@ -17,6 +17,7 @@ from gelslim_cad.light.inputs import NAMES as LIGHT_NAMES
 from gelslim_cad.spec import Spec
 
 Columns = dict[str, list[Any]]
+VERDICT = ("status", "binding", "thickness_by", "failed", "reason")
 SHOWN = (
     "finger.thickness_mm",
     "finger.width_mm",
@@ -47,9 +48,10 @@ def judge(
 ) -> Columns:
     """Columns over the rows, in their order; `also` names further dimensions.
 
-    `status` is feasible, infeasible or illegal (the spec would not accept the values); `binding`
-    is what stops the design, or what keeps a feasible one from being thinner. Numbers of illegal
-    designs are None.
+    `status` is feasible, infeasible or illegal (the spec would not accept the values).
+    `thickness_by` is the limit that keeps the finger from being thinner. `binding` is what stops
+    the design: the limit that the fold misses most, else the rule missed most, as a part of its
+    limit; for a feasible design `thickness_by`. Numbers of illegal designs are None.
     """
     table: list[dict[str, Any]] = [{} for _ in rows]
     legal = []
@@ -65,7 +67,17 @@ def judge(
         d = _derived(spec, fixed, columns)
         for k, entry in enumerate(_judged(d, len(places), (*SHOWN, *also))):
             table[legal[places[k]]] = entry
-    names = ("status", "binding", "failed", "reason", *SHOWN, *also, *LIGHT_NAMES, *PAD_NAMES)
+    names = (
+        "status",
+        "binding",
+        "thickness_by",
+        "failed",
+        "reason",
+        *SHOWN,
+        *also,
+        *LIGHT_NAMES,
+        *PAD_NAMES,
+    )
     return {n: [entry.get(n) for entry in table] for n in dict.fromkeys(names)}
 
 
@@ -100,18 +112,16 @@ def _judged(d: Dimensions, count: int, names: Sequence[str]) -> list[dict[str, A
         entry["status"] = "infeasible" if broken else "feasible"
         entry["failed"] = " ".join(broken)
         entry["reason"] = ""
+        nearest = limits[int(missed[:, k].argmax())]
+        nearest = LIMITS.get(nearest, nearest)
+        setter = list(DEPTHS)[int(depths[:, k].argmax())]
+        entry["thickness_by"] = SETTERS[setter] if setter == "guide" else nearest
         if FOLD_RULE in broken:
-            entry["binding"] = LIMITS.get(
-                limits[worst := int(missed[:, k].argmax())], limits[worst]
-            )
+            entry["binding"] = nearest
         elif broken:
             entry["binding"] = ids[int(room[:, k].argmin())]
         else:
-            setter = list(DEPTHS)[int(depths[:, k].argmax())]
-            nearest = limits[int(missed[:, k].argmax())]
-            entry["binding"] = (
-                SETTERS[setter] if setter == "guide" else LIMITS.get(nearest, nearest)
-            )
+            entry["binding"] = entry["thickness_by"]
         entries.append(entry)
     return entries
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+DIGITS = 4
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -32,10 +34,11 @@ TRADES = (
 def front(first: Sequence[float], second: Sequence[float], *, larger: bool = False) -> list[int]:
     """Places on the Pareto front, by rising `first`: no other is as good in both, better in one.
 
-    `first` is to be small, `second` small or, where `larger`, large. Equal designs are all on it.
+    `first` is to be small, `second` small or, where `larger`, large; `DIGITS` digits count, as the
+    solver stops near its limits. Equal designs are all on it.
     """
-    x = np.asarray(first, dtype=float)
-    y = np.asarray(second, dtype=float) * (-1.0 if larger else 1.0)
+    x = _coarse(first)
+    y = _coarse(second) * (-1.0 if larger else 1.0)
     order = np.lexsort((y, x))
     found: list[int] = []
     best, best_x = np.inf, np.nan
@@ -48,10 +51,5 @@ def front(first: Sequence[float], second: Sequence[float], *, larger: bool = Fal
     return found
 
 
-def on_front(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which of the points (n, m), every column to be small, no other point dominates."""
-    kept = np.ones(len(points), bool)
-    for k, point in enumerate(points):
-        beats = np.all(points <= point, axis=1) & np.any(points < point, axis=1)
-        kept[k] = not beats.any()
-    return kept
+def _coarse(values: Sequence[float]) -> NDArray[np.float64]:
+    return np.array([float(f"{v:.{DIGITS}g}") for v in values])

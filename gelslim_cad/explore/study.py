@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns
 from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX, Patch, PatchError
-from gelslim_cad.explore.judge import SHOWN
+from gelslim_cad.explore.judge import SHOWN, VERDICT
 from gelslim_cad.explore.space import Space
 from gelslim_cad.explore.store import Store
 from gelslim_cad.explore.task import Task, unpacked
@@ -29,7 +29,6 @@ LIGHT_COLUMNS = (
     "light.frame_rate_hz",
 )
 FORCE_COLUMNS = ("force.mesh_error", "force.noise_error", "force.error")
-VERDICT = ("status", "binding", "failed", "reason")
 
 
 @dataclass(frozen=True)
@@ -180,8 +179,6 @@ def _light(
 def _force(
     request: Request, columns: Mapping[str, list[Any]], rows: Sequence[int], run: _Run
 ) -> dict[str, list[Any]]:
-    from dataclasses import asdict
-
     patches = {k: Patch.of(_Row(columns, k)) for k in rows}
     distinct = list(dict.fromkeys(patches.values()))
     results = run.results("force error", [Task.of("force", asdict(p)) for p in distinct])

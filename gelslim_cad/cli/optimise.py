@@ -1,0 +1,147 @@
+"""`gelslim optimise`: the thinnest, brightest or most accurate feasible design."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim_cad.cli.explore import Jobs, NoisePx, Rays, Scheduler, Vary
+from gelslim_cad.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from gelslim_cad.explore.optimum import Optimum
+
+
+class Aim(StrEnum):
+    """What to make best."""
+
+    thin = "thin"
+    bright = "bright"
+    accurate = "accurate"
+
+
+def optimise(
+    spec: SpecFile,
+    vary: Vary,
+    aim: Annotated[
+        Aim,
+        typer.Option("--for", help="Thinnest finger, shortest exposure or least force error."),
+    ] = Aim.thin,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-optimise if left out.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the best design to this file, as a spec.")
+    ] = None,
+    rounds: Annotated[
+        int, typer.Option(min=0, max=12, help="Rounds of finer steps around the best.")
+    ] = 3,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    rays: Rays = 1 << 13,
+    marker_noise_px: NoisePx = 0.05,
+    as_json: AsJson = False,
+) -> int:
+    """Find the best feasible design and what binds it.
+
+    Every combination of the values, then finer steps around the best. Exit status 1 when no
+    design is feasible.
+    """
+    from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.cli.failure import CommandError
+    from gelslim_cad.cli.progress import progress_bar
+    from gelslim_cad.explore.axis import parse_axis
+    from gelslim_cad.explore.engine import Engine, processors
+    from gelslim_cad.explore.error import ExploreError
+    from gelslim_cad.explore.optimum import optimise as run
+    from gelslim_cad.explore.space import Space, changed
+    from gelslim_cad.explore.study import Request
+    from gelslim_cad.spec.reader import read_spec
+
+    loaded = read_spec(spec)
+    folder = out or Path("out") / f"{loaded.spec.name}-optimise"
+    try:
+        space = Space.of(loaded.spec, [parse_axis(v) for v in vary])
+        request = Request(space, rays=rays, noise_px=marker_noise_px)
+        engine = Engine(jobs or processors(), scheduler)
+        with progress_bar(quiet=as_json) as tell:
+            best = run(request, aim.value, folder, engine, rounds=rounds, progress=tell)
+    except ExploreError as error:
+        raise CommandError(f"gelslim optimise: {error}", _status(error)) from error
+    chosen = changed(loaded.spec, best.values)
+    words = _binding(chosen)
+    if save is not None:
+        from gelslim_cad.cli.output import replace_file
+        from gelslim_cad.explore.saved import spec_text
+
+        replace_file(save, spec_text(loaded.text, best.values).encode())
+    if as_json:
+        print_json(_record(best, words))
+        return 0
+    _report(loaded.spec.name, best, words)
+    if save is not None:
+        print(f"Wrote {save}. Next: gelslim check {save}")
+    return 0
+
+
+def _status(error: Exception) -> int:
+    from gelslim_cad.cli.status import BAD_INPUT, RULE_FAILED
+
+    return RULE_FAILED if "is feasible" in str(error) else BAD_INPUT
+
+
+def _binding(chosen: Any) -> tuple[str, ...]:
+    from gelslim_cad.binding import binding_sentences
+    from gelslim_cad.dimensions import derive
+
+    return binding_sentences(chosen, derive(chosen))
+
+
+def _record(best: Optimum, words: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "format": "gelslim-optimum/1",
+        "goal": asdict(best.goal),
+        "values": dict(best.values),
+        "best": dict(best.row),
+        "neighbours": [asdict(n) for n in best.neighbours],
+        "at_end_of_range": best.at_end,
+        "designs": best.designs,
+        "feasible": best.feasible,
+        "binding": words,
+    }
+
+
+def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
+    from rich.table import Table
+
+    from gelslim_cad.cli.answer import console, number, say
+    from gelslim_cad.explore.axis import shown
+
+    value = best.row[best.goal.column]
+    say(
+        f"{name}: least {best.goal.words} {number(value, best.goal.unit)} "
+        f"({best.feasible} of {best.designs} designs tried are feasible)",
+        style="bold",
+    )
+    for path, chosen in best.values.items():
+        end = ", an end of its range" if path in best.at_end else ""
+        say(f"  {path}: {shown(chosen)}{end}")
+    for sentence in words:
+        say(sentence)
+    table = Table("a step further", box=None, pad_edge=False)
+    table.add_column(best.goal.words, justify="right")
+    table.add_column("difference", justify="right")
+    table.add_column("what stops it")
+    for n in best.neighbours:
+        here = n.goal if n.status == "feasible" else None
+        table.add_row(
+            f"{n.path.removeprefix('design.')} {shown(n.value)}",
+            "" if here is None else number(here, best.goal.unit),
+            "" if here is None else f"{'+' if here > value else ''}{number(here - value)}",
+            "" if n.status == "feasible" else n.binding,
+        )
+    console().print(table)

@@ -1,0 +1,171 @@
+"""The best feasible design of a space, refined between the values given, and what holds it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from gelslim_cad.explore.axis import Axis, Value
+from gelslim_cad.explore.engine import Engine
+from gelslim_cad.explore.error import ExploreError
+from gelslim_cad.explore.pareto import Goal
+from gelslim_cad.explore.space import Space
+from gelslim_cad.explore.study import Exploration, Progress, Request, explore
+from gelslim_cad.spec import Spec
+from yaml_model.fields import field_at
+
+Aim = Literal["thin", "bright", "accurate"]
+GOALS: dict[Aim, Goal] = {
+    "thin": Goal("finger.thickness_mm", "finger thickness", "mm"),
+    "bright": Goal("light.exposure_ms", "exposure", "ms"),
+    "accurate": Goal("force.error", "expected force error"),
+}
+"""What each aim makes least. Bright: the shortest exposure, so light and aperture both count."""
+BETWEEN = 2
+"""New values between a value and its neighbour in a round of refinement."""
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """The optimum with one field a step further: its verdict and its goal."""
+
+    path: str
+    value: Value
+    status: str
+    binding: str
+    goal: float | None
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best design: its row of the table, its values, what a step further along would do."""
+
+    goal: Goal
+    values: Mapping[str, Value]
+    row: Mapping[str, Any]
+    neighbours: tuple[Neighbour, ...]
+    at_end: tuple[str, ...]
+    """Fields whose best value is an end of what was given: a longer range may hold a better one."""
+    designs: int
+    feasible: int
+
+
+def optimise(
+    request: Request,
+    aim: Aim,
+    folder: Path,
+    engine: Engine,
+    *,
+    rounds: int = 3,
+    progress: Progress | None = None,
+) -> Optimum:
+    """Explore the space, then `rounds` times the surroundings of the best design.
+
+    A round puts `BETWEEN` values between the best value and its neighbours, of fields that are
+    real numbers; it never leaves the range given. The grid finds the basin, so steps should be
+    fine enough for the design space's folds. Raises ExploreError where no design is feasible, as
+    `explore` does else.
+    """
+    goal = GOALS[aim]
+    asked = replace(request, light=aim == "bright", force_error=aim == "accurate")
+    designs = feasible = 0
+    best: tuple[Value, ...] = ()
+    for k in range(rounds + 1):
+        found = explore(asked, folder / f"round-{k}", engine, progress)
+        designs += found.space.count
+        feasible += len(found.rows_where("feasible"))
+        best = _best(found, goal)
+        finer = _finer(found.space, best)
+        if k == rounds or finer == found.space:
+            break
+        asked = replace(asked, space=finer)
+    place = found.space.rows(0, found.space.count).index(best)
+    given = request.space.axes
+    return Optimum(
+        goal,
+        {a.path: v for a, v in zip(given, best, strict=True)},
+        {n: column[place] for n, column in found.columns.items()},
+        _neighbours(asked, best, goal, folder, engine, request.space),
+        tuple(a.path for a, v in zip(given, best, strict=True) if _ended(a, v)),
+        designs,
+        feasible,
+    )
+
+
+def _best(found: Exploration, goal: Goal) -> tuple[Value, ...]:
+    rows = found.rows_where("feasible")
+    if not rows:
+        names = [b for b in found.columns["binding"] if b]
+        often = max(sorted(set(names)), key=names.count)
+        raise ExploreError(
+            f"none of the {found.space.count} designs is feasible; most often stopped by {often}. "
+            "Vary another field, or further"
+        )
+    column = found.columns[goal.column]
+    return found.space.row(min(rows, key=lambda k: (column[k], k)))
+
+
+def _real(spec: Spec, axis: Axis) -> bool:
+    field = field_at(type(spec), axis.path)
+    return axis.numeric and len(axis.values) > 1 and field is not None and float in field.types
+
+
+def _finer(space: Space, best: Sequence[Value]) -> Space:
+    """Values around the best: it, its neighbours, and `BETWEEN` between; other fields fixed."""
+    axes = []
+    for axis, value in zip(space.axes, best, strict=True):
+        if not _real(space.spec, axis):
+            axes.append(Axis(axis.path, (value,)))
+            continue
+        ordered = sorted(float(v) for v in axis.values if v is not None and not isinstance(v, str))
+        here = ordered.index(float(value))  # type: ignore[arg-type]
+        near = ordered[max(0, here - 1) : here + 2]
+        values: list[float] = []
+        for low, high in itertools.pairwise(near):
+            step = (high - low) / (BETWEEN + 1)
+            values += [low, *(float(f"{low + j * step:.10g}") for j in range(1, BETWEEN + 1))]
+        axes.append(Axis(axis.path, tuple(dict.fromkeys([*values, near[-1]]))))
+    return Space(space.spec, tuple(axes))
+
+
+def _ended(axis: Axis, value: Value) -> bool:
+    if not axis.numeric or len(axis.values) < 2:
+        return False
+    return value in (min(axis.values), max(axis.values))  # type: ignore[type-var]
+
+
+def _neighbours(
+    request: Request,
+    best: Sequence[Value],
+    goal: Goal,
+    folder: Path,
+    engine: Engine,
+    given: Space,
+) -> tuple[Neighbour, ...]:
+    """One step of the given grid to both sides along each field, the others at their best."""
+    found = []
+    for k, axis in enumerate(given.axes):
+        others = [v for v in _beside(axis, best[k]) if v != best[k]]
+        if not others:
+            continue
+        axes = [
+            Axis(a.path, tuple(others) if j == k else (best[j],)) for j, a in enumerate(given.axes)
+        ]
+        asked = replace(request, space=Space(given.spec, tuple(axes)))
+        tried = explore(asked, folder / f"beside-{k}", engine)
+        for i, value in enumerate(others):
+            cells = (tried.columns[n][i] for n in ("status", "binding", goal.column))
+            found.append(Neighbour(axis.path, value, *cells))
+    return tuple(found)
+
+
+def _beside(axis: Axis, value: Value) -> list[Value]:
+    if not axis.numeric:
+        return list(axis.values)
+    ordered: list[Any] = sorted(axis.values)
+    below = [v for v in ordered if v < value]
+    above = [v for v in ordered if v > value]
+    return [*below[-1:], *above[:1]]
