@@ -16,6 +16,7 @@ from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
 from gelslim_cad.cli.derive import derive
 from gelslim_cad.cli.diff import diff
+from gelslim_cad.cli.doctor import doctor
 from gelslim_cad.cli.explain import explain
 from gelslim_cad.cli.explore import explore
 from gelslim_cad.cli.force import force
@@ -34,7 +35,7 @@ app = typer.Typer(
     "report.",
     epilog=EPILOG,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
@@ -75,5 +76,6 @@ for _command in (
     light,
     plan,
     schema,
+    doctor,
 ):
     app.command()(carried(_command))

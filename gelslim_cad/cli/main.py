@@ -27,6 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         status = app(args=arguments, prog_name="gelslim", standalone_mode=False)
         sys.stdout.flush()
+    except SystemExit as ended:
+        # Only shell completion ends this way: it has printed its answer.
+        return ended.code if isinstance(ended.code, int) else 0
     except BaseException as raised:
         error = raised.cause if isinstance(raised, CarriedError) else raised
         if isinstance(error, BrokenPipeError):
