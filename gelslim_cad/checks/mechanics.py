@@ -86,6 +86,20 @@ def mesh_aspect(
 
 
 @rule(
+    "mesh.crown_mm",
+    title="Rim of a crowned gel holds a layer",
+    parameter="mesh.layers",
+    why="every column of the mesh needs a whole cell under the gel's surface",
+    advice="use more layers, a thicker gel or a lower crown",
+)
+def mesh_crown(gel_thickness_mm: Any, gel_crown_height_mm: Any, pad_mesh_cell_z_mm: Any) -> Finding:
+    """Thickness at the rim against the height of a cell."""
+    crowned = np.asarray(gel_crown_height_mm) > 0
+    least = np.where(crowned, pad_mesh_cell_z_mm, 0.0)
+    return Finding(gel_thickness_mm, least, least=True, tolerance=1e-9)
+
+
+@rule(
     "mesh.size",
     title="Mesh stays manageable",
     parameter="mesh.nodes_per_marker_pitch",

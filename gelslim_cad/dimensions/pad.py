@@ -115,10 +115,10 @@ def pad_mesh_cell_y_mm(
     return markers_pitch_mm / mesh_nodes_per_marker_pitch
 
 
-@dimension("pad_mesh.cell_z_mm", formula="gel thickness / layers")
-def pad_mesh_cell_z_mm(gel_thickness_mm: Any, mesh_layers: Any) -> Any:
+@dimension("pad_mesh.cell_z_mm", formula="(gel thickness + crown) / layers")
+def pad_mesh_cell_z_mm(gel_thickness_mm: Any, gel_crown_height_mm: Any, mesh_layers: Any) -> Any:
     """Cell size through the thickness."""
-    return gel_thickness_mm / mesh_layers
+    return (gel_thickness_mm + gel_crown_height_mm) / mesh_layers
 
 
 @dimension("pad_mesh.node_count", formula="(nx + 1)(ny + 1)(layers + 1), before the crop")

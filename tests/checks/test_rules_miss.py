@@ -75,6 +75,7 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"mesh.layers": 32, "mesh.nodes_per_marker_pitch": 1, "design.markers.pitch_mm": 4.0},
          "fail"),
     ],
+    "mesh.crown_mm": [({"mesh.layers": 1, "design.gel.crown_height_mm": 0.3}, "fail")],
     "mesh.size": [
         ({"mesh.nodes_per_marker_pitch": 20, "mesh.layers": 1}, "warn"),
         ({"mesh.nodes_per_marker_pitch": 20, "mesh.layers": 8}, "fail"),
