@@ -33,6 +33,10 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python bench/light_rays.py
 	$(BIN)/python bench/stiffness_ladder.py
 	$(BIN)/python bench/assembly.py --write
+	$(BIN)/python bench/force_ladders.py
+	$(BIN)/python bench/force_latency.py --frames 3000
+	$(BIN)/python bench/force_overlay.py
+	$(BIN)/python bench/force_tables.py
 
 designs: $(VENV)/.installed
 	for spec in designs/*.yaml; do $(BIN)/gelslim build "$$spec" -o "out/$$(basename "$$spec" .yaml)" || exit $$?; done
