@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gelslim_force.detections import Detections
+from gelslim_force.lattice_bridge import bridged
 
 _REACH = 2
 _GATE = 0.28
@@ -22,6 +23,7 @@ _SEEDS = 12
 _ENOUGH = 0.8
 _SMALLEST = 12
 _RINGS = 200
+_BRIDGES, _WHOLE = 6, 0.9
 
 
 class LatticeError(ValueError):
@@ -117,6 +119,15 @@ def _grown(
                 used.add(int(dot))
     if len(placed) < 5:
         return placed
+    for _ in range(_BRIDGES):
+        _rings(points, tree, placed, used)
+        if len(placed) > _WHOLE * len(points):
+            break
+        more = bridged(points, placed)
+        if not more:
+            break
+        placed.update(more)
+        used.update(more.values())
     for _ in range(3):
         _rings(points, tree, placed, used)
         wrong = [site for site, gap in _misfits(points, placed).items() if gap > _MISFIT]
