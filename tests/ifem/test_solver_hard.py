@@ -155,3 +155,16 @@ def test_threads_change_nothing_beyond_the_tolerance() -> None:
         answers.append([np.fromstring(r.split()[1], sep=",") for r in run.stdout.splitlines()])
     for one, two in zip(*answers, strict=True):
         assert np.linalg.norm(one - two) <= 1e-8 * np.linalg.norm(one)
+
+
+@pytest.mark.parametrize("nu", [0.3223, 0.49, 0.4999])
+def test_the_residual_of_a_loose_solve_is_the_true_one(nu: float) -> None:
+    """It is followed there, not computed afresh."""
+    mesh, _ = build_pad_mesh(RoundedRectangle(16.0, 14.0, 1.0), 2.0, pitch_mm=0.7, layers=4)
+    pad = system(mesh, nu)
+    load = np.random.default_rng(3).normal(size=pad.inner.shape[0])
+    for rtol in (1e-2, 1e-4, 1e-5):
+        found = inner_solver(pad, "pcg").solve(load, rtol)
+        true = np.linalg.norm(load - pad.inner @ found.x) / np.linalg.norm(load)
+        assert found.residual == pytest.approx(true, rel=1e-6)
+        assert true <= rtol * (1 + 1e-6)
