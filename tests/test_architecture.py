@@ -17,6 +17,7 @@ PACKAGES = (
     "gelslim_optics",
     "gelslim_twin",
     "ifem_export",
+    "work_pool",
     "yaml_model",
 )
 SOURCES = sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py"))
@@ -24,6 +25,7 @@ CAD_LIBRARIES = ("cadquery", "OCP", "vtk", "vtkmodules", "pyvista")
 
 FORBIDDEN = {
     "yaml_model": tuple(name for name in PACKAGES if name != "yaml_model") + CAD_LIBRARIES,
+    "work_pool": tuple(name for name in PACKAGES if name != "work_pool") + CAD_LIBRARIES,
     "ifem_export": tuple(name for name in PACKAGES if name != "ifem_export") + CAD_LIBRARIES,
     "gelslim_optics": tuple(name for name in PACKAGES if name != "gelslim_optics") + CAD_LIBRARIES,
     "gelslim_force": ("gelslim_cad", "gelslim_twin", *CAD_LIBRARIES),

@@ -1,0 +1,90 @@
+"""Markers and pictures of gel states, with the effects that a plan keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.plan import Plan
+from gelslim_twin.scene.scene import Scene
+from gelslim_twin.simulation.gel_state import GelState
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.view.camera import plan_camera
+from ifem_export.interpolation import marker_to_node
+
+if TYPE_CHECKING:
+    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_twin.render.frame_renderer import FrameRenderer
+    from gelslim_twin.render.rendered_frame import RenderedFrame
+    from gelslim_twin.render.surface_state import SurfaceState
+
+Array = NDArray[np.float64]
+MOTTLE, VIGNETTING = 0.04, 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Viewer:
+    """One sensor as a plan has it seen."""
+
+    sensor: TwinSensor
+    plan: Plan
+    scene: Scene
+    step_s: float
+    """Time from frame to frame."""
+
+    @cached_property
+    def camera(self) -> VirtualCamera:
+        """The camera of the plan."""
+        return plan_camera(self.plan, self.sensor.camera_record)
+
+    @cached_property
+    def _to_markers(self) -> Any:
+        """(m, c) from the surface nodes to the markers."""
+        return marker_to_node(self.sensor.points_mm, self.sensor.grid.positions_mm)
+
+    @cached_property
+    def _rest_mm(self) -> Array:
+        heights = self._to_markers @ self.sensor.points_mm[:, 2]
+        return np.column_stack([self.sensor.grid.positions_mm, heights])
+
+    def markers_px(self, state: GelState) -> Array:
+        """Images (m, 2) of the dots' centres."""
+        return self.camera.project(self._rest_mm + self._to_markers @ state.displacement_mm)
+
+    @cached_property
+    def renderer(self) -> FrameRenderer:
+        """Draws frames. Raises ValueError where the plan draws none."""
+        from gelslim_twin.render.frame_renderer import FrameRenderer
+        from gelslim_twin.render.surroundings import Pad
+        from gelslim_twin.view.look import plan_look
+
+        look = plan_look(
+            self.plan,
+            self.scene.effects.parameters(),
+            self.sensor.camera_record,
+            self.scene.seed,
+            self.step_s,
+        )
+        pad = Pad(
+            *self.sensor.size_mm,
+            self.sensor.corner_radius_mm,
+            mottle=MOTTLE,
+            vignetting=VIGNETTING,
+            seed=self.scene.seed,
+        )
+        return FrameRenderer(self.camera, self.sensor.grid, self.sensor.light(), pad, look)
+
+    def surface(self, state: GelState) -> SurfaceState:
+        """The state as the renderer takes it."""
+        from gelslim_twin.render.surface_state import SurfaceState
+
+        return SurfaceState.from_nodes(self.sensor.points_mm, state.displacement_mm)
+
+    def frame(self, state: GelState, before: GelState | None, number: int) -> RenderedFrame:
+        """Frame `number`; `before` is the state a frame earlier."""
+        earlier = None if before is None else self.surface(before)
+        return self.renderer.frame(self.surface(state), earlier, number=number)

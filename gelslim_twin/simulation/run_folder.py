@@ -1,0 +1,100 @@
+"""The folder of one simulated scene: what it was made from, and whether it is complete."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+
+FORMAT = "gelslim-simulation/1"
+RUN, PLAN, LEDGER = "run.json", "plan.json", "ledger.json"
+TRUTH, FIELDS = "truth.csv", "truth.npz"
+FRAMES, STATES = "frames", "states"
+
+
+class SimulationError(ValueError):
+    """A simulation that cannot start or go on; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A folder and the key of what is simulated into it."""
+
+    path: Path
+    key: str
+
+    @classmethod
+    def opened(cls, path: Path, key: str, overwrite: bool = False) -> RunFolder:
+        """Make the folder, or go on in it where it holds the same simulation.
+
+        Raises SimulationError for a folder with anything else in it, unless `overwrite`, which
+        takes away another simulation's files and nothing more.
+        """
+        found = cls(path, key)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            record = found.record()
+            if record is None and any(path.iterdir()):
+                raise SimulationError(
+                    f"{path} is not empty and holds no simulation; choose another folder"
+                )
+            if record is not None and record.get("key") != key:
+                if not overwrite:
+                    raise SimulationError(
+                        f"{path} holds another simulation ({record.get('scene')}); choose another "
+                        "folder or replace it with --force"
+                    )
+                found.clear()
+            (path / FRAMES).mkdir(exist_ok=True)
+            (path / STATES).mkdir(exist_ok=True)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise SimulationError(f"{path}: {reason}; choose a folder you can write to") from error
+        return found
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything is there."""
+        record = self.record()
+        return record is not None and record.get("state") == "complete"
+
+    def record(self) -> dict[str, Any] | None:
+        """What run.json says; None without one."""
+        try:
+            record = json.loads((self.path / RUN).read_bytes())
+        except (OSError, ValueError):
+            return None
+        return record if isinstance(record, dict) and record.get("format") == FORMAT else None
+
+    def write(self, name: str, data: bytes) -> None:
+        """A file, whole or not at all."""
+        replace_file(self.path / name, data)
+
+    def mark(self, state: str, about: dict[str, Any]) -> None:
+        """Rewrite run.json."""
+        self.write(RUN, json_bytes({"format": FORMAT, "key": self.key, "state": state, **about}))
+
+    def frame_path(self, number: int) -> Path:
+        """Picture of a frame."""
+        return self.path / FRAMES / f"frame_{number:06d}.png"
+
+    def clear(self) -> None:
+        """Take away a simulation's files."""
+        for name in (RUN, PLAN, LEDGER, TRUTH, FIELDS):
+            (self.path / name).unlink(missing_ok=True)
+        for pattern in (f"{FRAMES}/frame_*.png", f"{STATES}/states_*.npz"):
+            for file in self.path.glob(pattern):
+                file.unlink()
+
+
+def simulation_key(scene_record: str, plan_json: str, geometry_hash: str, material: str) -> str:
+    """Tells simulations apart: scene, plan, pad and gel."""
+    digest = hashlib.sha256(b"gelslim-simulation/1")
+    for part in (scene_record, plan_json, geometry_hash, material):
+        digest.update(len(part).to_bytes(8, "little"))
+        digest.update(part.encode())
+    return digest.hexdigest()

@@ -1,0 +1,205 @@
+"""Carry out a planned scene: solve the gel pose by pose, look at it frame by frame, write both.
+
+What was solved and drawn before a stop is kept: the same call goes on from there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+from gelslim_force.outputs.picture_file import encoded
+from gelslim_twin.plan import Plan
+from gelslim_twin.scene.frame_times import FrameTime, frame_times
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.scene import Scene
+from gelslim_twin.simulation.gel_state import GelState
+from gelslim_twin.simulation.run_folder import (
+    FIELDS,
+    LEDGER,
+    PLAN,
+    STATES,
+    TRUTH,
+    RunFolder,
+    simulation_key,
+)
+from gelslim_twin.simulation.state_store import StateStore
+from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+
+Progress = Callable[[str, int, int], None]
+COORDINATES = ("x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")
+
+
+class Mechanics(Protocol):
+    """Solves the gel along a path."""
+
+    def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+        """A state per pose, from the first one on."""
+
+
+@dataclass(frozen=True)
+class SimulationJob:
+    """One scene with its plan, sensor and mechanics."""
+
+    scene: Scene
+    poses: tuple[Pose, ...]
+    plan: Plan
+    sensor: TwinSensor
+    mechanics: Callable[[], Mechanics]
+    """Made only if there is something to solve."""
+
+    @property
+    def key(self) -> str:
+        """Tells this simulation from others."""
+        bundle = self.sensor.bundle
+        material = f"{bundle.material} {bundle.formulation}"
+        scene = self.scene.model_dump_json() + repr(self.poses)
+        return simulation_key(scene, self.plan.to_json(), bundle.geometry_hash, material)
+
+
+@dataclass
+class Ledger:
+    """Where the time went, and how well the solver did."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    poses_solved: int = 0
+    frames_drawn: int = 0
+    frames_kept: int = 0
+    worst: dict[str, float] = field(default_factory=dict)
+    """Largest residual, penetration and complementarity of any pose."""
+
+    def add(self, stage: str, since: float) -> float:
+        """Count time since `since`; returns now."""
+        now = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - since
+        return now
+
+    def judge(self, state: GelState) -> None:
+        """Keep the worst of what the solver reports."""
+        for name, value in state.solver.items():
+            self.worst[name] = max(self.worst.get(name, 0.0), float(value))
+
+    def to_record(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "seconds": self.seconds,
+            "poses_solved": self.poses_solved,
+            "frames_drawn": self.frames_drawn,
+            "frames_kept": self.frames_kept,
+            "solver_worst": self.worst,
+        }
+
+
+def simulate(
+    job: SimulationJob,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Ledger:
+    """Simulate into a folder.
+
+    Writes plan.json, truth.csv, truth.npz, frames/ where pictures are observed, ledger.json, and
+    run.json, which says "complete" last. A complete folder is left as it is.
+
+    Raises:
+        SimulationError: the folder holds something else.
+        IfemError: the solver does not converge; states solved before it are kept.
+    """
+    tell = progress or (lambda text, done, total: None)
+    run = RunFolder.opened(folder, job.key, overwrite)
+    about = {"scene": job.scene.name, "observe": list(job.scene.observe), "seed": job.scene.seed}
+    ledger = Ledger()
+    if run.complete:
+        ledger.frames_kept = len(frame_times(job.poses, job.scene.camera.frame_rate_hz))
+        return ledger
+    run.mark("running", about)
+    run.write(PLAN, job.plan.to_json().encode())
+    states = _solved(job, StateStore(run.path / STATES), ledger, tell)
+    truths = list(_seen(job, states, run, ledger, tell))
+    points = job.sensor.points_mm
+    run.write(TRUTH, wrench_csv(truths, points))
+    run.write(FIELDS, fields_npz(truths, points, job.scene.observe))
+    run.write(LEDGER, json_bytes(ledger.to_record()))
+    run.mark("complete", {**about, "frames": len(truths), "poses": len(job.poses)})
+    return ledger
+
+
+def _solved(job: SimulationJob, store: StateStore, ledger: Ledger, tell: Progress) -> StateStore:
+    """States of all poses; those stored already are not solved again where the rest is."""
+    total = len(job.poses)
+    if store.count < total:
+        # The solver remembers its path, so it walks it again; what is stored already is the same.
+        kept = store.count
+        started = time.perf_counter()
+        for index, state in enumerate(job.mechanics().states(job.poses)):
+            if index >= kept:
+                store.append(state)
+                ledger.poses_solved += 1
+            tell("gel", index + 1, total)
+        store.flush()
+        ledger.add("gel", started)
+    for state in store:
+        ledger.judge(state)
+    return store
+
+
+def _seen(
+    job: SimulationJob, states: StateStore, run: RunFolder, ledger: Ledger, tell: Progress
+) -> Iterator[FrameTruth]:
+    observe = job.scene.observe
+    times = frame_times(job.poses, job.scene.camera.frame_rate_hz)
+    viewer = None
+    if "markers" in observe or "image" in observe:
+        from gelslim_twin.simulation.picture import Viewer
+
+        viewer = Viewer(job.sensor, job.plan, job.scene, _step_s(times))
+    before: GelState | None = None
+    for number, when in enumerate(times):
+        state = _at(states, when)
+        started = time.perf_counter()
+        truth = FrameTruth(number, when.time_s, _pose(job.poses, when), state, None, None, None)
+        if viewer is not None:
+            truth = replace(truth, markers_px=viewer.markers_px(state))
+            started = ledger.add("markers", started)
+        if viewer is not None and "image" in observe:
+            drawn = viewer.frame(state, before, number)
+            started = ledger.add("image", started)
+            path = run.frame_path(number)
+            if path.is_file():
+                ledger.frames_kept += 1
+            else:
+                replace_file(path, encoded(np.asarray(drawn.image), ".png"))
+                ledger.frames_drawn += 1
+            ledger.add("write", started)
+            truth = replace(truth, centroids_px=drawn.centres_px, drawn=drawn.drawn)
+        before = state
+        tell("frames", number + 1, len(times))
+        yield truth
+
+
+def _at(states: StateStore, when: FrameTime) -> GelState:
+    first = states[when.before]
+    return first if when.part == 0 else first.blended(states[when.before + 1], when.part)
+
+
+def _pose(poses: tuple[Pose, ...], when: FrameTime) -> Pose:
+    first = poses[when.before]
+    if when.part == 0:
+        return first
+    last = poses[when.before + 1]
+    blend = {n: (1 - when.part) * getattr(first, n) + when.part * getattr(last, n)
+             for n in COORDINATES}  # fmt: skip
+    return replace(first, time_s=when.time_s, **blend)
+
+
+def _step_s(times: tuple[FrameTime, ...]) -> float:
+    """Usual time between frames."""
+    return float(np.median(np.diff([t.time_s for t in times]))) if len(times) > 1 else 0.0

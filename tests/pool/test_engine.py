@@ -1,0 +1,58 @@
+"""Tasks come back whole whatever does them, and whatever happens to who does them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+import pool_tasks
+
+from work_pool.engine import Engine, EngineError
+
+
+@pytest.fixture(autouse=True)
+def importable_in_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_task_once_whatever_the_jobs(jobs: int) -> None:
+    found = dict(Engine(jobs).run(pool_tasks.square, list(range(11))))
+    assert found == {k: k * k for k in range(11)}
+
+
+def test_a_dead_worker_loses_nothing_and_doubles_nothing(tmp_path: Path) -> None:
+    tasks = [(str(tmp_path), k) for k in range(9)]
+    results = list(Engine(2).run(pool_tasks.dies_once, tasks))
+    assert sorted(n for n, _ in results) == list(range(9))
+    assert dict(results) == {k: k * k for k in range(9)}
+    assert (tmp_path / "died").exists()
+
+
+def test_a_task_that_kills_its_workers_is_named() -> None:
+    with pytest.raises(EngineError, match="task 2 was in hand"):
+        list(Engine(2).run(pool_tasks.always_dies, list(range(6))))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_a_task_raises_comes_through(jobs: int) -> None:
+    with pytest.raises(ValueError, match="cannot be done"):
+        list(Engine(jobs).run(pool_tasks.fails, [4, 5, 6]))
+
+
+def test_a_cluster_that_is_not_there_is_named() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(EngineError, match="no Dask scheduler"):
+        list(Engine(scheduler="tcp://127.0.0.1:1").run(pool_tasks.square, [1]))
+
+
+def test_a_local_cluster_gives_the_same() -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        found = dict(Engine(scheduler=cluster.scheduler_address).run(pool_tasks.square, [3, 4]))
+    assert found == {0: 9, 1: 16}
