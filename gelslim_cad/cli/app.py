@@ -19,6 +19,7 @@ from gelslim_cad.cli.diff import diff
 from gelslim_cad.cli.doctor import doctor
 from gelslim_cad.cli.explain import explain
 from gelslim_cad.cli.explore import explore
+from gelslim_cad.cli.family import family
 from gelslim_cad.cli.force import force
 from gelslim_cad.cli.light import light
 from gelslim_cad.cli.markers import markers
@@ -26,6 +27,7 @@ from gelslim_cad.cli.new import new
 from gelslim_cad.cli.optimise import optimise
 from gelslim_cad.cli.plan import plan
 from gelslim_cad.cli.schema import schema
+from gelslim_cad.cli.track import track
 
 EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
 
@@ -67,11 +69,13 @@ for _command in (
     explore,
     optimise,
     build,
+    family,
     bundle,
     bundle_info,
     bundle_export,
     calibrate,
     force,
+    track,
     markers,
     light,
     plan,

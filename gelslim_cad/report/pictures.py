@@ -102,7 +102,7 @@ def _draw(
     meshes: Sequence[Mesh], view: View, explode: float, cut: tuple[int, float] | None = None
 ) -> bytes:
     checked = _checked(meshes)
-    window = _render_window()
+    window = render_window()
     stage = Stage(window, view, cut)
     for number, (_, vertices, faces, rgba, shift) in enumerate(checked):
         stage.add(vertices + explode * np.asarray(shift), faces, rgba, hatch_up=number % 2 == 0)
@@ -128,10 +128,10 @@ def _checked(meshes: Sequence[Mesh]) -> list[Mesh]:
     return checked
 
 
-def _render_window() -> Any:
+def render_window() -> Any:
     """Open an off-screen window that needs no display: EGL, else OSMesa.
 
-    VTK ends the process where neither works, so that is looked at first.
+    VTK ends the process where neither works, so that is looked at first. Raises PictureError.
     """
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:

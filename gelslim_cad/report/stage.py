@@ -13,6 +13,8 @@ HATCH_MM = 0.035
 """Distance of the hatch lines as a share of the picture's width."""
 LIFT = 0.07
 """Black parts are drawn a little lighter, so that their edges and faces can be told apart."""
+FRAME = 1.06
+"""Size of the picture over that of what it shows."""
 NUDGE_MM = 1.3e-4
 """Keeps the cut off vertices and faces which lie exactly in it, as seams do at y = 0."""
 INK = (0.09, 0.11, 0.14)
@@ -61,19 +63,22 @@ class Stage:
         hatch_up: bool = True,
     ) -> None:
         """Add a mesh: vertices (n, 3) in mm, faces (m, 3), sRGB colour with opacity."""
-        corners = view_box(vertices, self._view)
-        self._low = np.minimum(self._low, corners[0])
-        self._high = np.maximum(self._high, corners[1])
+        self.include(vertices)
         shown = (*(LIFT + (1 - LIFT) * channel for channel in rgba[:3]), rgba[3])
         self._solids.append((_poly_data(vertices, faces), shown, hatch_up))
+
+    def include(self, points: np.ndarray) -> None:
+        """Make the picture large enough for points (n, 3) in mm; nothing is drawn there."""
+        low, high = view_box(points, self._view)
+        self._low = np.minimum(self._low, low)
+        self._high = np.maximum(self._high, high)
 
     def image(self, width_px: int, oversampling: int) -> np.ndarray:
         """Draw; the height follows from what is shown. Returns uint8 (height, width, 3)."""
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
-        spread = self._high - self._low
-        shape = min(0.8, max(0.36, spread[1] / max(spread[0], 1e-9) * 1.02))
+        shape = self._shape()
         height_px = round(width_px * shape)
         self._aim(shape)
         for poly, rgba, hatch_up in self._solids:
@@ -99,6 +104,24 @@ class Stage:
         tall = flat.reshape(height_px, k, width_px, k, 3)[::-1]
         return np.ascontiguousarray(np.rint(tall.mean(axis=(1, 3))).astype(np.uint8))
 
+    def placed(self, points: np.ndarray, width_px: int) -> np.ndarray:
+        """Pixels (n, 2), right and down, of points (n, 3) in mm in an image of `width_px`."""
+        seen = points @ self._view.axes().T[:, :2]
+        middle = (self._low[:2] + self._high[:2]) / 2
+        height_px = round(width_px * self._shape())
+        offset = (seen - middle) / self.mm_per_px(width_px) * (1.0, -1.0)
+        return np.asarray(offset + np.array([width_px / 2, height_px / 2]))
+
+    def mm_per_px(self, width_px: int) -> float:
+        """Size of a pixel of an image of `width_px`."""
+        shape = self._shape()
+        half = (self._high - self._low) / 2
+        return float(2 * FRAME * max(half[1], half[0] * shape) / round(width_px * shape))
+
+    def _shape(self) -> float:
+        spread = self._high - self._low
+        return float(min(0.8, max(0.36, spread[1] / max(spread[0], 1e-9) * 1.02)))
+
     def _aim(self, shape: float) -> None:
         right, up, back = self._view.axes()
         middle = (self._low + self._high) / 2
@@ -110,7 +133,7 @@ class Stage:
         camera.SetFocalPoint(*target)
         camera.SetPosition(*(target + 3 * reach * back))
         camera.SetViewUp(*up)
-        self._scale_mm = 1.06 * max(half[1], half[0] * shape)
+        self._scale_mm = FRAME * max(half[1], half[0] * shape)
         camera.SetParallelScale(self._scale_mm)
         camera.SetClippingRange(reach, 5 * reach)
 

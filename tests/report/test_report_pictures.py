@@ -19,7 +19,7 @@ from PIL import Image
 from gelslim_cad.report import pictures
 
 try:
-    pictures._render_window()
+    pictures.render_window()
 except pictures.PictureError as error:
     pytest.skip(f"NO OPENGL: still pictures were not tested; {error}", allow_module_level=True)
 

@@ -1,0 +1,1 @@
+"""Several fingers from one parametric design: built, listed and drawn side by side."""
