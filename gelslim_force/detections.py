@@ -71,3 +71,13 @@ class Detections:
             moments_px2=self.moments_px2[chosen],
             flags=self.flags[chosen],
         )
+
+    def joined(self, more: Detections) -> Detections:
+        """Return these dots with others after them."""
+        return Detections(
+            centres_px=np.vstack([self.centres_px, more.centres_px]),
+            area_px=np.concatenate([self.area_px, more.area_px]),
+            contrast=np.concatenate([self.contrast, more.contrast]),
+            moments_px2=np.vstack([self.moments_px2, more.moments_px2]),
+            flags=np.concatenate([self.flags, more.flags]),
+        )

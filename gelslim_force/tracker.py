@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from gelslim_force.anchor_check import anchors_slipped
 from gelslim_force.detection import Detector, as_planes
@@ -23,6 +24,7 @@ from gelslim_force.reference_lattice import ReferenceLattice
 from gelslim_force.tracks import Tracks
 from ifem_export.marker_grid import ANCHOR_LARGE, MarkerGrid
 
+_SAME_PX = 1.0
 _LEAST_TO_FOLLOW = 0.25
 """Share of the markers that a full search must find for the next frame to go on from it."""
 Route = Literal["near", "full", "registered"]
@@ -33,7 +35,7 @@ Route = Literal["near", "full", "registered"]
 class TrackerSettings:
     """When the tracker leaves its fast path. Raises ValueError for shares outside 0 ... 1."""
 
-    least_coverage: float = 0.9
+    least_coverage: float = 0.97
     """Share of the markers tracked in the last full search that the fast path must find."""
     full_every: int = 30
     """Frames after which the whole frame is searched again in any case."""
@@ -135,9 +137,30 @@ class Tracker:
         dots = self._detector.detect_near(image, places, self._moments, compare=False)
         dots = dots.take(dots.found)
         tracks = match(self._reference, dots.centres_px, expected)
+        if tracks.tracked.sum() < self._usual:
+            dots, tracks = self._looked_again(image, dots, tracks, expected)
         if tracks.tracked.sum() < self._settings.least_coverage * self._usual:
             return None
         return TrackedFrame(tracks, dots, "near", False)
+
+    def _looked_again(
+        self,
+        image: NDArray[np.uint8],
+        dots: Detections,
+        tracks: Tracks,
+        expected: NDArray[np.float64],
+    ) -> tuple[Detections, Tracks]:
+        """Look for lost markers where their neighbours' motion puts them: it changed at once."""
+        lost = np.flatnonzero(~tracks.tracked & tracks.known)
+        more = self._detector.detect_near(image, tracks.places_px[lost], self._rest_moments[lost])
+        more = more.take(more.found)
+        if len(more) and len(dots):
+            gap, _ = cKDTree(dots.centres_px).query(more.centres_px)
+            more = more.take(gap > _SAME_PX)
+        if not len(more):
+            return dots, tracks
+        dots = dots.joined(more)
+        return dots, match(self._reference, dots.centres_px, expected)
 
     def _full(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame:
         dots = self._detector.detect(image)
