@@ -46,7 +46,7 @@ class ForceSettings:
     """`auto`: masked where the contact is known, else low-passed."""
     friction: float = 1.0
     """Coulomb coefficient of the cone and of the slip margin."""
-    low_pass_mm: float = 0.75
+    low_pass_mm: float = 0.4
     """Standard deviation of the low-pass."""
     most_steps: int = 60
     """Steps of the masked fit per frame; it starts from the last frame's forces."""

@@ -35,6 +35,8 @@ from ifem_export.marker_interpolation import FilledInterpolation
 
 Array = NDArray[np.float64]
 _CONTACT_SIGMAS = 5.0
+_SHIFT_MM = 0.03
+"""Change of the lateral motion in the contact that its normal motion need not follow."""
 _UNSEEN = "the markers move, but no contact patch is seen"
 
 
@@ -100,6 +102,7 @@ class ForcePipeline:
         )
         self._index = 0
         self._last_force: Array | None = None
+        self._last_lateral: Array | None = None
         self._kept_gains: tuple[bytes, Array] | None = None
 
     @property
@@ -115,7 +118,7 @@ class ForcePipeline:
     def reset(self) -> None:
         """Forget all motion and count frames from 0."""
         self._tracker.reset()
-        self._index, self._last_force = 0, None
+        self._index, self._last_force, self._last_lateral = 0, None, None
 
     def unreadable(self, problem: str, *, time_s: float | None = None) -> FrameResult:
         """Result of a frame that never arrived whole; it counts, and the stream goes on."""
@@ -214,7 +217,7 @@ class ForcePipeline:
             return reading, motion
         seen = self.normal.look(image, places_px)
         clock.stage("look")
-        reading = self.normal.motion(seen)
+        reading = self.normal.motion(seen, self._last_lateral)
         clock.stage("normal")
         motion = motion_of(places_px, reading)
         clock.stage("displace")
@@ -222,7 +225,9 @@ class ForcePipeline:
             # Nothing shows, yet the gel moves: no force at all would be a false statement.
             return replace(reading, problem=_UNSEEN), motion_of(places_px, None)
         lateral = self._motion.of_touched(motion, reading)
-        if lateral is not None:
+        used, self._last_lateral = self._last_lateral, lateral
+        before = 0.0 if used is None else used
+        if lateral is not None and np.hypot(*(lateral - before)) > _SHIFT_MM:
             reading = self.normal.motion(seen, lateral)
             clock.stage("normal")
             motion = motion_of(places_px, reading)

@@ -166,8 +166,8 @@ def test_an_altered_ladder_is_refused(ladder: Ladder, tmp_path: Path) -> None:
 
 
 def test_a_bundle_starts_with_the_quickest_rung_near_the_best(ladder: Ladder) -> None:
-    best = min(r.error_field for r in ladder.rungs)
+    allowed = max(0.03, 1.1 * min(r.error_field for r in ladder.rungs))
     start = ladder.balanced()
-    assert start.error_field <= 1.1 * best
+    assert start.error_field <= allowed
     quicker = [r for r in ladder.rungs if r.milliseconds < start.milliseconds]
-    assert all(r.error_field > 1.1 * best for r in quicker)
+    assert all(r.error_field > allowed for r in quicker)
