@@ -42,11 +42,11 @@ designs: $(VENV)/.installed
 	for spec in designs/*.yaml; do $(BIN)/gelslim build "$$spec" -o "out/$$(basename "$$spec" .yaml)" || exit $$?; done
 
 $(VENV)/.installed: pyproject.toml $(PINS)
-	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view"
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision"
 	touch $@
 
 $(VENV)/.installed-dev: pyproject.toml $(PINS)
-	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,dev"
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev"
 	touch $@ $(VENV)/.installed
 
 pins: $(VENV)/.installed-dev
