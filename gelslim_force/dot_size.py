@@ -24,6 +24,9 @@ _CONTRASTS = (0.12, 0.05)
 _MOST_DOTS = 6000
 _LEAST_SHARE = 0.25
 """Share of the dots found that must lie on the lattice; fewer lie on one by chance."""
+_MOST_UNEVEN = 0.06
+"""Median distance of a dot from where its neighbours predict it, in pitches: printed lattices
+have 0.02, dots strewn at random 0.08 and more where they can be strung together at all."""
 _DOUBLE_ASPECT = 1.5
 
 
@@ -90,6 +93,9 @@ def _tried(planes: NDArray[np.uint8], settings: DetectorSettings) -> DotEstimate
         return None
     # A strip of two lines has no direction, and a few specks make one easily.
     if min(lattice.shape) < 3 or len(lattice.dots) < _LEAST_SHARE * len(dots):
+        return None
+    known = lattice.residual_px[np.isfinite(lattice.residual_px)]
+    if len(known) == 0 or np.median(known) > _MOST_UNEVEN * lattice.pitch_px:
         return None
     thin, long = _diameters(dots.take(lattice.dots))
     extent = (float(np.percentile(thin, 1)), float(np.percentile(long, 99)))

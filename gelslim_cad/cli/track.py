@@ -104,7 +104,7 @@ class _Frames:
         for frame in self._frames:
             self._ahead.append(frame)
             if frame.image is not None:
-                return frame.image  # type: ignore[no-any-return]
+                return frame.image
         why = self._ahead[0].problem if self._ahead else "there are no frames"
         raise FrameSourceError(f"not one frame can be read: {why}")
 
