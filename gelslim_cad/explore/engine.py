@@ -82,7 +82,7 @@ def _on_cluster(tasks: Sequence[Task], address: str) -> Iterator[tuple[Task, dic
             f"--scheduler {address}: no Dask scheduler answers within {CONNECT_S} s ({error}); "
             "start one with `dask scheduler` and workers with `dask worker ADDRESS`"
         ) from error
-    with client:
+    with client, client.as_current():
         if not client.scheduler_info()["workers"]:
             raise ExploreError(
                 f"--scheduler {address}: the cluster has no workers; start some with "

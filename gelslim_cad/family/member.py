@@ -10,9 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.pad import marker_grid
 
 MM = 1000.0
 """Per metre: GLB is in metres."""
+CORNERS, LIFT_MM = 12, 0.03
+INK = (0.02, 0.02, 0.02, 1.0)
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,21 @@ def member(name: str, d: Dimensions, folder: Path) -> Member:
         (gel[0], gel[1], gel[2]),
         (size[0], size[1], size[2]),
         folder,
-        read_glb(folder / f"{name}.glb"),
+        (*read_glb(folder / f"{name}.glb"), dots(d)),
     )
+
+
+def dots(d: Dimensions) -> Mesh:
+    """The printed markers as one mesh of flat discs just above the gel, for the picture."""
+    grid, shape = marker_grid(d), GelShape.of(d)
+    angles = np.arange(CORNERS) * 2 * np.pi / CORNERS
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1) / 2
+    spread = grid.diameter_mm[:, None, None] * np.concatenate([[[0.0, 0.0]], rim])
+    xy = (grid.positions_mm[:, None, :2] + spread).reshape(-1, 2)
+    z = shape.surface_z_mm(xy[:, 0], xy[:, 1]) + LIFT_MM
+    fan = np.array([(0, k, 1 + k % CORNERS) for k in range(1, CORNERS + 1)])
+    faces = (np.arange(len(grid))[:, None, None] * (CORNERS + 1) + fan).reshape(-1, 3)
+    return Mesh("markers", np.column_stack([xy, z]), faces.astype(np.int64), INK)
 
 
 def read_glb(path: Path) -> tuple[Mesh, ...]:
