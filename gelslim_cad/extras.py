@@ -39,6 +39,10 @@ EXTRAS = (
 )  # fmt: skip
 
 
+INNER = {"OCP": "cad", "vtk": "view", "vtkmodules": "view"}
+"""Modules that come with those of an extra."""
+
+
 def installed(module: str) -> bool:
     """Whether a module can be found; it is not imported, so it may still fail to load."""
     try:
@@ -49,4 +53,4 @@ def installed(module: str) -> bool:
 
 def extra_of(module: str) -> str:
     """Name of the extra that brings a module; empty where none does."""
-    return next((e.name for e in EXTRAS if module in e.modules), "")
+    return INNER.get(module) or next((e.name for e in EXTRAS if module in e.modules), "")

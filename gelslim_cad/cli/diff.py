@@ -29,9 +29,10 @@ def diff(
     ] = True,
     as_json: AsJson = False,
 ) -> int:
-    """Compare two specs: fields, dimensions, rules, parts, bundle.
+    """Compare two specs.
 
-    Nothing is built. Exit status 0 whether or not they differ.
+    Fields, dimensions, rules, parts and bundle that change. Nothing is built. Exit status 0
+    whether or not they differ.
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.compare.comparison import compare

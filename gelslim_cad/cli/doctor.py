@@ -21,10 +21,10 @@ def doctor(
     ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Tell what is installed and what each missing extra would enable.
+    """Tell what is installed and what is missing.
 
-    Loads every library, draws a test picture and times a small force operator: about ten seconds.
-    Exit status 0 whatever is missing.
+    Says what each missing extra would enable. Loads every library, draws a test picture and times
+    a small force operator: about ten seconds. Exit status 0 whatever is missing.
     """
     from gelslim_cad import __version__
     from gelslim_cad.cli.answer import print_json

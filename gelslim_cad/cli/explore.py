@@ -50,7 +50,7 @@ def explore(
     pictures: Annotated[bool, typer.Option(help="Draw the pictures.")] = True,
     as_json: AsJson = False,
 ) -> int:
-    """Explore every combination of the values that vary.
+    """Explore every combination of some values.
 
     Dimensions and design rules of each design, on request light and expected force error: a table
     (CSV, and Parquet where pyarrow is installed), Pareto plots and a map of what is feasible and

@@ -10,16 +10,11 @@ import traceback
 import typer
 
 from gelslim_cad.cli.status import BAD_INPUT, FAULT, INTERRUPTED, RULE_FAILED
+from gelslim_cad.extras import extra_of
 
 # typer brings its own click from 0.20 on and uses the installed one before: ask typer for it.
 _USAGE_ERROR = typer.BadParameter.__mro__[1]
 _COMMAND_ERROR = typer.BadParameter.__mro__[2]
-
-CAD_MODULES = {
-    "OCP", "cadquery", "trimesh", "manifold3d", "lxml", "networkx", "ezdxf", "reportlab",
-    "gerber_writer", "matplotlib",
-}  # fmt: skip
-VIEW_MODULES = {"pyvista", "vtk", "vtkmodules"}
 
 
 class CommandError(Exception):
@@ -101,11 +96,11 @@ def _of_force(error: BaseException) -> bool:
 
 def _missing(error: ImportError) -> tuple[int, str]:
     top = (error.name or "").partition(".")[0]
-    extra = "cad" if top in CAD_MODULES else "view" if top in VIEW_MODULES else ""
+    extra = extra_of(top)
     if extra and isinstance(error, ModuleNotFoundError):
         return BAD_INPUT, (
             f"gelslim: this command needs {top}, which is not installed; "
-            f"run: pip install 'gelslim-cad[{extra}]'"
+            f"run: pip install 'gelslim-cad[{extra}]' (`gelslim doctor` lists all extras)"
         )
     if extra or ".so" in str(error):
         return BAD_INPUT, (

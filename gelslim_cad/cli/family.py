@@ -26,7 +26,7 @@ def family(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Build several fingers and draw them side by side, to scale.
+    """Build several fingers and draw them to scale.
 
     Each goes to a folder of its own, where what has not changed is taken over. Exit status 1 when
     a finger breaks a design rule; the others are built and drawn all the same.
