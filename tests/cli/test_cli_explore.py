@@ -1,0 +1,114 @@
+"""`gelslim explore` and `optimise` from the command line."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from cli_samples import MINI20, fresh
+
+from gelslim_cad.cli import main
+
+VARY = ["--vary", "gel.length_mm=16:24:4", "--vary", "camera.f_number=2,4"]
+
+
+def test_table_pictures_and_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    folder = tmp_path / "ein Raum ä"
+    command = ["explore", str(MINI20), *VARY, "-o", str(folder), "-j", "1"]
+    assert main(command) == 0
+    shown = capsys.readouterr().out
+    assert "6 designs, " in shown
+    assert "stopped by finger.thickness_mm" in shown
+    with open(folder / "designs.csv", encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 6
+    feasible = [r for r in rows if r["status"] == "feasible"]
+    for name in ("pareto.png", "feasibility.png"):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    before = {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()}
+    assert main([*command, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["feasible"] == len(feasible) > 0
+    assert answer["tasks"] == {"done": 0, "taken_over": 1}
+    assert sum(answer["binding"].values()) == 6 - len(feasible)
+    thinnest = min(feasible, key=lambda r: float(r["finger.thickness_mm"]))
+    assert int(thinnest["design"]) in answer["pareto"]["view.keystone"]
+    assert before == {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()}
+
+
+@pytest.mark.parametrize(
+    ("vary", "word"),
+    [
+        (["--vary", "gel.lenght_mm=1,2"], "did you mean design.gel.length_mm"),
+        (["--vary", "gel.length_mm=1:2"], "three numbers"),
+        ([], "--vary"),
+        (["--vary", "gel.length_mm=16", "--column", "finger.x"], "no dimension"),
+        (["--vary", "gel.length_mm=16", "--jobs", "0"], "--jobs"),
+    ],
+)
+@pytest.mark.parametrize("command", ["explore", "optimise"])
+def test_bad_requests(
+    command: str, vary: list[str], word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if command == "optimise" and "--column" in vary:
+        pytest.skip("optimise has no --column")
+    assert main([command, str(MINI20), *vary, "-o", str(tmp_path / "x")]) == 2
+    captured = capsys.readouterr()
+    assert word in captured.err
+    assert "Traceback" not in captured.err
+    assert not (tmp_path / "x").exists()
+
+
+def test_without_parquet_and_pictures_the_table_is_still_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gelslim_cad.extras.installed", lambda module: False)
+    command = ["explore", str(MINI20), "--vary", "gel.length_mm=16", "-o", str(tmp_path / "x")]
+    assert main(command) == 0
+    captured = capsys.readouterr()
+    assert "gelslim-cad[record]" in captured.err
+    assert "gelslim-cad[cad]" in captured.err
+    assert sorted(p.name for p in (tmp_path / "x").iterdir() if p.is_file()) == [
+        "designs.csv",
+        "explore.json",
+    ]
+
+
+def test_optimise_saves_a_spec_that_checks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    best = tmp_path / "best.yaml"
+    command = ["optimise", str(MINI20), *VARY, "-o", str(tmp_path / "x"), "-j", "1"]
+    assert main([*command, "--rounds", "1", "--save", str(best)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "least finger thickness" in shown
+    assert "design.gel.length_mm: 16, an end of its range" in shown
+    assert "Thickness" in shown
+    assert main(["check", str(best)]) == 0
+    capsys.readouterr()
+    assert main(["optimise", str(MINI20), "--vary", "gel.length_mm=60", "-o", "y"]) == 1
+    assert "is feasible" in capsys.readouterr().err
+
+
+def test_a_read_only_place_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("x")
+    command = ["explore", str(MINI20), "--vary", "gel.length_mm=16"]
+    assert main([*command, "-o", str(tmp_path / "file")]) == 2
+    assert "holds no exploration" in capsys.readouterr().err
+    assert main([*command, "-o", str(tmp_path / "file" / "x")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="bash completion")
+def test_completion_answers_without_a_traceback() -> None:
+    asked = {"_GELSLIM_COMPLETE": "complete_bash", "COMP_CWORD": "1"}
+    done = fresh(COMP_WORDS="gelslim opt", **asked)
+    assert (done.returncode, done.stdout.split()) == (0, ["optimise"])
+    done = fresh("--show-completion", "bash")
+    assert done.returncode == 0
+    assert "complete" in done.stdout
+    assert "unexpected" not in done.stderr
