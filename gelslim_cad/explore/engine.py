@@ -6,9 +6,11 @@ import multiprocessing
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any
 
+from gelslim_cad.build.fingerprint import code_hash
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.task import Task, perform
 
@@ -27,7 +29,8 @@ class Engine:
     def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, dict[str, Any]]]:
         """Each task with its result, in the order they finish.
 
-        Raises ExploreError where no cluster answers, and what a task raises.
+        Raises ExploreError where no cluster answers, its workers have other code, or a process is
+        killed, and what a task raises.
         """
         if self.scheduler:
             yield from _on_cluster(tasks, self.scheduler)
@@ -39,7 +42,13 @@ class Engine:
             context = multiprocessing.get_context("spawn")
             workers = min(self.jobs, len(tasks))
             with ProcessPoolExecutor(workers, mp_context=context) as pool:
-                yield from _in_pool(pool, tasks, workers)
+                try:
+                    yield from _in_pool(pool, tasks, workers)
+                except BrokenProcessPool as error:
+                    raise ExploreError(
+                        "a worker process was ended from outside, perhaps for want of memory; "
+                        "what was finished is kept: run again, with fewer --jobs"
+                    ) from error
 
 
 def processors() -> int:
@@ -88,6 +97,17 @@ def _on_cluster(tasks: Sequence[Task], address: str) -> Iterator[tuple[Task, dic
                 f"--scheduler {address}: the cluster has no workers; start some with "
                 f"`dask worker {address}` where gelslim-cad is installed"
             )
-        futures = {client.submit(perform, t, pure=False): t for t in tasks}
+        futures = {client.submit(signed, t, pure=False): t for t in tasks}
         for future in as_finished(list(futures)):
-            yield futures[future], future.result()
+            code, result = future.result()
+            if code != code_hash():
+                raise ExploreError(
+                    f"--scheduler {address}: a worker has another version of gelslim-cad or of its "
+                    "libraries than this machine; install the same there"
+                )
+            yield futures[future], result
+
+
+def signed(task: Task) -> tuple[str, dict[str, Any]]:
+    """A task's result with the digest of the code and libraries that gave it."""
+    return code_hash(), perform(task)

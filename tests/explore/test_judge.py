@@ -8,8 +8,12 @@ from explore_samples import mini20, space
 
 from gelslim_cad.checks import check, check_batch, margins_batch
 from gelslim_cad.dimensions import derive, derive_batch
+from gelslim_cad.explore.axis import Axis
 from gelslim_cad.explore.judge import SHOWN, judge
 from gelslim_cad.explore.space import changed, illegal
+from gelslim_cad.relaxation import given
+from gelslim_cad.spec import Spec
+from yaml_model.fields import field_at, field_table
 
 
 @pytest.mark.parametrize(
@@ -88,3 +92,23 @@ def test_margins_are_negative_exactly_where_rules_fail() -> None:
         if c.margin is not None and c.status == "pass" and c.limit is not None:
             expected = c.margin / max(abs(c.limit), 1.0)
             assert single[rule][0] == pytest.approx(expected, rel=1e-3, abs=1e-5), rule
+
+
+@pytest.mark.slow
+def test_every_numeric_field_of_the_spec_can_vary() -> None:
+    spec, varied = mini20(), 0
+    for field in field_table(Spec):
+        here = given(spec, field.path) if field_at(Spec, field.path) else None
+        if isinstance(here, bool | str) or not isinstance(here, int | float):
+            continue
+        further = here + 1 if float not in field.types else here * 1.03 or 0.1
+        values = [v for v in (here, further) if not illegal(spec, {field.path: v})]
+        columns = judge(spec, [Axis(field.path, tuple(values))], [(v,) for v in values])
+        for k, value in enumerate(values):
+            d = derive(changed(spec, {field.path: value}))
+            failed = {c.id for c in check(d) if c.status == "fail"}
+            assert set(columns["failed"][k].split()) == failed, field.path
+            for name in SHOWN:
+                assert columns[name][k] == pytest.approx(d[name], rel=1e-6, abs=1e-6), field.path
+        varied += len(values) == 2
+    assert varied > 70

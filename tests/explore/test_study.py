@@ -58,6 +58,36 @@ def test_a_dask_cluster_gives_the_table_of_one(tmp_path: Path, small_chunks: Non
     assert far.done == alone.done
 
 
+def test_a_worker_with_other_code_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("gelslim_cad.explore.engine.signed", lambda task: ("other", {}))
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        pytest.raises(ExploreError, match="another version"),
+    ):
+        explore(request(), tmp_path / "far", Engine(1, cluster.scheduler_address))
+    assert not list((tmp_path / "far" / "chunks").iterdir())
+
+
+def test_a_killed_worker_is_told_and_the_rest_kept(
+    tmp_path: Path, small_chunks: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gelslim_cad.explore.engine.perform", _deadly)
+    with pytest.raises(ExploreError, match="fewer --jobs"):
+        explore(request(), tmp_path / "x", Engine(2))
+    monkeypatch.undo()
+    monkeypatch.setattr(space_module, "CHUNK", 4)
+    assert explore(request(), tmp_path / "x", Engine(1)).done > 0
+
+
+def _deadly(task: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def test_no_cluster_is_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("gelslim_cad.explore.engine.CONNECT_S", 1)
