@@ -54,3 +54,10 @@ def installed(module: str) -> bool:
 def extra_of(module: str) -> str:
     """Name of the extra that brings a module; empty where none does."""
     return INNER.get(module) or next((e.name for e in EXTRAS if module in e.modules), "")
+
+
+def require(*modules: str) -> None:
+    """Raise ModuleNotFoundError for the first module that is missing, before any work is done."""
+    for module in modules:
+        if not installed(module):
+            raise ModuleNotFoundError(f"No module named {module!r}", name=module)

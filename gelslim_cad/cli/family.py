@@ -37,10 +37,12 @@ def family(
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.status import OK, RULE_FAILED
     from gelslim_cad.dimensions import derive
+    from gelslim_cad.extras import require
     from gelslim_cad.family.member import member
     from gelslim_cad.spec.reader import read_spec
 
     started = time.monotonic()
+    require("cadquery", "trimesh")
     loaded = [read_spec(s) for s in specs]
     _distinct([x.spec.name for x in loaded])
     members, refused, rebuilt = [], {}, {}

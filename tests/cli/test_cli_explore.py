@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from cli_samples import MINI20, fresh
+from cli_samples import MINI20, ROOT, fresh
 
 from gelslim_cad.cli import main
 
@@ -101,6 +103,38 @@ def test_a_read_only_place_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "holds no exploration" in capsys.readouterr().err
     assert main([*command, "-o", str(tmp_path / "file" / "x")]) == 2
     assert "cannot be written" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_told_and_nothing_is_half_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.replace
+
+    def full(source: str, target: Path) -> None:
+        if "designs-" in str(target):
+            raise OSError(28, "No space left on device", str(target))
+        real(source, target)
+
+    monkeypatch.setattr("os.replace", full)
+    command = ["explore", str(MINI20), *VARY, "-o", str(tmp_path / "x"), "-j", "1"]
+    assert main(command) == 2
+    assert "no space left on device" in capsys.readouterr().err
+    assert not list((tmp_path / "x" / "chunks").iterdir())
+    monkeypatch.undo()
+    assert main(command) == 0
+
+
+def test_two_runs_on_one_folder_wait_for_each_other(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gelslim_cad", "explore", str(MINI20)]
+    command += ["--vary", "gel.length_mm=16:24:0.01", "-o", str(tmp_path / "x"), "-j", "1"]
+    runs = [
+        subprocess.Popen([*command, "--no-pictures", "--json"], cwd=ROOT, stdout=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    answers = [json.loads(run.communicate(timeout=120)[0]) for run in runs]
+    assert [run.returncode for run in runs] == [0, 0]
+    assert sorted(a["tasks"]["done"] for a in answers) == [0, 2]
+    assert answers[0]["pareto"] == answers[1]["pareto"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="bash completion")

@@ -108,6 +108,15 @@ def test_two_specs_of_one_name_are_refused(
     assert not (tmp_path / "f").exists()
 
 
+def test_without_the_cad_extra_nothing_is_left_behind(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gelslim_cad.extras.installed", lambda module: module != "cadquery")
+    assert main(["family", str(DESIGNS / "mini20.yaml"), "-o", str(tmp_path / "f")]) == 2
+    assert "pip install 'gelslim-cad[cad]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.slow
 def test_a_family_is_built_once_and_drawn(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
