@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_force.anderson import Anderson
 from ifem_export.bundle import Bundle
 from ifem_export.finite_strain import NeoHookeanPad
 from ifem_export.pad_system import PadSystem
@@ -69,7 +70,7 @@ class FiniteStrainForce:
         inside = slice(columns, -columns)
         pull = self.system.surface_to_inner @ u.reshape(-1)
         whole[inside] = self.inner.solve(-pull, self.inner_rtol).x.reshape(-1, 3)
-        memory = _Anderson()
+        memory = Anderson()
         trail: list[float] = []
         for _ in range(self.most_steps):
             found = self.pad.force(whole)
@@ -87,27 +88,3 @@ class FiniteStrainForce:
             f"inner nodes of the neo-Hookean pad are not balanced after {self.most_steps} steps "
             f"(rest {shown} N): the motion strains the gel too far for the linear stiffness"
         )
-
-
-class _Anderson:
-    """Anderson acceleration of x <- x + step(x) (Walker and Ni 2011, type II), depth 4.
-
-    The linear stiffness alone gains a factor of two per step in a deep press; the last steps tell
-    how the real one differs.
-    """
-
-    def __init__(self, depth: int = 4) -> None:
-        self.depth = depth
-        self.places: list[Array] = []
-        self.steps: list[Array] = []
-
-    def next(self, x: Array, step: Array) -> Array:
-        """The next x from this one and its plain step."""
-        self.places = [*self.places[-self.depth :], x.copy()]
-        self.steps = [*self.steps[-self.depth :], step]
-        if len(self.steps) == 1:
-            return np.asarray(x + step)
-        change = np.diff(np.array(self.steps), axis=0).T
-        moved = np.diff(np.array(self.places), axis=0).T
-        weights = np.linalg.lstsq(change, step, rcond=None)[0]
-        return np.asarray(x + step - (moved + change) @ weights)

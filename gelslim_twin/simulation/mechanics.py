@@ -1,0 +1,88 @@
+"""The mechanics that a plan asks for: linear contact, friction, large strain, relaxation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gelslim_twin.plan import Plan
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.reader import LoadedScene
+from gelslim_twin.simulation.gel_state import GelState
+from gelslim_twin.simulation.simulate import Mechanics
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+
+
+def mechanics_of(
+    loaded: LoadedScene, plan: Plan, sensor: TwinSensor, folder: Path | None = None
+) -> Mechanics:
+    """Mechanics of a planned scene; `folder` keeps the pad's compliance.
+
+    Only the effects in the plan are imported. Raises ValueError or OSError for an STL that cannot
+    be read.
+    """
+    chosen = {choice.effect: choice for choice in plan.included}
+    if "normal_contact" not in chosen:
+        return Untouched(len(sensor.points_mm))
+    solver = import_module(chosen["normal_contact"].implementation)
+    from gelslim_twin.contact.compliance import SurfaceCompliance
+    from gelslim_twin.contact.tool import Tool
+
+    settings = solver.ContactSettings(**dict(chosen["normal_contact"].rung_parameters))
+    if "friction" in chosen:
+        friction = import_module(chosen["friction"].implementation)
+        knobs = dict(chosen["friction"].rung_parameters)
+        settings = friction.apply(settings, loaded.scene.contact.friction, **knobs)
+    tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
+    contact: Any = solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder), tool, settings)
+    if "nonlinearity" in chosen:
+        nonlinear = import_module(chosen["nonlinearity"].implementation)
+        contact = nonlinear.NonlinearContact(
+            contact, **dict(chosen["nonlinearity"].rung_parameters)
+        )
+    if "relaxation" in chosen:
+        given = loaded.scene.effects.parameters()["relaxation"].model_dump(exclude={"use"})
+        module = import_module(chosen["relaxation"].implementation)
+        return Relaxing(contact, module, given["terms"])
+    return contact
+
+
+@dataclass(frozen=True)
+class Untouched:
+    """A gel that nothing touches."""
+
+    nodes: int
+
+    def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+        """The gel at rest for every pose."""
+        return (GelState.at_rest(self.nodes) for _ in poses)
+
+
+@dataclass(frozen=True)
+class Relaxing:
+    """Elastic mechanics whose forces relax."""
+
+    elastic: Mechanics
+    relaxation: Any
+    """The module."""
+    terms: Sequence[Mapping[str, float]]
+
+    def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+        """The elastic states with relaxed forces."""
+        series = self.relaxation.PronySeries(
+            tuple(t["fraction"] for t in self.terms), tuple(t["time_s"] for t in self.terms)
+        )
+        memory, last = None, poses[0].time_s if poses else 0.0
+        for pose, state in zip(poses, self.elastic.states(poses), strict=True):
+            if memory is None:
+                memory = self.relaxation.at_rest(series, len(state.force_n))
+            force, memory = self.relaxation.relax(
+                series, memory, state.force_n, max(pose.time_s - last, 0.0)
+            )
+            last = pose.time_s
+            yield replace(state, force_n=np.asarray(force))
