@@ -27,6 +27,7 @@ from gelslim_cad.cli.new import new
 from gelslim_cad.cli.optimise import optimise
 from gelslim_cad.cli.plan import plan
 from gelslim_cad.cli.schema import schema
+from gelslim_cad.cli.simulate import simulate
 from gelslim_cad.cli.track import track
 
 EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
@@ -79,6 +80,7 @@ for _command in (
     markers,
     light,
     plan,
+    simulate,
     schema,
     doctor,
 ):

@@ -5,10 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from gelslim_cad.dimensions import Dimensions
     from gelslim_twin.effects.circumstances import SensorFigures
+    from gelslim_twin.render.light_map import LightMap
     from gelslim_twin.scene.reader import LoadedScene
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
     from ifem_export.bundle import Bundle
     from yaml_model.errors import InputError
+
+RAYS = 1 << 16
+RED_SHARE = 0.45
+"""Red is seen weaker than green on published frames of this finger."""
+ELEVATION_DEG = 25.0
+"""At which light rises through the gel on the mean; the tracer bins no directions."""
 
 
 def sensor_figures(loaded: LoadedScene) -> SensorFigures:
@@ -43,6 +52,46 @@ def sensor_bundle(loaded: LoadedScene) -> Bundle:
     d = derive(spec)
     grid = marker_grid(d)
     return make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
+
+
+def twin_sensor(loaded: LoadedScene) -> TwinSensor:
+    """The sensor to simulate: bundle, outline and, from a spec, the light of its guide.
+
+    Raises as `sensor_figures`.
+    """
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+
+    bundle = sensor_bundle(loaded)
+    if loaded.scene.sensor.bundle is not None:
+        return TwinSensor(bundle)
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.spec.reader import read_spec
+
+    d = derive(read_spec(loaded.sensor_path).spec)
+    length, width = float(d["design.gel.length_mm"]), float(d["design.gel.width_mm"])
+    corner = float(d["design.gel.corner_radius_mm"])
+    return TwinSensor(bundle, lambda: _traced(d), length, width, corner)
+
+
+def _traced(d: Dimensions) -> LightMap:
+    """The guide's light on the pad, traced."""
+    import numpy as np
+
+    from gelslim_cad.guide_section import guide_profile
+    from gelslim_cad.light.scene import light_scene
+    from gelslim_optics.trace import trace_light
+    from gelslim_twin.render.light_map import LED_COLOURS, LightMap
+
+    traced = trace_light(light_scene(d, guide_profile(d)), RAYS, seed=0)
+    return LightMap.from_bins(
+        np.stack([RED_SHARE * traced.irradiance("red"), traced.irradiance("green")]),
+        float(d["design.gel.length_mm"]),
+        float(d["design.gel.width_mm"]),
+        azimuth_deg=np.array([90.0, -90.0]),
+        elevation_deg=np.full(2, ELEVATION_DEG),
+        colour=LED_COLOURS,
+        smooth_mm=0.6,
+    )
 
 
 def _require_present(loaded: LoadedScene) -> None:

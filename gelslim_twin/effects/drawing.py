@@ -13,7 +13,7 @@ class DrawingParameters(EffectParameters):
     """The dots as area of ink in each pixel, on the light of the guide."""
 
     level_dn: float = Field(
-        default=130.0, gt=0, le=10_000, description="Grey value of the bare gel in full light"
+        default=80.0, gt=0, le=10_000, description="Grey value of the bare gel in full light"
     )
     contrast: float = Field(default=0.8, gt=0, le=1, description="Share of light the ink takes")
 
