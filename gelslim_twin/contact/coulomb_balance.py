@@ -1,0 +1,242 @@
+"""Forces of nodes in reach of a tool, with or without Coulomb friction, to a tolerance.
+
+Frictionless contact is a linear complementarity problem, solved exactly by block principal
+pivoting (Júdice and Pires 1994; Murty's single exchanges where blocks cycle). With friction, block
+Gauss-Seidel sweeps; where they slow down, semismooth Newton steps on who sticks and who slips
+(Alart and Curnier 1991) take over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
+
+from gelslim_twin.contact.contact_failure import ContactFailure
+
+Array = NDArray[np.float64]
+Touches = NDArray[np.int8]
+FREE, STICK, SLIP = 0, 1, 2
+MOST_SWEEPS = 3000
+CHECK_EVERY = 6
+SLOW = 0.7
+"""Gain of CHECK_EVERY sweeps below which Newton is tried."""
+NEWTON_STEPS = 12
+BLOCK_TRIES = 10
+RELAXATIONS = (1.0, 0.6, 0.3)
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Forces (n, 3) in N, motion (n, 3) in mm, who is free, sticks or slips, and how well.
+
+    `residual` is the root mean square by which nodes would change their forces if each were
+    solved alone, over that of the forces.
+    """
+
+    force_n: Array
+    motion_mm: Array
+    touch: Touches
+    residual: float
+    sweeps: int
+
+
+def balanced(
+    compliance: Array,
+    height_mm: Array,
+    target_mm: Array,
+    friction: float,
+    start_n: Array | None = None,
+    tolerance: float = 1e-3,
+) -> Balance:
+    """Contact of n nodes with a rigid tool.
+
+    Args:
+        compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite.
+        height_mm: (n,) the most each node may move along z; inf for never in contact.
+        target_mm: (n, 2) motion of a node that sticks.
+        friction: coefficient μ >= 0.
+        start_n: (n, 3) forces to start from.
+        tolerance: on `Balance.residual`; frictionless contact is solved to rounding.
+
+    Raises:
+        ContactFailure: no balance within the tolerance, or input that cannot be.
+    """
+    n = len(height_mm)
+    if not (np.isfinite(friction) and friction >= 0):
+        raise ContactFailure(f"friction = {friction}: must be 0 or more, and finite")
+    if np.isnan(height_mm).any() or not np.isfinite(target_mm).all():
+        raise ContactFailure("the tool's heights or the sticking places hold NaN")
+    start = np.zeros((n, 3)) if start_n is None else np.array(start_n, dtype=float)
+    if not (height_mm < 0).any():
+        nothing = np.zeros((n, 3))
+        return Balance(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
+    if friction == 0:
+        return _frictionless(compliance, height_mm, start[:, 2])
+    return _Frictional(compliance, height_mm, target_mm, friction).balance(start, tolerance)
+
+
+def _frictionless(compliance: Array, height: Array, start: Array) -> Balance:
+    n = len(height)
+    normal = compliance[2::3, 2::3]
+    active, pivots = _active_set(normal, height, start < 0)
+    force = np.zeros((n, 3))
+    force[active, 2] = np.minimum(_pressed(normal, height, active), 0.0)
+    motion = np.asarray(compliance[:, 2::3] @ force[:, 2]).reshape(n, 3)
+    touch = np.where(force[:, 2] < 0, SLIP, FREE).astype(np.int8)
+    own = np.minimum((height - motion[:, 2]) / np.diag(normal) + force[:, 2], 0.0)
+    size = float(np.linalg.norm(force))
+    residual = float(np.linalg.norm(own - force[:, 2])) / size if size > 0 else 0.0
+    return Balance(force, motion, touch, residual, pivots)
+
+
+def _pressed(normal: Array, height: Array, active: NDArray[np.bool_]) -> Array:
+    if not active.any():
+        return np.zeros(0)
+    factor = cho_factor(normal[np.ix_(active, active)], check_finite=False)
+    return np.asarray(cho_solve(factor, height[active], check_finite=False))
+
+
+def _active_set(
+    normal: Array, height: Array, active: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], int]:
+    """Nodes in contact, and how many factors it took."""
+    active = active & np.isfinite(height)
+    fewest, tries = len(height) + 1, BLOCK_TRIES
+    for pivots in range(1, 20 * len(height) + 200):
+        force = np.zeros(len(height))
+        force[active] = _pressed(normal, height, active)
+        room = height - normal @ force
+        # Rounding must not toggle a node whose force or gap is nothing.
+        slight = 1e-12 * np.abs(force).max(initial=0.0)
+        narrow = 1e-12 * np.abs(height[np.isfinite(height)]).max(initial=0.0)
+        wrong = (active & (force > slight)) | (~active & (room < -narrow))
+        count = int(wrong.sum())
+        if count == 0:
+            return active, pivots
+        if count < fewest:
+            fewest, tries = count, BLOCK_TRIES
+        elif tries > 0:
+            tries -= 1
+        else:
+            wrong &= np.arange(len(height)) == np.flatnonzero(wrong)[-1]
+        active = active ^ wrong
+    raise ContactFailure("the active set of a frictionless contact does not settle")
+
+
+class _Frictional:
+    def __init__(self, compliance: Array, height: Array, target: Array, friction: float) -> None:
+        self.c = np.ascontiguousarray(compliance)
+        self.height = np.ascontiguousarray(height, dtype=float)
+        self.target = np.ascontiguousarray(target, dtype=float)
+        self.mu = float(friction)
+        self.touch = np.zeros(len(height), dtype=np.int8)
+
+    def balance(self, start: Array, tolerance: float) -> Balance:
+        """Sweep until each node's own answer is the force it has."""
+        from gelslim_twin.contact.coulomb_kernel import sweep
+
+        f = np.ascontiguousarray(start).reshape(-1).copy()
+        f.reshape(-1, 3)[np.isinf(self.height)] = 0.0
+        best, sweeps, newton = np.inf, 0, 0
+        for relaxation in RELAXATIONS:
+            u, last = self.c @ f, np.inf
+            for turn in range(MOST_SWEEPS):
+                back = bool(turn % 2)
+                change = sweep(self.c, self.height, self.target, self.mu, relaxation, back,
+                               f, u, self.touch)  # fmt: skip
+                sweeps += 1
+                size = float(np.linalg.norm(f))
+                # A sweep's change understates what is left: half the tolerance, then look.
+                if change <= 0.5 * relaxation * tolerance * size or (turn + 1) % CHECK_EVERY == 0:
+                    u, residual = self._residual(f)
+                    if residual <= tolerance:
+                        return self._balance(f, u, residual, sweeps)
+                    best = min(best, residual)
+                    if residual > SLOW * last:
+                        newton += 1
+                        found = self._newton(f, residual, tolerance) if newton <= 20 else None
+                        if found is not None:
+                            f = found
+                            u, residual = self._residual(f)
+                            if residual <= tolerance:
+                                return self._balance(f, u, residual, sweeps)
+                    last = residual
+        raise ContactFailure(
+            f"the contact of {len(self.height)} nodes with friction {self.mu:g} is not found after "
+            f"{sweeps} sweeps: nodes are off by {best:.1e} of the forces at best, "
+            f"{tolerance:.1e} is asked for; take smaller steps of the motion, a lower friction or "
+            "a larger tolerance",
+            best,
+        )
+
+    def _balance(self, f: Array, u: Array, residual: float, sweeps: int) -> Balance:
+        return Balance(f.reshape(-1, 3), u.reshape(-1, 3), self.touch.copy(), residual, sweeps)
+
+    def _residual(self, f: Array) -> tuple[Array, float]:
+        """Motion afresh, and how far nodes are from their own answers; sets `touch`."""
+        own, u = self._own(f)
+        size = float(np.linalg.norm(own))
+        off = float(np.linalg.norm(own - f))
+        return u, off / size if size > 0 else float(off > 0)
+
+    def _own(self, f: Array) -> tuple[Array, Array]:
+        from gelslim_twin.contact.coulomb_kernel import answers
+
+        u, own = self.c @ f, np.empty_like(f)
+        answers(self.c, self.height, self.target, self.mu, f, u, own, self.touch)
+        return own, u
+
+    def _newton(self, f: Array, residual: float, tolerance: float) -> Array | None:
+        """Forces of a lower residual by Newton's steps, or None."""
+        start, x = residual, f.copy()
+        for _ in range(NEWTON_STEPS):
+            self._own(x)
+            try:
+                step = self._step(x)
+            except (LinAlgError, ValueError):
+                return None
+            # The shortest step that gains, from the whole one down.
+            for share in (1.0, 0.5, 0.25):
+                trial = x + share * step
+                ahead = self._residual(trial)[1]
+                if ahead < residual:
+                    break
+            else:
+                return x if residual < 0.5 * start else None
+            x, residual = trial, ahead
+            if residual <= tolerance:
+                break
+        return x
+
+    def _step(self, f: Array) -> Array:
+        """Newton's step for the touch just found, slip directions turning with the motion."""
+        n, on = len(self.height), np.flatnonzero(self.touch)
+        dof, m = (3 * on[:, None] + np.arange(3)).ravel(), len(on)
+        c = self.c[np.ix_(dof, dof)]
+        present = f[dof]
+        motion = (c @ present).reshape(m, 3)
+        matrix = c.copy().reshape(m, 3, 3 * m)
+        right = np.column_stack([self.target[on], self.height[on]])
+        at = np.flatnonzero(self.touch[on] == SLIP)
+        force = present.reshape(m, 3)[at]
+        own = matrix.reshape(m, 3, m, 3)[at, :, at, :]
+        # G = f_t + μ f_z d with d along f_t - ρ slip, ρ of the size of the node's stiffness.
+        rho = 2.0 / (own[:, 0, 0] + own[:, 1, 1])
+        along = force[:, :2] - rho[:, None] * (motion[at, :2] - right[at, :2])
+        size = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-300)
+        d = along / size[:, None]
+        swing = (self.mu * np.maximum(-force[:, 2], 0.0) / size)[:, None, None] * (
+            np.eye(2) - d[:, :, None] * d[:, None, :]
+        )
+        rows = np.matmul(swing * rho[:, None, None], c.reshape(m, 3, -1)[at, :2])
+        grid = rows.reshape(len(at), 2, m, 3)
+        grid[np.arange(len(at)), :, at, :2] += np.eye(2) - swing
+        grid[np.arange(len(at)), :, at, 2] += self.mu * d
+        matrix[at, :2] = rows
+        right[at, :2] = rows @ present - (force[:, :2] + self.mu * force[:, 2:] * d)
+        x = np.zeros(3 * n)
+        x[dof] = lu_solve(lu_factor(matrix.reshape(3 * m, 3 * m)), right.reshape(-1))
+        return x - f

@@ -1,0 +1,137 @@
+"""Compiled block Gauss-Seidel with Coulomb's law solved exactly at every node.
+
+At a node, with all other forces held, its force f and motion u = r0 + W f obey
+
+    u_z <= h,  f_z <= 0,  f_z (u_z - h) = 0
+    |f_t| <= μ |f_z|;  slip s = u_t - target is 0 inside the cone and opposed to f_t on it
+
+which is one scalar equation where the node slips: with f_z eliminated, (A + a) f_t = b for some
+a >= 0, and |f_t(a)| = μ |f_z(a)| changes sign between a = 0 (sticking) and infinity.
+(Jourdan, Alart and Jean 1998 for the sweeps; Bonnefon and Daviet 2011 for the node's equation.)
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba import njit
+
+FREE, STICK, SLIP = 0, 1, 2
+MOST_HALVINGS = 60
+CLOSE = 1e-13
+
+
+@njit(cache=True)
+def node_force(w: Any, rx: float, ry: float, rz: float, friction: float) -> Any:
+    """Force (fx, fy, fz) of one node and whether it is free, sticks or slips.
+
+    w (3, 3) own compliance, (rx, ry, rz) from the motion without its force to where it would
+    stick and to the tool's height.
+    """
+    if not rz < 0.0:
+        return 0.0, 0.0, 0.0, FREE
+    wzz = w[2, 2]
+    if friction == 0.0:
+        return 0.0, 0.0, rz / wzz, SLIP
+    cx, cy = w[0, 2] / wzz, w[1, 2] / wzz
+    axx, axy = w[0, 0] - cx * w[0, 2], w[0, 1] - cx * w[1, 2]
+    ayy = w[1, 1] - cy * w[1, 2]
+    bx, by = rx - cx * rz, ry - cy * rz
+    low, fx, fy = 0.0, 0.0, 0.0
+    # The larger eigenvalue of A is at most its trace: a unit for the search.
+    high, size = -1.0, axx + ayy
+    a = 0.0
+    for step in range(MOST_HALVINGS):
+        pxx, pyy = axx + a, ayy + a
+        det = pxx * pyy - axy * axy
+        fx, fy = (pyy * bx - axy * by) / det, (pxx * by - axy * bx) / det
+        fz = rz / wzz - cx * fx - cy * fy
+        tangential = math.sqrt(fx * fx + fy * fy)
+        excess = tangential + friction * fz
+        if step == 0 and excess <= 0.0:
+            return fx, fy, fz, STICK
+        if abs(excess) <= CLOSE * tangential:
+            break
+        if excess > 0.0:
+            low = a
+        else:
+            high = a
+        # Newton's step, kept between the bounds.
+        gx, gy = -(pyy * fx - axy * fy) / det, -(pxx * fy - axy * fx) / det
+        slope = (fx * gx + fy * gy) / tangential - friction * (cx * gx + cy * gy)
+        ahead = a - excess / slope if slope < 0.0 else -1.0
+        if high < 0.0:
+            a = ahead if ahead > low else 2.0 * a + size
+            a = min(a, 16.0 * (low + size))
+        elif low < ahead < high:
+            a = ahead
+        else:
+            a = 0.5 * (low + high)
+        if high >= 0.0 and high - low <= CLOSE * high:
+            break
+    # Exactly on the cone, whatever the search left.
+    tangential = math.sqrt(fx * fx + fy * fy)
+    slope = wzz - friction * (w[0, 2] * fx + w[1, 2] * fy) / tangential
+    fz = rz / slope if slope > 0.0 else rz / wzz - cx * fx - cy * fy
+    scale = -friction * fz / tangential
+    return fx * scale, fy * scale, fz, SLIP
+
+
+@njit(cache=True)
+def sweep(
+    compliance: Any,
+    height: Any,
+    target: Any,
+    friction: float,
+    relaxation: float,
+    backwards: bool,
+    f: Any,
+    u: Any,
+    touch: Any,
+) -> float:
+    """One sweep over n nodes, in place; returns |change of f| (root of the sum of squares).
+
+    compliance (3n, 3n), height (n,) of the tool, target (n, 2) where a sticking node would be;
+    f and u (3n,) forces and motion, touch (n,). `relaxation` is the share of each node's change
+    that is made.
+    """
+    n = len(height)
+    total = 0.0
+    for number in range(n):
+        k = n - 1 - number if backwards else number
+        a = 3 * k
+        w = compliance[a : a + 3, a : a + 3]
+        fx, fy, fz = f[a], f[a + 1], f[a + 2]
+        rx = target[k, 0] - u[a] + w[0, 0] * fx + w[0, 1] * fy + w[0, 2] * fz
+        ry = target[k, 1] - u[a + 1] + w[1, 0] * fx + w[1, 1] * fy + w[1, 2] * fz
+        rz = height[k] - u[a + 2] + w[2, 0] * fx + w[2, 1] * fy + w[2, 2] * fz
+        gx, gy, gz, state = node_force(w, rx, ry, rz, friction)
+        touch[k] = state
+        ex, ey, ez = relaxation * (gx - fx), relaxation * (gy - fy), relaxation * (gz - fz)
+        if ex == 0.0 and ey == 0.0 and ez == 0.0:
+            continue
+        if relaxation == 1.0:
+            f[a], f[a + 1], f[a + 2] = gx, gy, gz
+        else:
+            f[a], f[a + 1], f[a + 2] = fx + ex, fy + ey, fz + ez
+        # C is symmetric: its rows stand for its columns and lie together in memory.
+        for i in range(3 * n):
+            u[i] += compliance[a, i] * ex + compliance[a + 1, i] * ey + compliance[a + 2, i] * ez
+        total += ex * ex + ey * ey + ez * ez
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def answers(
+    compliance: Any, height: Any, target: Any, friction: float, f: Any, u: Any, g: Any, touch: Any
+) -> None:
+    """Force g (3n,) that each node would take if the others kept f: g = f at the solution."""
+    for k in range(len(height)):
+        a = 3 * k
+        w = compliance[a : a + 3, a : a + 3]
+        fx, fy, fz = f[a], f[a + 1], f[a + 2]
+        rx = target[k, 0] - u[a] + w[0, 0] * fx + w[0, 1] * fy + w[0, 2] * fz
+        ry = target[k, 1] - u[a + 1] + w[1, 0] * fx + w[1, 1] * fy + w[1, 2] * fz
+        rz = height[k] - u[a + 2] + w[2, 0] * fx + w[2, 1] * fy + w[2, 2] * fz
+        g[a], g[a + 1], g[a + 2], touch[k] = node_force(w, rx, ry, rz, friction)
