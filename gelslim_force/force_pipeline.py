@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 _CONTACT_SIGMAS = 5.0
 _SHIFT_MM = 0.03
 """Change of the lateral motion in the contact that its normal motion need not follow."""
+_MISFIT = 0.35
+_UNEXPLAINED = "forces on the contact seen leave {:.0%} of the motion unexplained"
 _UNSEEN = "the markers move, but no contact patch is seen"
 
 
@@ -171,6 +173,8 @@ class ForcePipeline:
             noise = self._noise_px(tracks.displacement_px)
             field = self._forces(displacement, reading, noise)
             clock.stage("force")
+            if field.misfit > _MISFIT and self._motion.moved(motion):
+                problems = (*problems, _UNEXPLAINED.format(field.misfit))
             covariance = self._covariance(interpolation, motion, noise, reading)
             wrench = self._wrench.wrench(field.force_n, covariance)
             clock.stage("wrench")

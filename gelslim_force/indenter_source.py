@@ -77,6 +77,8 @@ class IndenterSource:
     indenter: Indenter
     depth_mm: float | None = None
     """Known depth, which a flat punch needs."""
+    cap_only: bool = False
+    """The paper's model: the indenter's cap below the rim seen, and no motion beside it."""
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | None:
         """Return the patch of a frame whose markers are at (n, 2)."""
@@ -94,7 +96,11 @@ class IndenterSource:
         at_rest = patch
         if lateral_mm is not None:
             at_rest = replace(patch, centre_mm=patch.centre_mm - lateral_mm)
-        found = self.model.motion(at_rest, self.indenter, self.depth_mm)
+        found = (
+            self.model.cap_only(at_rest, self.indenter)
+            if self.cap_only
+            else self.model.motion(at_rest, self.indenter, self.depth_mm)
+        )
         return NormalReading(
             found.w_mm, found.sigma_mm, found.patch, patch, found.depth_mm, found.problem
         )

@@ -29,6 +29,7 @@ from gelslim_cad.cli.plan import plan
 from gelslim_cad.cli.schema import schema
 from gelslim_cad.cli.simulate import simulate
 from gelslim_cad.cli.track import track
+from gelslim_cad.cli.validate import validate
 
 EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
 
@@ -81,6 +82,7 @@ for _command in (
     light,
     plan,
     simulate,
+    validate,
     schema,
     doctor,
 ):

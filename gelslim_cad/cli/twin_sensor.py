@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from gelslim_cad.dimensions import Dimensions
     from gelslim_twin.effects.circumstances import SensorFigures
     from gelslim_twin.render.light_map import LightMap
@@ -61,13 +63,26 @@ def twin_sensor(loaded: LoadedScene) -> TwinSensor:
     """
     from gelslim_twin.simulation.twin_sensor import TwinSensor
 
-    bundle = sensor_bundle(loaded)
     if loaded.scene.sensor.bundle is not None:
-        return TwinSensor(bundle)
-    from gelslim_cad.dimensions import derive
-    from gelslim_cad.spec.reader import read_spec
+        return TwinSensor(sensor_bundle(loaded))
+    _require_present(loaded)
+    return spec_sensor(loaded.sensor_path)
 
-    d = derive(read_spec(loaded.sensor_path).spec)
+
+def spec_sensor(path: Path) -> TwinSensor:
+    """The sensor of a spec: bundle without a ladder, outline, and its guide's light when asked.
+
+    Raises `InputError` for a spec with faults.
+    """
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.spec.reader import read_spec
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+
+    spec = read_spec(path).spec
+    d = derive(spec)
+    grid = marker_grid(d)
+    bundle = make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
     length, width = float(d["design.gel.length_mm"]), float(d["design.gel.width_mm"])
     corner = float(d["design.gel.corner_radius_mm"])
     return TwinSensor(bundle, lambda: _traced(d), length, width, corner)
