@@ -89,9 +89,12 @@ def _of_ifem(error: BaseException) -> bool:
     return any(c.__module__ == "ifem_export.errors" for c in type(error).__mro__)
 
 
+_WORDED = ("gelslim_force.", "gelslim_twin.", "work_pool.")
+
+
 def _of_force(error: BaseException) -> bool:
-    """Errors that the force pipeline words for its users are classes of their own."""
-    return isinstance(error, ValueError) and type(error).__module__.startswith("gelslim_force.")
+    """Errors that pipeline, twin and engine word for their users are classes of their own."""
+    return isinstance(error, ValueError) and type(error).__module__.startswith(_WORDED)
 
 
 def _missing(error: ImportError) -> tuple[int, str]:
