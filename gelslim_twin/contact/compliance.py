@@ -67,16 +67,21 @@ class SurfaceCompliance:
     def block(self, nodes: Nodes) -> Array:
         """C among nodes (n,), (3n, 3n) in mm/N, symmetric."""
         self.require(nodes)
-        rows = self._rows.reshape(self.nodes, 3, self.nodes, 3)[nodes][:, :, nodes]
-        block = rows.reshape(3 * len(nodes), 3 * len(nodes)).astype(float)
-        return np.asarray((block + block.T) / 2)
+        from gelslim_twin.contact.compliance_kernel import gather_block
+
+        block = np.empty((3 * len(nodes), 3 * len(nodes)))
+        gather_block(self._rows.reshape(self.nodes, 3, self.nodes, 3), np.asarray(nodes), block)
+        return block
 
     def displacement(self, nodes: Nodes, force_n: Array) -> Array:
         """Motion (c, 3) under forces (n, 3) on `nodes` (n,)."""
         self.require(nodes)
-        rows = self._rows.reshape(self.nodes, 3, 3 * self.nodes)[nodes]
-        moved = force_n.reshape(-1).astype(np.float32) @ rows.reshape(-1, 3 * self.nodes)
-        return np.asarray(moved, dtype=float).reshape(-1, 3)
+        from gelslim_twin.contact.compliance_kernel import add_motion
+
+        moved = np.zeros(3 * self.nodes)
+        rows = self._rows.reshape(self.nodes, 3, 3 * self.nodes)
+        add_motion(rows, np.asarray(nodes), np.ascontiguousarray(force_n, dtype=float), moved)
+        return moved.reshape(-1, 3)
 
     def whole(self, force_n: Array) -> Array:
         """Motion (c, 3) under forces (c, 3) on any nodes, solved."""

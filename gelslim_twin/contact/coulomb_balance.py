@@ -1,9 +1,8 @@
 """Forces of nodes in reach of a tool, with or without Coulomb friction, to a tolerance.
 
-Frictionless contact is a linear complementarity problem, solved exactly by block principal
-pivoting (Júdice and Pires 1994; Murty's single exchanges where blocks cycle). With friction, block
-Gauss-Seidel sweeps; where they slow down, semismooth Newton steps on who sticks and who slips
-(Alart and Curnier 1991) take over.
+Frictionless contact is solved exactly by its active set. With friction, block Gauss-Seidel sweeps;
+where they slow down, semismooth Newton steps on who sticks and who slips (Alart and Curnier 1991)
+take over.
 """
 
 from __future__ import annotations
@@ -12,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
+from scipy.linalg import LinAlgError, lu_factor, lu_solve
 
-from gelslim_twin.contact.contact_failure import ContactFailure
+from gelslim_twin.contact.active_set import pressed_nodes
+from gelslim_twin.contact.contact_error import ContactError
 
 Array = NDArray[np.float64]
 Touches = NDArray[np.int8]
@@ -24,7 +24,6 @@ CHECK_EVERY = 6
 SLOW = 0.7
 """Gain of CHECK_EVERY sweeps below which Newton is tried."""
 NEWTON_STEPS = 12
-BLOCK_TRIES = 10
 RELAXATIONS = (1.0, 0.6, 0.3)
 
 
@@ -50,85 +49,66 @@ def balanced(
     friction: float,
     start_n: Array | None = None,
     tolerance: float = 1e-3,
+    frames: Array | None = None,
 ) -> Balance:
     """Contact of n nodes with a rigid tool.
 
     Args:
         compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite.
-        height_mm: (n,) the most each node may move along z; inf for never in contact.
-        target_mm: (n, 2) motion of a node that sticks.
+        height_mm: (n,) the most each node may move along its normal; inf for never in contact.
+        target_mm: (n, 2) motion along its tangents of a node that sticks.
         friction: coefficient μ >= 0.
         start_n: (n, 3) forces to start from.
         tolerance: on `Balance.residual`; frictionless contact is solved to rounding.
+        frames: (n, 3, 3), in the columns each node's tangents and the normal into the tool;
+            None for x, y, z.
 
     Raises:
-        ContactFailure: no balance within the tolerance, or input that cannot be.
+        ContactError: no balance within the tolerance, or input that cannot be.
     """
     n = len(height_mm)
     if not (np.isfinite(friction) and friction >= 0):
-        raise ContactFailure(f"friction = {friction}: must be 0 or more, and finite")
+        raise ContactError(f"friction = {friction}: must be 0 or more, and finite")
     if np.isnan(height_mm).any() or not np.isfinite(target_mm).all():
-        raise ContactFailure("the tool's heights or the sticking places hold NaN")
+        raise ContactError("the tool's heights or the sticking places hold NaN")
     start = np.zeros((n, 3)) if start_n is None else np.array(start_n, dtype=float)
     if not (height_mm < 0).any():
         nothing = np.zeros((n, 3))
         return Balance(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
     if friction == 0:
-        return _frictionless(compliance, height_mm, start[:, 2])
-    return _Frictional(compliance, height_mm, target_mm, friction).balance(start, tolerance)
+        return _frictionless(compliance, height_mm, start, frames)
+    return _Frictional(compliance, height_mm, target_mm, friction, frames).balance(start, tolerance)
 
 
-def _frictionless(compliance: Array, height: Array, start: Array) -> Balance:
+def _frictionless(compliance: Array, height: Array, start: Array, frames: Array | None) -> Balance:
     n = len(height)
-    normal = compliance[2::3, 2::3]
-    active, pivots = _active_set(normal, height, start < 0)
-    force = np.zeros((n, 3))
-    force[active, 2] = np.minimum(_pressed(normal, height, active), 0.0)
-    motion = np.asarray(compliance[:, 2::3] @ force[:, 2]).reshape(n, 3)
-    touch = np.where(force[:, 2] < 0, SLIP, FREE).astype(np.int8)
-    own = np.minimum((height - motion[:, 2]) / np.diag(normal) + force[:, 2], 0.0)
-    size = float(np.linalg.norm(force))
-    residual = float(np.linalg.norm(own - force[:, 2])) / size if size > 0 else 0.0
+    if frames is None:
+        across = compliance[:, 2::3]
+        normal, normals = across[2::3], np.array([[0.0, 0.0, 1.0]])
+    else:
+        normals = frames[:, :, 2]
+        across = np.einsum("ijb,jb->ij", compliance.reshape(3 * n, n, 3), normals)
+        normal = np.einsum("iaj,ia->ij", across.reshape(n, 3, n), normals)
+    # Pushed nodes are pushed against their normals.
+    push, pivots = pressed_nodes(normal, height, (start * normals).sum(axis=1) < 0)
+    force = push[:, None] * normals
+    motion = np.asarray(across @ push).reshape(n, 3)
+    own = np.minimum((height - normal @ push) / np.diag(normal) + push, 0.0)
+    size = float(np.linalg.norm(push))
+    residual = float(np.linalg.norm(own - push)) / size if size > 0 else 0.0
+    touch = np.where(push < 0, SLIP, FREE).astype(np.int8)
     return Balance(force, motion, touch, residual, pivots)
 
 
-def _pressed(normal: Array, height: Array, active: NDArray[np.bool_]) -> Array:
-    if not active.any():
-        return np.zeros(0)
-    factor = cho_factor(normal[np.ix_(active, active)], check_finite=False)
-    return np.asarray(cho_solve(factor, height[active], check_finite=False))
-
-
-def _active_set(
-    normal: Array, height: Array, active: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], int]:
-    """Nodes in contact, and how many factors it took."""
-    active = active & np.isfinite(height)
-    fewest, tries = len(height) + 1, BLOCK_TRIES
-    for pivots in range(1, 20 * len(height) + 200):
-        force = np.zeros(len(height))
-        force[active] = _pressed(normal, height, active)
-        room = height - normal @ force
-        # Rounding must not toggle a node whose force or gap is nothing.
-        slight = 1e-12 * np.abs(force).max(initial=0.0)
-        narrow = 1e-12 * np.abs(height[np.isfinite(height)]).max(initial=0.0)
-        wrong = (active & (force > slight)) | (~active & (room < -narrow))
-        count = int(wrong.sum())
-        if count == 0:
-            return active, pivots
-        if count < fewest:
-            fewest, tries = count, BLOCK_TRIES
-        elif tries > 0:
-            tries -= 1
-        else:
-            wrong &= np.arange(len(height)) == np.flatnonzero(wrong)[-1]
-        active = active ^ wrong
-    raise ContactFailure("the active set of a frictionless contact does not settle")
-
-
 class _Frictional:
-    def __init__(self, compliance: Array, height: Array, target: Array, friction: float) -> None:
+    def __init__(
+        self, compliance: Array, height: Array, target: Array, friction: float, frames: Array | None
+    ) -> None:
+        n = len(height)
         self.c = np.ascontiguousarray(compliance)
+        self.frames = np.tile(np.eye(3), (n, 1, 1)) if frames is None else np.array(frames)
+        blocks = self.c.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n), :]
+        self.own = np.ascontiguousarray(self.frames.transpose(0, 2, 1) @ blocks @ self.frames)
         self.height = np.ascontiguousarray(height, dtype=float)
         self.target = np.ascontiguousarray(target, dtype=float)
         self.mu = float(friction)
@@ -145,8 +125,10 @@ class _Frictional:
             u, last = self.c @ f, np.inf
             for turn in range(MOST_SWEEPS):
                 back = bool(turn % 2)
-                change = sweep(self.c, self.height, self.target, self.mu, relaxation, back,
-                               f, u, self.touch)  # fmt: skip
+                change = sweep(
+                    self.c, self.own, self.frames, self.height, self.target, self.mu,
+                    relaxation, back, f, u, self.touch,
+                )  # fmt: skip
                 sweeps += 1
                 size = float(np.linalg.norm(f))
                 # A sweep's change understates what is left: half the tolerance, then look.
@@ -164,7 +146,7 @@ class _Frictional:
                             if residual <= tolerance:
                                 return self._balance(f, u, residual, sweeps)
                     last = residual
-        raise ContactFailure(
+        raise ContactError(
             f"the contact of {len(self.height)} nodes with friction {self.mu:g} is not found after "
             f"{sweeps} sweeps: nodes are off by {best:.1e} of the forces at best, "
             f"{tolerance:.1e} is asked for; take smaller steps of the motion, a lower friction or "
@@ -186,7 +168,7 @@ class _Frictional:
         from gelslim_twin.contact.coulomb_kernel import answers
 
         u, own = self.c @ f, np.empty_like(f)
-        answers(self.c, self.height, self.target, self.mu, f, u, own, self.touch)
+        answers(self.own, self.frames, self.height, self.target, self.mu, f, u, own, self.touch)
         return own, u
 
     def _newton(self, f: Array, residual: float, tolerance: float) -> Array | None:
@@ -215,8 +197,10 @@ class _Frictional:
         """Newton's step for the touch just found, slip directions turning with the motion."""
         n, on = len(self.height), np.flatnonzero(self.touch)
         dof, m = (3 * on[:, None] + np.arange(3)).ravel(), len(on)
-        c = self.c[np.ix_(dof, dof)]
-        present = f[dof]
+        q = self.frames[on]
+        c = (q.transpose(0, 2, 1) @ self.c[np.ix_(dof, dof)].reshape(m, 3, 3 * m)).reshape(-1, m, 3)
+        c = np.ascontiguousarray(np.einsum("imb,mbd->imd", c, q)).reshape(3 * m, 3 * m)
+        present = np.einsum("mba,mb->ma", q, f.reshape(n, 3)[on]).reshape(-1)
         motion = (c @ present).reshape(m, 3)
         matrix = c.copy().reshape(m, 3, 3 * m)
         right = np.column_stack([self.target[on], self.height[on]])
@@ -238,5 +222,6 @@ class _Frictional:
         matrix[at, :2] = rows
         right[at, :2] = rows @ present - (force[:, :2] + self.mu * force[:, 2:] * d)
         x = np.zeros(3 * n)
-        x[dof] = lu_solve(lu_factor(matrix.reshape(3 * m, 3 * m)), right.reshape(-1))
+        local = lu_solve(lu_factor(matrix.reshape(3 * m, 3 * m)), right.reshape(-1))
+        x[dof] = np.einsum("mab,mb->ma", q, local.reshape(m, 3)).reshape(-1)
         return x - f

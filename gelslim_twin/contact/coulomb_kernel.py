@@ -79,8 +79,33 @@ def node_force(w: Any, rx: float, ry: float, rz: float, friction: float) -> Any:
 
 
 @njit(cache=True)
+def _wanted(
+    k: int, own: Any, frames: Any, height: Any, target: Any, friction: float, f: Any, u: Any
+) -> Any:
+    """Force along x, y, z that node k takes if the others keep theirs, and its touch."""
+    a, q, w = 3 * k, frames[k], own[k]
+    # Forces and motion so far in the node's frame.
+    f0 = q[0, 0] * f[a] + q[1, 0] * f[a + 1] + q[2, 0] * f[a + 2]
+    f1 = q[0, 1] * f[a] + q[1, 1] * f[a + 1] + q[2, 1] * f[a + 2]
+    f2 = q[0, 2] * f[a] + q[1, 2] * f[a + 1] + q[2, 2] * f[a + 2]
+    u0 = q[0, 0] * u[a] + q[1, 0] * u[a + 1] + q[2, 0] * u[a + 2]
+    u1 = q[0, 1] * u[a] + q[1, 1] * u[a + 1] + q[2, 1] * u[a + 2]
+    u2 = q[0, 2] * u[a] + q[1, 2] * u[a + 1] + q[2, 2] * u[a + 2]
+    r0 = target[k, 0] - u0 + w[0, 0] * f0 + w[0, 1] * f1 + w[0, 2] * f2
+    r1 = target[k, 1] - u1 + w[1, 0] * f0 + w[1, 1] * f1 + w[1, 2] * f2
+    r2 = height[k] - u2 + w[2, 0] * f0 + w[2, 1] * f1 + w[2, 2] * f2
+    g0, g1, g2, state = node_force(w, r0, r1, r2, friction)
+    gx = q[0, 0] * g0 + q[0, 1] * g1 + q[0, 2] * g2
+    gy = q[1, 0] * g0 + q[1, 1] * g1 + q[1, 2] * g2
+    gz = q[2, 0] * g0 + q[2, 1] * g1 + q[2, 2] * g2
+    return gx, gy, gz, state
+
+
+@njit(cache=True)
 def sweep(
     compliance: Any,
+    own: Any,
+    frames: Any,
     height: Any,
     target: Any,
     friction: float,
@@ -92,29 +117,28 @@ def sweep(
 ) -> float:
     """One sweep over n nodes, in place; returns |change of f| (root of the sum of squares).
 
-    compliance (3n, 3n), height (n,) of the tool, target (n, 2) where a sticking node would be;
-    f and u (3n,) forces and motion, touch (n,). `relaxation` is the share of each node's change
-    that is made.
+    compliance (3n, 3n); frames (n, 3, 3) with the two tangents and the normal of each node in
+    columns, own (n, 3, 3) each node's compliance in its frame; height (n,) the most it may move
+    along its normal, target (n, 2) where it would stick along its tangents; f and u (3n,) forces
+    and motion along x, y, z; touch (n,). `relaxation` is the share of each node's change that is
+    made.
     """
     n = len(height)
     total = 0.0
     for number in range(n):
         k = n - 1 - number if backwards else number
         a = 3 * k
-        w = compliance[a : a + 3, a : a + 3]
-        fx, fy, fz = f[a], f[a + 1], f[a + 2]
-        rx = target[k, 0] - u[a] + w[0, 0] * fx + w[0, 1] * fy + w[0, 2] * fz
-        ry = target[k, 1] - u[a + 1] + w[1, 0] * fx + w[1, 1] * fy + w[1, 2] * fz
-        rz = height[k] - u[a + 2] + w[2, 0] * fx + w[2, 1] * fy + w[2, 2] * fz
-        gx, gy, gz, state = node_force(w, rx, ry, rz, friction)
+        gx, gy, gz, state = _wanted(k, own, frames, height, target, friction, f, u)
         touch[k] = state
-        ex, ey, ez = relaxation * (gx - fx), relaxation * (gy - fy), relaxation * (gz - fz)
+        ex = relaxation * (gx - f[a])
+        ey = relaxation * (gy - f[a + 1])
+        ez = relaxation * (gz - f[a + 2])
         if ex == 0.0 and ey == 0.0 and ez == 0.0:
             continue
         if relaxation == 1.0:
             f[a], f[a + 1], f[a + 2] = gx, gy, gz
         else:
-            f[a], f[a + 1], f[a + 2] = fx + ex, fy + ey, fz + ez
+            f[a], f[a + 1], f[a + 2] = f[a] + ex, f[a + 1] + ey, f[a + 2] + ez
         # C is symmetric: its rows stand for its columns and lie together in memory.
         for i in range(3 * n):
             u[i] += compliance[a, i] * ex + compliance[a + 1, i] * ey + compliance[a + 2, i] * ez
@@ -124,14 +148,17 @@ def sweep(
 
 @njit(cache=True)
 def answers(
-    compliance: Any, height: Any, target: Any, friction: float, f: Any, u: Any, g: Any, touch: Any
+    own: Any,
+    frames: Any,
+    height: Any,
+    target: Any,
+    friction: float,
+    f: Any,
+    u: Any,
+    g: Any,
+    touch: Any,
 ) -> None:
     """Force g (3n,) that each node would take if the others kept f: g = f at the solution."""
     for k in range(len(height)):
         a = 3 * k
-        w = compliance[a : a + 3, a : a + 3]
-        fx, fy, fz = f[a], f[a + 1], f[a + 2]
-        rx = target[k, 0] - u[a] + w[0, 0] * fx + w[0, 1] * fy + w[0, 2] * fz
-        ry = target[k, 1] - u[a + 1] + w[1, 0] * fx + w[1, 1] * fy + w[1, 2] * fz
-        rz = height[k] - u[a + 2] + w[2, 0] * fx + w[2, 1] * fy + w[2, 2] * fz
-        g[a], g[a + 1], g[a + 2], touch[k] = node_force(w, rx, ry, rz, friction)
+        g[a], g[a + 1], g[a + 2], touch[k] = _wanted(k, own, frames, height, target, friction, f, u)

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from gelslim_force.anderson import Anderson
 from gelslim_force.finite_strain_force import FiniteStrainForce
-from gelslim_twin.contact.solver import ContactError, ContactSolver
+from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.gel_state import GelState
 from ifem_export.finite_strain import FiniteStrainError

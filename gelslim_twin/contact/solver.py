@@ -1,17 +1,18 @@
 """Contact of a rigid tool with a linear gel: who touches, and with which force.
 
-At each pose the nodes in reach obey, with u = C f (Kalker 1990; block Gauss-Seidel as in Jourdan,
-Alart and Jean 1998):
+With u = C f, n the normal into the tool where a node is now and t across it, at each pose
 
-    u_z <= h,  f_z <= 0,  f_z (u_z - h) = 0     the tool's height h over each node
-    |f_t| <= μ |f_z|,  sticking nodes move with the tool
+    n·u <= h,  n·f <= 0,  no force across a gap
+    |f_t| <= μ |n·f|;  slip against the tool is 0 inside the cone and opposed to f_t on it
 
-The tool's height is taken where the node is now, so it is evaluated again as the gel moves
-sideways. Nodes in reach grow until none outside them touches.
+(Kalker 1990; for the forces see `coulomb_balance`). Normals and heights h follow the nodes: the
+tool is a plane at each of them, put anew until no node is off its surface. Nodes in reach grow
+until none outside them touches. A pose that is not reached in one step is approached in halves.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -19,22 +20,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
+from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.coulomb_balance import Balance, balanced
+from gelslim_twin.contact.halved_path import between, reached
 from gelslim_twin.contact.tool import Tool
+from gelslim_twin.contact.tool_surface import ToolSurface, tool_surface
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.gel_state import GelState
-from ifem_export.errors import IfemError
+
+__all__ = ["ContactError", "ContactSettings", "ContactSolver"]
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-MOST_SWEEPS = 4000
-CHECK_EVERY = 4
 REACH = 0.15
 """Share of the depth by which the tool may stand over a node in reach: the gel bulges."""
-GEOMETRY_STEPS = 3
-
-
-class ContactError(IfemError):
-    """A contact that was not found; the message says how far the solver came."""
+GEOMETRY_STEPS = 25
+DAMPED_FROM = 8
+GROWTH_STEPS = 12
+MOST_SUBSTEPS = 200
+SPARE = 1.5
+"""How much larger than needed a kept block may be before a smaller one is gathered."""
 
 
 @dataclass(frozen=True)
@@ -42,44 +47,65 @@ class ContactSettings:
     """When a contact counts as found."""
 
     tolerance: float = 1e-3
-    """Last change of a force over the largest force."""
+    """How far nodes are from their own answers, relative to the forces; and how far off the
+    tool's surface they may be, relative to the depth (at most 1e-3)."""
     friction: float = 0.0
+    longest_step: float = 1.0
+    """Farthest that a touched node may be dragged in one step with friction, in cell sizes."""
+    halvings: int = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Nodes in reach with their compliance."""
+    """Nodes in reach with their compliance (3n, 3n)."""
 
     nodes: Nodes
     block: Array
-    inverse: Array
-    """(n, 3, 3) of the diagonal blocks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """Forces of the nodes in reach, the planes they were found with, and where nodes end up."""
+
+    reach: Reach
+    balance: Balance
+    surface: ToolSurface
+    gap_mm: Array
+    sweeps: int
 
 
 @dataclass(eq=False)
 class ContactSolver:
-    """Follows a tool along poses; remembers the last state, nothing else.
-
-    `offset_mm` (c, 3) is a motion that is there without contact forces: how a nonlinear gel
-    differs from C, see `nonlinear`.
-    """
+    """Follows a tool along poses; remembers nothing but which compliance it read last."""
 
     compliance: SurfaceCompliance
     tool: Tool
     settings: ContactSettings
 
     def __post_init__(self) -> None:
-        self.points_mm = np.asarray(self.compliance.bundle.mesh.surface_mm)
+        mesh = self.compliance.bundle.mesh
+        self.points_mm = np.asarray(mesh.surface_mm)
+        self._longest = self.settings.longest_step * min(mesh.cell_size_mm[:2])
         self._reach: Reach | None = None
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """A state per pose, from the untouched gel on. Raises ContactError."""
         state, before = GelState.at_rest(len(self.points_mm)), None
         for pose in poses:
-            state = self.step(state, before, pose)
+            state = self.advanced(state, before, pose)
             before = pose
             yield state
         self.compliance.store()
+
+    def advanced(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
+        """State at `pose`, in as many steps as the drag and the solver ask for."""
+        if before is None:
+            return self.step(last, None, pose)
+        state = last
+        for middle in between(before, pose, self._substeps(last, before, pose)):
+            state = reached(self.step, state, before, middle, self.settings.halvings)
+            before = middle
+        return state
 
     def step(
         self,
@@ -89,98 +115,159 @@ class ContactSolver:
         offset_mm: Array | None = None,
         start: GelState | None = None,
     ) -> GelState:
-        """State at `pose` after `last` at `before`; `start` has forces to begin with."""
-        guess = start or last
-        now = guess
-        for turn in range(GEOMETRY_STEPS):
-            height = self._height(pose, now.displacement_mm)
-            lateral = self._lateral(last, before, pose)
-            solved = self._solve(height, lateral, now.force_n, offset_mm)
-            moved = np.abs((solved.displacement_mm - now.displacement_mm)[:, :2]).max()
-            now = solved
-            if turn and moved < 1e-4:
-                break
-        return now
+        """State at `pose` after `last` at `before`, in one step; raises ContactError.
 
-    def _height(self, pose: Pose, moved_mm: Array) -> Array:
-        """(c,) height of the tool over each node's rest place, seen where the node is now."""
-        places = self.points_mm[:, :2] + moved_mm[:, :2]
-        return self.tool.height_mm(pose, places[:, 0], places[:, 1]) - self.points_mm[:, 2]
-
-    def _lateral(self, last: GelState, before: Pose | None, pose: Pose) -> Array:
-        """(c, 2) lateral motion of the nodes if they went along with the tool."""
-        if before is None:
-            return np.asarray(last.displacement_mm[:, :2])
-        places = self.points_mm + last.displacement_mm
-        carried = self.tool.carried(before, pose, places)
-        return np.asarray(last.displacement_mm[:, :2] + (carried - places)[:, :2])
-
-    def _solve(
-        self, height: Array, lateral: Array, start_n: Array, offset_mm: Array | None
-    ) -> GelState:
+        `offset_mm` (c, 3) is a motion that is there without contact forces: how a nonlinear gel
+        differs from C. `start` has forces and places to begin with.
+        """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
-        free_height = height - offset[:, 2]
-        deepest = -float(np.min(free_height, initial=0.0))
-        count = len(height)
-        if deepest <= 0:
-            return replace(GelState.at_rest(count), displacement_mm=offset.copy())
-        wanted = free_height < REACH * deepest
-        for _ in range(6):
-            reach = self._reached(np.flatnonzero(wanted))
-            f, touch, sweeps, change = self._balanced(
-                reach, free_height, lateral - offset[:, :2], start_n
-            )
-            u = self.compliance.displacement(reach.nodes, f) + offset
-            outside = (u[:, 2] > height + 1e-4 * deepest) & ~wanted
-            if not outside.any():
-                break
-            wanted |= outside
-        force, touched = np.zeros((count, 3)), np.zeros(count, dtype=np.int8)
-        force[reach.nodes], touched[reach.nodes] = f, touch
-        gap = height[reach.nodes] - u[reach.nodes, 2]
-        push = -f[:, 2]
-        scale = max(float(push.max(initial=0.0)) * deepest, 1e-300)
-        report = {
-            "residual": change,
-            "penetration_mm": float(np.max(u[:, 2] - height, initial=0.0)),
-            "complementarity": float(np.abs(push * gap)[push > 0].max(initial=0.0) / scale),
-            "iterations": float(sweeps),
-        }
-        return GelState(u, force, touched, report)
+        target, ahead = self._targets(last, before, pose)
+        on_tool = np.isfinite(self.tool.height_mm(pose, *(self.points_mm + ahead)[:, :2].T))
+        moved = (last if start is None else start).displacement_mm
+        guess = (last if start is None else start).force_n
+        wanted = np.zeros(len(moved), dtype=bool)
+        for _ in range(GROWTH_STEPS):
+            surface, room = self._room(pose, moved, offset, on_tool)
+            deepest = -float(np.min(room, initial=0.0))
+            if deepest <= 0:
+                return replace(GelState.at_rest(len(moved)), displacement_mm=offset.copy())
+            wanted |= room < REACH * deepest
+            found = self._settled(pose, wanted, surface, moved, target, offset, guess, deepest)
+            state, gap = self._state(found, pose, offset, deepest)
+            into = (gap < -self._slack(deepest)) & ~wanted
+            if not into.any():
+                return state
+            wanted, on_tool = wanted | into, on_tool | into
+            moved, guess = state.displacement_mm, state.force_n
+        raise ContactError("the region of contact keeps growing: take smaller steps of the motion")
 
-    def _balanced(
-        self, reach: Reach, height: Array, lateral: Array, start_n: Array
-    ) -> tuple[Array, NDArray[np.int8], int, float]:
-        """Forces (n, 3), who sticks and slips, sweeps taken and the last relative change."""
-        from gelslim_twin.contact.kernel import sweep
+    def _slack(self, deepest: float) -> float:
+        return min(self.settings.tolerance, 1e-3) * deepest
 
+    def _substeps(self, last: GelState, before: Pose, pose: Pose) -> int:
+        """Steps for the drag of nodes that touch; without friction the path does not matter."""
+        touched = last.touch > 0
+        if self.settings.friction == 0 or not touched.any():
+            return 1
+        places = (self.points_mm + last.displacement_mm)[touched]
+        dragged = np.hypot(*(self.tool.carried(before, pose, places) - places)[:, :2].T).max()
+        return min(MOST_SUBSTEPS, max(1, math.ceil(dragged / self._longest - 1e-9)))
+
+    def _targets(self, last: GelState, before: Pose | None, pose: Pose) -> tuple[Array, Array]:
+        """Motion (c, 3) of each node if it stuck from its first touch on, and the likely motion."""
+        u = last.displacement_mm
+        if before is None:
+            return u, u
+        places = self.points_mm + u
+        dragged = self.tool.carried(before, pose, places) - places
+        touched = last.touch > 0
+        ahead = u + np.where(touched[:, None], dragged, 0.0)
+        if self.settings.friction == 0 or not dragged.any():
+            return u + dragged, ahead
+        # Others go along for the part of the step in which they touch.
+        heights = [self.tool.height_mm(p, *places[:, :2].T) - places[:, 2] for p in (before, pose)]
+        share = np.where(np.isfinite(heights[0]), 0.0, 0.5)
+        closing = np.isfinite(heights[0]) & np.isfinite(heights[1]) & (heights[1] < 0)
+        first = np.maximum(heights[0][closing], 0.0)
+        share[closing] = heights[1][closing] / (heights[1][closing] - first)
+        share[touched] = 1.0
+        return u + share[:, None] * dragged, ahead
+
+    def _room(
+        self, pose: Pose, moved: Array, offset: Array, on_tool: NDArray[np.bool_]
+    ) -> tuple[ToolSurface, Array]:
+        """The tool over all nodes, and how far each may move along its normal by forces (c,)."""
+        places = self.points_mm + moved
+        surface = tool_surface(self.tool, pose, places[:, :2])
+        surface.height_mm[~on_tool] = np.inf
+        return surface, _room(surface, places, moved - offset)
+
+    def _settled(
+        self,
+        pose: Pose,
+        wanted: NDArray[np.bool_],
+        surface: ToolSurface,
+        moved: Array,
+        target: Array,
+        offset: Array,
+        guess: Array,
+        deepest: float,
+    ) -> Attempt:
+        """Forces with the tool's planes where the nodes are."""
+        reach = self._reached(wanted)
         nodes = reach.nodes
-        f = np.ascontiguousarray(start_n[nodes]).reshape(-1)
-        if self.settings.friction == 0:
-            f.reshape(-1, 3)[:, :2] = 0.0
-        u = reach.block @ f
-        touch = np.zeros(len(nodes), dtype=np.int8)
-        target = np.ascontiguousarray(lateral[nodes])
-        tops = np.ascontiguousarray(height[nodes])
-        change = np.inf
-        for done in range(1, MOST_SWEEPS + 1):
-            moved = sweep(
-                reach.block, reach.inverse, tops, target, self.settings.friction, f, u, touch
+        points, off, goal = self.points_mm[nodes], offset[nodes], target[nodes] - offset[nodes]
+        shape = ToolSurface(
+            surface.places_mm[nodes], surface.height_mm[nodes], surface.slopes[nodes]
+        )
+        u, force, sweeps = moved[nodes], guess[nodes], 0
+        worst = np.inf
+        for turn in range(GEOMETRY_STEPS):
+            frames = shape.frames
+            room = _room(shape, points + u, u - off)
+            sticking = goal[:, :2] if frames is None else np.einsum("kab,ka->kb", frames, goal)
+            balance = balanced(
+                reach.block,
+                np.where(wanted[nodes], room, np.inf),
+                np.ascontiguousarray(sticking[:, :2]),
+                self.settings.friction,
+                force,
+                self.settings.tolerance,
+                frames,
             )
-            largest = float(np.abs(f).max(initial=0.0))
-            change = moved / largest if largest > 0 else 0.0
-            if change <= self.settings.tolerance * 0.1:
-                return f.reshape(-1, 3), touch, done, change
+            sweeps += balance.sweeps
+            force, new = balance.force_n, balance.motion_mm + off
+            used = shape
+            shape = tool_surface(self.tool, pose, (points + new)[:, :2], shape)
+            gap = shape.gap_mm(points + new)
+            pressed = balance.touch > 0
+            worst = float(np.abs(np.where(pressed, gap, np.minimum(gap, 0.0)))[wanted[nodes]].max())
+            if worst <= self._slack(deepest):
+                return Attempt(reach, balance, used, gap, sweeps)
+            u = new if turn < DAMPED_FROM else (u + new) / 2
+            if turn >= DAMPED_FROM:
+                shape = tool_surface(self.tool, pose, (points + u)[:, :2], shape)
         raise ContactError(
-            f"the contact of {len(nodes)} nodes is not found after {MOST_SWEEPS} sweeps: forces "
-            f"still change by {change:.1e} of the largest; take smaller steps, a lower friction "
-            "or a larger tolerance"
+            f"nodes stay {worst:.2g} mm off the tool's surface after {GEOMETRY_STEPS} turns: its "
+            "relief is steeper or finer than the gel's cells can follow"
         )
 
-    def _reached(self, nodes: Nodes) -> Reach:
-        if self._reach is None or not np.array_equal(self._reach.nodes, nodes):
-            block = np.ascontiguousarray(self.compliance.block(nodes))
-            grid = block.reshape(len(nodes), 3, len(nodes), 3)
-            own = grid[np.arange(len(nodes)), :, np.arange(len(nodes)), :]
-            self._reach = Reach(nodes, block, np.ascontiguousarray(np.linalg.inv(own)))
+    def _state(
+        self, found: Attempt, pose: Pose, offset: Array, deepest: float
+    ) -> tuple[GelState, Array]:
+        """The whole surface, and gaps (c,) of all nodes."""
+        nodes, balance = found.reach.nodes, found.balance
+        u = self.compliance.displacement(nodes, balance.force_n) + offset
+        gap = tool_surface(self.tool, pose, (self.points_mm + u)[:, :2]).gap_mm(self.points_mm + u)
+        gap[nodes] = found.gap_mm
+        force, touch = np.zeros_like(u), np.zeros(len(u), dtype=np.int8)
+        force[nodes], touch[nodes] = balance.force_n, balance.touch
+        push = np.linalg.norm(balance.force_n, axis=1)
+        most = float(push.max(initial=0.0))
+        across = np.abs(push * np.where(push > 0, found.gap_mm, 0.0)).max(initial=0.0)
+        report = {
+            "residual": balance.residual,
+            "penetration_mm": max(0.0, -float(found.gap_mm.min(initial=0.0))),
+            "complementarity": float(across / (most * deepest)) if most > 0 else 0.0,
+            "iterations": float(found.sweeps),
+        }
+        return GelState(u, force, touch, report), gap
+
+    def _reached(self, wanted: NDArray[np.bool_]) -> Reach:
+        nodes = np.flatnonzero(wanted)
+        kept = self._reach
+        if kept is not None and len(kept.nodes) <= SPARE * len(nodes):
+            inside = np.zeros(len(wanted), dtype=bool)
+            inside[kept.nodes] = True
+            if inside[nodes].all():
+                return kept
+        self._reach = Reach(nodes, self.compliance.block(nodes))
         return self._reach
+
+
+def _room(surface: ToolSurface, places: Array, moved: Array) -> Array:
+    """Motion (n,) along the normals that takes nodes to the tool, beyond all but `moved`."""
+    frames, gap = surface.frames, surface.gap_mm(places)
+    if frames is None:
+        return np.asarray(gap + moved[:, 2])
+    return np.asarray(gap + (frames[:, :, 2] * moved).sum(axis=1))

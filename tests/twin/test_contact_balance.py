@@ -12,7 +12,7 @@ from contact_pads import dense_compliance, small_pad, violations
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from gelslim_twin.contact.contact_failure import ContactFailure
+from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_balance import FREE, SLIP, STICK, balanced
 from gelslim_twin.contact.coulomb_kernel import node_force
 from gelslim_twin.contact.tool import Tool
@@ -188,11 +188,11 @@ def test_refusals() -> None:
     """Impossible input, and a problem without an answer, are told."""
     c = np.eye(3)
     for friction, height in ((-1.0, 0.0), (np.inf, 0.0), (0.5, np.nan)):
-        with pytest.raises(ContactFailure):
+        with pytest.raises(ContactError):
             balanced(c, np.array([height]), np.zeros((1, 2)), friction)
     nothing = balanced(c, np.array([0.1]), np.ones((1, 2)), 0.5)
     assert not nothing.force_n.any()
     assert nothing.touch[0] == FREE
-    kept = pickle.loads(pickle.dumps(ContactFailure("why", 0.1)))
+    kept = pickle.loads(pickle.dumps(ContactError("why", 0.1)))
     assert str(kept) == "why"
     assert kept.residual == 0.1

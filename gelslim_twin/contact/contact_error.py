@@ -5,7 +5,7 @@ from __future__ import annotations
 from ifem_export.errors import IfemError
 
 
-class ContactFailure(IfemError):  # noqa: N818
+class ContactError(IfemError):
     """No contact within the tolerance; the message says how far it got and what to try.
 
     Attributes:
@@ -16,6 +16,6 @@ class ContactFailure(IfemError):  # noqa: N818
         super().__init__(message)
         self.residual = residual
 
-    def __reduce__(self) -> tuple[type[ContactFailure], tuple[str, float]]:
+    def __reduce__(self) -> tuple[type[ContactError], tuple[str, float]]:
         """Pickle by its parts, so that it crosses process boundaries."""
         return (type(self), (str(self), self.residual))
