@@ -76,8 +76,8 @@ def test_a_worker_with_other_code_is_refused(
 def test_a_killed_worker_is_told_and_the_rest_kept(
     tmp_path: Path, small_chunks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim_cad.explore.engine.perform", _deadly)
-    with pytest.raises(ExploreError, match="fewer --jobs"):
+    monkeypatch.setattr("gelslim_cad.explore.engine.signed", _deadly)
+    with pytest.raises(ExploreError, match="use fewer jobs"):
         explore(request(), tmp_path / "x", Engine(2))
     monkeypatch.undo()
     monkeypatch.setattr(space_module, "CHUNK", 4)
@@ -90,7 +90,7 @@ def _deadly(task: object) -> None:
 
 def test_no_cluster_is_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("gelslim_cad.explore.engine.CONNECT_S", 1)
+    monkeypatch.setattr("work_pool.engine.CONNECT_S", 1)
     with pytest.raises(ExploreError, match="no Dask scheduler answers"):
         explore(request(), tmp_path / "x", Engine(1, "tcp://127.0.0.1:1"))
 

@@ -43,8 +43,9 @@ def test_what_a_task_raises_comes_through(jobs: int) -> None:
         list(Engine(jobs).run(pool_tasks.fails, [4, 5, 6]))
 
 
-def test_a_cluster_that_is_not_there_is_named() -> None:
+def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr("work_pool.engine.CONNECT_S", 1)
     with pytest.raises(EngineError, match="no Dask scheduler"):
         list(Engine(scheduler="tcp://127.0.0.1:1").run(pool_tasks.square, [1]))
 
