@@ -19,7 +19,7 @@ from gelslim_twin.contact.contact_error import ContactError
 Array = NDArray[np.float64]
 Touches = NDArray[np.int8]
 FREE, STICK, SLIP = 0, 1, 2
-MOST_SWEEPS = 3000
+MOST_SWEEPS = 1000
 CHECK_EVERY = 6
 SLOW = 0.7
 """Gain of CHECK_EVERY sweeps below which Newton is tried."""

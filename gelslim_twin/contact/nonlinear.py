@@ -5,8 +5,9 @@ With F(u) the forces that hold the surface at u (`FiniteStrainForce`) and C the 
     u = [u - C F(u)] + C f
 
 holds where F(u) = f. The bracket is put into the linear contact as a motion that is there without
-forces, and the whole is iterated with Anderson's acceleration. A pose whose gel would turn inside
-out on the way, or does not settle, is approached in halves.
+forces, and the whole is iterated with Anderson's acceleration. Where the gel is pressed too deep
+for that, Newton's method on the whole gel takes over until the tool leaves (`newton_contact`); a
+pose that it does not reach in one step is approached in halves.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from numpy.typing import NDArray
 from gelslim_force.anderson import Anderson
 from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_body import GelBody
+from gelslim_twin.contact.halved_path import reached
+from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.gel_state import GelState
@@ -27,7 +31,6 @@ from ifem_export.finite_strain import FiniteStrainError
 from ifem_export.solver import ConvergenceError
 
 Array = NDArray[np.float64]
-COORDINATES = ("time_s", "x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")
 
 
 @dataclass(eq=False)
@@ -37,7 +40,7 @@ class NonlinearContact:
     solver: ContactSolver
     tolerance: float = 1e-2
     """|F(u) - f| over |f|."""
-    most_steps: int = 60
+    most_steps: int = 25
     most_halvings: int = 6
     law: FiniteStrainForce = field(init=False)
 
@@ -47,30 +50,65 @@ class NonlinearContact:
             self.solver.compliance.bundle, tolerance=inner, most_steps=40, inner_rtol=inner
         )
         self._zero = np.zeros_like(self.solver.points_mm)
+        body = GelBody(self.solver.compliance.bundle)
+        self._newton = NewtonContact(self.solver, body, self.tolerance)
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """A state per pose, from the untouched gel on. Raises ContactError."""
-        state, before = GelState.at_rest(len(self._zero)), None
+        state: GelState = GelState.at_rest(len(self._zero))
+        before: Pose | None = None
         for pose in poses:
-            state = self._reached(state, before, pose, 0)
-            before = pose
-            yield state
+            for middle in self.solver.steps_to(state, before, pose):
+                state = self._advanced(state, before or middle, middle)
+                before = middle
+            yield GelState(state.displacement_mm, state.force_n, state.touch, state.solver)
         self.solver.compliance.store()
 
-    def _reached(self, last: GelState, before: Pose | None, pose: Pose, halved: int) -> GelState:
-        try:
-            return self._step(last, before, pose)
-        except (FiniteStrainError, ConvergenceError, ContactError) as error:
-            if halved == self.most_halvings or before is None:
-                raise ContactError(
-                    f"the neo-Hookean gel finds no balance at depth {pose.depth_mm:g} mm, "
-                    f"t = {pose.time_s:g} s, even in {2**halved} smaller steps: {error}"
-                ) from error
-        middle = halfway(before, pose)
-        state = self._reached(last, before, middle, halved + 1)
-        return self._reached(state, middle, pose, halved + 1)
+    def _advanced(self, last: GelState, before: Pose, pose: Pose) -> GelState:
+        if not isinstance(last, SolidState) or not last.force_n.any():
+            try:
+                return self._step(last, before, pose)
+            except (FiniteStrainError, ConvergenceError, ContactError):
+                last = self._solid(last, before)
+        return reached(self._newton_step, last, before, pose, self.most_halvings)
 
-    def _step(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
+    def _newton_step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
+        try:
+            return self._newton.step(last, before, pose)
+        except FiniteStrainError as error:
+            raise ContactError(str(error)) from error
+
+    def _solid(self, state: GelState, pose: Pose) -> SolidState:
+        """A state found without the inner gel, with it."""
+        guess = SolidState(
+            state.displacement_mm,
+            state.force_n,
+            state.touch,
+            {},
+            self._whole(state.displacement_mm),
+        )
+        return self._newton_step(guess, pose, pose) if state.force_n.any() else guess
+
+    def _whole(self, u: Array) -> Array:
+        """Displacement (n, 3) of the gel under a surface at u, which the law has found before."""
+        body, system = self._newton.body, self.law.system
+        whole = np.zeros((self.solver.compliance.bundle.mesh.n_nodes, 3))
+        whole[body.surface] = u
+        if system.layers == 1 or not u.any():
+            return whole
+        inside, memory = slice(system.columns, -system.columns), Anderson()
+        pull = system.surface_to_inner @ u.reshape(-1)
+        whole[inside] = self.law.inner.solve(-pull, self.law.inner_rtol).x.reshape(-1, 3)
+        for _ in range(self.law.most_steps):
+            force = body.pad.force(whole)
+            rest = force[inside].reshape(-1)
+            if np.linalg.norm(rest) <= self.law.tolerance * np.linalg.norm(force[body.surface]):
+                break
+            step = self.law.inner.solve(-rest, self.law.inner_rtol).x
+            whole[inside] = memory.next(whole[inside].reshape(-1), step).reshape(-1, 3)
+        return whole
+
+    def _step(self, last: GelState, before: Pose, pose: Pose) -> GelState:
         now = self.solver.step(last, before, pose, self._offset(last.displacement_mm))
         memory, trail = Anderson(), []
         u = now.displacement_mm
@@ -108,8 +146,3 @@ class NonlinearContact:
         if not u.any():
             return self._zero
         return np.asarray(u - self.solver.compliance.whole(self.law.force(u)))
-
-
-def halfway(before: Pose, after: Pose) -> Pose:
-    """The pose in the middle of two."""
-    return Pose(**{n: (getattr(before, n) + getattr(after, n)) / 2 for n in COORDINATES})

@@ -99,13 +99,27 @@ class ContactSolver:
 
     def advanced(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
         """State at `pose`, in as many steps as the drag and the solver ask for."""
-        if before is None:
-            return self.step(last, None, pose)
         state = last
-        for middle in between(before, pose, self._substeps(last, before, pose)):
-            state = reached(self.step, state, before, middle, self.settings.halvings)
+        for middle in self.steps_to(last, before, pose):
+            if before is None:
+                state = self.step(state, None, middle)
+            else:
+                state = reached(self.step, state, before, middle, self.settings.halvings)
             before = middle
         return state
+
+    def steps_to(self, last: GelState, before: Pose | None, pose: Pose) -> Iterator[Pose]:
+        """Poses on the way to `pose`, itself included, that drag no touched node too far at once.
+
+        Without friction the path does not matter: there is one.
+        """
+        touched = last.touch > 0
+        count = 1
+        if before is not None and self.settings.friction > 0 and touched.any():
+            places = (self.points_mm + last.displacement_mm)[touched]
+            dragged = np.hypot(*(self.tool.carried(before, pose, places) - places)[:, :2].T).max()
+            count = min(MOST_SUBSTEPS, max(1, math.ceil(dragged / self._longest - 1e-9)))
+        return iter((pose,)) if before is None else between(before, pose, count)
 
     def step(
         self,
@@ -121,7 +135,7 @@ class ContactSolver:
         differs from C. `start` has forces and places to begin with.
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
-        target, ahead = self._targets(last, before, pose)
+        target, ahead = self.targets(last, before, pose)
         on_tool = np.isfinite(self.tool.height_mm(pose, *(self.points_mm + ahead)[:, :2].T))
         moved = (last if start is None else start).displacement_mm
         guess = (last if start is None else start).force_n
@@ -144,16 +158,7 @@ class ContactSolver:
     def _slack(self, deepest: float) -> float:
         return min(self.settings.tolerance, 1e-3) * deepest
 
-    def _substeps(self, last: GelState, before: Pose, pose: Pose) -> int:
-        """Steps for the drag of nodes that touch; without friction the path does not matter."""
-        touched = last.touch > 0
-        if self.settings.friction == 0 or not touched.any():
-            return 1
-        places = (self.points_mm + last.displacement_mm)[touched]
-        dragged = np.hypot(*(self.tool.carried(before, pose, places) - places)[:, :2].T).max()
-        return min(MOST_SUBSTEPS, max(1, math.ceil(dragged / self._longest - 1e-9)))
-
-    def _targets(self, last: GelState, before: Pose | None, pose: Pose) -> tuple[Array, Array]:
+    def targets(self, last: GelState, before: Pose | None, pose: Pose) -> tuple[Array, Array]:
         """Motion (c, 3) of each node if it stuck from its first touch on, and the likely motion."""
         u = last.displacement_mm
         if before is None:
@@ -180,7 +185,7 @@ class ContactSolver:
         places = self.points_mm + moved
         surface = tool_surface(self.tool, pose, places[:, :2])
         surface.height_mm[~on_tool] = np.inf
-        return surface, _room(surface, places, moved - offset)
+        return surface, room_to_tool(surface, places, moved - offset)
 
     def _settled(
         self,
@@ -197,14 +202,12 @@ class ContactSolver:
         reach = self._reached(wanted)
         nodes = reach.nodes
         points, off, goal = self.points_mm[nodes], offset[nodes], target[nodes] - offset[nodes]
-        shape = ToolSurface(
-            surface.places_mm[nodes], surface.height_mm[nodes], surface.slopes[nodes]
-        )
+        shape = surface.at(nodes)
         u, force, sweeps = moved[nodes], guess[nodes], 0
         worst = np.inf
         for turn in range(GEOMETRY_STEPS):
             frames = shape.frames
-            room = _room(shape, points + u, u - off)
+            room = room_to_tool(shape, points + u, u - off)
             sticking = goal[:, :2] if frames is None else np.einsum("kab,ka->kb", frames, goal)
             balance = balanced(
                 reach.block,
@@ -265,7 +268,7 @@ class ContactSolver:
         return self._reach
 
 
-def _room(surface: ToolSurface, places: Array, moved: Array) -> Array:
+def room_to_tool(surface: ToolSurface, places: Array, moved: Array) -> Array:
     """Motion (n,) along the normals that takes nodes to the tool, beyond all but `moved`."""
     frames, gap = surface.frames, surface.gap_mm(places)
     if frames is None:

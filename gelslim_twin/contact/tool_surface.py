@@ -28,6 +28,10 @@ class ToolSurface:
     slopes: Array
     """(n, 2)."""
 
+    def at(self, nodes: NDArray[np.intp]) -> ToolSurface:
+        """The tool over some of the places."""
+        return ToolSurface(self.places_mm[nodes], self.height_mm[nodes], self.slopes[nodes])
+
     def gap_mm(self, points_mm: Array) -> Array:
         """Distance (n,) of points (n, 3) to the planes along their normals; below 0 inside."""
         ahead = (self.slopes * (points_mm[:, :2] - self.places_mm)).sum(axis=1)

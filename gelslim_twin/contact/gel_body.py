@@ -1,0 +1,96 @@
+"""The whole gel at large strain, and how it answers small changes about a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
+from ifem_export.bundle import Bundle
+from ifem_export.finite_strain import NeoHookeanPad
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+STIFFENINGS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+"""Shares of the stiffness at rest that are added where the tangent is not positive definite."""
+
+
+@dataclass(frozen=True, eq=False)
+class GelBody:
+    """A neo-Hookean pad bonded at its lower face; fields (n, 3) over all its nodes.
+
+    Raises MeshError for a crowned pad or one with cut cells.
+    """
+
+    bundle: Bundle
+
+    @cached_property
+    def pad(self) -> NeoHookeanPad:
+        """The law."""
+        return NeoHookeanPad.of(self.bundle.mesh, self.bundle.material)
+
+    @cached_property
+    def surface(self) -> Nodes:
+        """(c,) nodes of the outer surface."""
+        return np.asarray(self.bundle.mesh.surface, dtype=np.intp)
+
+    @cached_property
+    def free(self) -> Nodes:
+        """Unknowns, 3 x node + axis, that are not bonded."""
+        nodes = np.asarray(self.bundle.mesh.free, dtype=np.intp)
+        return (3 * nodes[:, None] + np.arange(3)).ravel()
+
+    @cached_property
+    def _rows(self) -> NDArray[np.intp]:
+        """Lattice row of each unknown, along the longer side."""
+        numbering = self.bundle.mesh.numbering
+        _, j, i = np.unravel_index(numbering.positions[self.free // 3], numbering.shape)
+        return np.asarray(j if np.ptp(j) >= np.ptp(i) else i)
+
+    @cached_property
+    def _at_rest(self) -> sparse.csr_array:
+        return self._tangent(np.zeros((self.bundle.mesh.n_nodes, 3)))
+
+    def _tangent(self, whole_mm: Array) -> sparse.csr_array:
+        whole = sparse.csr_array(self.pad.tangent(whole_mm))
+        return sparse.csr_array(whole[self.free][:, self.free])
+
+    def tangent(self, whole_mm: Array) -> Tangent:
+        """The gel about a displacement (n, 3). Raises ContactError, FiniteStrainError."""
+        matrix = self._tangent(whole_mm)
+        for share in STIFFENINGS:
+            try:
+                stiff = matrix if share == 0 else sparse.csr_array(matrix + share * self._at_rest)
+                return Tangent(self, RowFactor.of(stiff, self._rows))
+            except LinAlgError:
+                continue
+        raise ContactError("the gel buckles: its tangent stiffness is far from positive definite")
+
+
+@dataclass(eq=False)
+class Tangent:
+    """A factored tangent."""
+
+    body: GelBody
+    factor: RowFactor
+    _nodes: Nodes = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    _block: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def motion(self, force_n: Array) -> Array:
+        """Displacement (n, 3) under forces (n, 3); those on bonded nodes do nothing."""
+        found = np.zeros(force_n.size)
+        found[self.body.free] = self.factor.solve(force_n.reshape(-1)[self.body.free])
+        return found.reshape(-1, 3)
+
+    def block(self, nodes: Nodes) -> Array:
+        """Compliance (3m, 3m) among places `nodes` (m,) of the surface; kept for the next call."""
+        if not np.array_equal(nodes, self._nodes):
+            own = (3 * self.body.surface[nodes][:, None] + np.arange(3)).ravel()
+            self._nodes = nodes
+            self._block = self.factor.compliance(np.searchsorted(self.body.free, own))
+        return self._block

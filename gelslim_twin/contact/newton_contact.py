@@ -1,0 +1,198 @@
+"""Contact of a neo-Hookean gel by Newton's method on the whole gel.
+
+About a displacement U with inner forces F(U) and tangent K, forces f on the surface move it by
+K⁻¹ (E f - F(U)). What the surface does under that is a linear contact, with K's compliance in the
+place of the linear one and -K⁻¹ F(U) as the motion that is there without forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.anderson import Anderson
+from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.coulomb_balance import Balance, balanced
+from gelslim_twin.contact.gel_body import GelBody, Tangent
+from gelslim_twin.contact.solver import REACH, ContactSolver, room_to_tool
+from gelslim_twin.contact.tool_surface import ToolSurface, tool_surface
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.simulation.gel_state import GelState
+from ifem_export.finite_strain import FiniteStrainError
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+MOST_STEPS = 40
+STALE = 0.3
+"""Gain of a step below which the tangent is made anew."""
+SHORTEST = 1 / 32
+BALANCE = (0.01, 1.0)
+"""Tolerances of the linear contact within a step, of that of the whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class SolidState(GelState):
+    """A state of the surface with the displacement (n, 3) of the whole gel."""
+
+    whole_mm: Array | None = None
+
+
+@dataclass(eq=False)
+class NewtonContact:
+    """Steps from pose to pose; keeps the last tangent."""
+
+    solver: ContactSolver
+    body: GelBody
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        self._tangent: Tangent | None = None
+
+    def released(self) -> SolidState:
+        """Nothing touches."""
+        still = np.zeros((self.body.bundle.mesh.n_nodes, 3))
+        rest = GelState.at_rest(len(self.body.surface))
+        return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, still)
+
+    def step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
+        """State at `pose` after `last` at `before`.
+
+        Raises ContactError where it is not found, FiniteStrainError where `last` is impossible.
+        """
+        walk = _Walk(self, last, before, pose)
+        if walk.deepest_mm <= 0:
+            return self.released()
+        for done in range(1, MOST_STEPS + 1):
+            if self._tangent is None or walk.stale:
+                self._tangent = self.body.tangent(walk.whole)
+            found = walk.forward(self._tangent, done)
+            if found is not None:
+                return found
+        raise ContactError(
+            f"the neo-Hookean gel is off balance by {walk.rest:.1e} of the forces and "
+            f"{walk.off_mm:.1e} mm off the tool after {MOST_STEPS} steps",
+            walk.rest,
+        )
+
+
+class _Walk:
+    """Newton's steps to one pose."""
+
+    def __init__(self, owner: NewtonContact, last: SolidState, before: Pose, pose: Pose) -> None:
+        assert last.whole_mm is not None
+        self.solver, self.body, self.tolerance = owner.solver, owner.body, owner.tolerance
+        self.pose = pose
+        self.whole = last.whole_mm
+        self.force = last.force_n
+        self.inner = self.body.pad.force(self.whole)
+        self.target, ahead = self.solver.targets(last, before, pose)
+        points = self.solver.points_mm
+        height = self.solver.tool.height_mm(pose, *(points + ahead)[:, :2].T)
+        self.on_tool = np.isfinite(height)
+        self.wanted = last.touch > 0
+        self.surface: ToolSurface | None = None
+        at_rest = self.solver.tool.height_mm(pose, *points[:, :2].T) - points[:, 2]
+        self.deepest_mm = -float(np.min(at_rest, initial=0.0))
+        self.rest, self.off_mm, self.stale = np.inf, np.inf, False
+        self.size = 1e-300
+        self.touch, self.memory = last.touch, Anderson()
+
+    def forward(self, tangent: Tangent, done: int) -> SolidState | None:
+        """One step; the state once it is there."""
+        points, u = self.solver.points_mm, self.whole[self.body.surface]
+        outer = self.inner.copy()
+        outer[np.asarray(self.body.bundle.mesh.bonded)] = 0.0
+        free = tangent.motion(-outer)
+        offset = u + free[self.body.surface]
+        surface = tool_surface(self.solver.tool, self.pose, (points + u)[:, :2], self.surface)
+        surface.height_mm[~self.on_tool] = np.inf
+        self.surface = surface
+        room = room_to_tool(surface, points + u, u - offset)
+        self.wanted |= room < REACH * self.deepest_mm
+        nodes = np.flatnonzero(self.wanted)
+        balance = self._balance(tangent, surface.at(nodes), room, offset, nodes)
+        self.force, load = np.zeros_like(points), np.zeros_like(self.whole)
+        self.force[nodes] = balance.force_n
+        load[self.body.surface] = self.force
+        self._move(self._accelerated(free + tangent.motion(load), balance, nodes))
+        return self._judged(balance, nodes, load, done)
+
+    def _balance(
+        self, tangent: Tangent, surface: ToolSurface, room: Array, offset: Array, nodes: Nodes
+    ) -> Balance:
+        frames, goal = surface.frames, (self.target - offset)[nodes]
+        sticking = goal if frames is None else np.einsum("kab,ka->kb", frames, goal)
+        # Nearly incompressible gel far from balance may not allow the finer tolerance.
+        for share in BALANCE:
+            try:
+                return balanced(
+                    tangent.block(nodes),
+                    room[nodes],
+                    np.ascontiguousarray(sticking[:, :2]),
+                    self.solver.settings.friction,
+                    self.force[nodes],
+                    share * self.tolerance,
+                    frames,
+                )
+            except ContactError as error:
+                failure = error
+        raise failure
+
+    def _accelerated(self, step: Array, balance: Balance, nodes: Nodes) -> Array:
+        """Step from what the last ones with the same touch gained.
+
+        A tangent that had to be stiffened gains little by itself.
+        """
+        touch = np.zeros(len(self.force), dtype=np.int8)
+        touch[nodes] = balance.touch
+        if not np.array_equal(touch, self.touch):
+            self.touch, self.memory = touch, Anderson()
+        ahead = self.memory.next(self.whole.reshape(-1), step.reshape(-1))
+        return np.asarray(ahead.reshape(-1, 3) - self.whole)
+
+    def _move(self, step: Array) -> None:
+        """Go by as much of a step as keeps every cell from turning inside out."""
+        share = 1.0
+        while share >= SHORTEST:
+            try:
+                ahead = self.whole + share * step
+                self.inner = self.body.pad.force(ahead)
+                self.whole = ahead
+                return
+            except FiniteStrainError:
+                share /= 2
+        raise ContactError("a step turns cells of the gel inside out: take smaller steps")
+
+    def _judged(self, balance: Balance, nodes: Nodes, load: Array, done: int) -> SolidState | None:
+        rest = self.inner - load
+        rest[np.asarray(self.body.bundle.mesh.bonded)] = 0.0
+        self.size = float(np.linalg.norm(load)) or self.size
+        before, self.rest = self.rest, float(np.linalg.norm(rest)) / self.size
+        points = self.solver.points_mm + self.whole[self.body.surface]
+        seen = tool_surface(self.solver.tool, self.pose, points[:, :2], self.surface)
+        gap = seen.gap_mm(points)
+        pressed = np.zeros(len(points), dtype=bool)
+        pressed[nodes] = balance.touch > 0
+        off = np.abs(np.where(pressed, gap, np.where(self.on_tool, np.minimum(gap, 0.0), 0.0)))
+        self.off_mm = float(off.max())
+        slack = min(self.tolerance, 1e-3) * self.deepest_mm
+        into = (gap < -slack) & ~self.wanted
+        self.wanted |= into
+        self.on_tool |= into
+        self.stale = self.rest > STALE * before
+        if self.rest > self.tolerance or self.off_mm > slack or into.any():
+            return None
+        push = np.linalg.norm(balance.force_n, axis=1)
+        across = float(np.abs(push * gap[nodes])[balance.touch > 0].max(initial=0.0))
+        report = {
+            "residual": self.rest,
+            "penetration_mm": max(0.0, -float(gap[nodes].min(initial=0.0))),
+            "complementarity": across / max(float(push.max(initial=0.0)) * self.deepest_mm, 1e-300),
+            "iterations": float(done),
+        }
+        touch = np.zeros(len(points), dtype=np.int8)
+        touch[nodes] = balance.touch
+        u = self.whole[self.body.surface]
+        return SolidState(u, self.force, touch, report, self.whole)
