@@ -16,6 +16,7 @@ MAX_HALVINGS = 40
 STEP_LEFT = 1e-15
 MISS_LEFT = 4e-16
 # Points whose work fits into the processor's cache.
+COMPILED_FROM = 64
 BLOCK = 4096
 
 
@@ -81,10 +82,11 @@ class LensDistortion:
         Raises ValueError for points that no point within the monotone radius is distorted to.
         """
         target = np.atleast_2d(np.asarray(distorted, dtype=float))
-        found = [
-            self._inverted(target[k : k + BLOCK]) for k in range(0, max(1, len(target)), BLOCK)
-        ]
-        lost = np.concatenate([missed for _, missed in found])
+        undistorted, left = self._settled(target)
+        lost = np.zeros(len(target), dtype=bool)
+        for k in range(0, len(left), BLOCK):
+            part = left[k : k + BLOCK]
+            undistorted[part], lost[part] = self._inverted(target[part])
         if lost.any():
             worst = target[lost][np.argmax(np.hypot(*target[lost].T))]
             raise ValueError(
@@ -93,7 +95,20 @@ class LensDistortion:
                 f"the distortion's monotone radius of {self.monotone_radius:.6g}: the coefficients "
                 "do not hold there"
             )
-        return np.concatenate([xy for xy, _ in found]).reshape(np.shape(distorted))
+        return undistorted.reshape(np.shape(distorted))
+
+    def _settled(self, target: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Points (n, 2) where plain Newton, compiled, settles; and which are left to do."""
+        xy = np.array(target)
+        if len(target) < COMPILED_FROM:
+            return xy, np.arange(len(target))
+        from gelslim_optics.undistort_kernel import undistort
+
+        settled = np.zeros(len(target), dtype=bool)
+        coefficients = np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
+        points = np.ascontiguousarray(target)
+        undistort(points, coefficients, self.monotone_radius, xy, settled)
+        return xy, np.flatnonzero(~settled)
 
     def jacobian(self, undistorted: ArrayLike) -> Array:
         """Derivative (n, 2, 2) of the distorted by the undistorted coordinates (n, 2)."""

@@ -125,3 +125,20 @@ def test_record_round_trip_and_refusals() -> None:
             LensDistortion.from_record(record)
     with pytest.raises(ValueError, match="finite"):
         LensDistortion(k1=float("nan"))
+
+
+def test_the_compiled_steps_find_what_the_careful_ones_do() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(6):
+        k1, k2, p1, p2 = rng.normal(0, [0.08, 0.03, 2e-3, 2e-3])
+        lens = LensDistortion(k1=k1, k2=k2, p1=p1, p2=p2)
+        reach = min(0.8, 0.7 * lens.monotone_radius)
+        true = rng.uniform(-reach / 1.5, reach / 1.5, (200, 2))
+        seen = lens.distort(true)
+        seen[3] = np.nan
+        whole = lens.undistort(seen)
+        one_by_one = np.vstack([lens.undistort(row[None]) for row in seen])
+        assert np.isnan(whole[3]).all()
+        keep = np.arange(200) != 3
+        assert np.abs(whole - one_by_one)[keep].max() < 1e-14
+        assert np.abs(whole - true)[keep].max() < 1e-13
