@@ -1,7 +1,9 @@
 """How the surface moves under forces on some of its nodes: columns of C, made once and kept.
 
 A column holds the displacement of all c surface nodes under 1 N along one axis on one node. They
-are made when a contact first needs them, with one factor of the pad, and a file keeps them.
+are made when a contact first needs them, with one factor of the pad, and a file keeps them. Of
+nodes that are images of one another in a symmetric pad, one is solved for: an eighth of a square
+pad.
 """
 
 from __future__ import annotations
@@ -15,29 +17,49 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.pad_symmetry import Symmetry, symmetries
+from gelslim_twin.contact.row_factor import RowFactor
 from ifem_export.bundle import Bundle
+from ifem_export.pad_system import PadSystem
 from ifem_export.sparse_factor import Factor, factored
 from ifem_export.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-BATCH = 24
-FORMAT = "gelslim-compliance/1"
+BATCH = 64
+FORMAT = "gelslim-compliance/2"
+MOST_BYTES = 4_000_000_000
+"""Largest table: pads of some 18 000 surface nodes need another method."""
+MOST_ROW = 1500
+"""Unknowns in a row of columns up to which dense blocks beat a sparse factor."""
 
 
 class SurfaceCompliance:
     """Columns of a bundle's surface compliance, float32 mm/N, in memory and in `folder`.
 
-    The file is `compliance-KEY.npy` with as many rows as there are columns of C; a row that is
-    all zero is not made yet. Without a folder nothing is kept. Not for two threads at once.
+    The file is `compliance-KEY.npy` with as many rows as there are columns of C; a row whose own
+    entry is zero is not made yet. It is mapped, so that only what is used is read. Without a
+    folder nothing is kept. Not for two threads at once.
+
+    Raises ContactError for a pad whose table would not fit.
     """
 
     def __init__(self, bundle: Bundle, folder: Path | None = None) -> None:
         self.bundle = bundle
         self.nodes = len(bundle.mesh.surface)
+        if 36 * self.nodes**2 > MOST_BYTES:
+            raise ContactError(
+                f"{self.nodes} surface nodes: the compliance would take "
+                f"{36 * self.nodes**2 / 1e9:.0f} GB, the limit is {MOST_BYTES / 1e9:.0f} GB; mesh "
+                "the pad with larger cells"
+            )
         self._folder = folder
         self._rows = self._loaded()
-        self._made: NDArray[np.bool_] = np.any(self._rows.reshape(3 * self.nodes, -1) != 0, axis=1)
+        own = np.arange(self.nodes)
+        self._made: NDArray[np.bool_] = np.all(
+            [self._rows[3 * own + axis, own, axis] > 0 for axis in range(3)], axis=0
+        )
         self._fresh = False
 
     @cached_property
@@ -45,11 +67,27 @@ class SurfaceCompliance:
         return self.bundle.surface_operator("factor")
 
     @cached_property
-    def _factor(self) -> Factor | None:
+    def _factor(self) -> Factor | RowFactor | None:
         system = getattr(self._operator, "system", None)
-        stiffness = getattr(system, "stiffness", None)
-        layered = stiffness is not None and getattr(system, "columns", 0) == self.nodes
-        return factored(stiffness) if layered else None
+        if system is None or system.columns != self.nodes:
+            return None
+        if type(system) is not PadSystem:
+            return factored(system.stiffness)
+        places = np.asarray(system.places)
+        row = places[:, int(np.ptp(places[:, 1]) > np.ptp(places[:, 0]))]
+        if 3 * system.layers * np.bincount(row - row.min()).max() > MOST_ROW:
+            return factored(system.stiffness)
+        return RowFactor.of(system.stiffness, np.repeat(np.tile(row, system.layers), 3))
+
+    @cached_property
+    def _symmetries(self) -> tuple[Symmetry, ...]:
+        return symmetries(self.bundle.mesh)
+
+    @cached_property
+    def _originals(self) -> Nodes:
+        """(c,) the lowest node that each node is an image of."""
+        images = np.stack([s.image for s in self._symmetries])
+        return np.asarray(images.min(axis=0))
 
     @property
     def key(self) -> str:
@@ -59,10 +97,33 @@ class SurfaceCompliance:
         return hashlib.sha256("|".join(parts).encode()).hexdigest()[:16]
 
     def require(self, nodes: Nodes) -> None:
-        """Make the columns of these nodes."""
-        missing = np.asarray(nodes)[~self._made[3 * np.asarray(nodes)]]
-        for first in range(0, len(missing), BATCH):
-            self._make(missing[first : first + BATCH])
+        """Make the columns of these nodes, and of those that are images of the same."""
+        missing = np.asarray(nodes)[~self._made[nodes]]
+        if len(missing) == 0:
+            return
+        self._fresh = True
+        originals = np.unique(self._originals[missing])
+        for first in range(0, len(originals), BATCH):
+            part = originals[first : first + BATCH]
+            self._rows.reshape(self.nodes, 3, self.nodes, 3)[part] = self._solved(part)
+            self._made[part] = True
+            for symmetry in self._symmetries[1:]:
+                self._copy(part, symmetry)
+
+    def _copy(self, nodes: Nodes, symmetry: Symmetry) -> None:
+        """Columns of the images of `nodes`: C(Pi, Pj) = Q C(i, j) Q'."""
+        rows = self._rows.reshape(self.nodes, 3, self.nodes, 3)
+        axes = np.abs(symmetry.turn).argmax(axis=1)
+        signs = symmetry.turn[np.arange(3), axes].astype(np.float32)
+        for node in nodes:
+            image = symmetry.image[node]
+            if self._made[image]:
+                continue
+            column = rows[node][axes][:, :, axes] * signs[:, None, None] * signs
+            turned = np.empty_like(column)
+            turned[:, symmetry.image] = column
+            rows[image] = turned
+            self._made[image] = True
 
     def block(self, nodes: Nodes) -> Array:
         """C among nodes (n,), (3n, 3n) in mm/N, symmetric."""
@@ -88,18 +149,21 @@ class SurfaceCompliance:
         return self._operator.displacement(force_n)
 
     def store(self) -> None:
-        """Write new columns to the folder, whole or not at all."""
+        """Write new columns to the folder, whole; not at all where it takes no file."""
         if self._folder is None or not self._fresh:
             return
-        target = self._path
-        handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        target, part = self._path, None
         try:
+            handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
             with os.fdopen(handle, "wb") as out:
                 np.save(out, self._rows)
             os.replace(part, target)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
+        except OSError:
+            # Read-only or full: the next run makes the columns again.
+            pass
+        finally:
+            if part is not None:
+                Path(part).unlink(missing_ok=True)
         self._fresh = False
 
     @property
@@ -111,29 +175,26 @@ class SurfaceCompliance:
         shape = (3 * self.nodes, self.nodes, 3)
         if self._folder is not None and self._path.is_file():
             try:
-                held = np.load(self._path, allow_pickle=False)
+                # Copy on write: what is made here is not in the file before `store`.
+                held = np.load(self._path, mmap_mode="c", allow_pickle=False)
             except (OSError, ValueError, EOFError):
                 held = np.zeros(0, dtype=np.float32)
-            if held.shape == shape and held.dtype == np.float32 and np.isfinite(held).all():
-                return held
+            if held.shape == shape and held.dtype == np.float32:
+                return np.asarray(held)
         return np.zeros(shape, dtype=np.float32)
 
-    def _make(self, nodes: Nodes) -> None:
-        self._fresh = True
-        for axis in range(3):
-            self._rows[3 * nodes + axis] = self._solved(nodes, axis)
-        self._made[(3 * nodes[:, None] + np.arange(3)).ravel()] = True
-
-    def _solved(self, nodes: Nodes, axis: int) -> Array:
-        """Displacements (n, c, 3) under 1 N along an axis on each node."""
-        if self._factor is None:
-            return np.stack([self._one(node, axis) for node in nodes])
-        unknowns = 3 * self.nodes * self.bundle.mesh.layers
+    def _solved(self, nodes: Nodes) -> Array:
+        """Columns (n, 3, c, 3)."""
+        n, factor = len(nodes), self._factor
+        if factor is None:
+            return np.stack([[self._one(node, axis) for axis in range(3)] for node in nodes])
+        unknowns = self._operator.system.stiffness.shape[0]  # type: ignore[attr-defined]
         first = unknowns - 3 * self.nodes
-        loads = np.zeros((unknowns, len(nodes)))
-        loads[first + 3 * nodes + axis, np.arange(len(nodes))] = 1.0
-        moved = np.asarray(self._factor.solve(loads))[first:]
-        return np.asarray(moved.T.reshape(len(nodes), self.nodes, 3))
+        loads = np.zeros((unknowns, 3 * n))
+        own = (3 * nodes[:, None] + np.arange(3)).ravel()
+        loads[first + own, np.arange(3 * n)] = 1.0
+        moved = np.asarray(factor.solve(loads))[first:]
+        return np.asarray(moved.T.reshape(n, 3, self.nodes, 3))
 
     def _one(self, node: int, axis: int) -> Array:
         force = np.zeros((self.nodes, 3))
