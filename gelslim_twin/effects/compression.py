@@ -8,6 +8,7 @@ from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
+from gelslim_twin.effects.exposure import dimming
 from gelslim_twin.effects.parameters import EffectParameters
 
 RMS_STEP = 67.1
@@ -33,7 +34,9 @@ def grey_levels(quality: int) -> float:
 def bound(c: Circumstances) -> Bound:
     """Three standard deviations."""
     quality = c.given("compression", CompressionParameters).quality
-    return picture(0.0 if quality is None else 3 * c.edge_shift_px(grey_levels(quality) / 255))
+    return picture(
+        0.0 if quality is None else 3 * c.edge_shift_px(grey_levels(quality) / 255) / dimming(c)
+    )
 
 
 EFFECT = Effect(
@@ -41,8 +44,8 @@ EFFECT = Effect(
     title="JPEG compression",
     parameters=CompressionParameters,
     bound=bound,
-    formula="3 q_rms/sqrt(12)/255 of the grey range x width of an edge",
-    ladder=lambda c: (Rung("jpeg", Bound(), 4.0 * c.sensor.frame_px / 307200),),
+    formula="3 q_rms/sqrt(12)/255 of the grey range x width of an edge, over exposure below 1",
+    ladder=lambda c: (Rung("jpeg", Bound(), 2.0 * c.sensor.frame_px / 307200),),
     is_null=lambda c: c.given("compression", CompressionParameters).quality is None,
     implementation="gelslim_twin.render.compression",
     refines=("image",),

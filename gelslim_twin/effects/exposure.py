@@ -19,6 +19,12 @@ class ExposureParameters(EffectParameters):
     )
 
 
+def dimming(c: Circumstances) -> float:
+    """Share of the usual contrast that a short exposure leaves the dots, at most 1."""
+    p = c.given("exposure", ExposureParameters)
+    return min(1.0, p.time * p.gain)
+
+
 def bound(c: Circumstances) -> Bound:
     """Grey share: |time gain - 1|, at most all, and the largest |v^e - v| of the response."""
     p = c.given("exposure", ExposureParameters)

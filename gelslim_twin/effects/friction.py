@@ -13,15 +13,19 @@ class FrictionParameters(EffectParameters):
     """Stick and slip; the coefficient stands under contact."""
 
 
-def dragged_mm(c: Circumstances) -> float:
-    """How far the surface is dragged at most: the tool's way, its turn, and half of the depth.
+LOCAL = 4.0
+"""Most that a node moves over the mean of a pad stuck to the tool: 3.6 for a sliding cone."""
 
-    A frictionless press moves the surface sideways by up to about half its depth, which
-    friction hinders.
+
+def dragged_mm(c: Circumstances) -> float:
+    """How far the surface is dragged at most: the tool's way, its turn, and the depth.
+
+    A frictionless press moves the surface sideways by up to 0.73 of its depth (a wedge, measured),
+    which friction hinders.
     """
     turn = math.radians(c.motion.twist_deg) * c.touch.radius_mm
     tilt = math.radians(c.motion.tilt_deg) * c.touch.depth_mm
-    return c.motion.lateral_mm + turn + tilt + c.touch.depth_mm / 2
+    return c.motion.lateral_mm + turn + tilt + c.touch.depth_mm
 
 
 def bound(c: Circumstances) -> Bound:
@@ -31,7 +35,7 @@ def bound(c: Circumstances) -> Bound:
         return Bound()
     tangential = min(mu * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
     stiffer = min(mu, 1.0) * (t.stick_n - t.normal_n)
-    moved = min(dragged_mm(c), tangential / t.shear_n_per_mm)
+    moved = min(dragged_mm(c), LOCAL * tangential / t.shear_n_per_mm)
     return geometry(moved * c.sensor.px_per_mm, math.hypot(tangential, stiffer))
 
 
@@ -46,7 +50,7 @@ def ladder(c: Circumstances) -> tuple[Rung, ...]:
             ms * nodes,
             {"tolerance": t},
         )
-        for name, t, ms in (("coarse", 1e-2, 4.0), ("medium", 1e-3, 7.0), ("fine", 1e-5, 15.0))
+        for name, t, ms in (("coarse", 1e-2, 2.0), ("medium", 1e-3, 3.0), ("fine", 1e-5, 6.0))
     )
 
 
@@ -55,7 +59,7 @@ EFFECT = Effect(
     title="Coulomb friction, stick and slip",
     parameters=FrictionParameters,
     bound=bound,
-    formula="hypot(min(mu F, (G A/h + 8 G a/(2-nu)) s), min(mu, 1) (F_stick - F)); s + depth/2",
+    formula="hypot(min(mu F, (G A/h + 8 G a/(2-nu)) s), min(mu, 1) (F_stick - F)); s + depth",
     ladder=ladder,
     is_null=lambda c: c.friction == 0,
     implementation="gelslim_twin.contact.friction",

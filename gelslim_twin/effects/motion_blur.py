@@ -32,7 +32,12 @@ def ladder(c: Circumstances) -> tuple[Rung, ...]:
     """Instants averaged: n of them leave a staircase of 1/(4 n) of the smear."""
     size = c.sensor.frame_px / 307200
     return tuple(
-        Rung(f"{n} instants", picture(smear_px(c) / (4 * n)), 2.5 * n * size, {"most_poses": n})
+        Rung(
+            f"{n} instants",
+            picture(smear_px(c) / (4 * n)),
+            (1.0 + 0.1 * n) * size,
+            {"most_poses": n},
+        )
         for n in (2, 4, 8, 16)
     )
 

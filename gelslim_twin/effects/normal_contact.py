@@ -11,10 +11,14 @@ class NormalContactParameters(EffectParameters):
     """Contact of rigid indenters with the gel."""
 
 
+RIDGES, ROUNDING = 1.25, 1.05
+"""Rings and bumps press up to 1.19 as hard as the disc of their area; nodes turn aside by 1 %."""
+
+
 def bound(c: Circumstances) -> Bound:
     """All the force, and a surface pushed in by the whole depth."""
-    px = c.touch.depth_mm * c.sensor.px_per_mm
-    return Bound(c.touch.normal_n, px, px, px)
+    px = ROUNDING * c.touch.depth_mm * c.sensor.px_per_mm
+    return Bound(RIDGES * c.touch.normal_n, px, px, px)
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
@@ -32,7 +36,7 @@ EFFECT = Effect(
     title="Normal contact",
     parameters=NormalContactParameters,
     bound=bound,
-    formula="F = 2.2 E* a V/A + bonded layer (M V/h in series with squeeze)); depth f/Z",
+    formula="1.25 F, F = 2.2 E* a V/A + bonded layer (M V/h in series with squeeze)); depth f/Z",
     ladder=ladder,
     is_null=never_null,
     implementation="gelslim_twin.contact.solver",

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
+from gelslim_twin.effects.exposure import dimming
 from gelslim_twin.effects.parameters import EffectParameters
 
 
@@ -38,9 +39,9 @@ EFFECT = Effect(
     name="sensor_noise",
     title="Sensor noise, shot and read",
     parameters=SensorNoiseParameters,
-    bound=lambda c: picture(3 * c.edge_shift_px(sigma_share(c))),
-    formula="3 sqrt(N + r²)/N of the grey range x width of an edge",
-    ladder=lambda c: (Rung("drawn", Bound(), 3.0 * c.sensor.frame_px / 307200),),
+    bound=lambda c: picture(3 * c.edge_shift_px(sigma_share(c)) / dimming(c)),
+    formula="3 sqrt(N + r²)/N of the grey range x width of an edge, over exposure below 1",
+    ladder=lambda c: (Rung("drawn", Bound(), 1.5 * c.sensor.frame_px / 307200),),
     is_null=lambda c: sigma_share(c) == 0,
     implementation="gelslim_twin.render.sensor_noise",
     refines=("image",),
