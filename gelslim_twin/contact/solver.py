@@ -85,7 +85,8 @@ class ContactSolver:
     def __post_init__(self) -> None:
         mesh = self.compliance.bundle.mesh
         self.points_mm = np.asarray(mesh.surface_mm)
-        self._longest = self.settings.longest_step * min(mesh.cell_size_mm[:2])
+        self._cell = min(mesh.cell_size_mm[:2])
+        self._longest = self.settings.longest_step * self._cell
         self._reach: Reach | None = None
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
@@ -183,7 +184,9 @@ class ContactSolver:
     ) -> tuple[ToolSurface, Array]:
         """The tool over all nodes, and how far each may move along its normal by forces (c,)."""
         places = self.points_mm + moved
-        surface = tool_surface(self.tool, pose, places[:, :2])
+        # Slopes matter near the gel only, and cost four more looks at the tool.
+        below = np.maximum(places[:, 2], self.points_mm[:, 2]) + self._cell
+        surface = tool_surface(self.tool, pose, places[:, :2], below_mm=below)
         surface.height_mm[~on_tool] = np.inf
         return surface, room_to_tool(surface, places, moved - offset)
 
@@ -241,7 +244,8 @@ class ContactSolver:
         """The whole surface, and gaps (c,) of all nodes."""
         nodes, balance = found.reach.nodes, found.balance
         u = self.compliance.displacement(nodes, balance.force_n) + offset
-        gap = tool_surface(self.tool, pose, (self.points_mm + u)[:, :2]).gap_mm(self.points_mm + u)
+        now = self.points_mm + u
+        gap = self.tool.height_mm(pose, now[:, 0], now[:, 1]) - now[:, 2]
         gap[nodes] = found.gap_mm
         force, touch = np.zeros_like(u), np.zeros(len(u), dtype=np.int8)
         force[nodes], touch[nodes] = balance.force_n, balance.touch

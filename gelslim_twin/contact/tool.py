@@ -14,8 +14,12 @@ from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
-_STEPS = 12
-_SETTLED_MM = 1e-9
+_ABOVE_MM = 1.0
+"""How far above the gel a tilted tool is looked for: the gel bulges by less."""
+_SAMPLES = 16
+_STEPS = 40
+_SETTLED_MM = 1e-10
+_WALL_MM = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +48,8 @@ class Tool:
     def height_mm(self, pose: Pose, x_mm: Array, y_mm: Array) -> Array:
         """Height (n,) of the lower surface over points of the sensor frame; infinite beside it.
 
-        A tilted tool's surface is found along the vertical by fixed-point steps, exact where
-        they settle; its undercuts are not seen.
+        A tilted tool's surface is where the upward line over a point first enters it. What it
+        enters through an upright wall, or more than a millimetre above the gel, counts as beside.
         """
         turn = rotation(pose)
         origin = np.array([pose.x_mm, pose.y_mm, -pose.depth_mm])
@@ -53,16 +57,44 @@ class Tool:
         if pose.tilt_x_deg == 0 and pose.tilt_y_deg == 0:
             place = np.stack([dx, dy]).T @ turn[:2, :2]
             return self.local(place[..., 0], place[..., 1]) + origin[2]
-        z = np.zeros(np.broadcast(dx, dy).shape)
-        for _ in range(_STEPS):
-            own = np.stack([dx, dy, z], axis=-1) @ turn
-            wanted = self.local(own[..., 0], own[..., 1])
-            step = np.where(np.isfinite(wanted), (wanted - own[..., 2]) / turn[2, 2], np.inf)
-            beside = ~np.isfinite(step)
-            z = np.where(beside, z, z + np.where(beside, 0.0, step))
-            if not np.any(np.abs(step[~beside]) > _SETTLED_MM):
+        # The tool stands on its base plane: nothing of it is lower.
+        base = -(dx * turn[0, 2] + dy * turn[1, 2]) / turn[2, 2] - 1e-9
+        height = np.full(np.shape(base), np.inf)
+        near = np.flatnonzero(base < _ABOVE_MM - origin[2])
+        flat = np.stack([dx[near], dy[near], np.zeros(len(near))], axis=-1) @ turn
+        height[near] = self._entered(flat, turn[2], base[near], _ABOVE_MM - origin[2])
+        return height + origin[2]
+
+    def _inside(self, flat: Array, line: Array, z: Array) -> Array:
+        """How far points at z (...,) on the lines over `flat` (..., 3) are inside the tool."""
+        own = flat + z[..., None] * line
+        return np.asarray(own[..., 2] - self.local(own[..., 0], own[..., 1]))
+
+    def _entered(self, flat: Array, line: Array, low: Array, high: float) -> Array:
+        """First z (n,) at which upward lines enter the tool between two heights; inf if none."""
+        steps = low[:, None] + np.linspace(0.0, 1.0, _SAMPLES) * (high - low)[:, None]
+        depth = self._inside(flat[:, None], line, steps)
+        first = (depth >= 0).argmax(axis=1)
+        hit = np.flatnonzero((depth >= 0).any(axis=1) & (first > 0))
+        found = np.full(len(flat), np.inf)
+        a, b = steps[hit, first[hit] - 1], steps[hit, first[hit]]
+        fa, fb = depth[hit, first[hit] - 1], depth[hit, first[hit]]
+        for turn in range(_STEPS):
+            # False position, and halves in between: walls have no slope to follow.
+            with np.errstate(invalid="ignore"):
+                guess = (a * fb - b * fa) / (fb - fa)
+            middle = (a + b) / 2
+            guess = np.where(np.isfinite(guess) & (turn % 2 == 0), guess, middle)
+            f = self._inside(flat[hit], line, guess)
+            # Exact but for rounding counts as in, so that level faces end the search at once.
+            into = f >= -_SETTLED_MM
+            a, fa = np.where(into, a, guess), np.where(into, fa, f)
+            b, fb = np.where(into, guess, b), np.where(into, f, fb)
+            if np.all((b - a < _SETTLED_MM) | (np.abs(fb) < _SETTLED_MM)):
                 break
-        return np.where(beside, np.inf, z + origin[2])
+        # Where the depth jumps, the line went through a wall.
+        found[hit] = np.where(np.abs(fb) < _WALL_MM, b, np.inf)
+        return found
 
     def carried(self, before: Pose, after: Pose, points_mm: Array) -> Array:
         """Where points (n, 3) fixed to the tool at one pose are at another."""

@@ -54,17 +54,22 @@ class ToolSurface:
 
 
 def tool_surface(
-    tool: Tool, pose: Pose, places_mm: Array, before: ToolSurface | None = None
+    tool: Tool,
+    pose: Pose,
+    places_mm: Array,
+    before: ToolSurface | None = None,
+    below_mm: Array | None = None,
 ) -> ToolSurface:
     """The tool's surface over places (n, 2).
 
     A place beside the tool has an infinite height, or where `before` has one there, the height of
     that one's plane: a node that slips off an edge on the way to a solution is not let go at once.
+    Slopes are found where the tool is lower than `below_mm` (n,), everywhere by default.
     """
     places = np.array(places_mm, dtype=float)
     height = tool.height_mm(pose, places[:, 0], places[:, 1])
     slopes = np.zeros((len(places), 2))
-    on = np.flatnonzero(np.isfinite(height))
+    on = np.flatnonzero(height < (np.inf if below_mm is None else below_mm))
     for axis in (0, 1):
         step = np.zeros(2)
         step[axis] = DIFFERENCE_MM

@@ -1,0 +1,141 @@
+"""Tools at poses: heights by brute force along the vertical, slopes, carried points."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelslim_twin.contact.tool import Tool, rotation
+from gelslim_twin.contact.tool_surface import tool_surface
+from gelslim_twin.scene.indenter import (
+    Cone,
+    Cylinder,
+    FlatPunch,
+    Indenter,
+    Ring,
+    Sphere,
+    TexturedPlane,
+    Wedge,
+)
+from gelslim_twin.scene.pose import Pose
+
+Array = NDArray[np.float64]
+SHAPES: dict[str, Indenter] = {
+    "sphere": Sphere(shape="sphere", radius_mm=3),
+    "cylinder": Cylinder(shape="cylinder", radius_mm=2, length_mm=6, axis_deg=20),
+    "wedge": Wedge(shape="wedge", included_angle_deg=60, length_mm=8, tip_radius_mm=0.2),
+    "cone": Cone(shape="cone", included_angle_deg=70, tip_radius_mm=0.1),
+    "punch": FlatPunch(shape="flat_punch", length_mm=4, width_mm=3),
+    "ring": Ring(shape="ring", outer_radius_mm=4, inner_radius_mm=2),
+    "ridges": TexturedPlane(
+        shape="textured_plane", length_mm=6, width_mm=6, pitch_mm=1.5, relief_mm=0.2
+    ),
+    "rough": TexturedPlane(
+        shape="textured_plane", length_mm=6, width_mm=6, texture="rough", pitch_mm=2, relief_mm=0.2
+    ),
+}
+
+
+def grid(half: float = 3.0, count: int = 15) -> Array:
+    axis = np.linspace(-half, half, count) + 0.013
+    return np.stack([g.ravel() for g in np.meshgrid(axis, axis)], axis=1)
+
+
+def first_inside(tool: Tool, pose: Pose, x: float, y: float) -> float:
+    """Lowest point of the vertical over (x, y) that is inside, to 0.2 µm; inf above 1 mm."""
+    low, high, origin = -3.0, 1.0, np.array([pose.x_mm, pose.y_mm, -pose.depth_mm])
+    for _ in range(2):
+        z = np.linspace(low, high, 4001)
+        own = (np.column_stack([np.full_like(z, x), np.full_like(z, y), z]) - origin) @ rotation(
+            pose
+        )
+        inside = own[:, 2] >= tool.local(own[:, 0], own[:, 1])
+        if not inside.any():
+            return math.inf
+        k = int(inside.argmax())
+        low, high = z[max(k - 1, 0)], z[k]
+    return float(high)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("tilt", [0.0, 4.0, 25.0])
+def test_height_by_brute_force(name: str, tilt: float) -> None:
+    tool = Tool.of([SHAPES[name]], Path())
+    pose = Pose(
+        x_mm=0.2, y_mm=-0.3, depth_mm=0.4, twist_deg=15, tilt_x_deg=tilt, tilt_y_deg=-tilt / 2
+    )
+    points = grid()
+    found = tool.height_mm(pose, points[:, 0], points[:, 1])
+    true = np.array([first_inside(tool, pose, *p) for p in points])
+    both = np.isfinite(found) & np.isfinite(true)
+    np.testing.assert_allclose(found[both], true[both], atol=2e-6)
+    assert both.sum() > 10
+    # What one of them does not see is a wall or lies high above the gel.
+    once = np.isfinite(found) & (found < 0.99) & ~np.isfinite(true)
+    assert not once.any()
+    walls = ~np.isfinite(found) & np.isfinite(true) & (true < 0.99)
+    assert tilt > 0 or not walls.any()
+    assert tilt > 10 or walls.sum() < 0.1 * both.sum()
+
+
+def test_a_tilted_sphere_is_a_sphere() -> None:
+    tool = Tool.of([SHAPES["sphere"]], Path())
+    pose = Pose(depth_mm=0.4, twist_deg=70, tilt_x_deg=30, tilt_y_deg=-20)
+    points = grid(1.5)
+    centre = np.array([0, 0, -0.4]) + rotation(pose) @ [0, 0, 3.0]
+    away = ((points - centre[:2]) ** 2).sum(axis=1)
+    true = centre[2] - np.sqrt(np.maximum(9 - away, 0.0))
+    low = (true < 0.99) & (away < 8.9)
+    assert low.sum() > 100
+    np.testing.assert_allclose(tool.height_mm(pose, *points[low].T), true[low], atol=1e-8)
+
+
+def test_tilted_plane_and_its_slope() -> None:
+    tool = Tool.of([FlatPunch(shape="flat_punch", radius_mm=20)], Path())
+    pose = Pose(x_mm=1.0, y_mm=2.0, depth_mm=0.3, twist_deg=33, tilt_x_deg=3, tilt_y_deg=-5)
+    normal = rotation(pose)[:, 2]
+    points = grid(2.0)
+    plane = -0.3 - ((points - [1.0, 2.0]) @ normal[:2]) / normal[2]
+    surface = tool_surface(tool, pose, points)
+    np.testing.assert_allclose(surface.height_mm, plane, atol=1e-8)
+    np.testing.assert_allclose(
+        surface.slopes, np.tile(-normal[:2] / normal[2], (len(points), 1)), atol=1e-4
+    )
+    frames = surface.frames
+    assert frames is not None
+    np.testing.assert_allclose(frames[:, :, 2], np.tile(normal, (len(points), 1)), atol=1e-4)
+    np.testing.assert_allclose(
+        frames.transpose(0, 2, 1) @ frames, np.tile(np.eye(3), (len(points), 1, 1)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(frames), 1.0)
+    above = np.column_stack([points, plane]) - 0.1 * normal
+    np.testing.assert_allclose(surface.gap_mm(above), 0.1, atol=1e-4)
+
+
+def test_level_faces_have_no_frames_and_rims_no_wild_slopes() -> None:
+    tool = Tool.of([FlatPunch(shape="flat_punch", radius_mm=2)], Path())
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [-1.99999, 0.0], [3.0, 0.0]])
+    surface = tool_surface(tool, Pose(depth_mm=0.1), points)
+    assert surface.frames is None
+    assert list(np.isfinite(surface.height_mm)) == [True, True, True, False]
+    later = tool_surface(tool, Pose(depth_mm=0.1), points + np.array([0.5, 0.0]), surface)
+    assert later.height_mm[1] == -0.1
+    assert later.height_mm[3] == math.inf
+
+
+def test_carried_points_keep_their_place_on_the_tool() -> None:
+    tool = Tool.of([SHAPES["cone"]], Path())
+    before = Pose(x_mm=1, depth_mm=0.2, twist_deg=20, tilt_x_deg=5)
+    after = Pose(x_mm=-1, y_mm=2, depth_mm=0.5, twist_deg=-50, tilt_y_deg=8)
+    points = np.random.default_rng(0).standard_normal((6, 3))
+    moved = tool.carried(before, after, points)
+    own = [
+        (p - [q.x_mm, q.y_mm, -q.depth_mm]) @ rotation(q)
+        for p, q in ((points, before), (moved, after))
+    ]
+    np.testing.assert_allclose(own[0], own[1], atol=1e-12)
+    np.testing.assert_allclose(tool.carried(after, before, moved), points, atol=1e-12)
