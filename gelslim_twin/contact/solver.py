@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 REACH = 0.15
 """Share of the depth by which the tool may stand over a node in reach: the gel bulges."""
-GEOMETRY_STEPS = 25
-DAMPED_FROM = 8
+GEOMETRY_STEPS = 40
+DAMPED_FROM = 6
 GROWTH_STEPS = 12
 MOST_SUBSTEPS = 200
 SPARE = 1.5
@@ -137,14 +137,16 @@ class ContactSolver:
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
         target, ahead = self.targets(last, before, pose)
-        on_tool = np.isfinite(self.tool.height_mm(pose, *(self.points_mm + ahead)[:, :2].T))
+        height = self.tool.height_mm(pose, *(self.points_mm + ahead)[:, :2].T)
+        on_tool = np.isfinite(height)
+        depth = -float(np.min(height - self.points_mm[:, 2], initial=0.0))
         moved = (last if start is None else start).displacement_mm
         guess = (last if start is None else start).force_n
         wanted = np.zeros(len(moved), dtype=bool)
         for _ in range(GROWTH_STEPS):
             surface, room = self._room(pose, moved, offset, on_tool)
             deepest = -float(np.min(room, initial=0.0))
-            if deepest <= 0:
+            if min(deepest, depth) <= 0:
                 return replace(GelState.at_rest(len(moved)), displacement_mm=offset.copy())
             wanted |= room < REACH * deepest
             found = self._settled(pose, wanted, surface, moved, target, offset, guess, deepest)
@@ -230,9 +232,15 @@ class ContactSolver:
             worst = float(np.abs(np.where(pressed, gap, np.minimum(gap, 0.0)))[wanted[nodes]].max())
             if worst <= self._slack(deepest):
                 return Attempt(reach, balance, used, gap, sweeps)
-            u = new if turn < DAMPED_FROM else (u + new) / 2
+            u_before, u = u, new
             if turn >= DAMPED_FROM:
-                shape = tool_surface(self.tool, pose, (points + u)[:, :2], shape)
+                # A node astride an edge goes from one flank to the other and back.
+                share = 1 / (turn - DAMPED_FROM + 2)
+                shape = replace(shape, slopes=used.slopes + share * (shape.slopes - used.slopes))
+                u = u_before + 0.5 * (u - u_before)
+                shape = replace(
+                    tool_surface(self.tool, pose, (points + u)[:, :2], shape), slopes=shape.slopes
+                )
         raise ContactError(
             f"nodes stay {worst:.2g} mm off the tool's surface after {GEOMETRY_STEPS} turns: its "
             "relief is steeper or finer than the gel's cells can follow"
