@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import shutil
@@ -19,15 +20,17 @@ LIGHT_FIELDS = ("x_mm", "y_mm", "irradiance", "azimuth_deg", "elevation_deg", "c
 
 
 def store_sensor(sensor: TwinSensor, folder: Path, with_light: bool) -> None:
-    """Write what is not there yet; a bundle of another pad there is replaced."""
+    """Write what is not there yet; another sensor there is replaced, its light included."""
     folder.mkdir(parents=True, exist_ok=True)
-    held = folder / BUNDLE
-    if not (held / "manifest.json").is_file() or _hash(held) != sensor.bundle.geometry_hash:
+    held, key = folder / BUNDLE, sensor_key(sensor)
+    if _stored_key(folder) != key or not (held / "manifest.json").is_file():
+        for name in (OUTLINE, LIGHT):
+            (folder / name).unlink(missing_ok=True)
         shutil.rmtree(held, ignore_errors=True)
         write_bundle(held, sensor.bundle)
     length, width = sensor.size_mm
     outline = {"length_mm": length, "width_mm": width, "corner_radius_mm": sensor.corner_radius_mm}
-    replace_file(folder / OUTLINE, json_bytes(outline))
+    replace_file(folder / OUTLINE, json_bytes({"key": key, **outline}))
     if with_light and not (folder / LIGHT).is_file():
         light = sensor.light()
         stream = io.BytesIO()
@@ -62,8 +65,22 @@ def stored_sensor(folder: Path) -> TwinSensor:
     )
 
 
-def _hash(folder: Path) -> str:
+def sensor_key(sensor: TwinSensor) -> str:
+    """Tells sensors apart: pad, gel, camera, outline and the spec that the light comes from."""
+    bundle = sensor.bundle
+    parts = (
+        bundle.geometry_hash,
+        repr(bundle.material),
+        bundle.formulation,
+        json.dumps(dict(bundle.camera), sort_keys=True),
+        repr((sensor.size_mm, sensor.corner_radius_mm)),
+        bundle.spec_hash,
+    )
+    return hashlib.sha256("|".join(parts).encode()).hexdigest()
+
+
+def _stored_key(folder: Path) -> str:
     try:
-        return load_bundle(folder).geometry_hash
-    except ValueError:
+        return str(json.loads((folder / OUTLINE).read_bytes())["key"])
+    except (OSError, ValueError, KeyError, TypeError):
         return ""

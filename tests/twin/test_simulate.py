@@ -152,6 +152,38 @@ def test_a_cluster_does_the_same(place: Path) -> None:
     assert digests(out) == digests(place / "out" / "one")
 
 
+def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from ifem_export.bundle_io import load_bundle
+    from ifem_export.material import Material
+
+    bundle = load_bundle(place / "bundle")
+    store_sensor(TwinSensor(bundle), tmp_path / "kept", True)
+    stiffer = build_bundle_of(bundle, Material(0.3, 0.3223, 1000.0))
+    store_sensor(TwinSensor(stiffer), tmp_path / "kept", True)
+    assert stored_sensor(tmp_path / "kept").bundle.material.youngs_modulus_mpa == 0.3
+    camera = {**bundle.camera, "focal_px": 650.0}
+    store_sensor(TwinSensor(replace(stiffer, camera=camera)), tmp_path / "kept", True)
+    assert stored_sensor(tmp_path / "kept").bundle.camera["focal_px"] == 650.0
+
+
+def build_bundle_of(bundle, material):
+    from ifem_export.bundle import build_bundle
+
+    return build_bundle(
+        bundle.mesh,
+        material,
+        bundle.formulation,
+        marker_positions_mm=bundle.markers.positions_mm,
+        marker_arrays=dict(bundle.markers.arrays),
+        camera=bundle.camera,
+        with_stiffness=False,
+    )
+
+
 def test_absent_effects_are_not_in_memory(place: Path) -> None:
     scene = place / "still.yaml"
     text = (place / "scene.yaml").read_text()
