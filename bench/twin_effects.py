@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -176,11 +176,11 @@ def _pictures(bench: Bench, states: list[GelState], null: set[str]) -> list[dict
         less = bench.viewer(**{name: "off"})
         if name in ("refraction", "lens_distortion"):
             shift = whole.markers_px(state) - less.markers_px(state)
-            on_ms, off_ms = (_ms(lambda v=v: v.markers_px(state)) for v in (whole, less))
+            on_ms, off_ms = (_ms(partial(v.markers_px, state)) for v in (whole, less))
             key = "markers_px"
         else:
             shift = _seen(whole, less, state, before, by_detector=name not in CENTRES)
-            on_ms, off_ms = (_ms(lambda v=v: v.frame(state, before, 1)) for v in (whole, less))
+            on_ms, off_ms = (_ms(partial(v.frame, state, before, 1)) for v in (whole, less))
             key = "markers_px" if name in CENTRES else "image_px"
         error = {key: float(np.linalg.norm(shift, axis=1).max())}
         rows.append(
