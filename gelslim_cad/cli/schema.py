@@ -1,4 +1,4 @@
-"""`gelslim schema`: the JSON Schema of the spec, or of scenes."""
+"""`gelslim schema`: the JSON Schema of the spec or of scenes, or the same as a page to read."""
 
 from __future__ import annotations
 
@@ -15,23 +15,27 @@ def schema(
     scene: Annotated[
         bool, typer.Option("--scene", help="Of contact scenes instead of specs.")
     ] = False,
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="As a page to read: every field in tables.")
+    ] = False,
 ) -> int:
     """Print the JSON Schema of the spec.
 
     Editors check and complete the YAML by it.
     """
-    text = _text(scene)
+    text = _page(scene) if markdown else _schema(scene)
     if out is None:
         print(text, end="")
         return 0
     from gelslim_cad.cli.output import replace_file
 
     replace_file(out, text.encode())
-    print(f"Wrote {out}. In VS Code, name it in the setting yaml.schemas.")
+    use = "" if markdown else " In VS Code, name it in the setting yaml.schemas."
+    print(f"Wrote {out}.{use}")
     return 0
 
 
-def _text(scene: bool) -> str:
+def _schema(scene: bool) -> str:
     if scene:
         from gelslim_twin.scene.reader import scene_schema_text
 
@@ -39,3 +43,13 @@ def _text(scene: bool) -> str:
     from gelslim_cad.spec.schema import schema_text
 
     return schema_text()
+
+
+def _page(scene: bool) -> str:
+    if scene:
+        from gelslim_twin.scene.reference import reference_text as scene_reference_text
+
+        return scene_reference_text()
+    from gelslim_cad.spec.reference import reference_text
+
+    return reference_text()

@@ -1,0 +1,52 @@
+"""The reference page of the spec, made from its schema."""
+
+from __future__ import annotations
+
+import json
+
+from gelslim_cad.spec.schema import schema_text
+from yaml_model.reference import reference_markdown
+
+RULES = (
+    (
+        "camera",
+        "`image_height_px` is at most `image_width_px`: the wider axis lies across the finger",
+    ),
+    ("camera", "pixels are square: picture and sensor have the same proportions within 2 %"),
+    ("camera", "a field of view that is given agrees with sensor and focal length within 5 %"),
+    ("camera", "`lens_diameter_mm` is at most `module_width_mm`"),
+    ("design.gel", "`corner_radius_mm` is at most half of the shorter side"),
+    ("design.leds", "`emission: table` has two or more angles, as many intensities, rising from 0"),
+    ("design.markers", "`rows` and `columns`, where given, fit on the gel at `pitch_mm`"),
+    ("design.markers", "`diameter_mm` is below `pitch_mm`, else dots merge"),
+    ("material.gel", "`youngs_modulus_mpa` is at most 5 unless `material.allow_stiff_gel: true`"),
+    ("mesh", "`cells_along` and `cells_across` are given together or not at all"),
+)
+"""What no single field can tell: block, rule. The reader enforces each."""
+
+_HEAD = """\
+# Spec reference
+
+<!-- Made by `make docs` from the schema; do not edit by hand. -->
+
+Every field of a spec (`format: gelslim-spec/1`), block by block in the order of the file. The unit
+is the last part of a name. *None* means that the value is derived, or that there is no limit;
+`null` may be written. Unknown names are refused with the nearest known one. `gelslim new` writes a
+spec with all of this as comments; `gelslim schema` prints the JSON Schema, which is also in
+[gelslim-spec-1.schema.json](gelslim-spec-1.schema.json).
+
+What each field does to the finger: [design guide](design_guide.md).
+"""
+_BETWEEN = """
+## Rules between fields
+
+Checked when the file is read. Whether the finger can be *built* is another question, which
+`gelslim check` answers.
+
+"""
+
+
+def reference_text() -> str:
+    """The whole page in Markdown, the same for the same program."""
+    rules = "".join(f"- `{block}`: {rule}.\n" for block, rule in RULES)
+    return f"{_HEAD}\n{reference_markdown(json.loads(schema_text()))}{_BETWEEN}{rules}"
