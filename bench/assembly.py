@@ -9,9 +9,7 @@ The floor is the time to touch fresh memory of the matrix's size for the first t
 from __future__ import annotations
 
 import argparse
-import json
 import multiprocessing
-import platform
 import resource
 import statistics
 import time
@@ -20,8 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_data import DOCS, write_data
+from machine import machine
 
-ROOT = Path(__file__).parents[1]
 SIZES = ((42, 42, 1), (100, 100, 4), (128, 128, 8))
 SIZE_MM = (0.5, 0.5, 0.5)
 REPEATS = 15
@@ -113,11 +112,13 @@ def touched(n_bytes: int) -> float:
 def main() -> None:
     """Print a table; write it on request."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true")
-    write = parser.parse_args().write
+    parser.add_argument("--quick", action="store_true", help="the smallest size alone")
+    parser.add_argument("--write", action="store_true", help="write docs/data/assembly.json")
+    parser.add_argument("--docs", type=Path, help="write data/assembly.json in this folder")
+    asked = parser.parse_args()
     context = multiprocessing.get_context("spawn")
     rows: list[dict[str, Any]] = []
-    for cells in SIZES:
+    for cells in SIZES[:1] if asked.quick else SIZES:
         base: dict[str, Any] = {}
         for tool in TOOLS:
             ours_end, theirs = context.Pipe(duplex=False)
@@ -142,13 +143,8 @@ def main() -> None:
                 f"{found['seconds'] / floor:7.1f} x first touch  "
                 f"peak {found['peak_bytes'] / base['matrix_bytes']:5.2f} x matrix"
             )
-    if write:
-        data = {
-            "machine": f"{platform.machine()}, Python {platform.python_version()}",
-            "rows": rows,
-        }
-        target = ROOT / "docs" / "data" / "assembly.json"
-        target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    if asked.write or asked.docs:
+        write_data("assembly", {**machine(), "rows": rows}, asked.docs or DOCS)
 
 
 if __name__ == "__main__":

@@ -10,15 +10,15 @@ presses whose truth comes from a mesh of half the pitch with eight layers. Set O
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
+from bench_data import DOCS, write_data, write_whole
 from force_ladder_fields import METHODS, compensation, interpolation, operators
 from force_ladder_markers import LOOKS, MISSING, SPURIOUS, detection, matching
-from force_rig import SEED, machine, small_rig
+from force_rig import SEED, small_rig
+from machine import machine
 
-ROOT = Path(__file__).parents[1]
 Rows = list[dict[str, Any]]
 LADDERS = {
     "detection": detection,
@@ -39,13 +39,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="fewer draws, nothing written")
+    parser.add_argument("--quick", action="store_true", help="fewer draws, printed only")
+    parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
     parser.add_argument("--only", choices=list(LADDERS), help="one ladder, nothing written")
     options = parser.parse_args()
     rig = small_rig()
     data: dict[str, Any] = {
-        "seed": SEED,
-        **machine(),
+        **machine(SEED),
         "markers": len(rig.grid),
         "surface_nodes": len(rig.mesh.surface),
     }
@@ -53,12 +53,11 @@ def main() -> None:
         if options.only in (None, name):
             data[name] = ladder(rig, options.quick)
             print_rows(name, data[name])
-    if options.quick or options.only:
+    if options.only or (options.quick and not options.docs):
         return
-    target = ROOT / "docs" / "data" / "force_ladders.json"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    draw(data, ROOT / "docs" / "images" / "force_ladders.png")
+    docs = options.docs or DOCS
+    write_data("force_ladders", data, docs)
+    draw(data, docs / "images" / "force_ladders.png")
 
 
 def print_rows(name: str, rows: Rows) -> None:
@@ -81,7 +80,7 @@ def draw(data: dict[str, Any], path: Path) -> None:
     draw_operators(axes[1][1], data["operators"])
     for panel in axes.flat:
         panel.grid(alpha=0.3, which="both")
-    path.write_bytes(as_png(figure))
+    write_whole(path, as_png(figure))
 
 
 def draw_detection(panel: Any, rows: Rows) -> None:

@@ -12,7 +12,6 @@ interpolates by Delaunay triangles (scipy's griddata) and multiplies by the stif
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -24,9 +23,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from force_rig import SEED, Rig, large_rig, machine, shares, small_rig
+from bench_data import DOCS, write_data
+from force_rig import SEED, Rig, large_rig, shares, small_rig
+from machine import machine
 from numpy.typing import NDArray
 
+from accuracy_budget.budget import Budget
 from gelslim_force.calibration import calibrate
 from gelslim_force.force_pipeline import ForcePipeline
 from gelslim_force.indenter_source import indenter_source
@@ -47,13 +49,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="fewer frames, nothing written")
+    parser.add_argument("--quick", action="store_true", help="fewer frames, printed only")
+    parser.add_argument("--docs", type=Path, help="folder to write data/ in")
     parser.add_argument("--frames", type=int, default=0, help="frames of the soak")
     parser.add_argument("--timed", type=int, default=960, help="frames timed per chain")
     options = parser.parse_args()
     timed = 240 if options.quick else options.timed
     keep_to_one_core()
-    data: dict[str, Any] = {"seed": SEED, **machine(), "frames": timed, "chains": []}
+    data: dict[str, Any] = {**machine(SEED), "frames": timed, "chains": []}
     for rig in (small_rig(), large_rig()):
         data["chains"] += [
             {"markers": len(rig.grid), "nodes": len(rig.bundle.mesh.surface_mm), **row}
@@ -67,11 +70,8 @@ def main() -> None:
           .format(**data["first_frame"]))  # fmt: skip
     if options.frames:
         data["soak"] = soak(large_rig(), options.frames)
-    if options.quick:
-        return
-    target = ROOT / "docs" / "data" / "force_latency.json"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    if options.docs or not options.quick:
+        write_data("force_latency", data, options.docs or DOCS)
 
 
 def keep_to_one_core() -> None:
@@ -103,7 +103,7 @@ def all_chains(
     known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
     yield "tangential", pipeline_chain(ForcePipeline(rig.bundle, calibration), frames)
     yield "depth given", pipeline_chain(ForcePipeline(rig.bundle, calibration), frames, known)
-    quick = PipelineSettings(time_ms=0.5)
+    quick = PipelineSettings(budget=Budget(time_ms=0.5))
     yield (
         "depth given, quick operator",
         pipeline_chain(ForcePipeline(rig.bundle, calibration, quick), frames, known),

@@ -7,11 +7,8 @@ the pipeline uses; dots are drawn by exact area under strong keystone.
 from __future__ import annotations
 
 import math
-import os
-import platform
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,35 +166,3 @@ def _rig(
     mesh, _ = build_pad_mesh(outline, THICKNESS_MM, cells=cells)
     grid = build_marker_grid(rows, columns, pitch_mm, diameter_mm)
     return Rig(grid, mesh, finger_camera())
-
-
-def machine() -> dict[str, Any]:
-    """What the numbers were measured on."""
-    import numba
-    import scipy
-
-    found = {
-        "machine": platform.machine(),
-        "system": platform.system(),
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "threads": int(os.environ.get("OMP_NUM_THREADS", 0)) or "default",
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
-    }
-    try:
-        import cv2
-    except ImportError:
-        return {**found, "opencv": None}
-    return {**found, "opencv": cv2.__version__}
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
-    except OSError:
-        names = []
-    return names[0] if names else platform.processor()

@@ -10,18 +10,16 @@ one thread, after the kernel is compiled.
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import os
-import platform
 import time
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_data import write_data
 from light_ratios import changes, earlier, ratios
 from light_rays_figure import draw
+from machine import machine
 
 from gelslim_optics.guide_facets import facetted_profile
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
@@ -143,24 +141,6 @@ def speed(rays: int = 1 << 20) -> list[dict[str, Any]]:
     return rows
 
 
-def setting() -> dict[str, Any]:
-    return {
-        "python": platform.python_version(),
-        **{name: version(name) for name in ("numpy", "scipy", "numba", "gelslim-cad")},
-        "seeds": {"runs": list(range(RUNS)), "reference": REFERENCE_SEED, "others": 0},
-    }
-
-
-def processor() -> dict[str, Any]:
-    """Name and number of this machine's processors."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return {"cpu": names[0] if names else platform.processor(), "cores": os.cpu_count()}
-
-
 def table(rows: list[dict[str, Any]]) -> str:
     heads = list(rows[0])
     lines = ["  ".join(f"{head:>14}" for head in heads)]
@@ -177,8 +157,8 @@ def main() -> None:
     parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
     options = parser.parse_args()
     report: dict[str, Any] = {
-        "setting": setting(),
-        "machine": processor(),
+        **machine(),
+        "seed": {"runs": list(range(RUNS)), "reference": REFERENCE_SEED, "others": 0},
         "ladder": ladder(options.rays, options.reference),
         "facets": facets(),
         "speed": speed(),
@@ -191,10 +171,8 @@ def main() -> None:
     for name in ("speed", "earlier", "changes"):
         print(f"{name}\n{table(report[name])}\n")
     if options.docs:
-        for folder in ("data", "images"):
-            (options.docs / folder).mkdir(parents=True, exist_ok=True)
-        text = json.dumps(report, indent=1) + "\n"
-        (options.docs / "data" / "light_rays.json").write_text(text)
+        write_data("light_rays", report, options.docs)
+        (options.docs / "images").mkdir(exist_ok=True)
         draw(report, options.docs / "images" / "light_rays.png")
 
 

@@ -11,8 +11,6 @@ settings and with weights linear in the darkness.
 from __future__ import annotations
 
 import argparse
-import json
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_data import DOCS, write_data
+from machine import machine
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -36,8 +36,8 @@ from gelslim_twin.render.sensor_look import sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
 
-ROOT = Path(__file__).parents[1]
-SPEC = ROOT / "designs" / "gelslim2.yaml"
+SPEC = Path(__file__).parents[1] / "designs" / "gelslim2.yaml"
+LIGHT_SEED = 0
 EFFECTS = (
     "shading",
     "defocus",
@@ -68,11 +68,13 @@ def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    repeats = 3 if parser.parse_args().quick else 25
+    parser.add_argument("--docs", type=Path, help="folder to write data/ in")
+    asked = parser.parse_args()
+    repeats = 3 if asked.quick else 25
     sensor = design_sensor()
     data: dict[str, Any] = {
+        **machine(LIGHT_SEED),
         "design": SPEC.name,
-        "machine": f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}",
         "dots": len(sensor.values["grid"]),
         "stages": stage_rows(sensor, repeats),
         "sampling": sampling_rows(sensor, repeats),
@@ -87,9 +89,8 @@ def main() -> None:
                     f"{k} {v:.4g}" if isinstance(v, float) else str(v) for k, v in row.items()
                 )
             )
-    if repeats > 3:
-        target = ROOT / "docs" / "data" / "rendering.json"
-        target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    if asked.docs or not asked.quick:
+        write_data("rendering", data, asked.docs or DOCS)
 
 
 def shown(name: str, value: object) -> str:
@@ -107,7 +108,7 @@ def design_sensor() -> Sensor:
     from gelslim_optics.trace import trace_light
 
     d = derive(read_spec(SPEC).spec)
-    traced = trace_light(light_scene(d, guide_profile(d)), 1 << 16, seed=0)
+    traced = trace_light(light_scene(d, guide_profile(d)), 1 << 16, seed=LIGHT_SEED)
     size = float(d["design.gel.length_mm"]), float(d["design.gel.width_mm"])
     light = LightMap.from_bins(
         np.stack([0.45 * traced.irradiance("red"), traced.irradiance("green")]),

@@ -1,7 +1,7 @@
 """Error of the force field against time: layers, element, pitch x operator x Poisson's ratio.
 
     python bench/stiffness_ladder.py            # writes docs/data and docs/images
-    python bench/stiffness_ladder.py --quick    # one Poisson's ratio, prints only
+    python bench/stiffness_ladder.py --quick    # one Poisson's ratio, fewer layers, prints only
 
 The reference of every point is the same pad at half its pitch with eight B-bar layers (see
 ifem_export.ladder). One of layers, element and pitch is varied at a time.
@@ -10,20 +10,21 @@ ifem_export.ladder). One of layers, element and pitch is varied at a time.
 from __future__ import annotations
 
 import argparse
-import json
-import platform
 from pathlib import Path
 from typing import Any
 
+from bench_data import DOCS, write_data, write_whole
+from machine import machine
+
 from ifem_export.element import Formulation
-from ifem_export.ladder import measure_ladder
+from ifem_export.ladder import FIELD_SEED, measure_ladder
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import build_pad_mesh
 
-ROOT = Path(__file__).parents[1]
 RATIOS = (0.3223, 0.45, 0.49)
 LAYERS = (1, 2, 3, 4, 6, 8)
+QUICK_LAYERS = (1, 2, 4)
 ELEMENTS: tuple[Formulation, ...] = ("full", "incompatible")
 ACROSS = (28, 56)
 CELLS, SIDE_MM, THICKNESS_MM, CORNER_MM = 42, 28.0, 2.0, 1.0
@@ -43,14 +44,16 @@ def main() -> None:
     """Measure, print, and write JSON and figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    quick = parser.parse_args().quick
+    parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
+    asked = parser.parse_args()
+    quick = asked.quick
     rows: list[dict[str, Any]] = []
     for ratio in RATIOS[:1] if quick else RATIOS:
-        for layers in LAYERS:
+        for layers in QUICK_LAYERS if quick else LAYERS:
             rows += measured(ratio, layers)
         for element in ELEMENTS:
             rows += measured(ratio, 4, element)
-        for across in ACROSS:
+        for across in ACROSS[:1] if quick else ACROSS:
             rows += measured(ratio, 4, across=across)
     for r in rows:
         print(
@@ -58,17 +61,16 @@ def main() -> None:
             f"{r['label']:22s} "
             f"{r['error_field']:8.2%}  {r['milliseconds']:7.3f} ms"
         )
-    if quick:
+    if quick and not asked.docs:
         return
+    docs = asked.docs or DOCS
     data = {
+        **machine(FIELD_SEED),
         "pad": f"{SIDE_MM:g} x {SIDE_MM:g} mm, {THICKNESS_MM:g} mm thick",
-        "machine": f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}",
         "rows": rows,
     }
-    target = ROOT / "docs" / "data" / "stiffness_ladder.json"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    draw(rows, ROOT / "docs" / "images" / "stiffness_ladder.png")
+    write_data("stiffness_ladder", data, docs)
+    draw(rows, docs / "images" / "stiffness_ladder.png")
 
 
 def measured(
@@ -100,8 +102,9 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     """Above: layers and operators with the Pareto front; below: elements and pitches."""
     from gelslim_cad.figure import as_png, new_figure
 
-    figure, axes = new_figure(12.0, 7.6, columns=len(RATIOS), rows=2)
-    for k, ratio in enumerate(RATIOS):
+    ratios = sorted({r["poissons_ratio"] for r in rows})
+    figure, axes = new_figure(12.0, 7.6, columns=max(2, len(ratios)), rows=2)
+    for k, ratio in enumerate(ratios):
         here = [r for r in rows if r["poissons_ratio"] == ratio]
         plain = [r for r in here if r["element"] == "bbar" and r["cells"] == CELLS]
         above, below = axes[0][k], axes[1][k]
@@ -132,7 +135,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         axes[1][-1].scatter([], [], marker="o", color=colour, label=name)
     for row in axes:
         row[-1].legend(fontsize=8, frameon=False, ncols=2)
-    path.write_bytes(as_png(figure))
+    write_whole(path, as_png(figure))
 
 
 def spot(row: dict[str, Any]) -> tuple[float, float]:

@@ -7,14 +7,14 @@ python bench/twin_ladders.py --quick    # two scenes without large strain, print
 from __future__ import annotations
 
 import argparse
-import json
-import platform
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_data import DOCS, write_data
+from machine import machine
 from twin_effects import Bench, measured
 
 from gelslim_cad.cli.twin_sensor import spec_sensor
@@ -27,6 +27,7 @@ from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
 ROOT = Path(__file__).parents[1]
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 FINEST = 1e-7
+MOST_POSES = 8
 QUICK = ("press_sphere", "release")
 
 
@@ -34,7 +35,9 @@ def main() -> None:
     """Measure, print, write JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    quick = parser.parse_args().quick
+    parser.add_argument("--docs", type=Path, help="folder to write data/ in")
+    asked = parser.parse_args()
+    quick = asked.quick
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         store_sensor(spec_sensor(ROOT / "designs" / "gelslim2.yaml"), folder, True)
@@ -42,7 +45,7 @@ def main() -> None:
         for path in sorted((ROOT / "designs" / "scenes").glob("*.yaml")):
             if quick and path.stem not in QUICK:
                 continue
-            bench = Bench(read_scene(path), sensor, folder, 8)
+            bench = Bench(read_scene(path), sensor, folder, MOST_POSES)
             rows += measured(bench, quick)
         for r in rows:
             errors = ", ".join(f"{k} {v:.3g} <= {r['bound'][k]:.3g}" for k, v in r["error"].items())
@@ -53,13 +56,10 @@ def main() -> None:
         contact = [r for mu in (0.0, 0.6) for r in ladder(sensor, folder, mu)]
         for r in contact:
             print(r)
-    if not quick:
-        about = {"machine": platform.machine(), "python": platform.python_version()}
-        record = {**about, "numpy": np.__version__, "poses_at_most": 8, "seed": "the scene's"}
-        path = ROOT / "docs" / "data" / "twin_ladders.json"
-        path.write_text(
-            json.dumps({**record, "effects": rows, "contact": contact}, indent=1) + "\n"
-        )
+    if asked.docs or not quick:
+        about = {**machine(), "seed": "of each scene", "poses_at_most": MOST_POSES}
+        data = {**about, "effects": rows, "contact": contact}
+        write_data("twin_ladders", data, asked.docs or DOCS)
 
 
 def ladder(sensor: Any, folder: Path, friction: float) -> list[dict[str, Any]]:
