@@ -21,7 +21,7 @@ class Rung:
     time_ms: float
     work: float
     measured: bool = True
-    """Whether error and time were measured; False where a law carries them on from measured ones."""
+    """Whether error and time were measured; False where a law carries them on from others."""
 
     def __str__(self) -> str:
         return f"{self.name} ({shown_share(self.error)}, {shown_time(self.time_ms)})"

@@ -16,9 +16,10 @@ from gelslim_cad.spec import Spec
 from ifem_export.bundle import Bundle, build_bundle
 from ifem_export.crop import CropReport
 from ifem_export.crown import Paraboloid
-from ifem_export.ladder import REFERENCE_LAYERS, Ladder
+from ifem_export.ladder import REFERENCE_LAYERS
 from ifem_export.marker_grid import MarkerGrid, build_marker_grid
 from ifem_export.material import Material
+from ifem_export.operator_ladder import OperatorLadder
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import PadMesh, build_pad_mesh
 
@@ -116,7 +117,7 @@ def make_bundle(
     grid: MarkerGrid,
     *,
     with_stiffness: bool = False,
-    ladder: Ladder | None = None,
+    ladder: OperatorLadder | None = None,
     operator: str = "",
 ) -> Bundle:
     """The stiffness bundle of this sensor; K itself only `with_stiffness`: its recipe is there."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from accuracy_budget.budget import Budget
 from gelslim_force.force_estimator import ForceSettings
 from gelslim_force.marker_motion import COMPENSATIONS, Compensation
 from ifem_export.bundle import Bundle
@@ -19,13 +20,12 @@ Gel = Literal["linear", "neo_hookean"]
 class PipelineSettings:
     """Choices of the pipeline. Raises ValueError for impossible ones.
 
-    Operator: a rung by name, or a budget (`error` of the force field, `time_ms` of the operator
-    per frame) that picks from the bundle's measured ladder; else the bundle's own choice.
+    Operator: a rung by name, or a budget (error of the force field, time of the operator per
+    frame) that picks from the bundle's measured ladder; else the bundle's own choice.
     """
 
     rung: Rung | None = None
-    error: float | None = None
-    time_ms: float | None = None
+    budget: Budget | None = None
     compensation: Compensation = "exact"
     interpolation: Interpolation = "sparse"
     gel: Gel = "linear"
@@ -41,12 +41,8 @@ class PipelineSettings:
     def __post_init__(self) -> None:
         if self.rung is not None and self.rung not in RUNGS:
             raise ValueError(f"operator {self.rung!r}: must be one of {', '.join(RUNGS)}")
-        if self.rung is not None and (self.error is not None or self.time_ms is not None):
+        if self.rung is not None and self.budget is not None and not self.budget.unlimited:
             raise ValueError("give an operator by name or a budget, not both")
-        if self.error is not None and not 0 < self.error < 10:
-            raise ValueError(f"error = {self.error:g}: must be a share > 0, such as 0.03")
-        if self.time_ms is not None and not self.time_ms > 0:
-            raise ValueError(f"time_ms = {self.time_ms:g}: must be > 0")
         if self.compensation not in COMPENSATIONS:
             raise ValueError(
                 f"compensation {self.compensation!r}: must be one of {', '.join(COMPENSATIONS)}"
@@ -65,7 +61,7 @@ class PipelineSettings:
 
         Raises BudgetError where no rung keeps the budget, IfemError for a budget without ladder.
         """
-        return bundle.surface_operator(self.rung, error=self.error, time_ms=self.time_ms)
+        return bundle.surface_operator(self.rung, budget=self.budget)
 
     def compliance(self, bundle: Bundle) -> SurfaceOperator:
         """The quick operator that a masked fit asks many times per frame."""

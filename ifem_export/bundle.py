@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from accuracy_budget.budget import Budget
 from ifem_export.element import Formulation, hex8_stiffness
 from ifem_export.errors import IfemError
-from ifem_export.ladder import Ladder, chosen_rung
 from ifem_export.marker_field import MarkerField, marker_field
 from ifem_export.material import Material
+from ifem_export.operator_ladder import OperatorLadder, chosen_rung
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.surface_operator import Rung, SurfaceOperator, surface_operator
 from ifem_export.weighted_assembly import mesh_stiffness
@@ -66,25 +67,24 @@ class Bundle:
     camera: Mapping[str, Any]
     self_test: SelfTest
     spec_hash: str
-    ladder: Ladder | None = None
+    ladder: OperatorLadder | None = None
     operator: str = ""
 
     def surface_operator(
         self,
         rung: Rung | None = None,
         *,
-        error: float | None = None,
-        time_ms: float | None = None,
+        budget: Budget | None = None,
         **parameters: Any,
     ) -> SurfaceOperator:
         """Operator on the outer surface, F = S u and u = C F.
 
-        By name with its parameters, or by budget: the quickest with a field error of at most
-        `error`, the most accurate within `time_ms`; else the maker's choice, else `pcg`. Raises
-        BudgetError where no measured rung keeps the budget, IfemError where none was measured.
+        By name with its parameters, or by budget from the measured ladder; else the maker's
+        choice, else `pcg`. Raises BudgetError where no rung keeps the budget, IfemError where none
+        was measured.
         """
         if rung is None:
-            chosen = chosen_rung(self.ladder, self.operator, error, time_ms)
+            chosen = chosen_rung(self.ladder, self.operator, budget)
             if chosen is not None:
                 rung, parameters = chosen.rung, dict(chosen.parameters)
         return surface_operator(
@@ -97,6 +97,12 @@ class Bundle:
         if self.stiffness is not None:
             return self.stiffness
         return mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
+
+    @property
+    def times_key(self) -> str:
+        """Names this sensor's operators among the times of a machine."""
+        parts = f"{self.geometry_hash}|{self.material}|{self.formulation}"
+        return f"operators-{hashlib.sha256(parts.encode()).hexdigest()[:32]}"
 
     @cached_property
     def geometry_hash(self) -> str:
@@ -114,7 +120,7 @@ def build_bundle(
     camera: Mapping[str, Any] | None = None,
     spec_hash: str = "",
     with_stiffness: bool = True,
-    ladder: Ladder | None = None,
+    ladder: OperatorLadder | None = None,
     operator: str = "",
 ) -> Bundle:
     """Make a bundle.

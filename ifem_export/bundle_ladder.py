@@ -9,7 +9,7 @@ from typing import Any
 
 from ifem_export.bundle import Bundle
 from ifem_export.errors import BundleError, IfemError
-from ifem_export.ladder import Ladder
+from ifem_export.operator_ladder import OperatorLadder
 
 LADDER = "ladder.json"
 _REMEDY = "rebuild the bundle from its spec (gelslim bundle SPEC)"
@@ -32,8 +32,8 @@ def ladder_section(bundle: Bundle) -> dict[str, Any] | None:
     return {"file": LADDER, "sha256": digest, "operator": bundle.operator}
 
 
-def read_ladder(folder: Path, manifest: dict[str, Any]) -> tuple[Ladder | None, str]:
-    """Ladder and chosen operator. Raises BundleError for a missing or altered file."""
+def read_ladder(folder: Path, manifest: dict[str, Any]) -> tuple[OperatorLadder | None, str]:
+    """OperatorLadder and chosen operator. Raises BundleError for a missing or altered file."""
     section = manifest.get("ladder")
     if section is None:
         return None, ""
@@ -44,6 +44,6 @@ def read_ladder(folder: Path, manifest: dict[str, Any]) -> tuple[Ladder | None, 
     if not isinstance(section, dict) or hashlib.sha256(data).hexdigest() != section.get("sha256"):
         raise BundleError(LADDER, "its SHA-256 differs from the manifest, it was altered", _REMEDY)
     try:
-        return Ladder.from_record(json.loads(data)), str(section.get("operator", ""))
+        return OperatorLadder.from_record(json.loads(data)), str(section.get("operator", ""))
     except (ValueError, IfemError) as error:
         raise BundleError(LADDER, str(error), _REMEDY) from error

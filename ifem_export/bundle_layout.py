@@ -10,9 +10,9 @@ from scipy import sparse
 from ifem_export.bundle import Bundle, SelfTest
 from ifem_export.bundle_manifest import MANIFEST, REBUILD
 from ifem_export.errors import BundleError, IfemError
-from ifem_export.ladder import Ladder
 from ifem_export.marker_field import MarkerField
 from ifem_export.material import Material
+from ifem_export.operator_ladder import OperatorLadder
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.thin_plate import ThinPlate
 
@@ -56,7 +56,7 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
 def bundle_from(
     manifest: dict[str, Any],
     arrays: dict[str, NDArray[Any]],
-    ladder: tuple[Ladder | None, str] = (None, ""),
+    ladder: tuple[OperatorLadder | None, str] = (None, ""),
 ) -> Bundle:
     """Put a bundle together from its manifest and opened arrays, reading no values.
 

@@ -8,16 +8,16 @@ bumps about a pad thickness wide, sideways and down: narrower ones no marker gri
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ifem_export.element import Formulation
-from ifem_export.errors import IfemError, MeshError
+from ifem_export.errors import MeshError
 from ifem_export.material import Material
+from ifem_export.operator_ladder import MeasuredRung, OperatorLadder
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.surface_operator import CROWNED_RUNGS, Rung, SurfaceOperator, surface_operator
 
@@ -28,7 +28,6 @@ REFERENCE_ELEMENT: Formulation = "bbar"
 REFERENCE_RTOL = 1e-8
 FIELD_SEED = 7
 TIMED_S = 0.12
-BALANCE, ENOUGH = 1.1, 0.03
 NOISE_SEED, NOISE_DRAWS = 11, 6
 _MARGIN = 4
 """Nodes by which the boxes of a mesh and its reference may differ, and one more."""
@@ -45,114 +44,6 @@ CHOICES: tuple[tuple[Rung, dict[str, Any]], ...] = (
 DENSE: tuple[tuple[Rung, dict[str, Any]], ...] = (("dense32", {}),)
 
 
-class BudgetError(IfemError):
-    """No rung keeps the budget; the message names the nearest ones."""
-
-
-@dataclass(frozen=True)
-class MeasuredRung:
-    """One operator. Errors are relative: of the field (L2, worst of the fields) and resultant.
-
-    `error_operator` is against exact condensation on the same mesh, without the mesh's own error.
-    `noise_…` are gains: standard deviation of a force component, at a node and of the resultant,
-    per mm of independent noise on every surface displacement.
-    """
-
-    rung: Rung
-    parameters: Mapping[str, float]
-    error_field: float
-    error_operator: float
-    error_resultant: float
-    noise_node_n_per_mm: float
-    noise_resultant_n_per_mm: float
-    milliseconds: float
-    n_bytes: int
-
-    @property
-    def label(self) -> str:
-        """Name with parameters."""
-        inside = ", ".join(f"{k} {v:g}" for k, v in self.parameters.items())
-        return f"{self.rung} ({inside})" if inside else self.rung
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """Rungs of one sensor in the order of CHOICES, and what they were measured against."""
-
-    rungs: tuple[MeasuredRung, ...]
-    reference: str
-    layers: int
-    formulation: str
-    poissons_ratio: float
-
-    def within_error(self, error: float) -> MeasuredRung:
-        """Quickest rung whose field error is at most `error`. Raises BudgetError."""
-        good = [r for r in self.rungs if r.error_field <= error]
-        if not good:
-            best = min(self.rungs, key=lambda r: r.error_field)
-            raise BudgetError(
-                f"no operator reaches a field error of {error:.2%}: the most accurate, "
-                f"{best.label}, has {best.error_field:.2%} in {best.milliseconds:.2f} ms; "
-                "use more layers or a finer pitch"
-            )
-        return min(good, key=lambda r: r.milliseconds)
-
-    def within_time(self, milliseconds: float) -> MeasuredRung:
-        """Most accurate rung that takes at most `milliseconds`. Raises BudgetError."""
-        good = [r for r in self.rungs if r.milliseconds <= milliseconds]
-        if not good:
-            quickest = min(self.rungs, key=lambda r: r.milliseconds)
-            raise BudgetError(
-                f"no operator takes {milliseconds:g} ms or less: the quickest, {quickest.label}, "
-                f"takes {quickest.milliseconds:.3f} ms"
-            )
-        return min(good, key=lambda r: r.error_field)
-
-    def balanced(self) -> MeasuredRung:
-        """What a bundle starts with: quickest rung within 3 % or a tenth of the smallest error.
-
-        Markers a millimetre apart leave more than 3 % open, whatever the operator.
-        """
-        best = min(r.error_field for r in self.rungs)
-        return self.within_error(max(ENOUGH, BALANCE * best))
-
-    def to_record(self) -> dict[str, Any]:
-        """Plain data."""
-        return {**asdict(self), "rungs": [asdict(r) for r in self.rungs]}
-
-    @classmethod
-    def from_record(cls, record: Mapping[str, Any]) -> Ladder:
-        """From plain data; raises IfemError where it is malformed."""
-        try:
-            rungs = tuple(MeasuredRung(**r) for r in record["rungs"])
-            return cls(**{**record, "rungs": rungs})
-        except (KeyError, TypeError) as error:
-            raise IfemError(f"the ladder is malformed ({error!r})") from error
-
-
-def chosen_rung(
-    ladder: Ladder | None, label: str, error: float | None, time_ms: float | None
-) -> MeasuredRung | None:
-    """Rung for a budget, else the one called `label`, else None; both budgets must hold.
-
-    Raises BudgetError where none does, IfemError for a budget without a ladder.
-    """
-    if error is None and time_ms is None:
-        return next((r for r in ladder.rungs if r.label == label), None) if ladder else None
-    if ladder is None:
-        raise IfemError("this bundle holds no measured ladder: build it with one, or name a rung")
-    if error is None:
-        return ladder.within_time(float(time_ms or 0.0))
-    found = ladder.within_error(error)
-    if time_ms is not None and found.milliseconds > time_ms:
-        nearest = ladder.within_time(time_ms)
-        raise BudgetError(
-            f"no operator has a field error of {error:.2%} within {time_ms:g} ms: {found.label} "
-            f"takes {found.milliseconds:.2f} ms, {nearest.label} errs {nearest.error_field:.2%}"
-        )
-    return found
-
-
 def measure_ladder(
     mesh: PadMesh,
     material: Material,
@@ -161,7 +52,7 @@ def measure_ladder(
     dense: bool = False,
     progress: Progress | None = None,
     reference: PadMesh | None = None,
-) -> Ladder:
+) -> OperatorLadder:
     """Measure every operator of a pad; `dense` adds the dense rung, which takes much longer.
 
     `reference` is a finer mesh of the same gel on a lattice of half the pitch that has the nodes of
@@ -203,7 +94,29 @@ def measure_ladder(
         f"{fine.layers} {REFERENCE_ELEMENT} layers at half the pitch, inner solve to "
         f"{REFERENCE_RTOL:g}"
     )
-    return Ladder(tuple(rungs), told, mesh.layers, formulation, material.poissons_ratio)
+    return OperatorLadder(tuple(rungs), told, mesh.layers, formulation, material.poissons_ratio)
+
+
+def retimed(
+    ladder: OperatorLadder,
+    mesh: PadMesh,
+    material: Material,
+    formulation: Formulation,
+    progress: Progress | None = None,
+) -> dict[str, float]:
+    """Times in ms of a ladder's rungs on this machine now, by label; errors need no measuring.
+
+    `mesh`, `material` and `formulation` are those the ladder was measured for.
+    """
+    tell = progress or (lambda text, done, total: None)
+    points = np.asarray(mesh.nodes_mm)[mesh.surface]
+    moved = [field(points) for field in bumps(mesh)]
+    times: dict[str, float] = {}
+    for done, rung in enumerate(ladder.rungs):
+        tell(rung.label, done, len(ladder.rungs))
+        operator = surface_operator(mesh, material, formulation, rung.rung, **rung.parameters)
+        times[rung.label] = timed_ms(operator, moved)
+    return times
 
 
 def bumps(mesh: PadMesh) -> list[Callable[[Array], Array]]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gelslim_cad.cli.budget import FieldError, FrameTime
 from gelslim_cad.cli.options import AsJson, Force, SpecFile
 
 if TYPE_CHECKING:
-    from ifem_export.ladder import Ladder
+    from accuracy_budget.budget import Budget
+    from ifem_export.operator_ladder import OperatorLadder
 
 
 def bundle(
@@ -18,13 +21,8 @@ def bundle(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-bundle if left out.")
     ] = None,
-    error: Annotated[
-        str | None,
-        typer.Option(help="Field error that the chosen operator may have, as 3% or 0.03."),
-    ] = None,
-    time_ms: Annotated[
-        float | None, typer.Option(min=0, help="Time per frame that it may take, in ms.")
-    ] = None,
+    error: FieldError = None,
+    within: FrameTime = None,
     ladder: Annotated[
         bool, typer.Option(help="Measure error and time of every operator (some seconds).")
     ] = True,
@@ -43,22 +41,23 @@ def bundle(
     and time measured for this sensor. A budget chooses the operator that the pipeline starts with.
     """
     from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.cli.budget import budget_of
     from gelslim_cad.cli.output import require_pad_rules, written
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
     from gelslim_cad.pad import gel_material, make_bundle, marker_grid, pad_mesh, reference_mesh
     from gelslim_cad.spec.reader import read_spec
     from ifem_export.bundle_io import write_bundle
-    from ifem_export.ladder import chosen_rung, measure_ladder
+    from ifem_export.ladder import measure_ladder
 
-    allowed = None if error is None else share(error)
+    budget = budget_of(error, within)
     loaded = read_spec(spec)
     d = derive(loaded.spec)
     require_pad_rules(d, "gelslim bundle", force)
     grid = marker_grid(d)
     mesh, _ = pad_mesh(d, grid)
-    measured, chosen = None, None
-    if ladder or allowed is not None or time_ms is not None:
+    measured, label = None, ""
+    if ladder or not budget.unlimited:
         gel, element = gel_material(loaded.spec), loaded.spec.mesh.element
         with progress_bar(quiet=as_json) as tell:
             measured = measure_ladder(
@@ -69,8 +68,7 @@ def bundle(
                 progress=tell,
                 reference=reference_mesh(d, mesh),
             )
-        chosen = chosen_rung(measured, measured.balanced().label, allowed, time_ms)
-    label = chosen.label if chosen is not None else ""
+        label = chosen_label(measured, budget)
     folder = out or Path("out") / f"{loaded.spec.name}-bundle"
     made = make_bundle(
         loaded.spec, d, mesh, grid, with_stiffness=with_k, ladder=measured, operator=label
@@ -97,7 +95,20 @@ def bundle(
     return 0
 
 
-def print_ladder(ladder: Ladder, chosen: str) -> None:
+def chosen_label(ladder: OperatorLadder, budget: Budget) -> str:
+    """Label of the operator that a budget picks, else of the one a bundle starts with.
+
+    The ladder was measured here and now, so that its times are this machine's. Raises BudgetError.
+    """
+    if budget.unlimited:
+        return ladder.balanced().label
+    choice = ladder.choose(budget)
+    for remark in choice.remarks:
+        print(f"gelslim: {remark}", file=sys.stderr)
+    return choice.rung.name
+
+
+def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
     """A table of the rungs, the chosen one marked."""
     from rich.table import Table
 
@@ -115,18 +126,3 @@ def print_ladder(ladder: Ladder, chosen: str) -> None:
         )
     console().print(table)
     print(f"Against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")
-
-
-def share(text: str) -> float:
-    """3% or 0.03 as 0.03; raises CommandError for anything else."""
-    from gelslim_cad.cli.failure import CommandError
-    from gelslim_cad.cli.status import BAD_INPUT
-
-    number = text.strip().removesuffix("%")
-    try:
-        value = float(number) / (100 if number != text.strip() else 1)
-    except ValueError:
-        value = float("nan")
-    if not 0 < value < 100:
-        raise CommandError(f"--error {text!r}: must be a share above 0, as 3% or 0.03", BAD_INPUT)
-    return value

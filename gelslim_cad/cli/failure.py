@@ -89,7 +89,7 @@ def _of_ifem(error: BaseException) -> bool:
     return any(c.__module__ == "ifem_export.errors" for c in type(error).__mro__)
 
 
-_WORDED = ("gelslim_force.", "gelslim_twin.", "work_pool.")
+_WORDED = ("accuracy_budget.", "gelslim_force.", "gelslim_twin.", "work_pool.")
 
 
 def _of_force(error: BaseException) -> bool:

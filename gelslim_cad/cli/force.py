@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim_cad.cli.budget import FieldError, FrameTime
 from gelslim_cad.cli.options import AsJson
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from accuracy_budget.budget import Budget
     from gelslim_force.force_pipeline import ForcePipeline, NormalSource
     from gelslim_force.force_run import RunSummary
     from gelslim_force.outputs.overlay import Overlay
@@ -51,12 +54,8 @@ def force(
         Path | None,
         typer.Option(help=".npy of heights (frames, h, w) in mm, registered to the pictures."),
     ] = None,
-    error: Annotated[
-        str | None, typer.Option(help="Error of the force field that is allowed, as 3%.")
-    ] = None,
-    time_ms: Annotated[
-        float | None, typer.Option(min=0, help="Time that the operator may take per frame.")
-    ] = None,
+    error: FieldError = None,
+    within: FrameTime = None,
     operator: Annotated[str | None, typer.Option(help="Operator by name, such as fft.")] = None,
     method: Annotated[
         str, typer.Option(help="auto, direct, low_pass or masked; see the guide.")
@@ -87,7 +86,7 @@ def force(
     or depth maps the normal force stays unknown. Writes a run folder: wrenches.csv, fields,
     overlay pictures.
     """
-    from gelslim_cad.cli.bundle import share
+    from gelslim_cad.cli.budget import budget_of
     from gelslim_cad.cli.failure import CommandError
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.status import BAD_INPUT
@@ -102,12 +101,14 @@ def force(
         raise CommandError(f"--fields {fields}: npz, parquet or none")
     if indenter and depth_maps:
         raise CommandError("give an indenter or depth maps, not both")
+    budget = budget_of(error, within)
     sensor = load_bundle(bundle)
+    if not budget.unlimited and operator is None:
+        sensor = _budgeted(sensor, budget, bundle, gel)
     try:
         settings = PipelineSettings(
             rung=operator,  # type: ignore[arg-type]
-            error=None if error is None else share(error),
-            time_ms=time_ms,
+            budget=budget,
             compensation=compensation,  # type: ignore[arg-type]
             interpolation=interpolation,  # type: ignore[arg-type]
             gel=gel,  # type: ignore[arg-type]
@@ -141,6 +142,20 @@ def force(
     else:
         _report(folder, pipeline, summary, files)
     return 0 if summary.with_forces else BAD_INPUT
+
+
+def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
+    """The sensor with this machine's times; what a budget cannot know of it is said."""
+    from gelslim_cad.cli.budget import note_choice, on_this_machine
+
+    timed = on_this_machine(sensor)
+    if timed.ladder is not None:
+        choice = timed.ladder.choose(budget)
+        if gel != "linear":
+            told = f"the ladder was measured on a linear gel; its errors say little of {gel}"
+            choice = replace(choice, remarks=(*choice.remarks, told))
+        note_choice(choice, budget, sensor.times_key, f"gelslim bench {path}")
+    return timed
 
 
 def _calibrated(

@@ -20,7 +20,7 @@ def test_shares_are_read(text: str, share: float) -> None:
 
 @pytest.mark.parametrize("text", ["", "%", "3 %%", "much", "0", "-1%", "nan", "inf", "1001%"])
 def test_other_shares_are_refused(text: str) -> None:
-    with pytest.raises(BudgetError, match="must be above 0, in per cent as 3% or a share as 0.03"):
+    with pytest.raises(BudgetError, match="in per cent as 3% or a share"):
         parse_share(text)
 
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from ifem_bundles import MARKERS
 
+from accuracy_budget.budget import Budget
+from accuracy_budget.errors import BudgetError
 from ifem_export.bundle import build_bundle
 from ifem_export.bundle_io import load_bundle, write_bundle
+from ifem_export.element import Formulation
 from ifem_export.errors import BundleError, IfemError
-from ifem_export.ladder import BudgetError, Ladder, lumped, measure_ladder, refined
+from ifem_export.ladder import lumped, measure_ladder, refined, retimed
 from ifem_export.material import Material
+from ifem_export.operator_ladder import OperatorLadder
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.surface_operator import surface_operator
@@ -27,15 +30,15 @@ def pad(layers: int = 4) -> PadMesh:
 
 
 @pytest.fixture(scope="module")
-def ladder() -> Ladder:
+def ladder() -> OperatorLadder:
     return measure_ladder(pad(), GEL, "bbar")
 
 
-def error(ladder: Ladder, label: str) -> float:
+def error(ladder: OperatorLadder, label: str) -> float:
     return next(r for r in ladder.rungs if r.label == label).error_field
 
 
-def test_errors_fall_from_the_paper_to_condensation(ladder: Ladder) -> None:
+def test_errors_fall_from_the_paper_to_condensation(ladder: OperatorLadder) -> None:
     assert error(ladder, "paper") > 0.2
     assert error(ladder, "pcg (rtol 0.01)") < 0.05
     assert error(ladder, "pcg (rtol 0.0001)") == pytest.approx(error(ladder, "factor"), rel=0.02)
@@ -46,7 +49,7 @@ def test_errors_fall_from_the_paper_to_condensation(ladder: Ladder) -> None:
     assert exact.error_operator < 1e-6
 
 
-def test_noise_gains_are_those_of_the_operator(ladder: Ladder) -> None:
+def test_noise_gains_are_those_of_the_operator(ladder: OperatorLadder) -> None:
     mesh = pad()
     operator = surface_operator(mesh, GEL, "bbar", "factor")
     count = len(mesh.surface)
@@ -59,7 +62,7 @@ def test_noise_gains_are_those_of_the_operator(ladder: Ladder) -> None:
     assert found.noise_resultant_n_per_mm > 0
 
 
-def test_the_resultant_of_the_paper_is_right_and_its_field_is_not(ladder: Ladder) -> None:
+def test_the_resultant_of_the_paper_is_right_and_its_field_is_not(ladder: OperatorLadder) -> None:
     paper = next(r for r in ladder.rungs if r.rung == "paper")
     assert paper.error_resultant < 0.1
     assert paper.error_field > 4 * paper.error_resultant
@@ -106,29 +109,76 @@ def test_lumping_keeps_the_resultant() -> None:
     np.testing.assert_allclose(lumped(force, fine, mesh).sum(axis=0), force.sum(axis=0), atol=1e-9)
 
 
-def test_budgets_choose(ladder: Ladder) -> None:
-    timed = [replace(r, milliseconds=float(k + 1)) for k, r in enumerate(ladder.rungs)]
-    known = replace(ladder, rungs=tuple(timed))
+def test_budgets_choose(ladder: OperatorLadder) -> None:
+    timed = ladder.timed({r.label: float(k + 1) for k, r in enumerate(ladder.rungs)})
     lumped_fft = error(ladder, "fft (lumped 1)")
     assert error(ladder, "pcg (rtol 0.01)") < lumped_fft < 0.05
-    assert known.within_error(0.05).label == "fft (lumped 1)"
-    assert known.within_error(0.99 * lumped_fft).label == "pcg (rtol 0.01)"
-    assert known.within_time(1.5).rung == "paper"
-    assert known.within_time(100.0).error_field == min(r.error_field for r in known.rungs)
-    with pytest.raises(BudgetError, match=r"the most accurate, .* has"):
-        known.within_error(1e-6)
-    with pytest.raises(BudgetError, match="the quickest, paper, takes 1"):
-        known.within_time(0.5)
+
+    def chosen(error: float | None = None, time_ms: float | None = None) -> str:
+        return timed.choose(Budget(error, time_ms)).rung.name
+
+    assert chosen(1.01 * lumped_fft) == "fft (lumped 1)"
+    assert chosen(0.99 * lumped_fft) == "pcg (rtol 0.01)"
+    assert chosen(time_ms=1.5) == "paper"
+    assert error(ladder, chosen(time_ms=100.0)) == min(r.error_field for r in ladder.rungs)
+    with pytest.raises(BudgetError, match=r"the nearest: .*more layers or a finer pitch"):
+        chosen(1e-6)
+    with pytest.raises(BudgetError, match=r"the nearest: paper \(.*, 1 ms\)"):
+        chosen(time_ms=0.5)
 
 
-def test_the_record_reads_back(ladder: Ladder) -> None:
+def test_an_error_picks_the_same_operator_and_the_same_bits_whatever_the_clock(
+    ladder: OperatorLadder,
+) -> None:
+    rng = np.random.default_rng(5)
+    field = rng.normal(size=(len(pad().surface), 3))
+    slow = ladder.timed({r.label: float(10 ** rng.uniform(-4, 4)) for r in ladder.rungs})
+    quick = ladder.timed({r.label: float(10 ** rng.uniform(-4, 4)) for r in ladder.rungs})
+    assert slow != quick
+    assert slow.balanced().label == quick.balanced().label == ladder.balanced().label
+    for error in (0.5, 0.1, 0.05, 0.03):
+        forces = [
+            build_bundle(pad(), GEL, "bbar", with_stiffness=False, ladder=one)
+            .surface_operator(budget=Budget(error))
+            .force(field)
+            for one in (slow, quick)
+        ]
+        assert forces[0].tobytes() == forces[1].tobytes()
+
+
+def test_times_are_measured_anew_for_every_rung(ladder: OperatorLadder) -> None:
+    times = retimed(ladder, pad(), GEL, "bbar")
+    assert list(times) == [r.label for r in ladder.rungs]
+    assert all(ms > 0 for ms in times.values())
+    again = ladder.timed(times)
+    assert [r.milliseconds for r in again.rungs] == list(times.values())
+    assert [r.error_field for r in again.rungs] == [r.error_field for r in ladder.rungs]
+
+
+def test_the_key_of_a_machines_times_tells_sensors_apart() -> None:
+    def key(mesh: PadMesh, gel: Material, element: Formulation) -> str:
+        return build_bundle(mesh, gel, element, with_stiffness=False).times_key
+
+    keys = {
+        key(pad(), GEL, "bbar"),
+        key(pad(2), GEL, "bbar"),
+        key(pad(), Material(0.147, 0.45, 1020.0), "bbar"),
+        key(pad(), GEL, "full"),
+    }
+    assert len(keys) == 4
+    assert key(pad(), GEL, "bbar") in keys
+
+
+def test_the_record_reads_back(ladder: OperatorLadder) -> None:
     text = json.dumps(ladder.to_record(), allow_nan=False)
-    assert Ladder.from_record(json.loads(text)) == ladder
+    assert OperatorLadder.from_record(json.loads(text)) == ladder
     with pytest.raises(IfemError, match="malformed"):
-        Ladder.from_record({"rungs": [{}]})
+        OperatorLadder.from_record({"rungs": [{}]})
 
 
-def test_a_bundle_carries_its_ladder_and_chooses_at_load(ladder: Ladder, tmp_path: Path) -> None:
+def test_a_bundle_carries_its_ladder_and_chooses_at_load(
+    ladder: OperatorLadder, tmp_path: Path
+) -> None:
     made = build_bundle(
         pad(),
         GEL,
@@ -142,18 +192,20 @@ def test_a_bundle_carries_its_ladder_and_chooses_at_load(ladder: Ladder, tmp_pat
     loaded = load_bundle(tmp_path / "b")
     assert loaded.ladder == ladder
     assert loaded.surface_operator().name == "fft"
-    assert loaded.surface_operator(error=0.05).name == ladder.within_error(0.05).rung
-    assert loaded.surface_operator(error=0.035).name in ("pcg", "factor")
+    chosen = ladder.named(ladder.choose(Budget(0.05)).rung.name)
+    assert chosen is not None
+    assert loaded.surface_operator(budget=Budget(0.05)).name == chosen.rung
+    assert loaded.surface_operator(budget=Budget(0.035)).name in ("pcg", "factor")
     assert loaded.surface_operator("paper").name == "paper"
-    with pytest.raises(BudgetError, match="takes 1e-06 ms or less"):
-        loaded.surface_operator(error=0.05, time_ms=1e-6)
+    with pytest.raises(BudgetError, match="in 1e-06 ms per frame"):
+        loaded.surface_operator(budget=Budget(0.05, 1e-6))
     bare = build_bundle(pad(), GEL, "bbar", with_stiffness=False)
     assert bare.surface_operator().name == "pcg"
     with pytest.raises(IfemError, match="no measured ladder"):
-        bare.surface_operator(error=0.05)
+        bare.surface_operator(budget=Budget(0.05))
 
 
-def test_an_altered_ladder_is_refused(ladder: Ladder, tmp_path: Path) -> None:
+def test_an_altered_ladder_is_refused(ladder: OperatorLadder, tmp_path: Path) -> None:
     made = build_bundle(pad(), GEL, "bbar", with_stiffness=False, ladder=ladder)
     write_bundle(tmp_path / "b", made)
     path = tmp_path / "b" / "ladder.json"
@@ -165,9 +217,10 @@ def test_an_altered_ladder_is_refused(ladder: Ladder, tmp_path: Path) -> None:
         load_bundle(tmp_path / "b")
 
 
-def test_a_bundle_starts_with_the_quickest_rung_near_the_best(ladder: Ladder) -> None:
+def test_a_bundle_starts_with_the_least_work_near_the_best(ladder: OperatorLadder) -> None:
     allowed = max(0.03, 1.1 * min(r.error_field for r in ladder.rungs))
     start = ladder.balanced()
     assert start.error_field <= allowed
-    quicker = [r for r in ladder.rungs if r.milliseconds < start.milliseconds]
-    assert all(r.error_field > allowed for r in quicker)
+    lighter = [r for r in ladder.rungs if r.n_bytes < start.n_bytes]
+    assert lighter
+    assert all(r.error_field > allowed for r in lighter)
