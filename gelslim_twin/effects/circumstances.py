@@ -54,6 +54,11 @@ class SensorFigures:
         return self.focal_px / self.near_mm
 
     @property
+    def node_pitch_mm(self) -> float:
+        """Distance of neighbouring nodes of the surface."""
+        return math.sqrt(self.length_mm * self.width_mm / self.surface_nodes)
+
+    @property
     def frame_px(self) -> int:
         """Pixels of a frame."""
         return self.image_width_px * self.image_height_px
@@ -140,12 +145,3 @@ class Circumstances:
             s.focal_px * s.aperture_mm * abs(z - s.focus_mm) / (z * s.focus_mm)
             for z in (s.near_mm, s.far_mm)
         )
-
-    @property
-    def edge_px(self) -> float:
-        """Width over which the edge of a dot turns from dark to bright: blur, at least a pixel."""
-        return math.hypot(1.0, self.blur_px)
-
-    def edge_shift_px(self, grey_share: float) -> float:
-        """Edge shift that changes grey values by `grey_share` of the contrast of dots."""
-        return grey_share * self.edge_px

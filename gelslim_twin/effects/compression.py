@@ -7,8 +7,8 @@ import math
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.dot_contrast import grey_shift_px
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
-from gelslim_twin.effects.exposure import dimming
 from gelslim_twin.effects.parameters import EffectParameters
 
 RMS_STEP = 67.1
@@ -32,11 +32,9 @@ def grey_levels(quality: int) -> float:
 
 
 def bound(c: Circumstances) -> Bound:
-    """Three standard deviations."""
+    """Three standard deviations, against the dots in the least light."""
     quality = c.given("compression", CompressionParameters).quality
-    return picture(
-        0.0 if quality is None else 3 * c.edge_shift_px(grey_levels(quality) / 255) / dimming(c)
-    )
+    return picture(0.0 if quality is None else grey_shift_px(c, 3 * grey_levels(quality)))
 
 
 EFFECT = Effect(
@@ -44,7 +42,7 @@ EFFECT = Effect(
     title="JPEG compression",
     parameters=CompressionParameters,
     bound=bound,
-    formula="3 q_rms/sqrt(12)/255 of the grey range x width of an edge, over exposure below 1",
+    formula="3 q_rms/sqrt(12) over the least contrast of a dot x width of an edge",
     ladder=lambda c: (Rung("jpeg", Bound(), 2.0 * c.sensor.frame_px / 307200),),
     is_null=lambda c: c.given("compression", CompressionParameters).quality is None,
     implementation="gelslim_twin.render.compression",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.dot_contrast import contrast, dot_px
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
 
@@ -20,10 +21,21 @@ class DirtParameters(EffectParameters):
 
 
 def bound(c: Circumstances) -> Bound:
-    """What a speck hides, its diameter; a hair is a tenth of a speck wide."""
+    """What a speck hides, its diameter; a hair is at most a fifth of a speck wide.
+
+    It counts by how dark it is against the ink. At most half of a dot and half of the speck, the
+    distance of their middles.
+    """
     p = c.given("dirt", DirtParameters)
-    wide = p.speck_mm if p.specks else p.speck_mm / 10 if p.hairs else 0.0
-    return picture(p.opacity * wide * c.sensor.px_per_mm)
+    wide = p.speck_mm if p.specks else p.speck_mm / 5 if p.hairs else 0.0
+    seen = wide * c.sensor.px_per_mm
+    return picture(min(p.opacity / contrast(c) * seen, (dot_px(c) + seen) / 2) if seen else 0.0)
+
+
+def is_null(c: Circumstances) -> bool:
+    """Whether the picture stays clean."""
+    p = c.given("dirt", DirtParameters)
+    return p.specks + p.hairs == 0 or p.opacity == 0
 
 
 EFFECT = Effect(
@@ -31,9 +43,9 @@ EFFECT = Effect(
     title="Dirt",
     parameters=DirtParameters,
     bound=bound,
-    formula="opacity x diameter of a speck x f/Z",
+    formula="opacity over the ink's contrast x diameter of a speck x f/Z",
     ladder=lambda c: (Rung("drawn once", Bound(), 0.01),),
-    is_null=lambda c: bound(c).image_px == 0,
+    is_null=is_null,
     implementation="gelslim_twin.render.dirt",
     refines=("image",),
     after=("shading",),

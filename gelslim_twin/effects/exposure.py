@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.defocus import diameter_px
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
 
@@ -19,20 +22,26 @@ class ExposureParameters(EffectParameters):
     )
 
 
-def dimming(c: Circumstances) -> float:
-    """Share of the usual contrast that a short exposure leaves the dots, at most 1."""
-    p = c.given("exposure", ExposureParameters)
-    return min(1.0, p.time * p.gain)
+def toned(share: float, gamma: float) -> float:
+    """Grey over white of a light over what saturates."""
+    return float(min(1.0, share) ** (1 / gamma))
 
 
 def bound(c: Circumstances) -> Bound:
-    """Grey share: |time gain - 1|, at most all, and the largest |v^e - v| of the response."""
+    """The whole width of an edge: brighter everywhere, edges stay between dark and bright.
+
+    Exposure and response change the grey values of the two sides of an edge and of what lies
+    between in the same order; of the width, the share by which they change them, at most all:
+    |time gain - 1| and the largest |v^e - v| of the response.
+    """
     p = c.given("exposure", ExposureParameters)
     tone, exponent = 0.0, 1 / p.gamma
     if exponent != 1:
         v = exponent ** (1 / (1 - exponent))
         tone = abs(v**exponent - v)
-    return picture(c.edge_shift_px(min(1.0, abs(p.time * p.gain - 1)) + tone))
+    changed = abs(p.time * p.gain - 1) + tone
+    width = math.hypot(1.0, diameter_px(c))
+    return picture(width * min(1.0, changed))
 
 
 EFFECT = Effect(
@@ -40,7 +49,7 @@ EFFECT = Effect(
     title="Exposure, saturation and response",
     parameters=ExposureParameters,
     bound=bound,
-    formula="(min(1, |time gain - 1|) + largest |v^(1/gamma) - v|) of the grey range x edge",
+    formula="min(1, |time gain - 1| + largest |v^(1/gamma) - v|) x width of an edge",
     ladder=lambda c: (Rung("per pixel", Bound(), 0.4 * c.sensor.frame_px / 307200),),
     is_null=lambda c: bound(c).image_px == 0,
     implementation="gelslim_twin.render.exposure",

@@ -23,7 +23,7 @@ def dragged_mm(c: Circumstances) -> float:
     A frictionless press moves the surface sideways by up to 0.73 of its depth (a wedge, measured),
     which friction hinders.
     """
-    turn = math.radians(c.motion.twist_deg) * c.touch.radius_mm
+    turn = math.radians(c.motion.twist_deg) * c.footprint.reach_mm(c.touch.depth_mm)
     tilt = math.radians(c.motion.tilt_deg) * c.touch.depth_mm
     return c.motion.lateral_mm + turn + tilt + c.touch.depth_mm
 

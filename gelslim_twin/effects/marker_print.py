@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
@@ -19,6 +21,10 @@ class MarkerPrintParameters(EffectParameters):
     odd_percent: float = Field(default=0.0, ge=0, le=100, description="Dots of odd size and shape")
 
 
+RARE = 1e-3
+"""Share of prints of which a dot is farther off than the bound says."""
+
+
 def is_null(c: Circumstances) -> bool:
     """Whether the print is perfect."""
     p = c.given("marker_print", MarkerPrintParameters)
@@ -26,12 +32,15 @@ def is_null(c: Circumstances) -> bool:
 
 
 def bound(c: Circumstances) -> Bound:
-    """Four standard deviations of a dot's place; a whole pitch where dots are missing.
+    """The farthest of all dots; a whole pitch where dots are missing.
+
+    Of n dots off by sigma per axis, none is farther off than sigma sqrt(2 ln(n/p)) in all but a
+    share p of the prints (Rayleigh's distribution, union bound).
 
     Odd dots keep their centres: they change their edges by up to half a radius.
     """
     p, scale = c.given("marker_print", MarkerPrintParameters), c.sensor.px_per_mm
-    moved = 4 * p.jitter_mm * scale
+    moved = p.jitter_mm * scale * math.sqrt(2 * math.log(max(c.sensor.markers, 1) / RARE))
     if p.missing_percent > 0:
         moved = max(moved, c.sensor.marker_pitch_mm * scale)
     edge = c.sensor.marker_diameter_mm / 4 * scale if p.odd_percent > 0 else 0.0
@@ -43,7 +52,7 @@ EFFECT = Effect(
     title="Marker print: jitter, missing and odd dots",
     parameters=MarkerPrintParameters,
     bound=bound,
-    formula="4 sigma f/Z; a pitch where dots are missing; d/4 at the edge of odd ones",
+    formula="sigma sqrt(2 ln(n/0.001)) f/Z; a pitch where dots are missing; d/4 for odd ones",
     ladder=lambda c: (Rung("drawn", optics(0.0), 0.05 * c.sensor.markers / 575),),
     is_null=is_null,
     implementation="gelslim_twin.render.print_faults",

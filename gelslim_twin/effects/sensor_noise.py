@@ -7,8 +7,9 @@ import math
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.dot_contrast import least_light_dn, shift_px
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
-from gelslim_twin.effects.exposure import dimming
+from gelslim_twin.effects.exposure import ExposureParameters
 from gelslim_twin.effects.parameters import EffectParameters
 
 
@@ -27,20 +28,25 @@ class SensorNoiseParameters(EffectParameters):
 
 
 def sigma_share(c: Circumstances) -> float:
-    """Standard deviation of a white pixel over white: sqrt(N + r²)/N."""
+    """Standard deviation of a pixel in the least light, over that light, channels summed.
+
+    sqrt(n + 3 r²)/n with n electrons in the three channels: the full well's share of the light and
+    of the exposure time. Gain amplifies both alike.
+    """
     p = c.given("sensor_noise", SensorNoiseParameters)
     if p.full_well_electrons == 0:
         return 0.0
-    electrons = p.full_well_electrons + p.read_noise_electrons**2
-    return math.sqrt(electrons) / p.full_well_electrons
+    time = c.given("exposure", ExposureParameters).time
+    electrons = p.full_well_electrons * least_light_dn(c) / 255 * time
+    return math.sqrt(electrons + 3 * p.read_noise_electrons**2) / electrons
 
 
 EFFECT = Effect(
     name="sensor_noise",
     title="Sensor noise, shot and read",
     parameters=SensorNoiseParameters,
-    bound=lambda c: picture(3 * c.edge_shift_px(sigma_share(c)) / dimming(c)),
-    formula="3 sqrt(N + r²)/N of the grey range x width of an edge, over exposure below 1",
+    bound=lambda c: picture(shift_px(c, 3 * sigma_share(c))),
+    formula="3 sqrt(n + 3 r²)/n of the least light over the ink's contrast x width of an edge",
     ladder=lambda c: (Rung("drawn", Bound(), 1.5 * c.sensor.frame_px / 307200),),
     is_null=lambda c: sigma_share(c) == 0,
     implementation="gelslim_twin.render.sensor_noise",

@@ -7,12 +7,14 @@ import math
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
 
-GRAZING = 1 / math.tan(math.radians(18.9))
-"""Light enters the gel at 18.9° above its face or more (total reflection acrylic to gel): a slope
-s changes what falls on the surface by at most s / tan of that."""
+GRAZING_DEG = 18.9
+"""Light enters the gel at this angle above its face or more (total reflection acrylic to gel): a
+slope s changes what falls on the surface by at most s / tan of that, up to 1 / sin for a surface
+that faces the light."""
 
 
 class ShadingParameters(EffectParameters):
@@ -24,10 +26,18 @@ class ShadingParameters(EffectParameters):
 
 
 def grey_share(c: Circumstances) -> float:
-    """Share of the light that the steepest slope, depth over thickness, adds or takes away."""
-    p = c.given("shading", ShadingParameters)
-    slope = c.touch.depth_mm / c.sensor.thickness_mm
-    return (1 - p.ambient_share) * min(1.0, slope * GRAZING)
+    """Share of the light that the steepest slope adds or takes away.
+
+    The gel is as steep as the tool, but not steeper than the mesh can be: the depth from one node
+    to the next.
+    """
+    p, t = c.given("shading", ShadingParameters), c.touch
+    if t.depth_mm == 0:
+        return 0.0
+    slope = min(t.depth_mm / c.sensor.node_pitch_mm, c.footprint.steepest(t.depth_mm))
+    slope = max(slope, t.depth_mm / c.sensor.thickness_mm)
+    angle = math.radians(GRAZING_DEG)
+    return (1 - p.ambient_share) * min(1 / math.sin(angle) - 1, slope / math.tan(angle))
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
@@ -36,7 +46,7 @@ def ladder(c: Circumstances) -> tuple[Rung, ...]:
     return tuple(
         Rung(
             f"every {p} px",
-            picture(c.edge_shift_px(grey_share(c) * p * p / (8 * reach * reach))),
+            picture(shift_px(c, grey_share(c) * p * p / (8 * reach * reach))),
             (0.6 + 40 / p**2) * size,
             {"pixel_step": p},
         )
@@ -48,8 +58,8 @@ EFFECT = Effect(
     name="shading",
     title="Red and green shading of the slopes",
     parameters=ShadingParameters,
-    bound=lambda c: picture(c.edge_shift_px(grey_share(c))),
-    formula="(1 - ambient) min(1, depth/(h tan 18.9 deg)) of the grey range x width of an edge",
+    bound=lambda c: picture(shift_px(c, grey_share(c))),
+    formula="(1 - ambient) min(2.1, slope/tan 18.9 deg) over the ink's contrast x width of an edge",
     ladder=ladder,
     is_null=lambda c: grey_share(c) == 0,
     implementation="gelslim_twin.render.shading",

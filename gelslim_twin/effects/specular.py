@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.dot_contrast import contrast, dot_px, edge_px, least_light_dn
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
 
@@ -19,12 +20,24 @@ class SpecularParameters(EffectParameters):
     radius_px: float = Field(default=2.0, gt=0, le=200, description="Radius of a usual spot")
 
 
-def bound(c: Circumstances) -> Bound:
-    """Brightness over the grey range times the width of an edge, at most the spot's width."""
+def is_null(c: Circumstances) -> bool:
+    """Whether there is no spot to see."""
     p = c.given("specular", SpecularParameters)
-    if p.spots == 0:
+    return p.spots == 0 or p.brightness_percent == 0
+
+
+def bound(c: Circumstances) -> Bound:
+    """Brightness over the least contrast of a dot times the width of an edge.
+
+    A spot in a lamp's tint has that brightness in one channel and half in the others, twice in all.
+    At most the largest spot's width.
+    """
+    p = c.given("specular", SpecularParameters)
+    if is_null(c):
         return Bound()
-    return picture(min(c.edge_shift_px(p.brightness_percent / 100), 3 * p.radius_px))
+    added = 2 * p.brightness_percent / 100 * 255
+    light = contrast(c) * least_light_dn(c)
+    return picture(min(edge_px(c) * added / light, dot_px(c), 3 * p.radius_px))
 
 
 EFFECT = Effect(
@@ -32,9 +45,9 @@ EFFECT = Effect(
     title="Specular reflections",
     parameters=SpecularParameters,
     bound=bound,
-    formula="brightness of a spot x width of an edge, at most the spot's width",
+    formula="2 x brightness of a spot over the least contrast x width of an edge, at most the spot",
     ladder=lambda c: (Rung("drawn once", Bound(), 0.3 * c.sensor.frame_px / 307200),),
-    is_null=lambda c: bound(c).image_px == 0,
+    is_null=is_null,
     implementation="gelslim_twin.render.specular",
     refines=("image",),
     after=("shading", "dirt", "defocus"),

@@ -13,10 +13,14 @@ NONLINEAR_EXCESS = ((0.0, 0.0), (0.05, 0.02), (0.15, 0.08), (0.30, 0.21), (0.50,
 
 @dataclass(frozen=True)
 class Footprint:
-    """Of the undeformed shapes below the gel's surface: area in mm² and volume in mm³ by depth."""
+    """Of the undeformed shapes below the gel's surface, by depth."""
 
     area_mm2: Callable[[float], float]
     volume_mm3: Callable[[float], float]
+    reach_mm: Callable[[float], float]
+    """Largest distance from the tool's axis."""
+    steepest: Callable[[float], float]
+    """Largest slope; infinite for shapes with walls."""
 
 
 @dataclass(frozen=True)

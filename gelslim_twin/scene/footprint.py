@@ -1,4 +1,4 @@
-"""Area and volume of an indenter below the gel's undeformed surface, in closed form by depth."""
+"""What of a tool lies below the gel's undeformed surface, in closed form by depth."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from gelslim_twin.scene.indenter import (
     TexturedPlane,
     Wedge,
 )
+from gelslim_twin.scene.reach import tool_reach_mm, tool_steepness
 from gelslim_twin.scene.stl_extent import footprint_mm
 
 Pair = Callable[[float], tuple[float, float]]
@@ -37,7 +38,12 @@ def tool_footprint(indenters: Sequence[Indenter], folder: Path, pad_mm2: float) 
         held = min(1.0, pad_mm2 / area) if area > 0 else 0.0
         return held * area, held * sum(v for _, v in parts)
 
-    return Footprint(lambda d: total(d)[0], lambda d: total(d)[1])
+    return Footprint(
+        lambda d: total(d)[0],
+        lambda d: total(d)[1],
+        lambda d: tool_reach_mm(indenters, folder, d),
+        lambda d: tool_steepness(indenters, d),
+    )
 
 
 def _pair(indenter: Indenter, folder: Path) -> Pair:

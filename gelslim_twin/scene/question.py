@@ -14,6 +14,8 @@ from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
 
+JUST_TOUCHING_MM = 1e-9
+
 
 def plan_scene(loaded: LoadedScene, sensor: SensorFigures) -> Plan:
     """The plan of a scene.
@@ -50,21 +52,24 @@ def question(loaded: LoadedScene, sensor: SensorFigures) -> Question:
 def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures:
     """Extremes of a motion while the tool is below the undeformed surface.
 
-    A tilted tool reaches deeper on one side, by the radius of the contact times the slope.
+    A tilted tool reaches deeper on one side, by its reach times the slope.
     """
     depths = [_reach(pose, footprint) for pose in poses]
     touching = [i for i, depth in enumerate(depths) if depth > 0]
     if not touching:
         return MotionFigures(len(poses))
-    radius = math.sqrt(footprint.area_mm2(max(depths)) / math.pi)
+    reach = footprint.reach_mm(max(depths))
     lateral = turned = speed = 0.0
     for (i, a), (j, b) in pairwise(enumerate(poses)):
         if depths[i] <= 0 and depths[j] <= 0:
             continue
         side, turn = math.hypot(b.x_mm - a.x_mm, b.y_mm - a.y_mm), abs(b.twist_deg - a.twist_deg)
         lateral, turned = lateral + side, turned + turn
-        angle = math.radians(turn + _tilt(a, b))
-        way = math.hypot(side, b.depth_mm - a.depth_mm) + angle * radius
+        aside = side + math.radians(turn + _tilt(a, b)) * reach
+        # What stands beside the tool is pushed down as the tool comes over it.
+        deepest = max(depths[i], depths[j])
+        pushed = min(deepest, footprint.steepest(deepest) * aside) if aside > 0 else 0.0
+        way = math.hypot(aside, b.depth_mm - a.depth_mm) + pushed
         speed = max(speed, way / (b.time_s - a.time_s))
     return MotionFigures(
         poses=len(poses),
@@ -82,8 +87,11 @@ def _tilt(a: Pose, b: Pose) -> float:
 
 
 def _reach(pose: Pose, footprint: Footprint) -> float:
-    if pose.depth_mm <= 0:
-        return pose.depth_mm
-    radius = math.sqrt(footprint.area_mm2(pose.depth_mm) / math.pi)
     slope = math.tan(math.radians(math.hypot(pose.tilt_x_deg, pose.tilt_y_deg)))
-    return pose.depth_mm + radius * slope
+    reached = pose.depth_mm
+    if slope == 0:
+        return reached
+    # Twice: shapes that are raised may come down by the tilt.
+    for _ in range(2):
+        reached = pose.depth_mm + footprint.reach_mm(max(reached, JUST_TOUCHING_MM)) * slope
+    return reached

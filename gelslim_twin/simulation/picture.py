@@ -55,6 +55,20 @@ class Viewer:
         """Images (m, 2) of the dots' centres."""
         return self.camera.project(self._rest_mm + self._to_markers @ state.displacement_mm)
 
+    def _usual(self, before: GelState, state: GelState, apart_s: float | None) -> GelState:
+        """Where the gel was one usual step ago, for which the look has the shutter's share.
+
+        The shutter is open for as long as it is, or since the frame before if that is less.
+        """
+        blur = self.scene.effects.parameters()["motion_blur"]
+        shutter_s = float(getattr(blur, "shutter_ms", 0.0)) / 1000
+        if apart_s is None or apart_s <= 0 or self.step_s <= 0 or shutter_s == 0:
+            return before
+        usual = min(1.0, shutter_s / self.step_s)
+        part = 1 - min(1.0, shutter_s / apart_s) / usual
+        # Even steps are even but for rounding.
+        return before if abs(part) < 1e-9 else before.blended(state, part)
+
     @cached_property
     def renderer(self) -> FrameRenderer:
         """Draws frames. Raises ValueError where the plan draws none."""
@@ -84,7 +98,9 @@ class Viewer:
 
         return SurfaceState.from_nodes(self.sensor.points_mm, state.displacement_mm)
 
-    def frame(self, state: GelState, before: GelState | None, number: int) -> RenderedFrame:
-        """Frame `number`; `before` is the state a frame earlier."""
-        earlier = None if before is None else self.surface(before)
+    def frame(
+        self, state: GelState, before: GelState | None, number: int, apart_s: float | None = None
+    ) -> RenderedFrame:
+        """Frame `number`; `before` is the state a frame earlier, by `apart_s` or else `step_s`."""
+        earlier = None if before is None else self.surface(self._usual(before, state, apart_s))
         return self.renderer.frame(self.surface(state), earlier, number=number)

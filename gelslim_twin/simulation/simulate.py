@@ -170,7 +170,8 @@ def _seen(
             truth = replace(truth, markers_px=viewer.markers_px(state))
             started = ledger.add("markers", started)
         if viewer is not None and "image" in observe:
-            drawn = viewer.frame(state, before, number)
+            apart = when.time_s - times[number - 1].time_s if number else None
+            drawn = viewer.frame(state, before, number, apart)
             started = ledger.add("image", started)
             path = run.frame_path(number)
             if path.is_file():

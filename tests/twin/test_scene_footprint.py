@@ -121,7 +121,9 @@ def test_an_stl_file_is_read_as_by_trimesh(tmp_path, kind):
 
 def punch(radius: float) -> Footprint:
     area = math.pi * radius**2
-    return Footprint(lambda _d: area, lambda d: area * d)
+    return Footprint(
+        lambda _d: area, lambda d: area * d, lambda _d: radius, lambda _d: math.inf
+    )
 
 
 def test_on_a_thick_gel_the_force_is_boussinesqs():

@@ -1,0 +1,174 @@
+"""What two plans of one scene differ by, solved, seen and drawn: in newtons and in pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from random_contact_scenes import Finger, Values, placed_finger, text_of
+from scipy.spatial import cKDTree
+
+from gelslim_force.detection import Detector
+from gelslim_force.detector_settings import DetectorSettings
+from gelslim_twin.effects.effect import OBSERVABLES, Bound
+from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.plan import Plan
+from gelslim_twin.planner import Question, make_plan
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.question import question
+from gelslim_twin.scene.reader import LoadedScene, read_scene
+from gelslim_twin.sensor_figures import bundle_figures
+from gelslim_twin.simulation.gel_state import GelState
+from gelslim_twin.simulation.mechanics import mechanics_of
+from gelslim_twin.simulation.picture import Viewer
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+from ifem_export.bundle_io import load_bundle
+
+Array = NDArray[np.float64]
+MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation")
+MATCH_PX = 3.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A scene carried out by one plan."""
+
+    plan: Plan
+    states: tuple[GelState, ...]
+    viewer: Viewer
+    times_s: tuple[float, ...]
+
+    def dots_px(self, at: int) -> Array:
+        """Images (m, 2) of the dots' centres at a pose."""
+        return self.viewer.markers_px(self.states[at])
+
+    def apart_s(self, at: int) -> float | None:
+        """Time since the pose before."""
+        return self.times_s[at] - self.times_s[at - 1] if at else None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A scene on its sensor, to be carried out by different plans."""
+
+    loaded: LoadedScene
+    sensor: TwinSensor
+    folder: Path
+    asked: Question
+
+    @classmethod
+    def of(cls, finger: Finger, scene: Values, folder: Path) -> Trial:
+        """The scene written to `folder`, the finger's bundle beside it."""
+        place = placed_finger(finger, folder)
+        path = folder / f"{scene['name']}.yaml"
+        path.write_text(text_of(scene))
+        loaded = read_scene(path)
+        return cls(
+            loaded,
+            TwinSensor(load_bundle(place)),
+            place,
+            question(loaded, bundle_figures(place)),
+        )
+
+    @cached_property
+    def off(self) -> frozenset[str]:
+        """Effects that the scene itself switches off, and that its parameters make nil."""
+        c = self.asked.circumstances
+        nil = {e.name for e in EFFECTS if e.is_null(c) and not e.provides}
+        return frozenset(nil | {e.name for e in EFFECTS if self.asked.use(e) == "off"})
+
+    def auto(self) -> Plan:
+        """As the planner decides."""
+        return make_plan(self.asked)
+
+    def full(self, *without: str) -> Plan:
+        """Everything on by its best rung, but for what the scene switches off, and `without`."""
+        use = {e.name: "off" if e.name in self.off or e.name in without else "on" for e in EFFECTS}
+        return self._planned(use)
+
+    def _planned(self, use: Mapping[str, str]) -> Plan:
+        c = self.asked.circumstances
+        given = {n: p.model_copy(update={"use": use[n]}) for n, p in c.parameters.items()}
+        exact = replace(
+            self.asked,
+            observe=OBSERVABLES,
+            force_n=0.0,
+            image_px=0.0,
+            circumstances=replace(c, parameters=given),
+        )
+        return make_plan(exact)
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Of the scene."""
+        return self.loaded.poses
+
+    def carried_out(self, plan: Plan, states: tuple[GelState, ...] = ()) -> Outcome:
+        """The plan's states, solved unless given, and its view of them."""
+        found = states or tuple(
+            mechanics_of(self.loaded, plan, self.sensor, self.folder).states(self.poses)
+        )
+        steps = np.diff([p.time_s for p in self.poses])
+        step_s = float(np.median(steps)) if len(steps) else 0.0
+        viewer = Viewer(self.sensor, plan, self.loaded.scene, step_s)
+        return Outcome(plan, found, viewer, tuple(p.time_s for p in self.poses))
+
+    def bound(self, effect: str) -> Bound:
+        """A priori, of leaving an effect out."""
+        c = self.asked.circumstances
+        return next(e for e in EFFECTS if e.name == effect).bound(c)
+
+    def differences(
+        self, one: Outcome, other: Outcome, observe: tuple[str, ...]
+    ) -> dict[str, float]:
+        """Largest differences over the poses in each observable, in N or px."""
+        scale = self.asked.circumstances.sensor.px_per_mm
+        pairs = list(zip(one.states, other.states, strict=True))
+        found: dict[str, float] = {}
+        if "force" in observe:
+            found["force"] = max(
+                float(np.linalg.norm((a.force_n - b.force_n).sum(axis=0))) for a, b in pairs
+            )
+        if "displacement" in observe:
+            found["displacement"] = scale * max(
+                float(np.linalg.norm(a.displacement_mm - b.displacement_mm, axis=1).max())
+                for a, b in pairs
+            )
+        if "markers" in observe:
+            found["markers"] = max(
+                float(np.linalg.norm(one.dots_px(k) - other.dots_px(k), axis=1).max())
+                for k in range(len(pairs))
+            )
+        if "image" in observe:
+            at = int(np.argmax([np.abs(a.force_n).sum() for a, _ in pairs]))
+            found["image"] = seen_apart_px(one, other, {at, len(pairs) - 1})
+        return found
+
+
+def seen_apart_px(one: Outcome, other: Outcome, frames: set[int]) -> float:
+    """How far the dots that a detector finds in both pictures lie apart at most."""
+    worst = 0.0
+    for at in sorted(frames):
+        found: list[Array] = []
+        good: NDArray[np.bool_] | None = None
+        for run in (one, other):
+            before = run.states[at - 1] if at else None
+            p = run.viewer.frame(run.states[at], before, at, run.apart_s(at))
+            drawn = p.drawn if good is None else good & p.drawn
+            if not drawn.any():
+                return worst
+            settings = DetectorSettings.for_diameters(p.diameter_px[drawn])
+            dots = Detector(settings).detect(p.image).centres_px
+            if not len(dots):
+                return worst
+            apart, nearest = cKDTree(dots).query(p.centres_px)
+            good = drawn & (apart < MATCH_PX)
+            found.append(dots[nearest])
+        assert good is not None
+        if good.any():
+            worst = max(worst, float(np.linalg.norm(found[0] - found[1], axis=1)[good].max()))
+    return worst
