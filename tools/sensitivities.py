@@ -68,8 +68,6 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "housing": (
         "housing.back_wall_mm=1,1.2,1.5",
         "housing.side_wall_mm=1.2,1.5,2",
-        "housing.gel_proud_mm=0.3,0.6,0.9",
-        "mount.tongue_thickness_mm=4,5,6",
     ),
 }
 COLUMNS: Mapping[str, tuple[str, float, int]] = {
