@@ -114,7 +114,8 @@ def retimed(
     times: dict[str, float] = {}
     for done, rung in enumerate(ladder.rungs):
         tell(rung.label, done, len(ladder.rungs))
-        operator = surface_operator(mesh, material, formulation, rung.rung, **rung.parameters)
+        given: dict[str, Any] = dict(rung.parameters)
+        operator = surface_operator(mesh, material, formulation, rung.rung, **given)
         times[rung.label] = timed_ms(operator, moved)
     return times
 

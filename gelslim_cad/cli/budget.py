@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from accuracy_budget.budget import Budget
     from accuracy_budget.ladder import Choice
     from ifem_export.bundle import Bundle
@@ -52,15 +55,22 @@ def on_this_machine(bundle: Bundle) -> Bundle:
     return replace(bundle, ladder=bundle.ladder.timed(read_times(bundle.times_key)))
 
 
-def note_choice(choice: Choice, budget: Budget, times_key: str, bench: str) -> None:
+def note_choice(choice: Choice, budget: Budget, calibrated: bool, bench: str) -> None:
     """Say on standard error what lies outside the calibration of the rung chosen.
 
-    `bench` is the command that would measure the times of `times_key` on this machine.
+    `calibrated` tells whether the times were measured on this machine; else `bench` is the command
+    that does.
     """
-    from accuracy_budget.machine_times import read_times
-
     remarks = list(choice.remarks)
-    if budget.time_ms is not None and not read_times(times_key):
+    if budget.time_ms is not None and not calibrated:
         remarks.append(f"times are not this machine's; `{bench}` measures them here")
     for remark in remarks:
         print(f"gelslim: {remark}", file=sys.stderr)
+
+
+def keep_times(ladder_key: str, times_ms: Mapping[str, float]) -> None:
+    """Keep times of this machine for the next command; where they cannot be kept, go on."""
+    from accuracy_budget.machine_times import write_times
+
+    with suppress(OSError):
+        write_times(ladder_key, times_ms)

@@ -146,6 +146,7 @@ def force(
 
 def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
     """The sensor with this machine's times; what a budget cannot know of it is said."""
+    from accuracy_budget.machine_times import read_times
     from gelslim_cad.cli.budget import note_choice, on_this_machine
 
     timed = on_this_machine(sensor)
@@ -154,7 +155,7 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
         if gel != "linear":
             told = f"the ladder was measured on a linear gel; its errors say little of {gel}"
             choice = replace(choice, remarks=(*choice.remarks, told))
-        note_choice(choice, budget, sensor.times_key, f"gelslim bench {path}")
+        note_choice(choice, budget, bool(read_times(sensor.times_key)), f"gelslim bench {path}")
     return timed
 
 

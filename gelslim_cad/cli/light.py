@@ -11,7 +11,10 @@ import typer
 from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
-    from gelslim_cad.light.study import LightStudy
+    from accuracy_budget.budget import Budget
+    from gelslim_cad.dimensions import Dimensions
+    from gelslim_cad.light.study import LightStudy, Progress
+    from gelslim_cad.spec import Spec
     from gelslim_optics.light_result import Estimate, LightResult
 
 
@@ -21,8 +24,21 @@ def light(
         Path | None,
         typer.Option("-o", "--out", help="Folder of the pictures; out/NAME-light if left out."),
     ] = None,
-    rays: Annotated[int, typer.Option(min=1024, max=1 << 28, help="Rays traced per guide.")] = 1
-    << 17,
+    rays: Annotated[
+        int | None,
+        typer.Option(min=1024, max=1 << 28, help="Rays traced per guide; 131072 if left out."),
+    ] = None,
+    error: Annotated[
+        str | None,
+        typer.Option(
+            help="Error allowed in the light on the coat (half of its 95 % interval), as 1%; "
+            "picks the rays."
+        ),
+    ] = None,
+    within: Annotated[
+        str | None,
+        typer.Option("--time", "--time-ms", help="Time it may take in all, as 2s; picks the rays."),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the rays.")] = 0,
     pictures: Annotated[bool, typer.Option(help="Draw the pictures.")] = True,
     as_json: AsJson = False,
@@ -33,18 +49,25 @@ def light(
     guides with 45° mirrors, exposure and frame rate.
     """
     from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.cli.budget import budget_of
+    from gelslim_cad.cli.failure import CommandError
     from gelslim_cad.cli.output import replace_file
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.record import study_record
-    from gelslim_cad.light.study import study_light
+    from gelslim_cad.light.study import RAYS, study_light
     from gelslim_cad.spec.reader import read_spec
 
     started = time.monotonic()
     loaded = read_spec(spec)
     d = derive(loaded.spec)
+    budget = budget_of(error, within)
+    if rays is not None and not budget.unlimited:
+        raise CommandError("give --rays or a budget, not both")
     with progress_bar(quiet=as_json) as tell:
-        study = study_light(d, rays=rays, seed=seed, progress=tell)
+        if not budget.unlimited:
+            rays = _budgeted(loaded.spec, d, budget, spec, tell)
+        study = study_light(d, rays=rays or RAYS, seed=seed, progress=tell)
     folder = out or Path("out") / f"{loaded.spec.name}-light"
     if pictures:
         from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
@@ -61,6 +84,24 @@ def light(
     return 0
 
 
+def _budgeted(spec: Spec, d: Dimensions, budget: Budget, path: Path, tell: Progress | None) -> int:
+    """Rays per guide for a budget; without times of this machine, one of time measures them."""
+    from accuracy_budget.machine_times import read_times
+    from gelslim_cad.cli.budget import keep_times, note_choice
+    from gelslim_cad.light.ray_ladder import measure_errors, measure_times, rays_of, times_key
+    from gelslim_cad.pad import spec_hash
+
+    key = times_key(spec_hash(spec))
+    times = read_times(key)
+    errors = measure_errors(d, tell)
+    if not times and budget.time_ms is not None:
+        times = measure_times(d, tell)
+        keep_times(key, times)
+    choice = errors.ladder(times).choose(budget)
+    note_choice(choice, budget, bool(times), f"gelslim bench {path}")
+    return rays_of(choice.rung)
+
+
 def _report(name: str, study: LightStudy) -> None:
     from gelslim_cad.cli.answer import say
 
@@ -69,6 +110,7 @@ def _report(name: str, study: LightStudy) -> None:
     for comparison in study.comparisons:
         say(f"{name} is {comparison.sentence()}.")
     print()
+    print(f"{study.light.rays} rays per guide")
     _ledger(study.light)
     for colour in ("red", "green"):
         _evenness(study.light, colour)

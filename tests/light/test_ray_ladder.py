@@ -1,0 +1,145 @@
+"""The rays' ladder against light traced with many more rays; budgets through the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from accuracy_budget.budget import Budget
+from accuracy_budget.errors import BudgetError
+from accuracy_budget.machine_times import read_times, write_times
+from gelslim_cad.cli import main
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.guide_section import guide_profile
+from gelslim_cad.light.ray_ladder import (
+    BEYOND,
+    QUANTITY,
+    SEEDS,
+    TRACED,
+    RayErrors,
+    measure_errors,
+    rays_of,
+    rung_name,
+    times_key,
+)
+from gelslim_cad.light.scene import light_scene
+from gelslim_cad.pad import spec_hash
+from gelslim_cad.spec.reader import read_spec
+from gelslim_optics.trace import trace_light
+
+SPEC = str(Path(__file__).parents[2] / "designs" / "gelslim2.yaml")
+JSON = ("--json", "--no-pictures")
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GELSLIM_CACHE_DIR", str(tmp_path / "cache"))
+
+
+@pytest.fixture(scope="module")
+def finger() -> Dimensions:
+    return derive(read_spec(Path(SPEC)).spec)
+
+
+@pytest.fixture(scope="module")
+def errors(finger: Dimensions) -> RayErrors:
+    return measure_errors(finger)
+
+
+def test_errors_hold_against_many_more_rays(finger: Dimensions, errors: RayErrors) -> None:
+    scene = light_scene(finger, guide_profile(finger))
+    true = float(trace_light(scene, 1 << 20, seed=77).replicates(QUANTITY).mean())
+    for rays in (1 << 11, 1 << 13):
+        seeds = range(40)
+        assert not set(seeds) & set(SEEDS)
+        off = [
+            abs(float(trace_light(scene, rays, seed=s).replicates(QUANTITY).mean()) / true - 1)
+            for s in seeds
+        ]
+        # A half-width of 95 %: of 40 draws, 2 outside on average; 7 are less than 1 in 100.
+        assert sum(o > errors.halves[rays] for o in off) < 7
+        # And it is no idle margin: about two standard deviations.
+        assert 1.2 < errors.halves[rays] / float(np.sqrt(np.mean(np.square(off)))) < 4
+
+
+def test_errors_fall_and_go_on_with_the_square_root(errors: RayErrors) -> None:
+    rungs = errors.ladder({}).rungs
+    halves = [r.error for r in rungs]
+    assert halves == sorted(halves, reverse=True)
+    assert [rays_of(r) for r in rungs] == [*TRACED, *BEYOND]
+    assert rungs[-1].error == pytest.approx(errors.halves[TRACED[-1]] * 2**-5.5)
+    assert [r.measured for r in rungs] == [True] * len(TRACED) + [False] * len(BEYOND)
+    slope = np.polyfit(np.log(TRACED), np.log([errors.halves[r] for r in TRACED]), 1)[0]
+    assert -0.75 < slope < -0.45
+
+
+def test_times_go_on_with_the_rays(errors: RayErrors) -> None:
+    times = {rung_name(r): 1e-2 * r for r in TRACED}
+    for rung in errors.ladder(times).rungs:
+        assert rung.time_ms == pytest.approx(1e-2 * rung.work)
+
+
+def light(capsys: pytest.CaptureFixture[str], *more: str) -> tuple[dict, str]:
+    assert main(["light", SPEC, *JSON, *more]) == 0
+    said = capsys.readouterr()
+    return json.loads(said.out), said.err
+
+
+def test_an_error_picks_the_rays_whatever_the_clock_says(
+    errors: RayErrors, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expected = rays_of(errors.ladder({}).choose(Budget(0.03)).rung)
+    first, said = light(capsys, "--error", "3%")
+    assert said == ""
+    assert first["guides"]["curved"]["rays"] == expected
+    key = times_key(spec_hash(read_spec(Path(SPEC)).spec))
+    assert read_times(key) == {}
+    write_times(key, {rung_name(r): 1e6 / r for r in TRACED})
+    again, _ = light(capsys, "--error", "3%")
+    assert again == first
+
+
+def test_a_time_uses_this_machines_times(capsys: pytest.CaptureFixture[str]) -> None:
+    key = times_key(spec_hash(read_spec(Path(SPEC)).spec))
+    write_times(key, {rung_name(r): float(r) for r in TRACED})
+    found, said = light(capsys, "--time", "5s")
+    assert found["guides"]["curved"]["rays"] == 4096
+    assert said == ""
+    assert main(["light", SPEC, *JSON, "--error", "0.5%", "--time", "5s"]) == 2
+    told = json.loads(capsys.readouterr().out)["message"]
+    assert "no number of rays keeps the budget" in told
+    assert "4096 rays" in told
+    assert "on the side of time" in told
+    assert "on the side of error" in told
+
+
+def test_a_time_without_calibration_measures_and_keeps_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gelslim_cad.light import ray_ladder
+
+    measured = {rung_name(r): float(r) for r in TRACED}
+    monkeypatch.setattr(ray_ladder, "measure_times", lambda d, tell: measured)
+    found, said = light(capsys, "--time", "3s")
+    assert found["guides"]["curved"]["rays"] == 2048
+    assert said == ""
+    assert read_times(times_key(spec_hash(read_spec(Path(SPEC)).spec))) == measured
+
+
+def test_rays_beyond_the_calibration_are_said(errors: RayErrors) -> None:
+    finest = errors.halves[TRACED[-1]]
+    choice = errors.ladder({}).choose(Budget(finest / 1.3))
+    assert rays_of(choice.rung) == BEYOND[0]
+    assert "outside the calibrated range" in choice.remarks[0]
+    with pytest.raises(BudgetError, match="no number of rays keeps"):
+        errors.ladder({}).choose(Budget(finest / 1000))
+
+
+def test_rays_and_budget_together_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["light", SPEC, "--rays", "2048", "--error", "3%"]) == 2
+    assert "not both" in capsys.readouterr().err
+    assert main(["light", SPEC, "--error", "3"]) == 2
+    assert "for 3 per cent write 3%" in capsys.readouterr().err
