@@ -1,0 +1,192 @@
+"""The gallery: docs/gallery.md and its pictures, each made by the command that stands under it.
+
+Usage: python tools/gallery.py [--page-only] [NAME ...]    (names of pictures; all if left out)
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+IMAGES = ROOT / "docs" / "images"
+PAGE = ROOT / "docs" / "gallery.md"
+FOLDER = "out/gallery"
+WIDTH_PX = 900
+COLOURS = 160
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture: the commands that make it, the file they leave, what it shows."""
+
+    name: str
+    title: str
+    caption: str
+    commands: tuple[str, ...]
+    made: str
+    """File under the repository; of several that match, the last."""
+
+    @property
+    def file(self) -> Path:
+        """Where it is kept."""
+        return IMAGES / f"gallery_{self.name}.png"
+
+
+def _scene(name: str, title: str, caption: str) -> Picture:
+    folder = f"{FOLDER}/{name}"
+    command = f"simulate designs/scenes/{name}.yaml -o {folder}"
+    return Picture(name, title, caption, (command,), f"{folder}/frames/*.png")
+
+
+PICTURES = (
+    Picture(
+        "family",
+        "A family of fingers",
+        "Three specs that differ in the gel: 20 × 20, 28 × 28 and 50 × 25 mm, to scale.",
+        (
+            "family designs/mini20.yaml designs/gelslim2.yaml designs/long50.yaml"
+            f" -o {FOLDER}/family",
+        ),
+        f"{FOLDER}/family/family.png",
+    ),
+    Picture(
+        "exploded",
+        "All parts",
+        "The 20 mm finger taken apart; `report.html` does this with a slider.",
+        (f"build designs/mini20.yaml -o {FOLDER}/mini20",),
+        f"{FOLDER}/mini20/pictures/exploded.png",
+    ),
+    Picture(
+        "section",
+        "Section along the finger",
+        "Camera, fold mirror, window and gel, cut in the middle.",
+        (f"build designs/mini20.yaml -o {FOLDER}/mini20",),
+        f"{FOLDER}/mini20/pictures/section.png",
+    ),
+    Picture(
+        "light_paths",
+        "Light in the guide",
+        "Rays from the LEDs up the leg, round the bend and under the gel, with what leaks.",
+        (f"light designs/gelslim2.yaml -o {FOLDER}/light",),
+        f"{FOLDER}/light/light_paths.png",
+    ),
+    Picture(
+        "irradiance",
+        "Light on the gel",
+        "Red from one side, green from the other, traced.",
+        (f"light designs/gelslim2.yaml -o {FOLDER}/light",),
+        f"{FOLDER}/light/irradiance.png",
+    ),
+    Picture(
+        "projection_error",
+        "What the paper's compensation misses",
+        "A marker pressed in seems to move sideways. Error of each formula over the gel.",
+        (f"build designs/mini20.yaml -o {FOLDER}/mini20",),
+        f"{FOLDER}/mini20/pictures/projection_error.png",
+    ),
+    Picture(
+        "feasibility",
+        "What is feasible, and what binds",
+        "Gel length against aperture, coloured by the rule or limit that stops the design.",
+        (
+            "explore designs/mini20.yaml --vary gel.length_mm=14:34:1 --vary gel.width_mm=14:34:1"
+            f" -o {FOLDER}/explore",
+        ),
+        f"{FOLDER}/explore/feasibility.png",
+    ),
+    Picture(
+        "pareto",
+        "Thickness against everything else",
+        "Every dot a design; the best trades marked.",
+        (
+            "explore designs/mini20.yaml --vary gel.length_mm=14:34:1 --vary gel.width_mm=14:34:1"
+            f" -o {FOLDER}/explore",
+        ),
+        f"{FOLDER}/explore/pareto.png",
+    ),
+    _scene("press_ring", "A ring, as the camera sees it", "Simulated; forces known at every node."),
+    _scene("textured_plane", "A knurled plane", "Simulated, with the same camera and light."),
+    Picture(
+        "rod_forces",
+        "Forces of a rod pressed and pushed aside",
+        "Estimated: motion yellow, shear red, pressure shaded.",
+        (f"validate designs/gelslim2.yaml -o {FOLDER}/validation",),
+        f"{FOLDER}/validation/rod_and_shear.png",
+    ),
+)
+_HEAD = """\
+# Gallery
+
+<!-- Made by `make docs`; do not edit by hand. -->
+
+Every picture is what the command under it leaves behind, made smaller. `python tools/gallery.py` makes
+them all anew, in a few minutes.
+"""
+
+
+def main() -> int:
+    """Make the pictures asked for, then the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--page-only", action="store_true")
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    given = parser.parse_args()
+    known = [p.name for p in PICTURES]
+    unknown = [n for n in given.names if n not in known]
+    if unknown:
+        parser.error(f"no picture {unknown[0]}; there are {', '.join(known)}")
+    wanted = [] if given.page_only else [p for p in PICTURES if p.name in (given.names or known)]
+    done: set[str] = set()
+    for picture in wanted:
+        for command in picture.commands:
+            if command not in done:
+                print(f"gelslim {command}", file=sys.stderr)
+                run = [sys.executable, "-m", "gelslim_cad", *shlex.split(command)]
+                subprocess.run(run, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+                done.add(command)
+        found = sorted(ROOT.glob(picture.made))
+        if not found:
+            raise SystemExit(f"{picture.name}: the command left no {picture.made}")
+        _replace(picture.file, small(found[-1].read_bytes()))
+    _replace(PAGE, page().encode())
+    return 0
+
+
+def page() -> str:
+    """The gallery in Markdown."""
+    parts = [_HEAD]
+    for p in PICTURES:
+        commands = "".join(f"    gelslim {c}\n" for c in p.commands)
+        picture = f"![{p.title}](images/{p.file.name})"
+        parts.append(f"## {p.title}\n\n{picture}\n\n{p.caption}\n\n{commands}")
+    return "\n".join(parts)
+
+
+def small(data: bytes) -> bytes:
+    """A PNG no wider than WIDTH_PX, with few colours: the same bytes for the same picture."""
+    from PIL import Image
+
+    picture = Image.open(io.BytesIO(data)).convert("RGB")
+    if picture.width > WIDTH_PX:
+        height = round(picture.height * WIDTH_PX / picture.width)
+        picture = picture.resize((WIDTH_PX, height), Image.Resampling.LANCZOS)
+    kept = io.BytesIO()
+    few = picture.quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    few.save(kept, "PNG", optimize=True)
+    return kept.getvalue()
+
+
+def _replace(path: Path, data: bytes) -> None:
+    part = path.with_name(f".{path.name}.part")
+    part.write_bytes(data)
+    os.replace(part, path)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
