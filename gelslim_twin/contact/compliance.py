@@ -125,24 +125,40 @@ class SurfaceCompliance:
             rows[image] = turned
             self._made[image] = True
 
-    def block(self, nodes: Nodes) -> Array:
-        """C among nodes (n,), (3n, 3n) in mm/N, symmetric."""
+    def block(self, nodes: Nodes, known: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """C among nodes (n,), (3n, 3n) in mm/N, symmetric.
+
+        `known` is the block of the first of the nodes, which is not read again.
+        """
         self.require(nodes)
         from gelslim_twin.contact.compliance_kernel import gather_block
 
-        block = np.empty((3 * len(nodes), 3 * len(nodes)))
-        gather_block(self._rows.reshape(self.nodes, 3, self.nodes, 3), np.asarray(nodes), block)
+        block = np.empty((3 * len(nodes), 3 * len(nodes)), dtype=np.float32)
+        kept = 0 if known is None else len(known)
+        if known is not None:
+            block[:kept, :kept] = known
+        rows = self._rows.reshape(self.nodes, 3, self.nodes, 3)
+        gather_block(rows, np.asarray(nodes), block, kept // 3)
         return block
 
-    def displacement(self, nodes: Nodes, force_n: Array) -> Array:
-        """Motion (c, 3) under forces (n, 3) on `nodes` (n,)."""
+    def displacement(self, nodes: Nodes, force_n: Array, known_mm: Array | None = None) -> Array:
+        """Motion (c, 3) under forces (n, 3) on `nodes` (n,), theirs `known_mm` (n, 3) if given."""
         self.require(nodes)
         from gelslim_twin.contact.compliance_kernel import add_motion
 
         moved = np.zeros(3 * self.nodes)
+        sought = np.ones(self.nodes + 2, dtype=bool)
+        sought[0] = sought[-1] = False
+        if known_mm is not None:
+            sought[1 + np.asarray(nodes)] = False
+        turns = 3 * np.flatnonzero(sought[1:] != sought[:-1])
         rows = self._rows.reshape(self.nodes, 3, 3 * self.nodes)
-        add_motion(rows, np.asarray(nodes), np.ascontiguousarray(force_n, dtype=float), moved)
-        return moved.reshape(-1, 3)
+        force = np.ascontiguousarray(force_n, dtype=float)
+        add_motion(rows, np.asarray(nodes), force, turns[::2], turns[1::2], moved)
+        found = moved.reshape(-1, 3)
+        if known_mm is not None:
+            found[nodes] = known_mm
+        return found
 
     def whole(self, force_n: Array) -> Array:
         """Motion (c, 3) under forces (c, 3) on any nodes, solved."""

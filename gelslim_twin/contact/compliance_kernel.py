@@ -6,30 +6,43 @@ from typing import Any
 
 from numba import njit
 
+TILE = 16
+
 
 @njit(cache=True)
-def gather_block(rows: Any, nodes: Any, block: Any) -> None:
-    """block (3n, 3n) = C among `nodes`, made symmetric, from rows (c, 3, c, 3)."""
+def gather_block(rows: Any, nodes: Any, block: Any, kept: int) -> None:
+    """block (3n, 3n) = C among `nodes` from rows (c, 3, c, 3), symmetric.
+
+    The first `kept` nodes' part is there already. The lower half is the upper one's image, in
+    tiles, so that neither is read nor written across memory.
+    """
     n = len(nodes)
-    for i in range(n):
-        for a in range(3):
-            for j in range(n):
-                for b in range(3):
-                    block[3 * i + a, 3 * j + b] = rows[nodes[i], a, nodes[j], b]
-    for i in range(3 * n):
-        for j in range(i):
-            mean = 0.5 * (block[i, j] + block[j, i])
-            block[i, j] = mean
-            block[j, i] = mean
+    for i0 in range(0, n, TILE):
+        i1 = min(n, i0 + TILE)
+        for j0 in range(i0, n, TILE):
+            j1 = min(n, j0 + TILE)
+            if j1 <= kept:
+                continue
+            for i in range(i0, i1):
+                for a in range(3):
+                    for j in range(max(i, j0), j1):
+                        for b in range(a if i == j else 0, 3):
+                            value = rows[nodes[i], a, nodes[j], b]
+                            block[3 * i + a, 3 * j + b] = value
+                            block[3 * j + b, 3 * i + a] = value
 
 
 @njit(cache=True, fastmath=True)
-def add_motion(rows: Any, nodes: Any, force: Any, motion: Any) -> None:
-    """motion (3c,) += C force (n, 3) on `nodes`; nodes without force cost nothing."""
+def add_motion(rows: Any, nodes: Any, force: Any, starts: Any, ends: Any, motion: Any) -> None:
+    """motion (3c,) += C force (n, 3) on `nodes`, between `starts` and `ends` (r,) only.
+
+    Nodes without force cost nothing.
+    """
     for i in range(len(nodes)):
-        for a in range(3):
-            f = force[i, a]
-            if f != 0.0:
-                row = rows[nodes[i], a]
-                for k in range(len(motion)):
-                    motion[k] += f * row[k]
+        x, y, z = force[i, 0], force[i, 1], force[i, 2]
+        if x == 0.0 and y == 0.0 and z == 0.0:
+            continue
+        row = rows[nodes[i]]
+        for run in range(len(starts)):
+            for k in range(starts[run], ends[run]):
+                motion[k] += x * row[0, k] + y * row[1, k] + z * row[2, k]

@@ -25,6 +25,10 @@ SLOW = 0.7
 """Gain of CHECK_EVERY sweeps below which Newton is tried."""
 NEWTON_STEPS = 12
 RELAXATIONS = (1.0, 0.6, 0.3)
+SURE = 0.1
+"""Share of the tolerance that Newton goes on to: its steps tell nothing of what is left."""
+LEAST_RATE = 0.5
+"""Of the sweeps, until three of them have shown theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +54,22 @@ def balanced(
     start_n: Array | None = None,
     tolerance: float = 1e-3,
     frames: Array | None = None,
+    start_mm: Array | None = None,
 ) -> Balance:
     """Contact of n nodes with a rigid tool.
 
     Args:
-        compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite.
+        compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite; single
+            precision halves the time of a large one.
         height_mm: (n,) the most each node may move along its normal; inf for never in contact.
         target_mm: (n, 2) motion along its tangents of a node that sticks.
         friction: coefficient μ >= 0.
         start_n: (n, 3) forces to start from.
-        tolerance: on `Balance.residual`; frictionless contact is solved to rounding.
+        tolerance: on `Balance.residual`, and on the error of the forces that the sweeps' rate
+            lets expect; frictionless contact is solved to rounding.
         frames: (n, 3, 3), in the columns each node's tangents and the normal into the tool;
             None for x, y, z.
+        start_mm: (n, 3) motion C f under `start_n`, if it is known.
 
     Raises:
         ContactError: no balance within the tolerance, or input that cannot be.
@@ -77,13 +85,14 @@ def balanced(
         return Balance(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
     if friction == 0:
         return _frictionless(compliance, height_mm, start, frames)
-    return _Frictional(compliance, height_mm, target_mm, friction, frames).balance(start, tolerance)
+    found = _Frictional(compliance, height_mm, target_mm, friction, frames)
+    return found.balance(start, start_mm, tolerance)
 
 
 def _frictionless(compliance: Array, height: Array, start: Array, frames: Array | None) -> Balance:
     n = len(height)
     if frames is None:
-        across = compliance[:, 2::3]
+        across = compliance[:, 2::3].astype(float)
         normal, normals = across[2::3], np.array([[0.0, 0.0, 1.0]])
     else:
         normals = frames[:, :, 2]
@@ -100,6 +109,13 @@ def _frictionless(compliance: Array, height: Array, start: Array, frames: Array 
     return Balance(force, motion, touch, residual, pivots)
 
 
+def _left(changes: list[float], relaxation: float) -> float:
+    """What sweeps still have to change, from their last changes: a geometric series' rest."""
+    first, _, last = changes[-3], changes[-2], changes[-1]
+    rate = max(LEAST_RATE, (last / first) ** 0.5) if 0 < first < np.inf else LEAST_RATE
+    return last * (rate / (1 - rate) if rate < 1 else np.inf) / relaxation
+
+
 class _Frictional:
     def __init__(
         self, compliance: Array, height: Array, target: Array, friction: float, frames: Array | None
@@ -107,34 +123,38 @@ class _Frictional:
         n = len(height)
         self.c = np.ascontiguousarray(compliance)
         self.frames = np.tile(np.eye(3), (n, 1, 1)) if frames is None else np.array(frames)
-        blocks = self.c.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n), :]
+        blocks = self.c.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n), :].astype(float)
         self.own = np.ascontiguousarray(self.frames.transpose(0, 2, 1) @ blocks @ self.frames)
         self.height = np.ascontiguousarray(height, dtype=float)
         self.target = np.ascontiguousarray(target, dtype=float)
         self.mu = float(friction)
         self.touch = np.zeros(len(height), dtype=np.int8)
 
-    def balance(self, start: Array, tolerance: float) -> Balance:
+    def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> Balance:
         """Sweep until each node's own answer is the force it has."""
         from gelslim_twin.contact.coulomb_kernel import sweep
 
         f = np.ascontiguousarray(start).reshape(-1).copy()
-        f.reshape(-1, 3)[np.isinf(self.height)] = 0.0
+        beside = np.isinf(self.height)
+        if f.reshape(-1, 3)[beside].any():
+            f.reshape(-1, 3)[beside], start_mm = 0.0, None
         best, sweeps, newton = np.inf, 0, 0
+        known = None if start_mm is None else np.array(start_mm, dtype=float).reshape(-1)
         for relaxation in RELAXATIONS:
-            u, last = self.c @ f, np.inf
+            u = self._motion(f) if known is None else known
+            known, last, changes = None, np.inf, [np.inf, np.inf]
             for turn in range(MOST_SWEEPS):
-                back = bool(turn % 2)
                 change = sweep(
                     self.c, self.own, self.frames, self.height, self.target, self.mu,
-                    relaxation, back, f, u, self.touch,
+                    relaxation, bool(turn % 2), f, u, self.touch,
                 )  # fmt: skip
                 sweeps += 1
+                changes = [*changes[-2:], change]
                 size = float(np.linalg.norm(f))
-                # A sweep's change understates what is left: half the tolerance, then look.
-                if change <= 0.5 * relaxation * tolerance * size or (turn + 1) % CHECK_EVERY == 0:
-                    u, residual = self._residual(f)
-                    if residual <= tolerance:
+                near = _left(changes, relaxation) <= tolerance * size
+                if near or (turn + 1) % CHECK_EVERY == 0:
+                    residual = self._residual(f, u)
+                    if near and residual <= tolerance:
                         return self._balance(f, u, residual, sweeps)
                     best = min(best, residual)
                     if residual > SLOW * last:
@@ -142,9 +162,11 @@ class _Frictional:
                         found = self._newton(f, residual, tolerance) if newton <= 20 else None
                         if found is not None:
                             f = found
-                            u, residual = self._residual(f)
-                            if residual <= tolerance:
+                            u = self._motion(f)
+                            residual = self._residual(f, u)
+                            if residual <= SURE * tolerance:
                                 return self._balance(f, u, residual, sweeps)
+                            changes = [np.inf, np.inf]
                     last = residual
         raise ContactError(
             f"the contact of {len(self.height)} nodes with friction {self.mu:g} is not found after "
@@ -157,25 +179,29 @@ class _Frictional:
     def _balance(self, f: Array, u: Array, residual: float, sweeps: int) -> Balance:
         return Balance(f.reshape(-1, 3), u.reshape(-1, 3), self.touch.copy(), residual, sweeps)
 
-    def _residual(self, f: Array) -> tuple[Array, float]:
-        """Motion afresh, and how far nodes are from their own answers; sets `touch`."""
-        own, u = self._own(f)
-        size = float(np.linalg.norm(own))
-        off = float(np.linalg.norm(own - f))
-        return u, off / size if size > 0 else float(off > 0)
+    def _motion(self, f: Array) -> Array:
+        """C f afresh."""
+        from gelslim_twin.contact.coulomb_kernel import motion
 
-    def _own(self, f: Array) -> tuple[Array, Array]:
+        u = np.zeros_like(f)
+        motion(self.c, f, u)
+        return u
+
+    def _residual(self, f: Array, u: Array) -> float:
+        """How far nodes are from their own answers under a motion C f; sets `touch`."""
         from gelslim_twin.contact.coulomb_kernel import answers
 
-        u, own = self.c @ f, np.empty_like(f)
+        own = np.empty_like(f)
         answers(self.own, self.frames, self.height, self.target, self.mu, f, u, own, self.touch)
-        return own, u
+        size = float(np.linalg.norm(own))
+        off = float(np.linalg.norm(own - f))
+        return off / size if size > 0 else float(off > 0)
 
     def _newton(self, f: Array, residual: float, tolerance: float) -> Array | None:
         """Forces of a lower residual by Newton's steps, or None."""
         start, x = residual, f.copy()
         for _ in range(NEWTON_STEPS):
-            self._own(x)
+            self._residual(x, self._motion(x))
             try:
                 step = self._step(x)
             except (LinAlgError, ValueError):
@@ -183,13 +209,13 @@ class _Frictional:
             # The shortest step that gains, from the whole one down.
             for share in (1.0, 0.5, 0.25):
                 trial = x + share * step
-                ahead = self._residual(trial)[1]
+                ahead = self._residual(trial, self._motion(trial))
                 if ahead < residual:
                     break
             else:
                 return x if residual < 0.5 * start else None
             x, residual = trial, ahead
-            if residual <= tolerance:
+            if residual <= SURE * tolerance:
                 break
         return x
 

@@ -162,3 +162,15 @@ def answers(
     for k in range(len(height)):
         a = 3 * k
         g[a], g[a + 1], g[a + 2], touch[k] = _wanted(k, own, frames, height, target, friction, f, u)
+
+
+@njit(cache=True)
+def motion(compliance: Any, f: Any, u: Any) -> None:
+    """u (3n,) += C f, by the rows of nodes with a force: C is symmetric."""
+    for k in range(len(f) // 3):
+        a = 3 * k
+        x, y, z = f[a], f[a + 1], f[a + 2]
+        if x == 0.0 and y == 0.0 and z == 0.0:
+            continue
+        for i in range(len(f)):
+            u[i] += compliance[a, i] * x + compliance[a + 1, i] * y + compliance[a + 2, i] * z

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from gelslim_force.anderson import Anderson
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.coulomb_balance import Balance, balanced
+from gelslim_twin.contact.coulomb_balance import STICK, Balance, balanced
 from gelslim_twin.contact.gel_body import GelBody, Tangent
-from gelslim_twin.contact.solver import REACH, ContactSolver, room_to_tool
-from gelslim_twin.contact.tool_surface import ToolSurface, tool_surface
+from gelslim_twin.contact.held_state import HeldState
+from gelslim_twin.contact.settling import room_to_tool, slack_mm
+from gelslim_twin.contact.solver import REACH, ContactSolver
+from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.gel_state import GelState
 from ifem_export.finite_strain import FiniteStrainError
@@ -33,7 +35,7 @@ BALANCE = (0.01, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class SolidState(GelState):
+class SolidState(HeldState):
     """A state of the surface with the displacement (n, 3) of the whole gel."""
 
     whole_mm: Array | None = None
@@ -54,7 +56,7 @@ class NewtonContact:
         """Nothing touches."""
         still = np.zeros((self.body.bundle.mesh.n_nodes, 3))
         rest = GelState.at_rest(len(self.body.surface))
-        return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, still)
+        return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, None, still)
 
     def step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
         """State at `pose` after `last` at `before`.
@@ -89,12 +91,11 @@ class _Walk:
         self.inner = self.body.pad.force(self.whole)
         self.target, ahead = self.solver.targets(last, before, pose)
         points = self.solver.points_mm
-        height = self.solver.tool.height_mm(pose, *(points + ahead)[:, :2].T)
-        self.on_tool = np.isfinite(height)
+        tool = self.solver.tool
+        self.on_tool = np.isfinite(clearance_mm(tool, pose, points + ahead * [1.0, 1.0, 0.0]))
         self.wanted = last.touch > 0
         self.surface: ToolSurface | None = None
-        at_rest = self.solver.tool.height_mm(pose, *points[:, :2].T) - points[:, 2]
-        self.deepest_mm = -float(np.min(at_rest, initial=0.0))
+        self.deepest_mm = -float(np.min(clearance_mm(tool, pose, points), initial=0.0))
         self.rest, self.off_mm, self.stale = np.inf, np.inf, False
         self.size = 1e-300
         self.touch, self.memory = last.touch, Anderson()
@@ -106,9 +107,8 @@ class _Walk:
         outer[np.asarray(self.body.bundle.mesh.bonded)] = 0.0
         free = tangent.motion(-outer)
         offset = u + free[self.body.surface]
-        surface = tool_surface(self.solver.tool, self.pose, (points + u)[:, :2], self.surface)
-        surface.height_mm[~self.on_tool] = np.inf
-        self.surface = surface
+        surface = tool_surface(self.solver.tool, self.pose, points + u, self.surface)
+        self.surface = surface = surface.only(self.on_tool)
         room = room_to_tool(surface, points + u, u - offset)
         self.wanted |= room < REACH * self.deepest_mm
         nodes = np.flatnonzero(self.wanted)
@@ -171,13 +171,13 @@ class _Walk:
         self.size = float(np.linalg.norm(load)) or self.size
         before, self.rest = self.rest, float(np.linalg.norm(rest)) / self.size
         points = self.solver.points_mm + self.whole[self.body.surface]
-        seen = tool_surface(self.solver.tool, self.pose, points[:, :2], self.surface)
+        seen = tool_surface(self.solver.tool, self.pose, points, self.surface)
         gap = seen.gap_mm(points)
         pressed = np.zeros(len(points), dtype=bool)
         pressed[nodes] = balance.touch > 0
         off = np.abs(np.where(pressed, gap, np.where(self.on_tool, np.minimum(gap, 0.0), 0.0)))
         self.off_mm = float(off.max())
-        slack = min(self.tolerance, 1e-3) * self.deepest_mm
+        slack = slack_mm(self.tolerance, self.deepest_mm)
         into = (gap < -slack) & ~self.wanted
         self.wanted |= into
         self.on_tool |= into
@@ -195,4 +195,5 @@ class _Walk:
         touch = np.zeros(len(points), dtype=np.int8)
         touch[nodes] = balance.touch
         u = self.whole[self.body.surface]
-        return SolidState(u, self.force, touch, report, self.whole)
+        held = np.where((touch == STICK)[:, None], self.target, u)
+        return SolidState(u, self.force, touch, report, held, self.whole)

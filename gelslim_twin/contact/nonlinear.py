@@ -23,6 +23,7 @@ from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.gel_body import GelBody
 from gelslim_twin.contact.halved_path import reached
+from gelslim_twin.contact.held_state import held_mm
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
@@ -85,6 +86,7 @@ class NonlinearContact:
             state.force_n,
             state.touch,
             {},
+            held_mm(state),
             self._whole(state.displacement_mm),
         )
         return self._newton_step(guess, pose, pose) if state.force_n.any() else guess

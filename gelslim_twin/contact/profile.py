@@ -24,6 +24,9 @@ from gelslim_twin.scene.indenter import (
 Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]
 """Height in mm of the lower surface over points x and y (n,); infinite beside the shape."""
+RIM_MM = 0.01
+"""Points this far beside a rim count as on it: rounding must not decide about whole rows of nodes
+that stick exactly there."""
 
 
 def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
@@ -32,18 +35,19 @@ def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
         case Sphere():
             return lambda x, y: _arc(indenter.radius_mm, np.hypot(x, y))
         case Cylinder():
-            half = indenter.length_mm / 2
+            half = indenter.length_mm / 2 + RIM_MM
             return _turned(
                 indenter.axis_deg,
                 lambda x, y: _within(np.abs(x) <= half, _arc(indenter.radius_mm, np.abs(y))),
             )
         case Ring():
-            inner, outer = indenter.inner_radius_mm, indenter.outer_radius_mm
+            inner = indenter.inner_radius_mm - RIM_MM
+            outer = indenter.outer_radius_mm + RIM_MM
             return lambda x, y: _flat((np.hypot(x, y) >= inner) & (np.hypot(x, y) <= outer))
         case FlatPunch():
             return _punch(indenter)
         case Wedge():
-            half = indenter.length_mm / 2
+            half = indenter.length_mm / 2 + RIM_MM
             tip, lean = indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
             return _turned(
                 indenter.axis_deg,
@@ -62,9 +66,9 @@ def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
 
 def _punch(punch: FlatPunch) -> Profile:
     if punch.radius_mm is not None:
-        radius = punch.radius_mm
+        radius = punch.radius_mm + RIM_MM
         return lambda x, y: _flat(np.hypot(x, y) <= radius)
-    a, b = (punch.length_mm or 0.0) / 2, (punch.width_mm or 0.0) / 2
+    a, b = (punch.length_mm or 0.0) / 2 + RIM_MM, (punch.width_mm or 0.0) / 2 + RIM_MM
     return lambda x, y: _flat((np.abs(x) <= a) & (np.abs(y) <= b))
 
 
@@ -84,7 +88,7 @@ def _texture(plane: TexturedPlane, seed: int) -> Profile:
         relief_of: Profile = rough_profile(plane, seed)
     else:
         relief_of = ridges if plane.texture == "ridges" else bumps
-    a, b = plane.length_mm / 2, plane.width_mm / 2
+    a, b = plane.length_mm / 2 + RIM_MM, plane.width_mm / 2 + RIM_MM
 
     def cut(x: Array, y: Array) -> Array:
         return _within((np.abs(x) <= a) & (np.abs(y) <= b), relief_of(x, y))

@@ -21,10 +21,13 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.coulomb_balance import Balance, balanced
+from gelslim_twin.contact.coulomb_balance import STICK
 from gelslim_twin.contact.halved_path import between, reached
+from gelslim_twin.contact.held_state import HeldState, held_mm
+from gelslim_twin.contact.reach import Reach, reach_of
+from gelslim_twin.contact.settling import Settled, Settling, room_to_tool, slack_mm
 from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.tool_surface import ToolSurface, tool_surface
+from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.gel_state import GelState
 
@@ -32,14 +35,10 @@ __all__ = ["ContactError", "ContactSettings", "ContactSolver"]
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-REACH = 0.15
+REACH = 0.2
 """Share of the depth by which the tool may stand over a node in reach: the gel bulges."""
-GEOMETRY_STEPS = 40
-DAMPED_FROM = 6
 GROWTH_STEPS = 12
 MOST_SUBSTEPS = 200
-SPARE = 1.5
-"""How much larger than needed a kept block may be before a smaller one is gathered."""
 
 
 @dataclass(frozen=True)
@@ -47,31 +46,12 @@ class ContactSettings:
     """When a contact counts as found."""
 
     tolerance: float = 1e-3
-    """How far nodes are from their own answers, relative to the forces; and how far off the
-    tool's surface they may be, relative to the depth (at most 1e-3)."""
+    """Largest error of the field of forces, relative (root of the sums of squares). See
+    `settling` for what balance and geometry may use of it."""
     friction: float = 0.0
     longest_step: float = 1.0
     """Farthest that a touched node may be dragged in one step with friction, in cell sizes."""
     halvings: int = 6
-
-
-@dataclass(frozen=True, eq=False)
-class Reach:
-    """Nodes in reach with their compliance (3n, 3n)."""
-
-    nodes: Nodes
-    block: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """Forces of the nodes in reach, the planes they were found with, and where nodes end up."""
-
-    reach: Reach
-    balance: Balance
-    surface: ToolSurface
-    gap_mm: Array
-    sweeps: int
 
 
 @dataclass(eq=False)
@@ -137,9 +117,9 @@ class ContactSolver:
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
         target, ahead = self.targets(last, before, pose)
-        height = self.tool.height_mm(pose, *(self.points_mm + ahead)[:, :2].T)
-        on_tool = np.isfinite(height)
-        depth = -float(np.min(height - self.points_mm[:, 2], initial=0.0))
+        below = clearance_mm(self.tool, pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
+        on_tool = np.isfinite(below)
+        depth = -float(np.min(below, initial=0.0))
         moved = (last if start is None else start).displacement_mm
         guess = (last if start is None else start).force_n
         wanted = np.zeros(len(moved), dtype=bool)
@@ -149,21 +129,25 @@ class ContactSolver:
             if min(deepest, depth) <= 0:
                 return replace(GelState.at_rest(len(moved)), displacement_mm=offset.copy())
             wanted |= room < REACH * deepest
-            found = self._settled(pose, wanted, surface, moved, target, offset, guess, deepest)
-            state, gap = self._state(found, pose, offset, deepest)
-            into = (gap < -self._slack(deepest)) & ~wanted
+            self._reach = self._reached(wanted)
+            nodes = self._reach.nodes
+            settling = Settling(
+                self.tool, pose, self._reach.block, self.points_mm[nodes], offset[nodes],
+                target[nodes], wanted[nodes], self.settings.friction, self.settings.tolerance,
+                deepest,
+            )  # fmt: skip
+            found = settling.settled(surface.at(nodes), moved[nodes], guess[nodes])
+            state, gap = self._state(nodes, found, pose, offset, target, deepest)
+            into = (gap < -slack_mm(self.settings.tolerance, deepest)) & ~wanted
             if not into.any():
                 return state
             wanted, on_tool = wanted | into, on_tool | into
             moved, guess = state.displacement_mm, state.force_n
         raise ContactError("the region of contact keeps growing: take smaller steps of the motion")
 
-    def _slack(self, deepest: float) -> float:
-        return min(self.settings.tolerance, 1e-3) * deepest
-
     def targets(self, last: GelState, before: Pose | None, pose: Pose) -> tuple[Array, Array]:
         """Motion (c, 3) of each node if it stuck from its first touch on, and the likely motion."""
-        u = last.displacement_mm
+        u = held_mm(last)
         if before is None:
             return u, u
         places = self.points_mm + u
@@ -173,7 +157,7 @@ class ContactSolver:
         if self.settings.friction == 0 or not dragged.any():
             return u + dragged, ahead
         # Others go along for the part of the step in which they touch.
-        heights = [self.tool.height_mm(p, *places[:, :2].T) - places[:, 2] for p in (before, pose)]
+        heights = [clearance_mm(self.tool, p, places) for p in (before, pose)]
         share = np.where(np.isfinite(heights[0]), 0.0, 0.5)
         closing = np.isfinite(heights[0]) & np.isfinite(heights[1]) & (heights[1] < 0)
         first = np.maximum(heights[0][closing], 0.0)
@@ -187,73 +171,22 @@ class ContactSolver:
         """The tool over all nodes, and how far each may move along its normal by forces (c,)."""
         places = self.points_mm + moved
         # Slopes matter near the gel only, and cost four more looks at the tool.
-        below = np.maximum(places[:, 2], self.points_mm[:, 2]) + self._cell
-        surface = tool_surface(self.tool, pose, places[:, :2], below_mm=below)
-        surface.height_mm[~on_tool] = np.inf
+        surface = tool_surface(self.tool, pose, places, reach_mm=self._cell).only(on_tool)
         return surface, room_to_tool(surface, places, moved - offset)
 
-    def _settled(
-        self,
-        pose: Pose,
-        wanted: NDArray[np.bool_],
-        surface: ToolSurface,
-        moved: Array,
-        target: Array,
-        offset: Array,
-        guess: Array,
-        deepest: float,
-    ) -> Attempt:
-        """Forces with the tool's planes where the nodes are."""
-        reach = self._reached(wanted)
-        nodes = reach.nodes
-        points, off, goal = self.points_mm[nodes], offset[nodes], target[nodes] - offset[nodes]
-        shape = surface.at(nodes)
-        u, force, sweeps = moved[nodes], guess[nodes], 0
-        worst = np.inf
-        for turn in range(GEOMETRY_STEPS):
-            frames = shape.frames
-            room = room_to_tool(shape, points + u, u - off)
-            sticking = goal[:, :2] if frames is None else np.einsum("kab,ka->kb", frames, goal)
-            balance = balanced(
-                reach.block,
-                np.where(wanted[nodes], room, np.inf),
-                np.ascontiguousarray(sticking[:, :2]),
-                self.settings.friction,
-                force,
-                self.settings.tolerance,
-                frames,
-            )
-            sweeps += balance.sweeps
-            force, new = balance.force_n, balance.motion_mm + off
-            used = shape
-            shape = tool_surface(self.tool, pose, (points + new)[:, :2], shape)
-            gap = shape.gap_mm(points + new)
-            pressed = balance.touch > 0
-            worst = float(np.abs(np.where(pressed, gap, np.minimum(gap, 0.0)))[wanted[nodes]].max())
-            if worst <= self._slack(deepest):
-                return Attempt(reach, balance, used, gap, sweeps)
-            u_before, u = u, new
-            if turn >= DAMPED_FROM:
-                # A node astride an edge goes from one flank to the other and back.
-                share = 1 / (turn - DAMPED_FROM + 2)
-                shape = replace(shape, slopes=used.slopes + share * (shape.slopes - used.slopes))
-                u = u_before + 0.5 * (u - u_before)
-                shape = replace(
-                    tool_surface(self.tool, pose, (points + u)[:, :2], shape), slopes=shape.slopes
-                )
-        raise ContactError(
-            f"nodes stay {worst:.2g} mm off the tool's surface after {GEOMETRY_STEPS} turns: its "
-            "relief is steeper or finer than the gel's cells can follow"
-        )
-
     def _state(
-        self, found: Attempt, pose: Pose, offset: Array, deepest: float
-    ) -> tuple[GelState, Array]:
+        self,
+        nodes: Nodes,
+        found: Settled,
+        pose: Pose,
+        offset: Array,
+        target: Array,
+        deepest: float,
+    ) -> tuple[HeldState, Array]:
         """The whole surface, and gaps (c,) of all nodes."""
-        nodes, balance = found.reach.nodes, found.balance
-        u = self.compliance.displacement(nodes, balance.force_n) + offset
-        now = self.points_mm + u
-        gap = self.tool.height_mm(pose, now[:, 0], now[:, 1]) - now[:, 2]
+        balance = found.balance
+        u = self.compliance.displacement(nodes, balance.force_n, balance.motion_mm) + offset
+        gap = clearance_mm(self.tool, pose, self.points_mm + u)
         gap[nodes] = found.gap_mm
         force, touch = np.zeros_like(u), np.zeros(len(u), dtype=np.int8)
         force[nodes], touch[nodes] = balance.force_n, balance.touch
@@ -266,23 +199,10 @@ class ContactSolver:
             "complementarity": float(across / (most * deepest)) if most > 0 else 0.0,
             "iterations": float(found.sweeps),
         }
-        return GelState(u, force, touch, report), gap
+        held = np.where((touch == STICK)[:, None], target, u)
+        return HeldState(u, force, touch, report, held), gap
 
     def _reached(self, wanted: NDArray[np.bool_]) -> Reach:
-        nodes = np.flatnonzero(wanted)
-        kept = self._reach
-        if kept is not None and len(kept.nodes) <= SPARE * len(nodes):
-            inside = np.zeros(len(wanted), dtype=bool)
-            inside[kept.nodes] = True
-            if inside[nodes].all():
-                return kept
-        self._reach = Reach(nodes, self.compliance.block(nodes))
-        return self._reach
-
-
-def room_to_tool(surface: ToolSurface, places: Array, moved: Array) -> Array:
-    """Motion (n,) along the normals that takes nodes to the tool, beyond all but `moved`."""
-    frames, gap = surface.frames, surface.gap_mm(places)
-    if frames is None:
-        return np.asarray(gap + moved[:, 2])
-    return np.asarray(gap + (frames[:, :, 2] * moved).sum(axis=1))
+        if self._reach is None:
+            return reach_of(wanted, self.compliance)
+        return self._reach.including(wanted, self.compliance)

@@ -7,82 +7,112 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.tool import Tool
+from gelslim_twin.contact.tool import Tool, rotation
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
 DIFFERENCE_MM = 1e-4
 MOST_SLOPE = 10.0
 """Steeper flanks count as this steep: a wall is a flank that nothing slips past."""
+_SIDES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * DIFFERENCE_MM
 
 
 @dataclass(frozen=True, eq=False)
 class ToolSurface:
-    """The tool over n places: a plane at each, by height and slopes along x and y.
+    """The tool by n points: its tangent plane where it is met along the tool's own axis."""
 
-    Height and slopes are those at `places_mm` (n, 2).
-    """
-
-    places_mm: Array
-    height_mm: Array
-    slopes: Array
-    """(n, 2)."""
+    met_mm: Array
+    """(n, 3) a point of each plane; infinite z where the tool is not met."""
+    normal: Array
+    """(n, 3) unit normals into the tool."""
 
     def at(self, nodes: NDArray[np.intp]) -> ToolSurface:
-        """The tool over some of the places."""
-        return ToolSurface(self.places_mm[nodes], self.height_mm[nodes], self.slopes[nodes])
+        """The tool by some of the points."""
+        return ToolSurface(self.met_mm[nodes], self.normal[nodes])
+
+    @property
+    def is_met(self) -> NDArray[np.bool_]:
+        """(n,)."""
+        return np.asarray(np.isfinite(self.met_mm[:, 2]))
+
+    def only(self, kept: NDArray[np.bool_]) -> ToolSurface:
+        """The same, not met but at `kept` (n,)."""
+        met = self.met_mm.copy()
+        met[~kept, 2] = np.inf
+        return ToolSurface(met, self.normal)
+
+    def turned(self, other: ToolSurface, share: float) -> ToolSurface:
+        """The same points with normals `share` of the way from another's."""
+        mixed = other.normal + share * (self.normal - other.normal)
+        return ToolSurface(self.met_mm, mixed / np.linalg.norm(mixed, axis=1)[:, None])
 
     def gap_mm(self, points_mm: Array) -> Array:
         """Distance (n,) of points (n, 3) to the planes along their normals; below 0 inside."""
-        ahead = (self.slopes * (points_mm[:, :2] - self.places_mm)).sum(axis=1)
-        return np.asarray((self.height_mm + ahead - points_mm[:, 2]) / self._size)
-
-    @property
-    def _size(self) -> Array:
-        return np.asarray(np.sqrt(1.0 + (self.slopes**2).sum(axis=1)))
+        return np.asarray(((self.met_mm - points_mm) * self.normal).sum(axis=1))
 
     @property
     def frames(self) -> Array | None:
         """(n, 3, 3): in the columns two tangents and the normal into the tool; None if level."""
-        if not self.slopes.any():
+        normal = self.normal
+        if not normal[:, :2].any():
             return None
-        a, b = self.slopes.T
-        zero = np.zeros_like(a)
-        normal = np.stack([-a, -b, np.ones_like(a)], axis=1) / self._size[:, None]
-        first = np.stack([np.ones_like(a), zero, a], axis=1) / np.sqrt(1 + a * a)[:, None]
-        return np.stack([first, np.cross(normal, first), normal], axis=2)
+        # The first tangent has no part along y, the second is the normal times the first.
+        size = np.hypot(normal[:, 0], normal[:, 2])
+        frames = np.empty((len(normal), 3, 3))
+        frames[:, 0, 0], frames[:, 2, 0] = normal[:, 2] / size, -normal[:, 0] / size
+        frames[:, 1, 0] = 0.0
+        frames[:, :, 2] = normal
+        a, c = frames[:, 0, 0], frames[:, 2, 0]
+        frames[:, 0, 1] = normal[:, 1] * c
+        frames[:, 1, 1] = normal[:, 2] * a - normal[:, 0] * c
+        frames[:, 2, 1] = -normal[:, 1] * a
+        return frames
+
+
+def clearance_mm(tool: Tool, pose: Pose, points_mm: Array) -> Array:
+    """How far (n,) points (n, 3) are below the tool along its own axis; infinite beside it."""
+    own = _own(pose, points_mm)
+    return np.asarray(tool.local(own[:, 0], own[:, 1]) - own[:, 2])
 
 
 def tool_surface(
     tool: Tool,
     pose: Pose,
-    places_mm: Array,
+    points_mm: Array,
     before: ToolSurface | None = None,
-    below_mm: Array | None = None,
+    reach_mm: float = np.inf,
 ) -> ToolSurface:
-    """The tool's surface over places (n, 2).
+    """The tool by points (n, 3).
 
-    A place beside the tool has an infinite height, or where `before` has one there, the height of
-    that one's plane: a node that slips off an edge on the way to a solution is not let go at once.
-    Slopes are found where the tool is lower than `below_mm` (n,), everywhere by default.
+    A point beside the tool meets nothing, or where `before` meets it, that one's plane: a node
+    that slips off an edge on the way to a solution is not let go at once. Planes are tilted as
+    the tool is where a point is nearer than `reach_mm`, else level on the tool.
     """
-    places = np.array(places_mm, dtype=float)
-    height = tool.height_mm(pose, places[:, 0], places[:, 1])
-    slopes = np.zeros((len(places), 2))
-    on = np.flatnonzero(height < (np.inf if below_mm is None else below_mm))
-    for axis in (0, 1):
-        step = np.zeros(2)
-        step[axis] = DIFFERENCE_MM
-        ahead, behind = (
-            tool.height_mm(pose, *(places[on] + side * step).T) for side in (1.0, -1.0)
-        )
-        slopes[on, axis] = _slope(behind, height[on], ahead)
+    own, turn = _own(pose, points_mm), rotation(pose)
+    height = tool.local(own[:, 0], own[:, 1])
+    slopes = np.zeros((len(own), 2))
+    on = np.flatnonzero(height < own[:, 2] + reach_mm)
+    if len(on):
+        around = tool.local(own[on, 0] + _SIDES[:, :1], own[on, 1] + _SIDES[:, 1:])
+        for axis in (0, 1):
+            ahead, behind = around[2 * axis], around[2 * axis + 1]
+            slopes[on, axis] = _slope(behind, height[on], ahead)
+    met = np.column_stack([own[:, :2], np.where(np.isfinite(height), height, 0.0)]) @ turn.T
+    met += [pose.x_mm, pose.y_mm, -pose.depth_mm]
+    met[~np.isfinite(height), 2] = np.inf
+    normal = np.column_stack([-slopes, np.ones(len(own))])
+    normal /= np.sqrt(1.0 + (slopes**2).sum(axis=1))[:, None]
+    if pose.tilt_x_deg != 0 or pose.tilt_y_deg != 0 or slopes.any():
+        normal = normal @ turn.T
     if before is not None:
-        off = np.flatnonzero(~np.isfinite(height) & np.isfinite(before.height_mm))
-        moved = places[off] - before.places_mm[off]
-        height[off] = before.height_mm[off] + (before.slopes[off] * moved).sum(axis=1)
-        slopes[off] = before.slopes[off]
-    return ToolSurface(places, height, slopes)
+        off = np.flatnonzero(~np.isfinite(height) & before.is_met)
+        met[off], normal[off] = before.met_mm[off], before.normal[off]
+    return ToolSurface(met, normal)
+
+
+def _own(pose: Pose, points_mm: Array) -> Array:
+    """Points in the tool's own frame."""
+    return np.asarray((points_mm - [pose.x_mm, pose.y_mm, -pose.depth_mm]) @ rotation(pose))
 
 
 def _slope(behind: Array, here: Array, ahead: Array) -> Array:

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.tool import Tool, rotation
-from gelslim_twin.contact.tool_surface import tool_surface
+from gelslim_twin.contact.tool_surface import clearance_mm, tool_surface
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -100,11 +100,9 @@ def test_tilted_plane_and_its_slope() -> None:
     normal = rotation(pose)[:, 2]
     points = grid(2.0)
     plane = -0.3 - ((points - [1.0, 2.0]) @ normal[:2]) / normal[2]
-    surface = tool_surface(tool, pose, points)
-    np.testing.assert_allclose(surface.height_mm, plane, atol=1e-8)
-    np.testing.assert_allclose(
-        surface.slopes, np.tile(-normal[:2] / normal[2], (len(points), 1)), atol=1e-4
-    )
+    surface = tool_surface(tool, pose, np.column_stack([points, np.zeros(len(points))]))
+    np.testing.assert_allclose(surface.normal, np.tile(normal, (len(points), 1)), atol=1e-9)
+    np.testing.assert_allclose(surface.gap_mm(np.column_stack([points, plane])), 0.0, atol=1e-9)
     frames = surface.frames
     assert frames is not None
     np.testing.assert_allclose(frames[:, :, 2], np.tile(normal, (len(points), 1)), atol=1e-4)
@@ -118,13 +116,46 @@ def test_tilted_plane_and_its_slope() -> None:
 
 def test_level_faces_have_no_frames_and_rims_no_wild_slopes() -> None:
     tool = Tool.of([FlatPunch(shape="flat_punch", radius_mm=2)], Path())
-    points = np.array([[0.0, 0.0], [2.0, 0.0], [-1.99999, 0.0], [3.0, 0.0]])
+    points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [-1.99999, 0.0, 0.0], [3.0, 0.0, 0.0]])
     surface = tool_surface(tool, Pose(depth_mm=0.1), points)
     assert surface.frames is None
-    assert list(np.isfinite(surface.height_mm)) == [True, True, True, False]
-    later = tool_surface(tool, Pose(depth_mm=0.1), points + np.array([0.5, 0.0]), surface)
-    assert later.height_mm[1] == -0.1
-    assert later.height_mm[3] == math.inf
+    assert list(surface.is_met) == [True, True, True, False]
+    later = tool_surface(tool, Pose(depth_mm=0.1), points + np.array([0.5, 0, 0]), surface)
+    np.testing.assert_allclose(later.gap_mm(points)[:3], -0.1)
+    assert later.gap_mm(points)[3] == math.inf
+
+
+def test_a_rim_is_not_decided_by_rounding() -> None:
+    """Nodes that stick at a rim stay on the tool, whichever way rounding moves them."""
+    for shape in (FlatPunch(shape="flat_punch", length_mm=8, width_mm=6),
+                  FlatPunch(shape="flat_punch", radius_mm=4)):  # fmt: skip
+        tool = Tool.of([shape], Path())
+        x = np.array([4 - 1e-6, 4.0, 4 + 1e-6, 4.1])
+        assert list(np.isfinite(tool.local(x, np.zeros(4)))) == [True, True, True, False]
+
+
+@pytest.mark.parametrize("name", ["sphere", "cone", "wedge", "punch", "rough"])
+@pytest.mark.parametrize("tilt", [0.0, 6.0])
+def test_planes_are_those_of_the_tool_along_the_vertical(name: str, tilt: float) -> None:
+    """A point on the tool, found along the vertical, lies on its plane; planes face the gel."""
+    tool = Tool.of([SHAPES[name]], Path())
+    pose = Pose(x_mm=0.2, y_mm=-0.3, depth_mm=0.4, twist_deg=15, tilt_x_deg=tilt)
+    points = grid(1.2)
+    height = tool.height_mm(pose, points[:, 0], points[:, 1])
+    on = np.isfinite(height) & (height < 0.9)
+    assert on.sum() > 50
+    met = np.column_stack([points, height])[on]
+    surface = tool_surface(tool, pose, met)
+    np.testing.assert_allclose(surface.gap_mm(met), 0.0, atol=1e-8)
+    np.testing.assert_allclose(clearance_mm(tool, pose, met), 0.0, atol=1e-8)
+    assert (surface.normal[:, 2] > 0).all()
+    # A short step along the plane leaves the tool by no more than its curvature.
+    frames = surface.frames
+    if frames is None:
+        return
+    near = met + 1e-3 * frames[:, :, 0]
+    flat = np.abs(clearance_mm(tool, pose, near)) < 3e-5
+    assert flat.mean() > 0.9
 
 
 def test_carried_points_keep_their_place_on_the_tool() -> None:
