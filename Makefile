@@ -8,7 +8,7 @@ PINS := requirements/constraints.txt
 
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: variant test test-slow lint stability designs bench pins clean
+.PHONY: variant test test-slow lint stability designs bench docs pins clean
 
 variant: $(VENV)/.installed
 	$(BIN)/gelslim build "$(SPEC)" -o "$(OUT)"
@@ -37,6 +37,14 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python bench/force_latency.py --frames 3000
 	$(BIN)/python bench/force_overlay.py
 	$(BIN)/python bench/force_tables.py
+
+docs: $(VENV)/.installed-dev
+	$(BIN)/gelslim schema -o docs/gelslim-spec-1.schema.json
+	$(BIN)/gelslim schema --scene -o docs/gelslim-scene-1.schema.json
+	$(BIN)/gelslim schema --markdown -o docs/spec_reference.md
+	$(BIN)/gelslim schema --scene --markdown -o docs/scene_reference.md
+	$(BIN)/python tools/sensitivities.py
+	$(BIN)/python tools/gallery.py
 
 designs: $(VENV)/.installed
 	for spec in designs/*.yaml; do $(BIN)/gelslim build "$$spec" -o "out/$$(basename "$$spec" .yaml)" || exit $$?; done

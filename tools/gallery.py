@@ -94,7 +94,7 @@ PICTURES = (
     Picture(
         "feasibility",
         "What is feasible, and what binds",
-        "Gel length against aperture, coloured by the rule or limit that stops the design.",
+        "Gel length against width, coloured by the rule or limit that stops the design.",
         (
             "explore designs/mini20.yaml --vary gel.length_mm=14:34:1 --vary gel.width_mm=14:34:1"
             f" -o {FOLDER}/explore",
@@ -126,8 +126,8 @@ _HEAD = """\
 
 <!-- Made by `make docs`; do not edit by hand. -->
 
-Every picture is what the command under it leaves behind, made smaller. `python tools/gallery.py` makes
-them all anew, in a few minutes.
+Every picture is what the command under it leaves behind, made smaller. `python tools/gallery.py`
+makes them all anew, in a few minutes.
 """
 
 
