@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from gelslim_force.dot_tracking import DotsAtRest
 from gelslim_force.frame_result import FrameResult
 from gelslim_force.outputs.output_error import disk_error
 from gelslim_force.tracks import MarkerStatus
+from whole_files.replaced_file import replacement
 
 COLUMNS = (
     "index", "time_s", "coverage", "tracked", "predicted", "lost", "rejected",
@@ -78,21 +78,11 @@ class TrackRecord:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the NumPy file (compressed .npz), whole or not at all. Raises OutputError."""
         target = Path(path)
-        part: str | None = None
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-            with os.fdopen(handle, "wb") as stream:
+            with replacement(target, parents=True) as stream:
                 np.savez_compressed(stream, **self.arrays())  # type: ignore[arg-type]
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.chmod(part, 0o644)
-            os.replace(part, target)
         except OSError as error:
             raise disk_error(target, "writing the tracks", error) from error
-        finally:
-            if part is not None:
-                Path(part).unlink(missing_ok=True)
 
     def table(self) -> bytes:
         """Return the CSV: a header, then a line per frame."""

@@ -7,8 +7,8 @@ renamed into it, so a reader sees the old one or the new one.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,11 @@ from ifem_export.bundle_ladder import LADDER, ladder_json, read_ladder
 from ifem_export.bundle_layout import bundle_arrays, bundle_from
 from ifem_export.bundle_manifest import MANIFEST, REBUILD, describe, read_manifest, to_json
 from ifem_export.errors import BundleError
+from whole_files.file_lock import locked
+from whole_files.replaced_folder import FolderError, recover, replaced_folder
 
+FAMILY = "gelslim-bundle/"
+"""How the format of a bundle's manifest begins, whatever its version."""
 _ALTERED = "copy the bundle again from where it was built, or " + REBUILD
 
 
@@ -33,31 +37,32 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
             disk refuses.
     """
     check_bundle(bundle)
-    target = Path(path)
-    _require_replaceable(target)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    retired = target.with_name(f".{target.name}.{os.getpid()}.old")
+    target = Path(os.path.abspath(path))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(temporary, ignore_errors=True)
-        temporary.mkdir()
-        entries = {
-            name: _write_array(temporary, name, array)
-            for name, array in bundle_arrays(bundle).items()
-        }
-        ladder = ladder_json(bundle)
-        if ladder:
-            (temporary / LADDER).write_bytes(ladder)
-        (temporary / MANIFEST).write_text(
-            to_json(describe(bundle, entries)), encoding="utf-8", newline="\n"
-        )
-        _swap(temporary, target, retired)
+        with locked(target.with_name(f".{target.name}.lock")):
+            recover(target)
+            _require_replaceable(target)
+            with replaced_folder(target, _files_of(target)) as staging:
+                _fill(staging, bundle)
+    except FolderError as error:
+        raise BundleError(str(target), "cannot be written", str(error)) from error
     except OSError as error:
         raise BundleError(
             str(target), f"cannot be written ({error.strerror or error})", "check the disk"
         ) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _fill(folder: Path, bundle: Bundle) -> None:
+    entries = {
+        name: _write_array(folder, name, array) for name, array in bundle_arrays(bundle).items()
+    }
+    ladder = ladder_json(bundle)
+    if ladder:
+        (folder / LADDER).write_bytes(ladder)
+    (folder / MANIFEST).write_text(
+        to_json(describe(bundle, entries)), encoding="utf-8", newline="\n"
+    )
 
 
 def load_bundle(
@@ -105,10 +110,28 @@ def load_bundle(
 def _require_replaceable(target: Path) -> None:
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
-    if not (target / MANIFEST).is_file():
+    found = _manifest_of(target) if target.is_dir() else {}
+    # Builds and other programs have a manifest.json too.
+    if not str(found.get("format")).startswith(FAMILY):
         raise BundleError(
             str(target), "exists and is not a bundle", "give another path or remove it yourself"
         )
+
+
+def _manifest_of(folder: Path) -> dict[str, Any]:
+    """The manifest as it is; empty where there is none or it is damaged."""
+    try:
+        found = json.loads((folder / MANIFEST).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _files_of(folder: Path) -> set[str]:
+    """The files that a bundle there consists of; any others are not ours."""
+    arrays = _manifest_of(folder).get("arrays")
+    entries = arrays.values() if isinstance(arrays, dict) else ()
+    return {MANIFEST, LADDER, *(str(e.get("file")) for e in entries if isinstance(e, dict))}
 
 
 def _write_array(folder: Path, name: str, array: NDArray[Any]) -> dict[str, Any]:
@@ -122,20 +145,6 @@ def _write_array(folder: Path, name: str, array: NDArray[Any]) -> dict[str, Any]
         "dtype": contiguous.dtype.str,
         "shape": list(contiguous.shape),
     }
-
-
-def _swap(temporary: Path, target: Path, retired: Path) -> None:
-    """Put the new bundle in place; if that fails, put the old one back."""
-    had_old = target.exists()
-    if had_old:
-        os.rename(target, retired)
-    try:
-        os.rename(temporary, target)
-    except OSError:
-        if had_old:
-            os.rename(retired, target)
-        raise
-    shutil.rmtree(retired, ignore_errors=True)
 
 
 def _sha256(path: Path) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from ifem_export.bundle import Bundle
 from ifem_export.errors import IfemError
+from whole_files.replaced_file import replace_file
 
 Arrays = dict[str, NDArray[Any]]
 HEADER_DATE = b"gelslim-bundle"
@@ -102,13 +102,4 @@ def _write(
         raise IfemError(f"{target}: the name must end in {suffix}")
     stream = io.BytesIO()
     fill(stream)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
-            out.write(finish(stream.getvalue()))
-        os.chmod(part, 0o644)
-        os.replace(part, target)
-    except BaseException:
-        Path(part).unlink(missing_ok=True)
-        raise
+    replace_file(target, finish(stream.getvalue()), parents=True)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import MeshError
 from ifem_export.pad_mesh import PadMesh
+from whole_files.replaced_file import replace_file
 
 _VTK_HEXAHEDRON = 12
 _VTK_TYPES = {
@@ -55,13 +55,7 @@ def write_vtu(
     points = {"node_set": _node_set_bits(mesh), **(point_data or {})}
     cells = {**_fill(mesh), **(cell_data or {})}
     body = "\n".join(_document(mesh, points, cells)) + "\n"
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(body, encoding="ascii", newline="\n")
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    replace_file(path, body.encode("ascii"))
 
 
 def _fill(mesh: PadMesh) -> dict[str, NDArray[np.float64]]:

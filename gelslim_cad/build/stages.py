@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 from gelslim_cad.binding import binding_sentences
 from gelslim_cad.build.bom import bill_of_materials, bom_csv
@@ -20,6 +18,7 @@ from gelslim_cad.part import Part
 from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_cad.view_figures import view_inputs
 from ifem_export.marker_grid import MarkerGrid
+from whole_files.scratch import scratch_folder
 
 
 @dataclass(frozen=True)
@@ -137,8 +136,8 @@ class Stages:
         from ifem_export.vtu import write_vtu
 
         mesh, _ = pad_mesh(self.dimensions, self.grid)
-        with tempfile.TemporaryDirectory(prefix="gelslim-") as scratch:
-            folder = Path(scratch) / "bundle"
+        with scratch_folder() as scratch:
+            folder = scratch / "bundle"
             write_bundle(folder, make_bundle(self.loaded.spec, self.dimensions, mesh, self.grid))
             load_bundle(folder, verify=True)
             write_vtu(folder / "pad.vtu", mesh)

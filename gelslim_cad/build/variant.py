@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gelslim_cad.build.fingerprint import code_hash, combined, versions
-from gelslim_cad.build.folder import locked, recover, require_ours, staged
+from gelslim_cad.build.folder import locked, require_ours, staged
 from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
 from gelslim_cad.build.work import Unit, Written, run
 from gelslim_cad.checks import Check
+from whole_files.replaced_folder import recover
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Stages
@@ -99,7 +100,7 @@ def _build(
             plan.checks, f"{stages.name}: a written file fails its proof: {lines}"
         )
     note = " ".join(w.note for w in written.values() if w.note)
-    with staged(target) as folder:
+    with staged(target, () if previous is None else {*previous.files, NAME}) as folder:
         files: dict[str, FileEntry] = {}
         proofs = list(_kept_proofs(previous, reused))
         contents: dict[str, bytes] = {}

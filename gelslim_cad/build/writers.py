@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from gelslim_cad.build.light_writer import write_light  # noqa: F401
 from gelslim_cad.build.view_writer import write_view  # noqa: F401
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
 from gelslim_cad.part import Part
+from whole_files.scratch import scratch_folder
 
 SECTION_MM = 0.013
 """Off the mid-plane, so that no section runs along a face."""
@@ -132,9 +132,9 @@ def _outline(
 def _on_disk(files: Files, prove: Callable[[Path], Proofs]) -> tuple[dict[str, Any], ...]:
     """Write the files to a scratch folder, read each back and prove it there."""
     results: Proofs = []
-    with tempfile.TemporaryDirectory(prefix="gelslim-") as scratch:
+    with scratch_folder() as scratch:
         for path, data in files.items():
-            target = Path(scratch) / path
+            target = scratch / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
             results += prove(target)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sized
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from whole_files.replaced_file import replace_file as whole_file
 
 if TYPE_CHECKING:
     from gelslim_cad.dimensions import Dimensions
@@ -17,22 +18,7 @@ PAD_RULES = ("gel.", "mesh.", "marker.")
 
 def replace_file(target: Path, data: bytes) -> None:
     """Write `data` to `target` in one step; folders above it are made. Raises OSError."""
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(target)) from error
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        # mkstemp keeps others out; a file the user asked for follows the umask.
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(part, 0o666 & ~mask)
-        os.replace(part, target)
-    except BaseException:
-        Path(part).unlink(missing_ok=True)
-        raise
+    whole_file(target, data, parents=True)
 
 
 def written(folder: Path, files: Sized) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 from gelslim_cad.build.folder import locked
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.task import Task
+from whole_files.replaced_file import is_part, replace_file, sweep
 
 MARK = "explore.json"
 CHUNKS = "chunks"
@@ -39,9 +40,10 @@ class Store:
                 raise ExploreError(
                     f"{folder} exists and holds no exploration; give another -o or remove it"
                 )
-            (target / CHUNKS).mkdir(parents=True, exist_ok=True)
             if not (target / MARK).exists():
-                whole_file(target / MARK, b"{}\n")
+                replace_file(target / MARK, b"{}\n", parents=True)
+            (target / CHUNKS).mkdir(exist_ok=True)
+            sweep(target, again=True)
             yield cls(target)
 
     def read(self, task: Task) -> dict[str, Any] | None:
@@ -56,7 +58,7 @@ class Store:
     def write(self, task: Task, result: dict[str, Any]) -> None:
         """Store a result in one step."""
         record = {"key": task.key, "result": result}
-        whole_file(self._place(task), json.dumps(record, separators=(",", ":")).encode())
+        replace_file(self._place(task), json.dumps(record, separators=(",", ":")).encode())
 
     def keep_only(self, tasks: Iterable[Task]) -> None:
         """Remove results of other tasks and what a killed run left half-written."""
@@ -69,16 +71,7 @@ class Store:
         return self.folder / CHUNKS / f"{task.kind}-{task.key[:20]}.json"
 
 
-def whole_file(target: Path, data: bytes) -> None:
-    """Write a file beside its place, then move it there. Raises OSError."""
-    part = target.with_name(f".{target.name}.part")
-    try:
-        part.write_bytes(data)
-        os.replace(part, target)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-
-
 def _foreign(folder: Path) -> bool:
-    return any(folder.iterdir()) and not (folder / MARK).is_file()
+    """Whether it holds more than a run killed at its start leaves."""
+    strange = any(not is_part(path.name) for path in folder.iterdir())
+    return strange and not (folder / MARK).is_file()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -11,6 +10,7 @@ from gelslim_cad.markers.csv import render_csv
 from gelslim_cad.markers.nodes import NearestNodes
 from gelslim_cad.markers.outline import Outline, as_outline
 from ifem_export.marker_grid import MarkerGrid
+from whole_files.replaced_file import replace_file
 
 
 def render_marker_files(
@@ -69,11 +69,6 @@ def write_marker_files(
     directory.mkdir(parents=True, exist_ok=True)
     paths = []
     for name in sorted(files):
-        part = directory / f".{name}.part"
-        try:
-            part.write_bytes(files[name])
-            os.replace(part, directory / name)
-        finally:
-            part.unlink(missing_ok=True)
+        replace_file(directory / name, files[name])
         paths.append(directory / name)
     return paths

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
+
+from whole_files.replaced_file import replace_file as whole_file
 
 
 def replace_file(path: str | os.PathLike[str], data: bytes) -> None:
@@ -15,18 +15,7 @@ def replace_file(path: str | os.PathLike[str], data: bytes) -> None:
 
     Raises OSError; the old file, if any, is then as it was.
     """
-    target = Path(path)
-    handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
-            out.write(data)
-            out.flush()
-            os.fsync(out.fileno())
-        os.chmod(part, 0o644)
-        os.replace(part, target)
-    except BaseException:
-        Path(part).unlink(missing_ok=True)
-        raise
+    whole_file(path, data)
 
 
 def json_bytes(record: Mapping[str, Any]) -> bytes:

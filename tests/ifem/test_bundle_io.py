@@ -18,6 +18,7 @@ from ifem_export.bundle_summary import summarise_bundle
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import build_pad_mesh
+from whole_files import replaced_folder
 
 ROOT = Path(ifem_export.__file__).parents[1]
 
@@ -114,14 +115,16 @@ def test_a_failed_write_leaves_the_old_bundle(bundle, stored, monkeypatch):
 
 
 def test_a_failed_swap_puts_the_old_bundle_back(bundle, stored, monkeypatch):
-    rename = bundle_io.os.rename
+    rename = replaced_folder.os.rename
 
     def refuse_new(source, target):
-        if str(source).endswith(".tmp"):
+        if str(source).endswith(".building"):
             raise OSError(13, "Permission denied")
         rename(source, target)
 
-    monkeypatch.setattr(bundle_io.os, "rename", refuse_new)
+    # As where the system cannot exchange two folders in one step.
+    monkeypatch.setattr(replaced_folder, "_exchanged", lambda staging, place: False)
+    monkeypatch.setattr(replaced_folder.os, "rename", refuse_new)
     with pytest.raises(BundleError, match="Permission denied"):
         write_bundle(stored, bundle)
     monkeypatch.undo()
