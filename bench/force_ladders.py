@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import DOCS, write_data, write_whole
-from force_ladder_fields import METHODS, compensation, interpolation, operators
+from force_ladder_fields import METHODS, OPERATORS, compensation, interpolation, operators
 from force_ladder_markers import LOOKS, MISSING, SPURIOUS, detection, matching
 from force_rig import SEED, small_rig
 from machine import machine
@@ -48,6 +48,7 @@ def main() -> None:
         **machine(SEED),
         "markers": len(rig.grid),
         "surface_nodes": len(rig.mesh.surface),
+        "balanced_operator": balanced_operator(rig.bundle.operator),
     }
     for name, ladder in LADDERS.items():
         if options.only in (None, name):
@@ -58,6 +59,15 @@ def main() -> None:
     docs = options.docs or DOCS
     write_data("force_ladders", data, docs)
     draw(data, docs / "images" / "force_ladders.png")
+
+
+def balanced_operator(label: str) -> str | None:
+    """Which of OPERATORS the bundle's own choice is, by the label of its rung."""
+    for name, (rung, parameters) in OPERATORS.items():
+        inside = ", ".join(f"{key} {value:g}" for key, value in parameters.items())
+        if label == (f"{rung} ({inside})" if inside else rung):
+            return name
+    return None
 
 
 def print_rows(name: str, rows: Rows) -> None:

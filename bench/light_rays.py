@@ -21,6 +21,7 @@ from light_ratios import changes, earlier, ratios
 from light_rays_figure import draw
 from machine import machine
 
+from gelslim_cad.light.study import RAYS
 from gelslim_optics.guide_facets import facetted_profile
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
 from gelslim_optics.guide_shapes import CurvedGuide, GelSection, curved_profile
@@ -55,6 +56,12 @@ def timed(scene: LightScene, rays: int, **options: Any) -> tuple[Any, float]:
     return result, time.process_time() - start
 
 
+def powers(largest: int) -> list[int]:
+    """Powers of 2 of the numbers of rays: every other one, and what `gelslim light` takes."""
+    usual = RAYS.bit_length() - 1
+    return sorted({*range(10, largest + 1, 2), *([usual] if usual <= largest else [])})
+
+
 def ladder(largest: int, reference: int) -> dict[str, Any]:
     """Errors by number of rays, points and splitting, about a run of 2^reference rays."""
     scene = led_scene()
@@ -62,7 +69,7 @@ def ladder(largest: int, reference: int) -> dict[str, Any]:
     truth = trace_light(scene, 1 << reference, seed=REFERENCE_SEED).ledger()
     sampling: Sampling
     rows = []
-    for power in range(10, largest + 1, 2):
+    for power in powers(largest):
         for sampling in ("sobol", "random"):
             for split in SPLITS:
                 options: dict[str, Any] = {
@@ -75,6 +82,7 @@ def ladder(largest: int, reference: int) -> dict[str, Any]:
                     "sampling": sampling,
                     "split": split,
                     "cpu_s": float(np.median([seconds for _, seconds in runs])),
+                    "faces_per_ray": float(np.mean([r.crossings for r, _ in runs])),
                 }
                 for entry in ENTRIES:
                     errors = [r.value(entry) / truth[entry].value - 1 for r, _ in runs]

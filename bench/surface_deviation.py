@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.export.brep import bare_copy
-from gelslim_cad.export.patch import Patch, face_patches
+from gelslim_cad.export.patch import Patch
 
 Array = NDArray[np.float64]
 Distance = Callable[[Array], Array]
@@ -18,15 +18,14 @@ DIVISIONS = 4
 """Points per side of a triangle; its corners lie on the surface already."""
 
 
-def deviation_um(solid: Any, linear_mm: float, angular_deg: float) -> float:
-    """Largest distance in µm from the mesh to the surface of the face it stands for.
+def deviation_um(solid: Any, patches: Sequence[Patch]) -> float:
+    """Largest distance in µm from a solid's mesh (`face_patches`) to the faces' surfaces.
 
     Points are a lattice on every triangle, the middles of its sides among them, from corners
     rounded to float32 as the files hold them. Neighbouring faces share the chords of their common
     edge, so the trim of each is judged on the surface of the other.
     """
     faces = bare_copy(solid).Faces()
-    patches = face_patches(solid, linear_mm, angular_deg)
     worst = 0.0
     for face, patch in zip(faces, patches, strict=True):
         worst = max(worst, float(distance_from(face)(lattice(patch)).max()))

@@ -8,10 +8,13 @@ from typing import Any, Literal
 
 ErrorUnit = Literal["relative", "px", "um", "N", "mm", "share", "grey values"]
 TimeUnit = Literal["ms", "s"]
+Kind = Literal["ladder", "problems", "omissions"]
+"""`ladder`: all rungs answer one question. `problems`: each series is a problem of its own.
+`omissions`: each rung is an effect; error and time are what leaving it out costs and saves."""
 
 
 @dataclass(frozen=True)
-class Rung:
+class RungRecord:
     """One way to do it. `count` is a number of operations or things that no machine changes."""
 
     label: str
@@ -22,14 +25,14 @@ class Rung:
     is_ours: bool = False
     count: float | None = None
 
-    def beats(self, other: Rung) -> bool:
+    def beats(self, other: RungRecord) -> bool:
         """At least as good in both and better in one."""
         no_worse = self.error <= other.error and self.time <= other.time
         return no_worse and (self.error < other.error or self.time < other.time)
 
 
 @dataclass(frozen=True)
-class Ladder:
+class LadderRecord:
     """Rungs of one question. `header` is that of the file they were measured in.
 
     `paper` says what the paper does, or that it does nothing of the kind; `reference` what errors
@@ -46,11 +49,10 @@ class Ladder:
     time_label: str
     time_unit: TimeUnit
     source: str
-    rungs: tuple[Rung, ...]
+    rungs: tuple[RungRecord, ...]
     header: Mapping[str, Any] = field(default_factory=dict)
     count_label: str = ""
-    shown: tuple[str, ...] = ()
-    """Labels of the rungs in the page's table; all where empty."""
+    kind: Kind = "ladder"
 
     def __post_init__(self) -> None:
         labels = [r.label for r in self.rungs]
@@ -59,37 +61,52 @@ class Ladder:
         for rung in self.rungs:
             if not (rung.error >= 0 and rung.time >= 0):
                 raise ValueError(f"ladder {self.name}, {rung.label}: error and time must be >= 0")
-        if strange := set(self.shown) - set(labels):
-            raise ValueError(f"ladder {self.name}: no rung is called {sorted(strange)}")
 
     @property
-    def front(self) -> tuple[Rung, ...]:
-        """Rungs that no other beats in both, quickest first."""
-        kept = [r for r in self.rungs if not any(other.beats(r) for other in self.rungs)]
-        return tuple(sorted(kept, key=lambda r: (r.time, r.error)))
+    def series(self) -> tuple[str, ...]:
+        """Names of the series, in order."""
+        return tuple(dict.fromkeys(r.series for r in self.rungs))
 
     @property
-    def ours(self) -> Rung | None:
+    def fronts(self) -> tuple[tuple[RungRecord, ...], ...]:
+        """Rungs that no other beats in both, quickest first: of each problem, or of all."""
+        if self.kind == "omissions":
+            return ()
+        groups = self.series if self.kind == "problems" else ("",)
+        fronts = []
+        for name in groups:
+            rungs = [r for r in self.rungs if self.kind != "problems" or r.series == name]
+            kept = [r for r in rungs if not any(other.beats(r) for other in rungs)]
+            fronts.append(tuple(sorted(kept, key=lambda r: (r.time, r.error))))
+        return tuple(fronts)
+
+    @property
+    def ours(self) -> tuple[RungRecord, ...]:
         """What the project does unless told otherwise."""
-        return next((r for r in self.rungs if r.is_ours), None)
+        return tuple(r for r in self.rungs if r.is_ours)
 
     @property
-    def papers(self) -> Rung | None:
+    def papers(self) -> tuple[RungRecord, ...]:
         """What the paper does."""
-        return next((r for r in self.rungs if r.is_paper), None)
+        return tuple(r for r in self.rungs if r.is_paper)
+
+    def rivals(self, rung: RungRecord) -> tuple[RungRecord, ...]:
+        """Rungs that answer the same question as one: of its problem, or all."""
+        same = self.kind == "problems"
+        return tuple(r for r in self.rungs if not same or r.series == rung.series)
 
     def to_record(self) -> dict[str, Any]:
         """Plain data."""
-        return asdict(self) | {"rungs": [asdict(r) for r in self.rungs], "shown": [*self.shown]}
+        return asdict(self) | {"rungs": [asdict(r) for r in self.rungs]}
 
     @classmethod
-    def from_record(cls, record: Mapping[str, Any]) -> Ladder:
+    def from_record(cls, record: Mapping[str, Any]) -> LadderRecord:
         """From plain data; raises TypeError or KeyError where it is malformed."""
-        rungs = tuple(Rung(**r) for r in record["rungs"])
-        return cls(**{**record, "rungs": rungs, "shown": tuple(record["shown"])})
+        rungs = tuple(RungRecord(**r) for r in record["rungs"])
+        return cls(**{**record, "rungs": rungs})
 
 
-def joined(ladders: Sequence[Ladder]) -> list[dict[str, Any]]:
+def records_of(ladders: Sequence[LadderRecord]) -> list[dict[str, Any]]:
     """Records of several ladders; raises ValueError where two have one name."""
     names = [ladder.name for ladder in ladders]
     if len(set(names)) < len(names):

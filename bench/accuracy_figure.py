@@ -1,0 +1,135 @@
+"""One figure per ladder, all alike: error up, time across, front, the paper's and our choice."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+from typing import Any
+
+from ladder_record import LadderRecord, RungRecord
+
+SIZE_IN, DPI = (9.0, 5.0), 110
+COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#30a0b0", "#c03060", "#7f7f7f",
+           "#0b1e3d", "#e8a66b", "#5f9bd6", "#86b86b", "#3b3b3b")  # fmt: skip
+OURS, PAPER, FRONT = "#d62728", "#000000", "#9aa3ad"
+NEGLIGIBLE = 1e-6
+"""Of a ladder's largest error: what is below is drawn there, as an open triangle."""
+KEY = "Ladder"
+"""PNG text that says from which record a figure was drawn."""
+UNITS = {"relative": "", "share": "", "um": " (µm)", "px": " (px)", "N": " (N)", "mm": " (mm)",
+         "grey values": " (grey values)"}  # fmt: skip
+
+
+def digest(ladder: LadderRecord) -> str:
+    """SHA-256 of what a figure shows."""
+    record = {k: v for k, v in ladder.to_record().items() if k != "header"}
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode("utf-8")).hexdigest()
+
+
+def drawn(ladder: LadderRecord) -> bytes:
+    """The figure as PNG; the same record gives the same bytes."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=SIZE_IN, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    _points(axes, ladder)
+    _fronts(axes, ladder)
+    _choices(axes, ladder)
+    _frame(axes, ladder)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right center", fontsize=8, frameon=False)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None, KEY: digest(ladder)})
+    return stream.getvalue()
+
+
+def floor(ladder: LadderRecord) -> tuple[float, float]:
+    """Where errors and times too small for the axes are drawn."""
+    errors = [r.error for r in ladder.rungs if r.error > 0]
+    times = [r.time for r in ladder.rungs if r.time > 0]
+    least = min((e for e in errors if e > NEGLIGIBLE * max(errors)), default=1.0)
+    zero = any(r.error <= NEGLIGIBLE * max(errors, default=0.0) for r in ladder.rungs)
+    lowest = least / 3 if zero else least
+    return lowest, min(times, default=1.0) / (3 if any(r.time == 0 for r in ladder.rungs) else 1)
+
+
+def _spot(ladder: LadderRecord, rung: RungRecord) -> tuple[float, float]:
+    error, time = floor(ladder)
+    return max(rung.time, time), max(rung.error, error)
+
+
+def _points(axes: Any, ladder: LadderRecord) -> None:
+    for k, name in enumerate(ladder.series):
+        colour = COLOURS[k % len(COLOURS)]
+        rungs = [r for r in ladder.rungs if r.series == name]
+        named = ladder.kind != "omissions" and len(ladder.series) > 1
+        for shape, some in (("o", True), ("v", False)):
+            here = [r for r in rungs if (_spot(ladder, r)[1] == r.error) is some]
+            if not here:
+                continue
+            axes.scatter(
+                *zip(*(_spot(ladder, r) for r in here), strict=True),
+                s=34,
+                marker=shape,
+                facecolor=colour if some else "none",
+                edgecolor=colour,
+                label=name if named and (some or here == rungs) else None,
+                zorder=3,
+            )
+    for rung in _named(ladder):
+        axes.annotate(
+            _short(ladder, rung), _spot(ladder, rung), xytext=(6, 4), fontsize=7.5,
+            textcoords="offset points", color="#333a44",
+        )  # fmt: skip
+
+
+def _named(ladder: LadderRecord) -> list[RungRecord]:
+    """Rungs with their name beside them: all where they are few and no legend names them."""
+    few = len(ladder.series) == 1 or ladder.kind == "omissions"
+    return list(ladder.rungs) if few and len(ladder.rungs) <= 24 else []
+
+
+def _short(ladder: LadderRecord, rung: RungRecord) -> str:
+    return rung.series if ladder.kind == "omissions" else rung.label
+
+
+def _fronts(axes: Any, ladder: LadderRecord) -> None:
+    for k, front in enumerate(ladder.fronts):
+        spots = [_spot(ladder, r) for r in front]
+        label = None if k else "front: no rung beats these in both"
+        axes.plot(*zip(*spots, strict=True), color=FRONT, lw=1.4, zorder=1, label=label)
+        axes.scatter(*zip(*spots, strict=True), s=90, marker="o", color=FRONT, alpha=0.45, zorder=1)
+
+
+def _choices(axes: Any, ladder: LadderRecord) -> None:
+    for rungs, colour, marker, size, label in (
+        (ladder.papers, PAPER, "*", 210, "the paper's choice"),
+        (ladder.ours, OURS, "o", 170, "our default"),
+    ):
+        if not rungs:
+            continue
+        spots = list(zip(*(_spot(ladder, r) for r in rungs), strict=True))
+        face = PAPER if marker == "*" else "none"
+        axes.scatter(
+            *spots, s=size, marker=marker, facecolor=face, edgecolor=colour, lw=1.8, label=label,
+            zorder=4,
+        )  # fmt: skip
+
+
+def _frame(axes: Any, ladder: LadderRecord) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel(f"{ladder.time_label} ({ladder.time_unit})")
+    axes.set_ylabel(ladder.error_label + UNITS[ladder.error_unit])
+    axes.set_title(ladder.title, fontsize=11, loc="left")
+    axes.grid(alpha=0.25, which="major")
+    axes.margins(x=0.16, y=0.1)
+    # At least a decade, so that what takes the same time is not drawn apart.
+    for low, high, put in ((*axes.get_xlim(), axes.set_xlim), (*axes.get_ylim(), axes.set_ylim)):
+        if high / low < 10:
+            middle = math.sqrt(low * high)
+            put(middle / math.sqrt(10), middle * math.sqrt(10))

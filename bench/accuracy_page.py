@@ -1,0 +1,168 @@
+"""The page of all ladders, and its figures, from the JSON that the benches wrote.
+
+    python bench/accuracy_page.py              # from docs/data to docs
+    python bench/accuracy_page.py --docs D     # from D/data to D
+    python bench/accuracy_page.py --check      # says what is out of date, writes nothing
+
+Writes accuracy_vs_time.md, images/accuracy_*.png and data/accuracy.json, which holds every ladder
+in one form. A ladder whose bench has not been run yet is named as missing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from accuracy_figure import drawn
+from accuracy_text import conclusion, table
+from bench_data import DOCS, write_data, write_whole
+from ladder_record import LadderRecord, records_of
+from ladders_of_force import force
+from ladders_of_solids import light, stiffness, tessellation
+from ladders_of_twin import rendering, twin
+
+Convert = Callable[[Mapping[str, Any], Mapping[str, Any]], list[LadderRecord]]
+SOURCES: dict[str, Convert] = {
+    "stiffness_ladder": stiffness,
+    "light_rays": light,
+    "tessellation": tessellation,
+    "force_ladders": force,
+    "twin_ladders": twin,
+    "rendering": rendering,
+}
+"""File in docs/data and what makes ladders of it, in the order of the page."""
+HEADER = ("machine", "system", "processor", "cores", "threads", "python", "numpy", "scipy",
+          "numba", "opencv", "cadquery", "gelslim_cad", "seed")  # fmt: skip
+PAGE = "accuracy_vs_time.md"
+INTRODUCTION = """\
+# What accuracy costs in time
+
+Almost every step of this project can be done more or less accurately, and accuracy takes time. This
+page shows how much: for each step that offers a choice, the error of every way to do it against an
+independent reference, and the time it takes. A grey line joins the ways that no other beats in both
+error and time (the Pareto front). A black star is what the GelSlim 2.0 paper does, where it says; a
+red ring is what this project does unless told otherwise. A default that is off the front is called
+beaten: another way was both quicker and more accurate on this measure, which is one of several that
+matter. Times are of one machine and compare ways on it; errors do not depend on the machine.
+"""
+CLOSING = """\
+## How this page is made
+
+    make bench          # every ladder in full, then this page
+    make bench-quick    # every ladder at reduced size into out/bench, under five minutes
+
+Text, tables and figures come from the JSON files in `docs/data` by `python bench/accuracy_page.py`;
+`docs/data/accuracy.json` holds all ladders in one form. Tests hold the page to these files, and the
+files to limits on errors and operation counts; no test looks at a time.
+"""
+
+
+def main() -> None:
+    """Write, or say what is out of date."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder with data/ and images/")
+    parser.add_argument("--check", action="store_true", help="write nothing; 1 where out of date")
+    asked = parser.parse_args()
+    ladders = read_ladders(asked.docs)
+    text = page(ladders)
+    if asked.check:
+        path = asked.docs / PAGE
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            sys.exit(f"{path} is out of date: run python bench/accuracy_page.py")
+        return
+    for ladder in ladders:
+        write_whole(asked.docs / picture(ladder), drawn(ladder))
+    wanted = {(asked.docs / picture(ladder)).name for ladder in ladders}
+    for old in (asked.docs / "images").glob("accuracy_*.png"):
+        if old.name not in wanted:
+            old.unlink()
+    write_data("accuracy", {"ladders": records_of(ladders)}, asked.docs)
+    write_whole(asked.docs / PAGE, text.encode("utf-8"))
+    print(f"{len(ladders)} ladders in {asked.docs / PAGE}")
+
+
+def read_ladders(docs: Path) -> list[LadderRecord]:
+    """Ladders of all benches that have been run."""
+    found: list[LadderRecord] = []
+    for name, convert in SOURCES.items():
+        path = docs / "data" / f"{name}.json"
+        if path.exists():
+            data = json.loads(path.read_text(encoding="utf-8"))
+            found += convert(data, {key: data[key] for key in HEADER if key in data})
+    return found
+
+
+def picture(ladder: LadderRecord) -> str:
+    """Path of a ladder's figure under docs."""
+    return f"images/accuracy_{ladder.name.replace('-', '_')}.png"
+
+
+def page(ladders: list[LadderRecord]) -> str:
+    """The whole page."""
+    present = {ladder.source for ladder in ladders}
+    missing = [name for name in SOURCES if name not in present]
+    parts = [INTRODUCTION, overview(ladders), *map(section, ladders)]
+    if missing:
+        names = ", ".join(f"`{name}`" for name in missing)
+        parts.append(f"Not measured yet: {names}.\n")
+    return "\n".join([*parts, CLOSING])
+
+
+def overview(ladders: list[LadderRecord]) -> str:
+    """One line per ladder."""
+    lines = [f"- [{ladder.title}](#{anchor(ladder.title)})" for ladder in ladders]
+    return "\n".join(lines) + "\n"
+
+
+def anchor(title: str) -> str:
+    """Link to a heading, as forges make it."""
+    kept = "".join(c for c in title.lower() if c.isalnum() or c in " -_")
+    return kept.replace(" ", "-")
+
+
+def section(ladder: LadderRecord) -> str:
+    """One ladder: conclusion, figure, table, what it is against and where it was measured."""
+    return f"""\
+## {ladder.title}
+
+{ladder.question}
+
+{conclusion(ladder)}
+
+![{ladder.error_label} against {ladder.time_label}]({picture(ladder)})
+
+{table(ladder)}
+
+Error against: {sentence(ladder.reference)} {ladder.paper}
+
+<sub>`data/{ladder.source}.json`: {measured_on(ladder.header)}</sub>
+"""
+
+
+def sentence(text: str) -> str:
+    """With a full stop."""
+    return text if text.endswith(".") else f"{text}."
+
+
+def measured_on(header: Mapping[str, Any]) -> str:
+    """Machine, versions and seed as a line."""
+    machine = ", ".join(
+        str(header[key]) for key in ("processor", "machine", "system") if header.get(key)
+    )
+    if header.get("cores"):
+        machine += f", {header['cores']} cores, {header.get('threads', 'default')} thread"
+    plain = ("python", "numpy", "scipy", "numba", "opencv", "cadquery")
+    versions = ", ".join(f"{key} {header[key]}" for key in plain if header.get(key))
+    seed = header.get("seed")
+    seeds = f"seeds {json.dumps(seed)}" if isinstance(seed, dict) else f"seed {seed}"
+    return f"{machine}; {versions}; {'no random numbers' if seed is None else seeds}"
+
+
+if __name__ == "__main__":
+    main()
