@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.checks import guide, making, mechanics, mount, optics, structure  # noqa: F401
-from gelslim_cad.checks.rule import GROUPS, RULES, Check, Finding, Rule, Status
+from gelslim_cad.checks.rule import GROUPS, OTHER, RULES, Check, Finding, Rule, Status
 from gelslim_cad.dimensions import Dimensions
 
 
 def check(d: Dimensions) -> tuple[Check, ...]:
     """All rules on one design, group by group in the order of definition."""
-    order = list(GROUPS.values())
+    order = [*GROUPS.values(), OTHER]
     ordered = sorted(RULES.values(), key=lambda entry: order.index(entry.group))
     return tuple(_check(entry, d) for entry in ordered)
 

@@ -69,7 +69,7 @@ class Rule:
     @property
     def group(self) -> str:
         """Title of the group of rules it belongs to."""
-        return GROUPS.get(self.judge.__module__.rpartition(".")[2], "Other")
+        return GROUPS.get(self.judge.__module__.rpartition(".")[2], OTHER)
 
 
 GROUPS = {
@@ -81,6 +81,8 @@ GROUPS = {
     "mechanics": "Gel, mesh and envelope",
 }
 """Titles of the groups by the module that defines their rules, in the order they are shown."""
+OTHER = "Other"
+"""Title of the last group: rules defined elsewhere, as by a user's program."""
 
 RULES: dict[str, Rule] = {}
 """All rules by id, in the order of definition."""

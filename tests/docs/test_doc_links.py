@@ -1,0 +1,72 @@
+"""Links, anchors, pictures and paths of the pages lead somewhere; README leads to every page."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from page_text import DOCS, PAGES, ROOT, headings, links, named, text_of
+
+OURS = [p.parent.name for p in ROOT.glob("*/__init__.py")]
+CODE = "|".join(["tests", "docs", "designs", "bench", "tools", "requirements", *OURS])
+PATH = re.compile(rf"`((?:{CODE})/[\w./*-]+)`")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_relative_links_lead_somewhere(page: Path) -> None:
+    for link in links(page):
+        target, _, fragment = link.partition("#")
+        place = (page.parent / target).resolve() if target else page
+        assert place.exists(), f"{named(page)}: {link}"
+        assert place.is_relative_to(ROOT), f"{named(page)}: {link} leaves the repository"
+        if fragment:
+            assert fragment in headings(place), f"{named(page)}: {link}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_files_named_in_the_text_exist(page: Path) -> None:
+    for path in PATH.findall(text_of(page)):
+        if path.startswith(("docs/data/", "designs/")) and "*" in path:
+            continue
+        assert list(ROOT.glob(path.rstrip("/"))), f"{named(page)}: {path}"
+
+
+def test_readme_leads_to_every_page() -> None:
+    seen: set[Path] = set()
+    todo = [ROOT / "README.md"]
+    while todo:
+        page = todo.pop()
+        if page in seen:
+            continue
+        seen.add(page)
+        targets = [(page.parent / link.partition("#")[0]).resolve() for link in links(page)]
+        todo += [t for t in targets if t.suffix == ".md" and t.exists()]
+    assert {named(p) for p in PAGES} <= {named(p) for p in seen}
+
+
+def test_contents_list_every_page_and_schema() -> None:
+    listed = {link.partition("#")[0] for link in links(DOCS / "README.md")}
+    wanted = {p.name for p in (*DOCS.glob("*.md"), *DOCS.glob("*.schema.json"))} - {"README.md"}
+    assert wanted <= listed
+
+
+def test_no_picture_lies_about_unused() -> None:
+    shown = {
+        (page.parent / link).resolve() for page in PAGES for link in links(page) if ".png" in link
+    }
+    kept = set((DOCS / "images").glob("*.png"))
+    assert kept <= shown, sorted(p.name for p in kept - shown)
+    assert shown <= kept
+
+
+def test_the_gallery_is_what_its_list_says_and_small() -> None:
+    import sys
+
+    sys.path.insert(0, str(ROOT / "tools"))
+    import gallery
+
+    assert gallery.PAGE.read_text("utf-8") == gallery.page(), "run: make docs"
+    sizes = [p.file.stat().st_size for p in gallery.PICTURES]
+    assert sum(sizes) < 1_500_000
+    assert len({p.name for p in gallery.PICTURES}) == len(sizes)
