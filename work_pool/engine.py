@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     Executor,
     Future,
-    ProcessPoolExecutor,
     as_completed,
 )
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import TypeVar
+
+from work_pool.workers import worker_pool
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -64,13 +64,12 @@ def _in_pools(
     perform: Callable[[Task], Result], tasks: Sequence[Task], workers: int
 ) -> Iterator[tuple[int, Result]]:
     """A pool, and another one for what is left whenever a worker dies."""
-    # Fresh processes, not forks: numeric libraries have started threads by now.
-    context = multiprocessing.get_context("spawn")
     left = list(range(len(tasks)))
     deaths: dict[int, int] = {}
     while left:
         suspects: list[int] = []
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        # Fresh processes, not forks: numeric libraries have started threads by now.
+        with worker_pool(workers, "spawn") as pool:
             for number, result in _in_pool(pool, perform, tasks, left, workers, suspects):
                 yield number, result
         for number in suspects:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import sys
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +15,7 @@ from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact,
 from gelslim_cad.build.work import Unit, Written, run
 from gelslim_cad.checks import Check
 from whole_files.replaced_folder import recover
+from work_pool.workers import worker_pool
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Stages
@@ -173,14 +172,16 @@ def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
         return results
     # Forked workers start with the CAD kernel loaded; elsewhere each worker loads its own.
     # Booleans run on kernel threads that a fork loses: units only write and read files.
-    method = "fork" if sys.platform.startswith("linux") else "spawn"
-    context = multiprocessing.get_context(method)
-    with ProcessPoolExecutor(min(jobs, len(queue)), mp_context=context) as pool:
+    with worker_pool(min(jobs, len(queue)), "fork" if _forks() else "spawn") as pool:
         futures = [(unit, pool.submit(run, unit)) for unit in queue]
         for done, (unit, future) in enumerate(futures):
             tell(unit.name, done, len(queue))
             results[unit.name] = future.result()
     return results
+
+
+def _forks() -> bool:
+    return sys.platform.startswith("linux")
 
 
 def _refusal(name: str, failed: tuple[Check, ...]) -> str:

@@ -63,7 +63,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
     """Exit status and message."""
     name = type(error).__name__
     if isinstance(error, KeyboardInterrupt) or name == "Abort":
-        return INTERRUPTED, "Interrupted; nothing half-written is left."
+        return INTERRUPTED, "Interrupted; every file that is there is whole."
     if isinstance(error, CommandError):
         return error.status, str(error)
     if name == "BuildRefusedError":

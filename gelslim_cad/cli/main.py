@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 from collections.abc import Sequence
 from io import TextIOWrapper
-
-from gelslim_cad.cli.app import app
-from gelslim_cad.cli.carry import CarriedError
-from gelslim_cad.cli.failure import explain_failure
-from gelslim_cad.cli.spelling import SPELLED
-from gelslim_cad.cli.status import CLOSED_PIPE
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,20 +16,57 @@ def main(argv: Sequence[str] | None = None) -> int:
     130 after an interrupt and 141 when the reader of a pipe has gone.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors=SPELLED)
     try:
-        status = app(args=arguments, prog_name="gelslim", standalone_mode=False)
-        sys.stdout.flush()
+        return _run(arguments)
     except SystemExit as ended:
         # Only shell completion ends this way: it has printed its answer.
         return ended.code if isinstance(ended.code, int) else 0
     except BaseException as raised:
-        error = raised.cause if isinstance(raised, CarriedError) else raised
-        if isinstance(error, BrokenPipeError):
-            # Nobody is left to say anything to; the interpreter must not try at its exit either.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return CLOSED_PIPE
-        return explain_failure(error, as_json="--json" in arguments)
+        return _failed(raised, as_json="--json" in arguments)
+
+
+def _run(arguments: list[str]) -> int:
+    _open_streams()
+    # Loaded here, so that an interrupt meanwhile is caught too.
+    from gelslim_cad.cli.app import app
+
+    status = app(args=arguments, prog_name="gelslim", standalone_mode=False)
+    sys.stdout.flush()
     return int(status or 0)
+
+
+def _open_streams() -> None:
+    from gelslim_cad.cli.spelling import SPELLED
+
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            # Closed by the caller, as with `>&-`: what is said goes nowhere.
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        stream = getattr(sys, name)
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors=SPELLED)
+
+
+def _failed(raised: BaseException, as_json: bool) -> int:
+    from gelslim_cad.cli.carry import CarriedError
+    from gelslim_cad.cli.failure import explain_failure
+    from gelslim_cad.cli.status import CLOSED_PIPE
+
+    error = raised.cause if isinstance(raised, CarriedError) else raised
+    if isinstance(error, BrokenPipeError):
+        _silence()
+        return CLOSED_PIPE
+    try:
+        status = explain_failure(error, as_json=as_json)
+        sys.stdout.flush()
+    except OSError:
+        # Standard output takes nothing, be it a full disk or a pipe without a reader.
+        _silence()
+        status = explain_failure(error, as_json=False)
+    return status
+
+
+def _silence() -> None:
+    """Nobody is left to say anything to; the interpreter must not try at its exit either."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
