@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gelslim_cad.cli.options import AsJson
+from gelslim_cad.cli.scene_budget import PoseTime, SceneError
 
 if TYPE_CHECKING:
     from gelslim_twin.plan import Choice, Plan
@@ -15,17 +16,23 @@ if TYPE_CHECKING:
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene's YAML file.")]
 
 
-def plan(scene: SceneFile, as_json: AsJson = False) -> int:
+def plan(
+    scene: SceneFile,
+    error: SceneError = None,
+    within: PoseTime = None,
+    as_json: AsJson = False,
+) -> int:
     """Print which effects a contact scene needs.
 
     Each effect, in or out and why, the largest error of leaving it out, the rung chosen and the
     time predicted for it. Nothing is simulated.
     """
+    from gelslim_cad.cli.scene_budget import budgeted_scene
     from gelslim_cad.cli.twin_sensor import sensor_figures
     from gelslim_twin.scene.question import plan_scene
     from gelslim_twin.scene.reader import read_scene
 
-    loaded = read_scene(scene)
+    loaded = budgeted_scene(read_scene(scene), error, within)
     made = plan_scene(loaded, sensor_figures(loaded))
     if as_json:
         print(made.to_json(), end="")

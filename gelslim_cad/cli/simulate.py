@@ -10,6 +10,7 @@ import typer
 
 from gelslim_cad.cli.options import AsJson
 from gelslim_cad.cli.plan import SceneFile
+from gelslim_cad.cli.scene_budget import PoseTime, SceneError
 
 if TYPE_CHECKING:
     from gelslim_twin.scene.reader import LoadedScene
@@ -28,6 +29,8 @@ def simulate(
     scheduler: Annotated[
         str, typer.Option(help="Dask scheduler, such as tcp://host:8786, in place of processes.")
     ] = "",
+    error: SceneError = None,
+    within: PoseTime = None,
     overwrite: Annotated[
         bool, typer.Option("--force", help="Replace another simulation in the folder.")
     ] = False,
@@ -37,15 +40,17 @@ def simulate(
 
     Writes frames, true surface motion and forces, the plan and a ledger of time and residuals.
     Simulates only the effects that the scene's tolerance calls for. An interrupted run goes on
-    where it stopped. With --count, every scene is drawn anew from the scene's `vary` block.
+    where it stopped. With --count, every scene is drawn anew from the scene's `vary` block, all
+    with the tolerance that a budget gives the scene as it stands.
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.progress import progress_bar
+    from gelslim_cad.cli.scene_budget import budgeted_scene
     from gelslim_cad.cli.twin_sensor import twin_sensor
     from gelslim_twin.scene.reader import read_scene
     from gelslim_twin.simulation.stored_sensor import store_sensor
 
-    loaded = read_scene(scene)
+    loaded = budgeted_scene(read_scene(scene), error, within)
     folder = out or Path("out") / loaded.scene.name
     started = time.monotonic()
     with progress_bar(quiet=as_json) as tell:
@@ -94,6 +99,7 @@ def _many(
 
     for number in range(count):
         loaded.numbered(number)
+    allowed = loaded.scene.tolerance
     tasks = [
         SceneTask(
             str(Path(loaded.path).resolve()),
@@ -101,6 +107,7 @@ def _many(
             str((folder / f"scene_{number:05d}").resolve()),
             number,
             overwrite,
+            (allowed.force_n, allowed.image_px),
         )
         for number in range(count)
     ]

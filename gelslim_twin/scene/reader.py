@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from gelslim_twin.scene.motion_csv import read_motion_csv
 from gelslim_twin.scene.pose import Pose, poses
-from gelslim_twin.scene.scene import FORMAT, Scene
+from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
 from gelslim_twin.scene.stl_extent import footprint_mm
 from gelslim_twin.scene.varied import varied
 from yaml_model.errors import InputError, Problem, shown
@@ -56,6 +56,11 @@ class LoadedScene(Loaded[Scene]):
             raise self.problem("vary", None, message, remedy or "correct it") from None
         moved = self.poses if scene.motion.csv is not None else poses(scene.motion)
         return replace(self, model=scene, poses=moved)
+
+    def with_tolerance(self, force_n: float, image_px: float) -> LoadedScene:
+        """The same scene with another tolerance."""
+        tolerance = Tolerance(force_n=force_n, image_px=image_px)
+        return replace(self, model=self.scene.model_copy(update={"tolerance": tolerance}))
 
     def problem(self, field: str, value: str | None, message: str, remedy: str) -> InputError:
         """An error about a field of the scene, on its line or on that of the block it is in."""

@@ -27,6 +27,8 @@ class SceneTask:
     """Where the result goes."""
     number: int | None = None
     overwrite: bool = False
+    tolerance: tuple[float, float] | None = None
+    """In N and px, in place of the scene's: decided once, so that every worker does the same."""
 
 
 def perform(task: SceneTask) -> dict[str, Any]:
@@ -36,6 +38,8 @@ def perform(task: SceneTask) -> dict[str, Any]:
     loaded = read_scene(task.scene)
     if task.number is not None:
         loaded = loaded.numbered(task.number)
+    if task.tolerance is not None:
+        loaded = loaded.with_tolerance(*task.tolerance)
     folder = Path(task.sensor)
     with threadpool_limits(limits=1, user_api="blas"):
         job = job_of(loaded, stored_sensor(folder), folder)
