@@ -17,6 +17,7 @@ Mask = NDArray[np.bool_]
 
 SELF_SHARE = 0.5
 """Part of a node's own compliance that grows as only a share of its area is loaded."""
+LEAST_SHARE = 0.02
 SHIFTS = ((0.25, 0.25), (0.25, -0.25), (-0.25, 0.25), (-0.25, -0.25))
 STEPS = 40
 DISCRETE = 0.2
@@ -150,16 +151,25 @@ class NormalModel:
         """
         if not np.isfinite(self._rim_profile(patch, indenter)):
             return np.nan
-        gained, saved = 0.0, 0.0
+        from gelslim_force.punch_kernel import punches
+
+        half = self.pitch_mm / 2
+        near = np.flatnonzero(patch.outside_mm(*self.points_mm.T) < 2 * self.pitch_mm)
+        x, y = self.points_mm[near].T
+        shares, profiles = [], []
         for shift in SHIFTS:
             moved = replace(patch, centre_mm=patch.centre_mm + self.pitch_mm * np.array(shift))
-            outside = moved.outside_mm(*self.points_mm.T)
-            profile = self._profile(moved, indenter)
-            for sign in (1, -1):
-                stiffness, force = self._punch(outside - sign * self.pitch_mm / 2, profile)
-                gained += sign * stiffness
-                saved += sign * force
-        return saved / gained if gained > 0 else np.nan
+            outside = moved.outside_mm(x, y)
+            shares += [0.5 - (outside - sign * half) / self.pitch_mm for sign in (1, -1)]
+            profiles += 2 * [np.asarray(indenter.profile(*moved.local(x, y)), dtype=float)]
+        block = self.compliance.block(near)
+        # A force on a part of a node's area sinks in further, as 1/side of the loaded square.
+        own = SELF_SHARE * float(np.median(np.diag(block))) if len(near) else 0.0
+        found = np.empty((len(shares), 2))
+        shares_of = np.clip(shares, 0.0, 1.0)
+        punches(block, own, shares_of, np.array(profiles), LEAST_SHARE, found)
+        gained, saved = found[0::2].sum(axis=0) - found[1::2].sum(axis=0)
+        return float(saved / gained) if gained > 0 else np.nan
 
     def _settled(
         self, patch: ContactPatch, indenter: Indenter
@@ -187,20 +197,6 @@ class NormalModel:
 
     def _profile(self, patch: ContactPatch, indenter: Indenter) -> Array:
         return np.asarray(indenter.profile(*patch.local(*self.points_mm.T)), dtype=float)
-
-    def _punch(self, outside_mm: Array, profile: Array) -> tuple[float, float]:
-        """k and Φ of the region where `outside_mm` (c,) is negative, rim nodes in part."""
-        share = np.clip(0.5 - outside_mm / self.pitch_mm, 0.0, 1.0)
-        nodes = np.flatnonzero((share > 0.02) & np.isfinite(profile))
-        if not len(nodes):
-            return 0.0, 0.0
-        block = self.compliance.block(nodes)
-        # A force on a part of a node's area sinks in further, as 1/side of the loaded square.
-        own = SELF_SHARE * np.median(np.diag(block))
-        block[np.diag_indices(len(nodes))] += own * (1 / np.sqrt(share[nodes]) - 1)
-        sides = np.column_stack([np.ones(len(nodes)), profile[nodes]])
-        solved = cho_solve(cho_factor(block, overwrite_a=True), sides)
-        return float(solved[:, 0].sum()), float(solved[:, 1].sum())
 
     def _contact(
         self, gap: Array, patch: ContactPatch

@@ -55,6 +55,7 @@ class PatchFinder:
         self.settings = settings or PatchSettings()
         self.indenter = indenter
         self._last: tuple[ContactPatch, ShadingFit] | None = None
+        self._asked: tuple[Array, tuple[int, int]] | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
         picture = np.asarray(reference)
@@ -105,7 +106,9 @@ class PatchFinder:
             if start is None:
                 return None
             patch = start if isinstance(self.indenter, Flat) else self._refined(start, light)
-        share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
+        share = 0.0
+        if not self._well_inside(patch):
+            share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
         return _finished(patch, share, contrast)
 
     def _outline(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
@@ -218,15 +221,16 @@ class PatchFinder:
 
     def _window(self, start: ContactPatch, light: ShadingChange) -> Window | None:
         s = self.settings
-        near = start.outside_mm(self._x, self._y) < (s.window - 1) * start.size_mm
-        near &= light.valid
-        rows, columns = np.nonzero(near)
+        live = np.flatnonzero(light.valid)
+        apart = start.outside_mm(self._x.ravel()[live], self._y.ravel()[live])
+        near = live[apart < (s.window - 1) * start.size_mm]
+        rows, columns = np.divmod(near, light.valid.shape[1])
         skip = 1 + len(rows) // s.most_bins
         kept = (rows + columns) % skip == 0
         rows, columns = rows[kept], columns[kept]
         if len(rows) < 40:
             return None
-        number = np.full((near.shape[0] + 1, near.shape[1] + 1), -1)
+        number = np.full((light.valid.shape[0] + 1, light.valid.shape[1] + 1), -1)
         number[rows, columns] = np.arange(len(rows))
         partner = number[rows + 1, columns - 1]
         have = partner >= 0
@@ -252,10 +256,25 @@ class PatchFinder:
         axis = getattr(self.indenter, "axis_deg", None)
         return angle if axis is None else float(np.deg2rad(axis))
 
+    def _well_inside(self, patch: ContactPatch) -> bool:
+        """Whether all of a disc's rim is on the pad, without a look at its points."""
+        return patch.kind == "disc" and bool(
+            self._inside_mm[self._nearest(patch.centre_mm)] > patch.size_mm
+        )
+
+    @cached_property
+    def _inside_mm(self) -> Array:
+        """Distance of each bin from the nearest that is not on the pad, in its smallest bins."""
+        on = np.pad(self._light.on_pad, 1)
+        steps = ndimage.distance_transform_edt(on)[1:-1, 1:-1]
+        return np.asarray((steps - 1) * self._bin_mm[self._light.on_pad].min() / np.sqrt(2))
+
     def _nearest(self, place: Array) -> tuple[int, int]:
-        _, at = self._pad.query(place)
-        row, column = np.unravel_index(int(self._on[at]), self._x.shape)
-        return int(row), int(column)
+        if self._asked is None or not np.array_equal(self._asked[0], place):
+            _, at = self._pad.query(place)
+            row, column = divmod(int(self._on[at]), self._x.shape[1])
+            self._asked = place.copy(), (row, column)
+        return self._asked[1]
 
     def _sight(self, place: Array) -> tuple[Array, float]:
         at = self._nearest(place)

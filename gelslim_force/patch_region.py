@@ -11,22 +11,29 @@ from gelslim_force.shading_change import ShadingChange
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+LEAST_AROUND = 2
+"""Valid bins of 3 x 3 that a bin must have around it."""
 
 
 def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask | None, float]:
     """Largest group of bins whose shading changed, and its contrast."""
     s = settings
-    power = np.einsum("cij,c->ij", light.change**2, 1 / light.noise**2) / len(light.noise)
-    size = s.largest_change * np.tanh(np.abs(light.change).max(axis=0) / s.largest_change)
-    weight = ndimage.uniform_filter(light.valid.astype(float), 3, mode="constant")
-    full = np.maximum(weight, 1e-6)
-    power = ndimage.uniform_filter(np.where(light.valid, power, 0.0), 3, mode="constant") / full
-    size = ndimage.uniform_filter(np.where(light.valid, size, 0.0), 3, mode="constant") / full
-    changed = (power > s.least_power) & (size > s.least_change) & (weight > 0.2)
+    change = light.change.astype(np.float32, copy=False)
+    valid = light.valid.astype(np.float32)
+    scale = np.float32(1 / np.sqrt(len(change))) / light.noise.astype(np.float32)
+    power = np.square(change * scale[:, None, None]).sum(axis=0)
+    size = np.float32(s.largest_change) * np.tanh(
+        np.abs(change).max(axis=0) / np.float32(s.largest_change)
+    )
+    around = _around(np.stack([valid, power * valid, size * valid]))
+    power, size = around[1:] / np.maximum(around[0], 1)
+    changed = (power > s.least_power) & (size > s.least_change) & (around[0] >= LEAST_AROUND)
     if changed.sum() < s.least_bins:
         return None, 0.0
     # Faint changes far off (a lamp, a hand's shadow) are not the patch's.
-    level = s.outline_level * float(np.quantile(size[changed], 0.98))
+    sizes = size[changed]
+    rank = round(0.98 * (len(sizes) - 1))
+    level = s.outline_level * float(np.partition(sizes, rank)[rank])
     whole = changed & (size >= level)
     box = _box(whole, 3)
     strong, size = whole[box], size[box]
@@ -41,6 +48,13 @@ def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask 
     region = np.zeros_like(whole)
     region[box] = strong
     return region, float(np.sqrt(power[region].mean()))
+
+
+def _around(layers: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sums over 3 x 3 bins, of layers (k, rows, columns); nothing lies beyond the picture."""
+    wide = np.pad(layers, ((0, 0), (1, 1), (1, 1)))
+    down = wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]
+    return np.asarray(down[:, :, :-2] + down[:, :, 1:-1] + down[:, :, 2:])
 
 
 def _box(mask: Mask, margin: int) -> tuple[slice, slice]:

@@ -18,8 +18,10 @@ Array = NDArray[np.float64]
 
 STEPS = 12
 FIRST_STEPS = 5
+NEAR = 0.03
+"""Move over the patch's size up to which a fit followed from the frame before goes on with the
+derivative it has."""
 LOOK_AT = 300
-RIDGE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ def best_shading_fit(
 ) -> ShadingFit | None:
     """The fit from the start that leaves least after a few steps on a part of the bins."""
     if len(starts) == 1:
-        return fit_shading(window, starts[0], strip, curvature_per_mm, blur_mm)
+        return fit_shading(window, starts[0], strip, curvature_per_mm, blur_mm, NEAR)
     part = window.thinned(LOOK_AT)
 
     def tried(start: Array) -> tuple[float, Array]:
@@ -72,14 +74,19 @@ def best_shading_fit(
 
 
 def fit_shading(
-    window: Window, start: Array, strip: bool, curvature_per_mm: float, blur_mm: float
+    window: Window,
+    start: Array,
+    strip: bool,
+    curvature_per_mm: float,
+    blur_mm: float,
+    near: float = 0.0,
 ) -> ShadingFit | None:
     """Gauss-Newton with the gains projected out; None where it does not settle.
 
     `curvature_per_mm` is 1/R of the indenter, 0 where unknown; `blur_mm` widens the crease.
     """
     theta, cost, residual, jacobian = _settle(
-        window, start, strip, curvature_per_mm, blur_mm, STEPS
+        window, start, strip, curvature_per_mm, blur_mm, STEPS, near
     )
     whole = window.change - window.change.mean(axis=0)
     explained = 1 - cost / max(float((whole**2).sum()), 1e-12)
@@ -92,58 +99,25 @@ def fit_shading(
 
 
 def _settle(
-    window: Window, start: Array, strip: bool, curvature_per_mm: float, blur_mm: float, steps: int
+    window: Window,
+    start: Array,
+    strip: bool,
+    curvature_per_mm: float,
+    blur_mm: float,
+    steps: int,
+    near: float = 0.0,
 ) -> tuple[Array, float, Array, Array]:
-    """Levenberg-Marquardt: values, squares left, residual (n, c) and its derivative (n c, 4)."""
+    """Values, squares left, residual (n, c) and its derivative (n c, 4)."""
+    from gelslim_force.patch_fit_kernel import settle
+
     theta = start.copy()
-    scale = np.array([1.0, 1.0 if not strip else 0.2, 1.0, 2.0])
-    residual = _residual(window, theta, strip, curvature_per_mm, blur_mm)
-    cost, damping = float((residual**2).sum()), 1e-3
+    residual = np.empty(window.change.shape)
     jacobian = np.zeros((residual.size, 4))
-    for _ in range(steps):
-        for k in range(4):
-            small = 1e-3 * scale[k] * max(theta[2], 0.1)
-            moved = theta.copy()
-            moved[k] += small
-            ahead = _residual(window, moved, strip, curvature_per_mm, blur_mm)
-            jacobian[:, k] = (ahead - residual).ravel() / small
-        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual.ravel()
-        settled = False
-        for _ in range(6):
-            step = -np.linalg.solve(
-                normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(4), gradient
-            )
-            step = np.clip(step, -0.4 * theta[2] * scale, 0.4 * theta[2] * scale)
-            trial = theta + step
-            trial[2] = max(trial[2], 0.3 * theta[2])
-            trial[3] = min(max(trial[3], 0.0), 5.0)
-            tried = _residual(window, trial, strip, curvature_per_mm, blur_mm)
-            new = float((tried**2).sum())
-            if new <= cost:
-                gained = cost - new
-                theta, residual, cost = trial, tried, new
-                damping = max(damping / 5, 1e-6)
-                settled = gained < 1e-3 * cost and bool((np.abs(step[:3]) < 3e-3 * theta[2]).all())
-                break
-            damping *= 6
-        else:
-            settled = True
-        if settled:
-            break
-    return theta, cost, residual, jacobian
-
-
-def _residual(window: Window, theta: Array, strip: bool, curvature: float, blur_mm: float) -> Array:
-    """What the best gains leave of the change, (n, c)."""
-    from gelslim_force.slope_kernel import slope_basis
-
-    basis = np.empty((len(window.x_mm), 6))
-    at = np.array([theta[0], theta[1], max(theta[2], 1e-3), theta[3]])
-    slope_basis(window.x_mm, window.y_mm, window.lean, at, strip, curvature, blur_mm, basis)
-    normal = basis.T @ basis
-    normal[np.diag_indices(6)] += RIDGE * np.trace(normal)
-    gains = np.linalg.solve(normal, basis.T @ window.change)
-    return np.asarray(window.change - basis @ gains)
+    cost = settle(
+        window.x_mm, window.y_mm, window.lean, window.change, theta, strip, curvature_per_mm,
+        blur_mm, steps, near, residual, jacobian,
+    )  # fmt: skip
+    return theta, float(cost), residual, jacobian
 
 
 def _together(residual: Array, window: Window) -> float:

@@ -19,7 +19,7 @@ LEAST_LEVEL = 8.0
 FLOOR = 5.0
 LEAST_FREE = 0.34
 """Share of a bin's pixels that must be free of ink and glare."""
-MEDIAN_OF = 3000
+MEDIAN_OF = 1500
 ROBUST = 1.4826
 """Standard deviation of a normal law over its median absolute deviation."""
 
@@ -51,12 +51,16 @@ class ShadingReference:
         self.shape = (height // bin_px, width // bin_px)
         self.on_pad = np.ones(self.shape, dtype=bool)
         self._radius = radius_px
-        self._blocked = np.zeros((height, width), dtype=np.uint8)
-        from gelslim_force.shading_kernel import block_discs
+        from gelslim_force.shading_kernel import block_discs, whole_sums
 
-        block_discs(self._blocked, markers_px, radius_px)
-        self._scratch = np.empty_like(self._blocked)
+        self._blocked = np.zeros((height, width), dtype=np.uint8)
+        self._touched = np.zeros(self.shape, dtype=np.uint8)
+        block_discs(self._blocked, markers_px, radius_px, bin_px, self._touched)
+        self._scratch = np.empty_like(self._blocked), np.empty_like(self._touched)
         self._sums = np.zeros((2, *self.shape, channels), dtype=np.int64)
+        self._glaring = np.zeros((2, *self.shape), dtype=np.uint8)
+        whole_sums(self.image, bin_px, self._sums[0], self._glaring[0])
+        self._ratios = np.ones((channels, *self.shape), dtype=np.float32)
         self._counts = np.zeros(self.shape, dtype=np.int64)
         level = self.image.reshape(-1, channels).mean(axis=0)
         self._used = np.flatnonzero(level >= LEAST_LEVEL)
@@ -78,7 +82,7 @@ class ShadingReference:
 
         Raises ValueError for an image of another shape.
         """
-        from gelslim_force.shading_kernel import block_discs, sums_in_bins
+        from gelslim_force.shading_kernel import block_discs, light_ratios, whole_sums
 
         picture = as_picture(image)
         if picture.shape != self.image.shape:
@@ -86,19 +90,23 @@ class ShadingReference:
                 f"the frame has shape {picture.shape}, the reference {self.image.shape}: "
                 "use frames of one camera mode"
             )
-        np.copyto(self._scratch, self._blocked)
+        blocked, touched = self._scratch
+        np.copyto(blocked, self._blocked)
+        np.copyto(touched, self._touched)
         if markers_px is not None and len(markers_px):
             radius = radius_px
             if radius is None:
                 radius = np.full(len(markers_px), float(np.median(self._radius)))
-            block_discs(self._scratch, np.asarray(markers_px, dtype=float), radius)
-        sums_in_bins(self.image, picture, self._scratch, self.bin_px, self._sums, self._counts)
-        free = self._counts >= LEAST_FREE * self.bin_px**2
+            block_discs(blocked, np.asarray(markers_px, dtype=float), radius, self.bin_px, touched)
+        whole_sums(picture, self.bin_px, self._sums[1], self._glaring[1])
+        glaring = self._glaring[0] | self._glaring[1]
         # A few grey values keep a channel that goes black from outweighing all others.
-        floor = FLOOR * np.maximum(self._counts[..., None], 1)
-        ratio = ((self._sums[1] + floor) / (self._sums[0] + floor)).astype(np.float32)
-        log = np.log(np.maximum(ratio[..., self._used], 1e-6))
-        return _about_median(np.moveaxis(_combined(log), 2, 0), free & self.on_pad)
+        light_ratios(
+            self.image, picture, blocked, touched, glaring, self.bin_px, self._sums, FLOOR,
+            self._ratios, self._counts,
+        )  # fmt: skip
+        free = self._counts >= LEAST_FREE * self.bin_px**2
+        return _about_median(_combined(np.log(self._ratios[self._used])), free & self.on_pad)
 
 
 def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -116,13 +124,15 @@ def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Log R/G first, then the brightness, then what further channels add."""
-    if log.shape[2] == 1:
+    """Log R/G first, then the brightness, then what further channels add; (c, rows, columns)."""
+    if len(log) == 1:
         return log
-    ratio = log[..., :1] - log[..., 1:2]
-    bright = log[..., :2].mean(axis=2, keepdims=True)
-    rest = log[..., 2:] - bright
-    return np.concatenate([ratio, bright, rest], axis=2)
+    out = np.empty_like(log)
+    np.subtract(log[0], log[1], out=out[0])
+    np.add(log[0], log[1], out=out[1])
+    out[1] *= 0.5
+    np.subtract(log[2:], out[1], out=out[2:])
+    return out
 
 
 def _about_median(change: NDArray[np.floating], valid: Mask) -> ShadingChange:
@@ -131,7 +141,14 @@ def _about_median(change: NDArray[np.floating], valid: Mask) -> ShadingChange:
     if not len(used):
         return ShadingChange(np.zeros_like(change), valid, np.full(layers, np.inf))
     some = change.reshape(layers, -1)[:, used[:: max(1, len(used) // MEDIAN_OF)]]
-    middle = np.median(some, axis=1, keepdims=True)
-    noise = np.maximum(ROBUST * np.median(np.abs(some - middle), axis=1), 1e-4)
-    seen = np.where(valid, change - middle[:, :, None], 0)
-    return ShadingChange(seen, valid, noise.astype(float))
+    middle = _middles(some)
+    noise = np.maximum(ROBUST * _middles(np.abs(some - middle))[:, 0], 1e-4)
+    change -= middle[:, :, None]
+    change *= valid
+    return ShadingChange(change, valid, noise.astype(float))
+
+
+def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:
+    """(c, 1) upper medians."""
+    half = rows.shape[1] // 2
+    return np.partition(rows, half, axis=1)[:, half : half + 1]

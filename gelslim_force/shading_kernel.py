@@ -12,48 +12,130 @@ SATURATED = 253
 
 
 @njit(**COMPILED)
-def block_discs(blocked: Any, centres: Any, radius: Any) -> None:
-    """Set `blocked` (h, w) in discs of `radius` (n,) px about `centres` (n, 2); NaN is passed."""
+def block_discs(blocked: Any, centres: Any, radius: Any, size: Any, touched: Any) -> None:
+    """Set `blocked` (h, w) in discs of `radius` (n,) px about `centres` (n, 2); NaN is passed.
+
+    `touched` (rows, columns) is set for the bins of `size` px that a disc's box meets.
+    """
     height, width = blocked.shape
+    rows, columns = touched.shape
     for k in range(len(centres)):
         x, y, r = centres[k, 0], centres[k, 1], radius[k]
         if not (x > -r and y > -r and x < width + r and y < height + r):
             continue
-        for i in range(max(0, int(y - r)), min(height, int(y + r) + 2)):
-            for j in range(max(0, int(x - r)), min(width, int(x + r) + 2)):
+        top, bottom = max(0, int(y - r)), min(height, int(y + r) + 2)
+        left, right = max(0, int(x - r)), min(width, int(x + r) + 2)
+        for i in range(top, bottom):
+            for j in range(left, right):
                 if (i - y) ** 2 + (j - x) ** 2 <= r * r:
                     blocked[i, j] = 1
+        for row in range(top // size, min(rows, (bottom - 1) // size + 1)):
+            for column in range(left // size, min(columns, (right - 1) // size + 1)):
+                touched[row, column] = 1
 
 
 @njit(**COMPILED)
-def sums_in_bins(first: Any, second: Any, blocked: Any, size: Any, sums: Any, counts: Any) -> None:
-    """Sums (2, rows, columns, c) of two images (h, w, 1 or 3) uint8 over the same free pixels.
+def whole_sums(image: Any, size: Any, sums: Any, glaring: Any) -> None:
+    """Sums (rows, columns, c) of an image (h, w, c) over whole bins, and where some pixel may
+    glare: where every channel reaches SATURATED somewhere."""
+    rows, channels = sums.shape[0], sums.shape[2]
+    width = image.shape[1] * channels
+    flat = image.reshape(image.shape[0], width)
+    down, most = np.zeros(width, dtype=np.uint16), np.zeros(width, dtype=np.uint8)
+    for row in range(rows):
+        # Along whole rows first: that runs on the vector unit.
+        down[:] = 0
+        most[:] = 0
+        for i in range(row * size, (row + 1) * size):
+            for k in range(width):
+                down[k] += flat[i, k]
+                most[k] = max(most[k], flat[i, k])
+        _along(down, size, channels, sums[row])
+        glaring[row] = 0
+        if most.max() >= SATURATED:
+            _mark_glare(most, size, channels, glaring[row])
 
-    Blocked pixels, and those where every channel glares in one of the two, are left out of
-    both; `counts` (rows, columns) are those left in.
+
+@njit(**COMPILED)
+def _along(down: Any, size: Any, channels: Any, sums: Any) -> None:
+    if channels == 3:
+        for column in range(sums.shape[0]):
+            first = second = third = np.int64(0)
+            start = column * size * 3
+            for k in range(start, start + 3 * size, 3):
+                first += down[k]
+                second += down[k + 1]
+                third += down[k + 2]
+            sums[column, 0], sums[column, 1], sums[column, 2] = first, second, third
+    else:
+        for column in range(sums.shape[0]):
+            first = np.int64(0)
+            for k in range(column * size, (column + 1) * size):
+                first += down[k]
+            sums[column, 0] = first
+
+
+@njit(**COMPILED)
+def _mark_glare(most: Any, size: Any, channels: Any, glaring: Any) -> None:
+    for column in range(glaring.shape[0]):
+        least = np.uint8(255)
+        for c in range(channels):
+            top = np.uint8(0)
+            for k in range(column * size, (column + 1) * size):
+                top = max(top, most[channels * k + c])
+            least = min(least, top)
+        glaring[column] = least >= SATURATED
+
+
+@njit(**COMPILED)
+def light_ratios(
+    first: Any,
+    second: Any,
+    blocked: Any,
+    touched: Any,
+    glaring: Any,
+    size: Any,
+    sums: Any,
+    floor: Any,
+    ratios: Any,
+    counts: Any,
+) -> None:
+    """Ratios (c, rows, columns) of the light of two images (h, w, c) uint8, `floor` added to both.
+
+    Blocked pixels, and those where every channel glares in one of the two, are left out of both;
+    `counts` (rows, columns) are those left in. `sums` (2, rows, columns, c) are those of whole
+    bins; they stand where no pixel is blocked, `touched`, and none may glare, `glaring`.
     """
-    _, rows, columns, channels = sums.shape
-    sums[:] = 0
+    channels, rows, columns = ratios.shape
+    g, b = min(1, channels - 1), channels - 1
     for row in range(rows):
         for column in range(columns):
-            free = 0
-            a0 = a1 = a2 = b0 = b1 = b2 = np.int64(0)
-            for i in range(row * size, (row + 1) * size):
-                for j in range(column * size, (column + 1) * size):
-                    if blocked[i, j]:
-                        continue
-                    p0, q0 = np.int64(first[i, j, 0]), np.int64(second[i, j, 0])
-                    p1, q1, p2, q2 = p0, q0, p0, q0
-                    if channels == 3:
-                        p1, q1 = np.int64(first[i, j, 1]), np.int64(second[i, j, 1])
-                        p2, q2 = np.int64(first[i, j, 2]), np.int64(second[i, j, 2])
-                    if min(p0, p1, p2) >= SATURATED or min(q0, q1, q2) >= SATURATED:
-                        continue
-                    free += 1
-                    a0, a1, a2 = a0 + p0, a1 + p1, a2 + p2
-                    b0, b1, b2 = b0 + q0, b1 + q1, b2 + q2
+            free = size * size
+            p0, p1, p2 = sums[0, row, column, 0], sums[0, row, column, g], sums[0, row, column, b]
+            q0, q1, q2 = sums[1, row, column, 0], sums[1, row, column, g], sums[1, row, column, b]
+            if touched[row, column] or glaring[row, column]:
+                may = glaring[row, column]
+                free = p0 = p1 = p2 = q0 = q1 = q2 = 0
+                for i in range(row * size, (row + 1) * size):
+                    for j in range(column * size, (column + 1) * size):
+                        if blocked[i, j] or (
+                            may and (_glares(first[i, j]) or _glares(second[i, j]))
+                        ):
+                            continue
+                        free += 1
+                        p0, q0 = p0 + first[i, j, 0], q0 + second[i, j, 0]
+                        p1, q1 = p1 + first[i, j, g], q1 + second[i, j, g]
+                        p2, q2 = p2 + first[i, j, b], q2 + second[i, j, b]
             counts[row, column] = free
-            sums[0, row, column, 0], sums[1, row, column, 0] = a0, b0
-            if channels == 3:
-                sums[0, row, column, 1], sums[1, row, column, 1] = a1, b1
-                sums[0, row, column, 2], sums[1, row, column, 2] = a2, b2
+            least = np.float32(floor * max(free, 1))
+            ratios[0, row, column] = (q0 + least) / (p0 + least)
+            ratios[g, row, column] = (q1 + least) / (p1 + least)
+            ratios[b, row, column] = (q2 + least) / (p2 + least)
+
+
+@njit(**COMPILED)
+def _glares(pixel: Any) -> Any:
+    least = pixel[0]
+    for c in range(1, len(pixel)):
+        least = min(least, pixel[c])
+    return least >= SATURATED

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ifem_export.compliance_gram import ComplianceGram
 from ifem_export.errors import IfemError
 from ifem_export.layered_operator import LayeredOperator
 from ifem_export.pad_system import PadSystem
@@ -41,6 +43,11 @@ class Convolved:
         """Convolution with the infinite pad's compliance, whichever the truncation."""
         f = checked(force_n, self.system.columns)
         return np.asarray(self.system.surface_compliance_guess(f[None])[0])
+
+    @cached_property
+    def gram(self) -> ComplianceGram:
+        """For fits of forces on few nodes."""
+        return ComplianceGram(self.system.surface_compliance_guess)
 
     @property
     def n_bytes(self) -> int:

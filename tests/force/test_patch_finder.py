@@ -211,22 +211,76 @@ def test_circle_and_strip_fits_have_honest_errors():
         circle_start(np.zeros((2, 2)))
 
 
-def test_sums_in_bins_are_those_of_numpy():
-    from gelslim_force.shading_kernel import block_discs, sums_in_bins
+def test_light_ratios_are_those_of_numpy():
+    from gelslim_force.shading_kernel import block_discs, light_ratios, whole_sums
 
     rng = np.random.default_rng(0)
     for channels in (1, 3):
         pair = rng.integers(0, 256, (2, 50, 70, channels)).astype(np.uint8)
-        blocked = np.zeros((50, 70), np.uint8)
-        block_discs(blocked, np.array([[20.3, 10.0], [-2.0, 60.0], [np.nan, 1.0]]), np.full(3, 5.5))
+        pair[:, 30:40, 20:40] = 255
+        blocked, touched = np.zeros((50, 70), np.uint8), np.zeros((12, 17), np.uint8)
+        discs = np.array([[20.3, 10.0], [-2.0, 60.0], [np.nan, 1.0]])
+        block_discs(blocked, discs, np.full(3, 5.5), 4, touched)
         y, x = np.mgrid[:50, :70]
         assert (blocked == (np.hypot(x - 20.3, y - 10) <= 5.5)).all()
-        sums, counts = np.ones((2, 12, 17, channels), np.int64), np.ones((12, 17), np.int64)
-        sums_in_bins(pair[0], pair[1], blocked, 4, sums, counts)
+        assert touched[blocked[:48, :68].reshape(12, 4, 17, 4).any(axis=(1, 3))].all()
+        sums, glaring = np.ones((2, 12, 17, channels), np.int64), np.ones((2, 12, 17), np.uint8)
+        for image, total, may in zip(pair, sums, glaring, strict=True):
+            whole_sums(image, 4, total, may)
+        ratios, counts = np.ones((channels, 12, 17), np.float32), np.ones((12, 17), np.int64)
+        light_ratios(*pair, blocked, touched, glaring[0] | glaring[1], 4, sums, 5.0, ratios, counts)
         free = (blocked == 0) & (pair.min(axis=3) < 253).all(axis=0)
         cut = (pair * free[..., None])[:, :48, :68].reshape(2, 12, 4, 17, 4, channels)
-        assert (sums == cut.sum(axis=(2, 4), dtype=np.int64)).all()
-        assert (counts == free[:48, :68].reshape(12, 4, 17, 4).sum(axis=(1, 3))).all()
+        left = free[:48, :68].reshape(12, 4, 17, 4).sum(axis=(1, 3))
+        assert (counts == left).all()
+        light = cut.sum(axis=(2, 4), dtype=float) + 5.0 * np.maximum(left, 1)[..., None]
+        np.testing.assert_allclose(np.moveaxis(ratios, 0, 2), light[1] / light[0], rtol=1e-6)
+
+
+def test_the_compiled_fit_ends_where_least_squares_does():
+    """Against scipy on the plain law with the gains solved by NumPy; tables and Broyden's update
+    cost less than the fit's own tolerance."""
+    from scipy.optimize import least_squares
+
+    from gelslim_force.patch_fit_kernel import settle
+    from gelslim_force.slope_kernel import law
+
+    rng = np.random.default_rng(5)
+    x, y = rng.uniform(-4, 4, (2, 900))
+    lean = np.full((900, 2), [0.3, -0.1])
+    for strip in (False, True):
+        true = np.array([0.3, 0.2, 1.8, 0.8])
+
+        def basis(theta, strip=strip):
+            if strip:
+                dx, dy = np.cos(theta[1]) * y - np.sin(theta[1]) * x - theta[0], 0 * x
+            else:
+                dx, dy = x - theta[0], y - theta[1]
+            r = np.hypot(dx, dy)
+            terms = np.zeros((2, 900))
+            for side, weight in ((-np.sqrt(0.6), 5), (0, 8), (np.sqrt(0.6), 5)):
+                ratio = np.abs(r + side * 0.05) / theta[2]
+                terms += weight / 18 * np.array([law(q, theta[3], strip) for q in ratio]).T
+            unit = np.array([dx, dy]) / r
+            return np.column_stack(
+                [*(terms[0] * unit), *(terms[1] * unit), terms[0] ** 2, 1 + 0 * x]
+            )
+
+        gains = np.array([[3, 0.2], [0.1, 2], [1, 0], [0, 1], [0.5, 0.5], [0.1, 0.2]])
+        change = 10 * basis(true) @ gains + rng.normal(size=(900, 2))
+
+        def left(theta, change=change, basis=basis):
+            b = basis(theta)
+            return (change - b @ np.linalg.lstsq(b, change, rcond=1e-9)[0]).ravel()
+
+        best = least_squares(left, true)
+        for near in (0.0, 0.03):
+            found, residual = true + np.array([0.2, 0.1, -0.2, 0.3]), np.empty((900, 2))
+            jacobian = np.zeros((1800, 4))
+            cost = settle(x, y, lean, change, found, strip, 0.0, 0.05, 12, near, residual, jacobian)
+            assert cost < 2 * best.cost * 1.004
+            np.testing.assert_allclose(found[:3], best.x[:3], atol=0.01)
+            np.testing.assert_allclose((residual**2).sum(), cost, rtol=1e-12)
 
 
 def test_grey_frames_show_a_patch_too():

@@ -7,8 +7,10 @@ import pytest
 from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ifem_export.contact_fit_kernel import project
 from ifem_export.contact_inverse import (
     MARGIN,
+    _by_operator,
     _largest,
     _projected,
     masked_force,
@@ -155,3 +157,58 @@ def test_step_size_comes_from_the_largest_eigenvalue(press: Press) -> None:
         estimate = _largest(press.quick, mask)
         assert estimate <= exact * (1 + 1e-9)
         assert MARGIN * estimate >= exact
+
+
+def test_products_of_motions_bound_the_cropped_pads_and_are_exact_inside(press: Press) -> None:
+    """Against C applied to single forces: far from the rim the same, at the rim never less."""
+    gram = press.quick.gram
+    inside = np.argsort(np.hypot(*press.points[:, :2].T))[:4]
+    rim = np.argsort(press.points[:, 0] + press.points[:, 1])[-4:]
+    nodes = np.concatenate([inside, rim])
+    columns = []
+    for node in nodes:
+        for axis in range(3):
+            force = np.zeros_like(press.points)
+            force[node, axis] = 1.0
+            columns.append(press.quick.displacement(force).reshape(-1))
+    true = np.array(columns) @ np.array(columns).T
+    found = gram.block(nodes)
+    scale = np.abs(true).max()
+    np.testing.assert_allclose(found, found.T, rtol=0, atol=0)
+    np.testing.assert_allclose(found[:12, :12], true[:12, :12], atol=0.01 * scale)
+    assert np.linalg.eigvalsh(found - true).min() > -1e-9 * scale
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5, np.inf])
+@pytest.mark.parametrize("middle", [(0.0, 0.0), (8.5, -7.0)], ids=["centre", "corner"])
+def test_a_fit_by_products_is_that_by_the_operator(
+    press: Press, middle: tuple[float, float], friction: float
+) -> None:
+    mask = np.hypot(*(press.points[:, :2] - middle).T) < 2.5
+    rng = np.random.default_rng(3)
+    push = np.where(mask[:, None], [0.01, 0.004, -0.02], 0.0) * rng.uniform(
+        0.5, 1.5, (len(mask), 1)
+    )
+    motion = press.exact.displacement(push) + rng.normal(size=push.shape) * 0.002
+    start = np.zeros_like(motion)
+    exact = _by_operator(press.quick, motion, mask, friction, start, 4000, 1e-5)
+    quick = masked_force(
+        press.quick, motion, mask, friction=friction, most_steps=4000, tolerance=1e-5
+    )
+    assert quick.converged
+    assert exact.converged
+    assert quick.misfit == pytest.approx(exact.misfit, rel=1e-3)
+    resultant = exact.force_n.sum(axis=0)
+    np.testing.assert_allclose(
+        quick.force_n.sum(axis=0), resultant, atol=0.005 * np.linalg.norm(resultant)
+    )
+
+
+def test_the_compiled_projection_is_the_plain_one() -> None:
+    rng = np.random.default_rng(4)
+    forces = rng.normal(size=(50, 3))
+    for friction in (0.0, 0.7, np.inf):
+        found = forces.reshape(-1).copy()
+        project(found, friction)
+        plain = _projected(forces, np.ones(50, bool), friction)
+        np.testing.assert_allclose(found.reshape(-1, 3), plain, atol=1e-14)
