@@ -93,10 +93,20 @@ class Viewer:
         return FrameRenderer(self.camera, self.sensor.grid, self.sensor.light(), pad, look)
 
     def surface(self, state: GelState) -> SurfaceState:
-        """The state as the renderer takes it."""
+        """The state as the renderer takes it; the last two are kept, as a frame needs the one
+        before it."""
         from gelslim_twin.render.surface_state import SurfaceState
 
-        return SurfaceState.from_nodes(self.sensor.points_mm, state.displacement_mm)
+        for known, surface in self._surfaces:
+            if known is state:
+                return surface
+        made = SurfaceState.from_nodes(self.sensor.points_mm, state.displacement_mm)
+        self._surfaces[:] = [*self._surfaces[-1:], (state, made)]
+        return made
+
+    @cached_property
+    def _surfaces(self) -> list[tuple[GelState, SurfaceState]]:
+        return []
 
     def frame(
         self, state: GelState, before: GelState | None, number: int, apart_s: float | None = None
