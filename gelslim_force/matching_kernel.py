@@ -8,6 +8,7 @@ lattice or -1, `pitch` (n,) distance to the nearest of them, `points` (m, 2) dot
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,9 @@ from numba import njit
 
 from gelslim_force.darkness_kernel import COMPILED
 from gelslim_force.local_motion_kernel import local_affine, local_place, local_quadratic
+from gelslim_optics.kernel_cache import drop_stale
+
+drop_stale(["matching_kernel"], ["local_motion_kernel"], Path(__file__).parent)
 
 _LEVELS = 12
 

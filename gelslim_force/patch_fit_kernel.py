@@ -7,12 +7,16 @@ a fit that starts near its end then costs eight evaluations instead of twenty.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from gelslim_force.slope_kernel import COMPILED, slope_basis
+from gelslim_optics.kernel_cache import drop_stale
+
+drop_stale(["patch_fit_kernel"], ["slope_kernel"], Path(__file__).parent)
 
 GAINS = 6
 RIDGE = 1e-9

@@ -9,6 +9,7 @@ Arrays as in `matching_kernel`.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from numba import njit
 
 from gelslim_force.darkness_kernel import COMPILED
 from gelslim_force.local_motion_kernel import local_place
+from gelslim_optics.kernel_cache import drop_stale
+
+drop_stale(["steep_kernel"], ["local_motion_kernel"], Path(__file__).parent)
 
 _DIRECT = 4
 """The first four neighbours are one site away along an axis."""
