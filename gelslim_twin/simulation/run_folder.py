@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+from whole_files.replaced_file import is_part, sweep
 
 FORMAT = "gelslim-simulation/1"
 RUN, PLAN, LEDGER = "run.json", "plan.json", "ledger.json"
@@ -38,7 +39,7 @@ class RunFolder:
         try:
             path.mkdir(parents=True, exist_ok=True)
             record = found.record()
-            if record is None and any(path.iterdir()):
+            if record is None and found.foreign():
                 raise SimulationError(
                     f"{path} is not empty and holds no simulation; choose another folder"
                 )
@@ -51,6 +52,8 @@ class RunFolder:
                 found.clear()
             (path / FRAMES).mkdir(exist_ok=True)
             (path / STATES).mkdir(exist_ok=True)
+            for folder in (path, path / FRAMES, path / STATES):
+                sweep(folder, again=True)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise SimulationError(f"{path}: {reason}; choose a folder you can write to") from error
@@ -61,6 +64,14 @@ class RunFolder:
         """Whether everything is there."""
         record = self.record()
         return record is not None and record.get("state") == "complete"
+
+    def foreign(self) -> bool:
+        """Whether it holds more than a simulation killed at its very start leaves."""
+        for path in self.path.iterdir():
+            begun = path.name in (FRAMES, STATES) and path.is_dir() and not any(path.iterdir())
+            if not begun and not is_part(path.name):
+                return True
+        return False
 
     def record(self) -> dict[str, Any] | None:
         """What run.json says; None without one."""

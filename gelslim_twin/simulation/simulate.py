@@ -5,6 +5,8 @@ What was solved and drawn before a stop is kept: the same call goes on from ther
 
 from __future__ import annotations
 
+import os
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -27,11 +29,13 @@ from gelslim_twin.simulation.run_folder import (
     STATES,
     TRUTH,
     RunFolder,
+    SimulationError,
     simulation_key,
 )
 from gelslim_twin.simulation.state_store import StateStore
 from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
 from gelslim_twin.simulation.twin_sensor import TwinSensor
+from whole_files.file_lock import locked
 
 Progress = Callable[[str, int, int], None]
 COORDINATES = ("x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")
@@ -113,7 +117,21 @@ def simulate(
         SimulationError: the folder holds something else.
         IfemError: the solver does not converge; states solved before it are kept.
     """
-    tell = progress or (lambda text, done, total: None)
+    place = Path(os.path.abspath(folder))
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SimulationError(f"{folder}: {reason}; choose a folder you can write to") from error
+    with locked(place.with_name(f".{place.name}.lock"), _say_waiting):
+        return _simulated(job, folder, overwrite, progress or (lambda text, done, total: None))
+
+
+def _say_waiting(lock: Path) -> None:
+    print("Another gelslim is simulating into this folder; waiting for it", file=sys.stderr)
+
+
+def _simulated(job: SimulationJob, folder: Path, overwrite: bool, tell: Progress) -> Ledger:
     run = RunFolder.opened(folder, job.key, overwrite)
     about = {"scene": job.scene.name, "observe": list(job.scene.observe), "seed": job.scene.seed}
     ledger = Ledger()

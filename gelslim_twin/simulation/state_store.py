@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -74,7 +75,10 @@ class StateStore:
         """States in the unbroken row of chunks from the first one on."""
         total = number = 0
         while self._path(number).is_file():
-            found = len(_unpacked(self._path(number)))
+            try:
+                found = len(_unpacked(self._path(number)))
+            except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+                break  # damaged: solved again from here on
             total, number = total + found, number + 1
             if found < CHUNK:
                 break

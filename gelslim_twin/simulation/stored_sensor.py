@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -14,28 +13,61 @@ from gelslim_force.outputs.atomic_file import json_bytes, replace_file
 from gelslim_twin.simulation.run_folder import SimulationError
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from ifem_export.bundle_io import load_bundle, write_bundle
+from whole_files.file_lock import locked
+from whole_files.shared_use import use, used_elsewhere
 
 BUNDLE, LIGHT, OUTLINE = "bundle", "light.npz", "sensor.json"
+USE = ".in_use"
+MOST_COMPLIANCES = 4
 LIGHT_FIELDS = ("x_mm", "y_mm", "irradiance", "azimuth_deg", "elevation_deg", "colour")
 
 
 def store_sensor(sensor: TwinSensor, folder: Path, with_light: bool) -> None:
-    """Write what is not there yet; another sensor there is replaced, its light included."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write what is not there yet; another sensor there is replaced, its light included.
+
+    The sensor is in use by this process from then on. Raises SimulationError where another process
+    uses another sensor there, or the folder cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with locked(folder / ".lock"):
+            _store(sensor, folder, with_light)
+            use(folder / USE)
+    except OSError as error:
+        raise SimulationError(
+            f"{folder}: the sensor cannot be kept there ({(error.strerror or str(error)).lower()});"
+            " choose a folder you can write to"
+        ) from error
+
+
+def _store(sensor: TwinSensor, folder: Path, with_light: bool) -> None:
     held, key = folder / BUNDLE, sensor_key(sensor)
     if _stored_key(folder) != key or not (held / "manifest.json").is_file():
+        if used_elsewhere(folder / USE):
+            raise SimulationError(
+                f"{folder} holds the sensor of another simulation that is still running; "
+                "wait for it, or choose an output folder whose parent is another"
+            )
         for name in (OUTLINE, LIGHT):
             (folder / name).unlink(missing_ok=True)
-        shutil.rmtree(held, ignore_errors=True)
         write_bundle(held, sensor.bundle)
-    length, width = sensor.size_mm
-    outline = {"length_mm": length, "width_mm": width, "corner_radius_mm": sensor.corner_radius_mm}
-    replace_file(folder / OUTLINE, json_bytes({"key": key, **outline}))
+        _forget_compliances(folder)
+        length, width = sensor.size_mm
+        radius = sensor.corner_radius_mm
+        outline = {"length_mm": length, "width_mm": width, "corner_radius_mm": radius}
+        replace_file(folder / OUTLINE, json_bytes({"key": key, **outline}))
     if with_light and not (folder / LIGHT).is_file():
         light = sensor.light()
         stream = io.BytesIO()
         np.savez(stream, **{name: getattr(light, name) for name in LIGHT_FIELDS})
         replace_file(folder / LIGHT, stream.getvalue())
+
+
+def _forget_compliances(folder: Path) -> None:
+    """Keep the newest: each changed pad leaves one, of up to hundreds of megabytes."""
+    found = sorted(folder.glob("compliance-*.npy"), key=lambda path: path.stat().st_mtime)
+    for path in found[:-MOST_COMPLIANCES]:
+        path.unlink(missing_ok=True)
 
 
 def stored_sensor(folder: Path) -> TwinSensor:
