@@ -94,10 +94,10 @@ PICTURES = (
     Picture(
         "feasibility",
         "What is feasible, and what binds",
-        "Gel length against width, coloured by the rule or limit that stops the design.",
+        "Gel length against gel thickness, coloured by the rule or limit that stops the design.",
         (
-            "explore designs/mini20.yaml --vary gel.length_mm=14:34:1 --vary gel.width_mm=14:34:1"
-            f" -o {FOLDER}/explore",
+            "explore designs/mini20.yaml --vary gel.length_mm=10:30:0.5"
+            f" --vary gel.thickness_mm=0.5:5:0.25 -o {FOLDER}/explore",
         ),
         f"{FOLDER}/explore/feasibility.png",
     ),
@@ -106,8 +106,8 @@ PICTURES = (
         "Thickness against everything else",
         "Every dot a design; the best trades marked.",
         (
-            "explore designs/mini20.yaml --vary gel.length_mm=14:34:1 --vary gel.width_mm=14:34:1"
-            f" -o {FOLDER}/explore",
+            "explore designs/mini20.yaml --vary gel.length_mm=10:30:0.5"
+            f" --vary gel.thickness_mm=0.5:5:0.25 -o {FOLDER}/explore",
         ),
         f"{FOLDER}/explore/pareto.png",
     ),

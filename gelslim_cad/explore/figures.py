@@ -115,11 +115,26 @@ def feasibility_png(found: Exploration) -> bytes:
             panel.set_title(f"{label} = {shown(panels_over.values[k])}", fontsize=9)
     marks = [Patch(color="#2e9e5b", label="feasible")]
     marks += [Patch(color=colours[n], label=_told(n)) for n in names]
-    figure.legend(
-        handles=marks, loc="outside lower center", ncols=min(3, len(marks)), fontsize=8,
-        title="feasible, or what binds",
-    )  # fmt: skip
+    legend_below(figure, marks, "feasible, or what binds")
     return as_png(figure)
+
+
+def legend_below(figure: Any, marks: list[Any], title: str) -> Any:
+    """A legend under the panels in as many columns, at most three, as the figure is wide for.
+
+    The figure grows by the rows that this takes beyond the first.
+    """
+    row_in = 0.18
+    for columns in range(min(3, len(marks)), 0, -1):
+        legend = figure.legend(
+            handles=marks, loc="outside lower center", ncols=columns, fontsize=8, title=title
+        )
+        wide = legend.get_window_extent(figure.canvas.get_renderer()).width
+        if wide <= figure.bbox.width or columns == 1:
+            break
+        legend.remove()
+    figure.set_figheight(figure.get_figheight() + row_in * (-(-len(marks) // columns) - 1))
+    return legend
 
 
 def _told(binding: str) -> str:
