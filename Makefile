@@ -28,15 +28,10 @@ stability: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.stability.run --count 300
 
 bench: $(VENV)/.installed-dev
-	$(BIN)/python bench/design_batch.py
-	$(BIN)/python bench/refraction.py
-	$(BIN)/python bench/light_rays.py
-	$(BIN)/python bench/stiffness_ladder.py
-	$(BIN)/python bench/assembly.py --write
-	$(BIN)/python bench/force_ladders.py
-	$(BIN)/python bench/force_latency.py --frames 3000
-	$(BIN)/python bench/force_overlay.py
-	$(BIN)/python bench/force_tables.py
+	$(BIN)/python bench/run_all.py
+
+bench-quick: $(VENV)/.installed-dev
+	$(BIN)/python bench/run_all.py --quick
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/gelslim schema -o docs/gelslim-spec-1.schema.json

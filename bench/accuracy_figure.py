@@ -10,12 +10,13 @@ from typing import Any
 
 from ladder_record import LadderRecord, RungRecord
 
-SIZE_IN, DPI = (9.0, 5.0), 110
+SIZE_IN, DPI = (8.5, 5.4), 110
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#30a0b0", "#c03060", "#7f7f7f",
            "#0b1e3d", "#e8a66b", "#5f9bd6", "#86b86b", "#3b3b3b")  # fmt: skip
 OURS, PAPER, FRONT = "#d62728", "#000000", "#9aa3ad"
 NEGLIGIBLE = 1e-6
 """Of a ladder's largest error: what is below is drawn there, as an open triangle."""
+MOST_NAMES = {"ladder": 20, "problems": 0, "omissions": 30}
 KEY = "Ladder"
 """PNG text that says from which record a figure was drawn."""
 UNITS = {"relative": "", "share": "", "um": " (µm)", "px": " (px)", "N": " (N)", "mm": " (mm)",
@@ -40,8 +41,12 @@ def drawn(ladder: LadderRecord) -> bytes:
     _fronts(axes, ladder)
     _choices(axes, ladder)
     _frame(axes, ladder)
+    _names(axes, ladder)
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right center", fontsize=8, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=4, fontsize=8, frameon=False,
+        markerscale=0.7,
+    )  # fmt: skip
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None, KEY: digest(ladder)})
     return stream.getvalue()
@@ -80,21 +85,32 @@ def _points(axes: Any, ladder: LadderRecord) -> None:
                 label=name if named and (some or here == rungs) else None,
                 zorder=3,
             )
+    if any(r.error < floor(ladder)[0] for r in ladder.rungs):
+        axes.scatter([], [], s=34, marker="v", facecolor="none", edgecolor="#333a44",
+                     label="smaller than the axis shows")  # fmt: skip
+
+
+def _names(axes: Any, ladder: LadderRecord) -> None:
+    """Beside the points, on the side where there is room."""
+    low, high = axes.get_xlim()
     for rung in _named(ladder):
+        time, error = _spot(ladder, rung)
+        on_left = math.log(time / low) > 0.78 * math.log(high / low)
         axes.annotate(
-            _short(ladder, rung), _spot(ladder, rung), xytext=(6, 4), fontsize=7.5,
-            textcoords="offset points", color="#333a44",
+            _short(ladder, rung), (time, error), xytext=(-7 if on_left else 7, 3), fontsize=7.5,
+            textcoords="offset points", color="#333a44", ha="right" if on_left else "left",
         )  # fmt: skip
 
 
 def _named(ladder: LadderRecord) -> list[RungRecord]:
-    """Rungs with their name beside them: all where they are few and no legend names them."""
-    few = len(ladder.series) == 1 or ladder.kind == "omissions"
-    return list(ladder.rungs) if few and len(ladder.rungs) <= 24 else []
+    """Rungs with their name beside them: all where there is room."""
+    return list(ladder.rungs) if len(ladder.rungs) <= MOST_NAMES[ladder.kind] else []
 
 
 def _short(ladder: LadderRecord, rung: RungRecord) -> str:
-    return rung.series if ladder.kind == "omissions" else rung.label
+    if ladder.kind == "omissions":
+        return rung.series
+    return rung.label.replace(f", {rung.series}", "") if rung.series else rung.label
 
 
 def _fronts(axes: Any, ladder: LadderRecord) -> None:
@@ -133,3 +149,16 @@ def _frame(axes: Any, ladder: LadderRecord) -> None:
         if high / low < 10:
             middle = math.sqrt(low * high)
             put(middle / math.sqrt(10), middle * math.sqrt(10))
+    _ticks(axes.xaxis, axes.get_xlim(), 1.0, "")
+    percent = ladder.error_unit in ("relative", "share")
+    _ticks(axes.yaxis, axes.get_ylim(), *((100.0, " %") if percent else (1.0, "")))
+
+
+def _ticks(axis: Any, limits: tuple[float, float], factor: float, unit: str) -> None:
+    """Plain numbers; 2 and 5 besides the decades where there are few."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    subs = (1.0, 2.0, 5.0) if limits[1] / limits[0] < 300 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=20))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:g}{unit}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import accuracy_text
 from accuracy_figure import drawn
 from accuracy_text import conclusion, table
 from bench_data import DOCS, write_data, write_whole
@@ -45,9 +46,9 @@ Almost every step of this project can be done more or less accurately, and accur
 page shows how much: for each step that offers a choice, the error of every way to do it against an
 independent reference, and the time it takes. A grey line joins the ways that no other beats in both
 error and time (the Pareto front). A black star is what the GelSlim 2.0 paper does, where it says; a
-red ring is what this project does unless told otherwise. A default that is off the front is called
-beaten: another way was both quicker and more accurate on this measure, which is one of several that
-matter. Times are of one machine and compare ways on it; errors do not depend on the machine.
+red ring is what this project does unless told otherwise. A default is called beaten where another
+way was no worse in both and by 5 % better in one, on this one measure. Times are of one machine and
+compare ways on it; errors do not depend on the machine.
 """
 CLOSING = """\
 ## How this page is made
@@ -115,8 +116,11 @@ def page(ladders: list[LadderRecord]) -> str:
 
 
 def overview(ladders: list[LadderRecord]) -> str:
-    """One line per ladder."""
-    lines = [f"- [{ladder.title}](#{anchor(ladder.title)})" for ladder in ladders]
+    """One row per ladder."""
+    lines = ["| step | ours | the paper | ours is |", "|---|---|---|---|"]
+    for ladder in ladders:
+        link = f"[{ladder.title}](#{anchor(ladder.title)})"
+        lines.append(accuracy_text.overview(ladder, link))
     return "\n".join(lines) + "\n"
 
 
@@ -139,7 +143,7 @@ def section(ladder: LadderRecord) -> str:
 
 {table(ladder)}
 
-Error against: {sentence(ladder.reference)} {ladder.paper}
+Error against: {sentence(ladder.reference)} Paper: {ladder.paper}
 
 <sub>`data/{ladder.source}.json`: {measured_on(ladder.header)}</sub>
 """
@@ -160,7 +164,13 @@ def measured_on(header: Mapping[str, Any]) -> str:
     plain = ("python", "numpy", "scipy", "numba", "opencv", "cadquery")
     versions = ", ".join(f"{key} {header[key]}" for key in plain if header.get(key))
     seed = header.get("seed")
-    seeds = f"seeds {json.dumps(seed)}" if isinstance(seed, dict) else f"seed {seed}"
+    seeds = f"seed {seed}"
+    if isinstance(seed, dict):
+        told = (
+            f"{key} {value[0]} to {value[-1]}" if isinstance(value, list) else f"{key} {value}"
+            for key, value in seed.items()
+        )
+        seeds = f"seeds: {', '.join(told)}"
     return f"{machine}; {versions}; {'no random numbers' if seed is None else seeds}"
 
 

@@ -16,12 +16,10 @@ ALIKE = 1.05
 def error_text(ladder: LadderRecord, error: float) -> str:
     """An error with its unit."""
     if ladder.error_unit in ("relative", "share"):
-        if error < 1e-6:
-            return "0" if error == 0 else "rounding"
-        return f"{100 * error:.3g} %" if error >= 1e-4 else f"{error:.1e}"
+        return f"{100 * error:.3g} %" if error >= 1e-7 or error == 0 else f"{error:.1e}"
     unit = {"um": "µm"}.get(ladder.error_unit, ladder.error_unit)
     if ladder.error_unit == "mm":
-        return "rounding" if error < 1e-9 else f"{1000 * error:.3g} µm"
+        return f"{1000 * error:.3g} µm" if error >= 1e-9 else f"{1000 * error:.0e} µm"
     return f"{error:.3g} {unit}" if error >= 1e-3 or error == 0 else f"{error:.1e} {unit}"
 
 
@@ -63,24 +61,33 @@ def conclusion(ladder: LadderRecord) -> str:
             f"The front goes from {quick.label} ({spoken(ladder, [quick])}) to {good.label} "
             f"({spoken(ladder, [good])})."
         )
-    what = ladder.ours[0].label if len(ladder.ours) == 1 else "our default"
-    text = f"**{what[0].upper()}{what[1:]}** errs {spoken(ladder, ladder.ours)}"
+    name = f" ({ladder.ours[0].label})" if len(ladder.ours) == 1 else ""
+    text = f"Our default{name} errs {spoken(ladder, ladder.ours)}"
     if ladder.papers:
         text += f", the paper's choice {spoken(ladder, ladder.papers)}"
     return f"{text}{_beaten(ladder)}."
 
 
+def beating(ladder: LadderRecord, ours: RungRecord) -> list[RungRecord]:
+    """Rungs that are no worse in error and time and clearly better in one."""
+    return [
+        r
+        for r in ladder.rivals(ours)
+        if r.beats(ours) and (r.error * ALIKE < ours.error or r.time * ALIKE < ours.time)
+    ]
+
+
 def _beaten(ladder: LadderRecord) -> str:
     """Whether something measured beats our choice, and what more accuracy would cost."""
     better = [
-        (ours, max((r for r in ladder.rivals(ours) if r.beats(ours)), key=lambda r: -r.error))
+        (ours, min(beating(ladder, ours), key=lambda r: r.error))
         for ours in ladder.ours
-        if any(r.beats(ours) for r in ladder.rivals(ours))
+        if beating(ladder, ours)
     ]
     if better:
         cases = "; ".join(dict.fromkeys(f"{b.label} ({spoken(ladder, [b])})" for _, b in better))
-        part = "" if len(better) == len(ladder.ours) else f" in {len(better)} of {len(ladder.ours)}"
-        return f"; **beaten in both**{part} by {cases}"
+        part = f" in {len(better)} of {len(ladder.ours)} problems" if len(ladder.ours) > 1 else ""
+        return f"; **it is beaten in both**{part} by {cases}"
     if len(ladder.ours) > 1:
         return "; nothing measured beats it in both"
     (ours,) = ladder.ours
@@ -109,9 +116,9 @@ def _omitted(ladder: LadderRecord) -> str:
 
 
 def table(ladder: LadderRecord) -> str:
-    """Rungs by time: all where they are few, else front, paper's and ours."""
+    """Rungs by time: all where they are few, else front, paper's and ours, of three problems."""
     rungs = list(ladder.rungs)
-    if len(rungs) > MOST_ROWS:
+    if len(rungs) > MOST_ROWS and ladder.kind != "omissions":
         rungs = _thinned(ladder)
     order = list(ladder.series)
     by_problem = ladder.kind == "problems"
@@ -137,7 +144,9 @@ def _thinned(ladder: LadderRecord) -> list[RungRecord]:
     """What matters: ours, the paper's, and the front, evenly thinned where it is long."""
     chosen = [r for r in ladder.rungs if r.is_ours or r.is_paper]
     if ladder.kind != "ladder":
-        return [r for r in ladder.rungs if r in chosen or any(r in f for f in ladder.fronts)]
+        some = {ladder.series[k] for k in (0, len(ladder.series) // 2, -1)}
+        front = [r for f in ladder.fronts for r in f]
+        return [r for r in ladder.rungs if r.series in some and (r in chosen or r in front)]
     front = [r for r in ladder.fronts[0] if r not in chosen]
     room = max(2, MOST_ROWS - len(chosen))
     if len(front) > room:
@@ -150,3 +159,15 @@ def marks(ladder: LadderRecord, rung: RungRecord) -> str:
     on_front = any(rung in f for f in ladder.fronts)
     flags = ((rung.is_ours, "**ours**"), (rung.is_paper, "paper"), (on_front, "front"))
     return ", ".join(text for is_so, text in flags if is_so)
+
+
+def overview(ladder: LadderRecord, link: str) -> str:
+    """One row of the table at the top: ours, the paper's, and whether ours is on the front."""
+    ours = spoken(ladder, ladder.ours) if ladder.ours else ""
+    papers = spoken(ladder, ladder.papers) if ladder.papers else ""
+    verdict = ""
+    if ladder.ours:
+        beaten = sum(bool(beating(ladder, o)) for o in ladder.ours)
+        part = f" in {beaten} of {len(ladder.ours)}" if len(ladder.ours) > 1 else ""
+        verdict = f"beaten{part}" if beaten else "on the front"
+    return f"| {link} | {ours} | {papers} | {verdict} |"

@@ -38,7 +38,7 @@ def detection(rows: list[Data], markers: int, about: dict[str, Any]) -> LadderRe
         question=f"Centres of {markers} dots on 640 x 480 frames that are clean, noisy (σ 8 grey "
         "values) or blurred (1.5 px). “Near predictions” follows dots; the first frame is searched "
         "whole.",
-        paper="The paper finds markers in each frame and does not say how.",
+        paper="finds markers in each frame and does not say how.",
         reference="Where the dots were drawn, by exact areas with perspective and refraction",
         error_label="error of a centre, RMS",
         error_unit="px",
@@ -66,7 +66,7 @@ def matching(rows: list[Data], about: dict[str, Any]) -> LadderRecord:
         title="Matching of markers in one shot",
         question="Which dot is which marker, from rest, with 5 % of the dots missing and 1 % "
         "spurious; the series is the largest displacement in pitches of the lattice.",
-        paper="The nearest dot, checked; here the nearest dot as it is.",
+        paper="the nearest dot, checked; here the nearest dot as it is.",
         reference="The marker each dot was made from",
         error_label="share of markers matched wrongly",
         error_unit="share",
@@ -94,8 +94,8 @@ def interpolation(rows: list[Data], about: dict[str, Any]) -> LadderRecord:
         name="interpolation",
         title="Interpolation from markers to nodes",
         question="Motion of the mesh's nodes from that of the markers.",
-        paper="Scattered interpolation in every frame; which one is not said. Linear over Delaunay "
-        "triangles is taken for it.",
+        paper="interpolates scattered markers in every frame and does not say how; linear over "
+        "Delaunay triangles is taken for it.",
         reference="The smooth bumps that were sampled, without noise",
         error_label="error of the motion",
         error_unit="relative",
@@ -121,7 +121,7 @@ def compensation(rows: list[Data], about: dict[str, Any]) -> LadderRecord:
         name="compensation",
         title="Compensation of projection",
         question="Lateral motion of markers that a press also moves along z, depth known.",
-        paper="Its formula as printed, α = |r|/|z - z_c| for the angle.",
+        paper="the formula as printed, α = |r|/|z - z_c| for the angle.",
         reference="The motion that was projected through camera, acrylic and gel; the exact model "
         "inverts that very projection, so its error is rounding",
         error_label="error of the motion, RMS",
@@ -153,7 +153,7 @@ def operators(rows: list[Data], balanced: str | None, about: dict[str, Any]) -> 
         question="Forces from markers that are off by 0.04 px and a depth off by 2 %, on a push "
         "with shear. “Direct” takes them as they come; the low-pass and the masked fit trade "
         "detail for noise.",
-        paper="One layer, direct.",
+        paper="one layer, direct.",
         reference="The forces applied on a pad of half the pitch with eight layers",
         error_label="error of the force field",
         error_unit="relative",
@@ -162,7 +162,7 @@ def operators(rows: list[Data], balanced: str | None, about: dict[str, Any]) -> 
                 f"{r['operator']}, {r['method']}",
                 r["error_field"],
                 r["milliseconds"],
-                r["operator"],
+                r["method"],
                 is_paper=(r["operator"], r["method"]) == ("paper, one layer", "direct"),
                 is_ours=(r["operator"], r["method"]) == (balanced, method),
                 count=100 * r["error_resultant"],
@@ -181,7 +181,7 @@ def large_strain(rows: list[Data], about: dict[str, Any]) -> LadderRecord:
         name="large-strain",
         title="Large strain",
         question="The same motion, 0.5 mm deep in 2 mm of gel, where the gel is neo-Hookean.",
-        paper="A linear gel.",
+        paper="a linear gel.",
         reference="A neo-Hookean pad of half the pitch with eight layers",
         error_label="error of the force field",
         error_unit="relative",

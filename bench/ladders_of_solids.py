@@ -18,12 +18,15 @@ ENTRIES = {
     "delivered": ("light-delivered", "Rays: light on the coat"),
     "leaked.outer_bend_right": ("light-leak", "Rays: leak of one bend"),
 }
-NO_PAPER_LIGHT = "The paper traces no light; it states that the bend keeps it in."
-NO_PAPER_MESH = "The paper does not say how its parts were tessellated."
+NO_PAPER_LIGHT = "traces no light; it states that the bend keeps it in."
+NO_PAPER_MESH = "does not say how its parts were tessellated."
 
 
 def stiffness(data: Data, header: Data) -> list[LadderRecord]:
-    """Element, layers, pitch and operator: one ladder per Poisson's ratio shown."""
+    """Element, layers and operator: one ladder per Poisson's ratio shown.
+
+    Pads of another pitch are left out: each pitch has a reference of its own.
+    """
     return [
         stiffness_at(data, header, ratio)
         for ratio in SHOWN_RATIOS
@@ -33,7 +36,7 @@ def stiffness(data: Data, header: Data) -> list[LadderRecord]:
 
 def stiffness_at(data: Data, header: Data, ratio: float) -> LadderRecord:
     """The ladder of one Poisson's ratio; ours is what a bundle of four B-bar layers starts with."""
-    rows = [r for r in data["rows"] if r["poissons_ratio"] == ratio]
+    rows = [r for r in data["rows"] if (r["poissons_ratio"], r["cells"]) == (ratio, OWN_CELLS)]
     own = [r for r in rows if pad_of(r) == (OWN_CELLS, OWN_LAYERS, OWN_ELEMENT)]
     enough = max(ENOUGH, BALANCE * min(r["error_field"] for r in own))
     chosen = min((r for r in own if r["error_field"] <= enough), key=lambda r: r["n_bytes"])
@@ -57,10 +60,10 @@ def stiffness_at(data: Data, header: Data, ratio: float) -> LadderRecord:
         )
     return LadderRecord(
         name=f"stiffness-{ratio:g}".replace(".", "p"),
-        title=f"Stiffness at ν = {ratio:g}: element, layers, pitch and operator",
+        title=f"Stiffness at ν = {ratio:g}: element, layers and operator",
         question=f"Forces from the motion of the pad's outer surface ({data['pad']}), ν = {ratio:g}"
         + (", the paper's gel." if ratio == SHOWN_RATIOS[0] else ", a nearly incompressible gel."),
-        paper="One layer of fully integrated elements, all nodes observed.",
+        paper="one layer of fully integrated elements, all nodes observed.",
         reference="The same pad at half the pitch with eight B-bar layers, solved to 1e-8; bumps "
         "about a thickness wide, the worst of four",
         error_label="error of the force field",
@@ -107,7 +110,7 @@ def light(data: Data, header: Data) -> list[LadderRecord]:
 def light_rung(row: Data, entry: str) -> RungRecord:
     """Sobol points with both branches above 5 % are the tracer's defaults."""
     points = "Sobol" if row["sampling"] == "sobol" else "pseudo-random"
-    branches = "one branch" if row["split"] == 1 else f"both branches above {row['split']:.0%}"
+    branches = "one branch" if row["split"] == 1 else f"both above {100 * row['split']:g} %"
     series = f"{points}, {branches}"
     power = row["rays"].bit_length() - 1
     is_ours = row["sampling"] == "sobol" and row["split"] != 1 and row["rays"] == RAYS

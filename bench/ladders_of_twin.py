@@ -11,7 +11,7 @@ from gelslim_twin.contact.solver import ContactSettings
 from gelslim_twin.render.shading import Shading
 
 Data = Mapping[str, Any]
-NO_PAPER = "The paper has no digital twin."
+NO_PAPER = "has no digital twin."
 POSE = "time per pose, one thread"
 FRAME = "time per frame, one thread"
 

@@ -163,25 +163,34 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=18, help="power of 2 of the largest run")
     parser.add_argument("--reference", type=int, default=24, help="power of 2 of the long run")
     parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
+    parser.add_argument("--ladder-alone", action="store_true", help="nothing but the rays' ladder")
     options = parser.parse_args()
     report: dict[str, Any] = {
         **machine(),
         "seed": {"runs": list(range(RUNS)), "reference": REFERENCE_SEED, "others": 0},
         "ladder": ladder(options.rays, options.reference),
+    }
+    print(f"ladder\n{table(report['ladder']['rows'])}\n")
+    if not options.ladder_alone:
+        report |= rest()
+    if options.docs:
+        write_data("light_rays", report, options.docs)
+        if not options.ladder_alone:
+            draw(report, options.docs / "images" / "light_rays.png")
+
+
+def rest() -> dict[str, Any]:
+    """Facets, speed and ratios, printed."""
+    found = {
         "facets": facets(),
         "speed": speed(),
         "ratios": ratios(),
         "earlier": earlier(),
         "changes": changes(),
     }
-    for name in ("ladder", "facets", "ratios"):
-        print(f"{name}\n{table(report[name]['rows'])}\n")
-    for name in ("speed", "earlier", "changes"):
-        print(f"{name}\n{table(report[name])}\n")
-    if options.docs:
-        write_data("light_rays", report, options.docs)
-        (options.docs / "images").mkdir(exist_ok=True)
-        draw(report, options.docs / "images" / "light_rays.png")
+    for name, part in found.items():
+        print(f"{name}\n{table(part['rows'] if isinstance(part, dict) else part)}\n")
+    return found
 
 
 if __name__ == "__main__":

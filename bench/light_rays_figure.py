@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
-import os
 from pathlib import Path
 from typing import Any
+
+from bench_data import write_whole
 
 INK, GRID = "#333a44", {"alpha": 0.25, "which": "major"}
 POINTS = {
@@ -40,9 +41,7 @@ def draw(report: dict[str, Any], path: Path) -> None:
     _ratios(right, report["ratios"], report["earlier"])
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
-    fresh = path.with_suffix(".new")
-    fresh.write_bytes(stream.getvalue())
-    os.replace(fresh, path)
+    write_whole(path, stream.getvalue())
 
 
 def _errors(panels: Any, ladder: dict[str, Any]) -> None:
