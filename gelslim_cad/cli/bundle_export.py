@@ -7,6 +7,12 @@ from typing import Annotated
 
 import typer
 
+MARKS = {
+    ".mtx": b"K in N/mm of geometry",
+    ".mat": b"gelslim-bundle",
+    ".safetensors": b"gelslim-bundle/",
+}
+
 
 def bundle_export(
     path: Annotated[Path, typer.Argument(metavar="BUNDLE", help="The bundle.")],
@@ -20,6 +26,7 @@ def bundle_export(
     safetensors. The bundle is verified first.
     """
     from gelslim_cad.cli.failure import CommandError
+    from gelslim_cad.cli.output import spare_strangers
     from gelslim_cad.cli.status import BAD_INPUT
     from ifem_export import export_matrix
     from ifem_export.bundle_io import load_bundle
@@ -34,6 +41,8 @@ def bundle_export(
             f"{file}: the ending {file.suffix!r} names no format; use {', '.join(writers)}",
             BAD_INPUT,
         )
+    # Each kind of file says where it comes from in its head.
+    spare_strangers(file, MARKS[file.suffix], "export of a bundle")
     writers[file.suffix](load_bundle(path), file)
     print(f"Wrote {file} ({file.stat().st_size / 1e6:.2f} MB)")
     return 0

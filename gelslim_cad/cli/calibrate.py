@@ -43,13 +43,15 @@ def calibrate(
     refuses pictures of another sensor, turned ones, and contact (status 2).
     """
     from gelslim_cad.cli.answer import print_json
-    from gelslim_cad.cli.output import replace_file
+    from gelslim_cad.cli.output import replace_file, spare_strangers
     from gelslim_force.calibration import calibrate as calibrated
     from gelslim_force.calibration_file import calibration_record
     from gelslim_force.outputs.atomic_file import json_bytes
     from gelslim_force.reference_picture import read_reference
     from ifem_export.bundle_io import load_bundle
 
+    if out is not None:
+        spare_strangers(out, b"gelslim-calibration/", "calibration")
     sensor = load_bundle(bundle)
     found = calibrated(sensor, read_reference(reference), allow_contact=allow_contact)
     record = calibration_record(found)

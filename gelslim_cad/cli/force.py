@@ -220,6 +220,8 @@ def _sinks(
     quiet: bool,
 ) -> tuple[list[Any], Any]:
     """What takes the results; and the picture sink, which writes at the end."""
+    from gelslim_cad.cli.failure import CommandError
+    from gelslim_cad.cli.output import spare_strangers
     from gelslim_force.outputs.result_sinks import RecorderSink
     from gelslim_force.outputs.run_manifest import bundle_identity
     from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
@@ -231,6 +233,7 @@ def _sinks(
         from gelslim_force.outputs.mcap_recording import McapRecording
 
         if overwrite:
+            spare_strangers(mcap, b"gelslim", "recording of gelslim")
             mcap.unlink(missing_ok=True)
         sinks.append(RecorderSink(stack.enter_context(McapRecording(mcap, about=identity))))
     if video is not None:
@@ -238,6 +241,8 @@ def _sinks(
         from gelslim_force.outputs.overlay_sink import VideoSink
         from gelslim_force.outputs.overlay_video import OverlayVideo
 
+        if video.exists() and not overwrite:
+            raise CommandError(f"{video} exists; give another --video, or --force to replace it")
         made = stack.enter_context(OverlayVideo(video, overlay.size_px, frames_per_s))
         sinks.append(VideoSink(overlay, made, LiveScale(Extent())))
     keep = RecorderSettings(fields=None if fields == "none" else fields)  # type: ignore[arg-type]

@@ -23,10 +23,10 @@ def markers(
     SVG, DXF, PDF, Gerber, CSV and stencil, as `build` writes them.
     """
     from gelslim_cad.cli.answer import print_json
-    from gelslim_cad.cli.output import require_pad_rules, written
+    from gelslim_cad.cli.output import require_pad_rules, spare_strangers_in, written
     from gelslim_cad.dimensions import derive
     from gelslim_cad.markers.process import MARKING_PROCESSES
-    from gelslim_cad.markers.write import write_marker_files
+    from gelslim_cad.markers.write import FIRST_FILE, render_marker_files, write_marker_files
     from gelslim_cad.pad import marker_grid, marker_print
     from gelslim_cad.spec.reader import read_spec
 
@@ -36,6 +36,7 @@ def markers(
     grid = marker_grid(d)
     nodes, outline = marker_print(d, grid)
     folder = out or Path("out") / f"{loaded.spec.name}-markers"
+    spare_strangers_in(folder, render_marker_files(grid, nodes, outline), FIRST_FILE, b"gelslim")
     paths = write_marker_files(folder, grid, nodes, outline)
     process = MARKING_PROCESSES[loaded.spec.manufacturing.marking_process]
     if as_json:

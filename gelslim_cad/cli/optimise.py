@@ -53,6 +53,7 @@ def optimise(
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.failure import CommandError
+    from gelslim_cad.cli.output import spare_strangers
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.explore.axis import parse_axis
     from gelslim_cad.explore.engine import Engine, processors
@@ -62,6 +63,8 @@ def optimise(
     from gelslim_cad.explore.study import Request
     from gelslim_cad.spec.reader import read_spec
 
+    if save is not None:
+        spare_strangers(save, b"gelslim-spec/", "spec")
     loaded = read_spec(spec)
     folder = out or Path("out") / f"{loaded.spec.name}-optimise"
     try:

@@ -27,8 +27,9 @@ def schema(
     if out is None:
         print(text, end="")
         return 0
-    from gelslim_cad.cli.output import replace_file
+    from gelslim_cad.cli.output import replace_file, spare_strangers
 
+    spare_strangers(out, b"gelslim-", "schema of gelslim")
     replace_file(out, text.encode())
     use = "" if markdown else " In VS Code, name it in the setting yaml.schemas."
     print(f"Wrote {out}.{use}")

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from gelslim_force.track_record import TrackRecord
 
 
+FILES = ("tracks.npz", "frames.csv", "summary.json")
+"""What a run writes, in this order."""
+
+
 def track(
     frames: Annotated[
         str,
@@ -60,7 +64,7 @@ def track(
     per frame, summary.json, and overlay pictures. Ctrl-C ends a live camera and keeps the run.
     """
     from gelslim_cad.cli.answer import print_json
-    from gelslim_cad.cli.output import replace_file
+    from gelslim_cad.cli.output import replace_file, spare_strangers_in
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_force.frame_source import open_frames
     from gelslim_force.outputs.atomic_file import json_bytes
@@ -70,6 +74,7 @@ def track(
     # A reference that is no good must not cost the run: look at it before the source opens.
     rest = None if reference is None else _at_rest(_picture(reference), settings, str(reference))
     folder = out or Path("out") / f"{_name(frames)}-track"
+    spare_strangers_in(folder, FILES, FILES[0], b"places_px")
     with open_frames(frames, frames_per_s) as source, progress_bar(quiet=as_json) as tell:
         first = _Frames(source, most_frames, tell)
         if rest is None:
@@ -195,8 +200,10 @@ def _report(folder: Path, summary: dict[str, Any], rest: DotsAtRest, pictures: i
     from gelslim_cad.cli.answer import say
 
     rows, columns = rest.lattice_shape
+    most = rest.lines_in_view
+    cut = "" if most == (rows, columns) else f" ({most[0]} x {most[1]} at least half in view)"
     say(
-        f"{summary['markers']} dots on a lattice of {rows} x {columns}, "
+        f"{summary['markers']} dots on a lattice of {rows} x {columns}{cut}, "
         f"{summary['on_lattice']:.1%} of those found, pitch {rest.pitch_px:.1f} px."
     )
     bad, seen = summary["frames_without_tracks"], summary["coverage"]

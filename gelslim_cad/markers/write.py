@@ -12,6 +12,9 @@ from gelslim_cad.markers.outline import Outline, as_outline
 from ifem_export.marker_grid import MarkerGrid
 from whole_files.replaced_file import replace_file
 
+FIRST_FILE = "markers-Alignment.gbr"
+"""Written first; it names its generator."""
+
 
 def render_marker_files(
     grid: MarkerGrid,

@@ -7,6 +7,7 @@ or one by one where the run has no end.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +20,7 @@ from gelslim_force.outputs.arrow_scale import ArrowScale, LiveScale, extent, sca
 from gelslim_force.outputs.overlay import Overlay, write_overlay
 from gelslim_force.outputs.overlay_video import OverlayVideo
 
+_PICTURE = re.compile(r"frame_\d{6,}\.png")
 Show = Callable[[NDArray[np.uint8], FrameResult], None]
 
 
@@ -55,6 +57,9 @@ class PictureSink:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_overlay(path, self.overlay.draw(image, result, scale))
             files.append(path)
+        for old in Path(self.folder).glob("frame_*.png"):
+            if old not in files and _PICTURE.fullmatch(old.name):
+                old.unlink()  # of an earlier, other run
         return files
 
 

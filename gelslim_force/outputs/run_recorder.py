@@ -36,10 +36,14 @@ from gelslim_force.outputs.run_manifest import (
     UNITS,
     RunCounts,
     State,
+    read_manifest,
     versions,
     write_manifest,
 )
+from whole_files.file_lock import locked
+from whole_files.replaced_file import sweep
 
+LOCK = ".lock"
 WRENCHES, STAGES = "wrenches.csv", "stages.jsonl"
 FIELD_FILE = re.compile(r"fields_(\d{5,})\.(npz|parquet|part)")
 
@@ -118,14 +122,20 @@ class RunRecorder:
         self._last_index: int | None = None
         self._open = False
         self._chunk = _OpenChunk(0)
+        self._lock = contextlib.ExitStack()
         try:
+            self._take_folder()
             self._make_room(overwrite)
             self._write_manifest("running")
             self._csv = AppendFile(self.folder / WRENCHES)
             self._stages = AppendFile(self.folder / STAGES)
             self._csv.append(wrench_csv.header().encode())
         except OSError as error:
+            self._lock.close()
             raise disk_error(self.folder, "starting the run", error) from error
+        except BaseException:
+            self._lock.close()
+            raise
         self._writer = ChunkWriter(self._checkpoint)
         self._open = True
 
@@ -231,6 +241,7 @@ class RunRecorder:
             for file in (self._csv, self._stages, self._chunk.journal):
                 if file is not None:
                     file.close()
+            self._lock.close()
 
     def _write_manifest(self, state: State, reason: str = "") -> None:
         write_manifest(
@@ -246,8 +257,17 @@ class RunRecorder:
             },
         )
 
-    def _make_room(self, overwrite: bool) -> None:
+    def _take_folder(self) -> None:
+        def refuse(_: Path) -> None:
+            raise OutputError(
+                f"{self.folder}: another process is writing a run there; choose another folder"
+            )
+
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._lock.enter_context(locked(self.folder / LOCK, refuse))
+        sweep(self.folder, again=True)
+
+    def _make_room(self, overwrite: bool) -> None:
         fixed = (MANIFEST, WRENCHES, STAGES)
         found = [
             p for p in self.folder.iterdir() if p.name in fixed or FIELD_FILE.fullmatch(p.name)
@@ -256,5 +276,7 @@ class RunRecorder:
             raise OutputError(
                 f"{self.folder}: holds a run already; choose another folder or overwrite it"
             )
+        if MANIFEST in (p.name for p in found):
+            read_manifest(self.folder)  # other programs have a run.json too: theirs stays
         for path in sorted(found):
             path.unlink()
