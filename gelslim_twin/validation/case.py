@@ -1,4 +1,4 @@
-"""Contacts that a validation tries, scaled to the pad."""
+"""Contacts beside the paper's ball, scaled to the pad: rods both ways, a punch that turns."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter, Sphere
+from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter
 from gelslim_twin.scene.pose import Pose
 
-STEPS = 6
-FRICTION = 0.8
+STEPS = 3
+DEPTH_SHARE = 0.15
 
 
 @dataclass(frozen=True)
@@ -24,33 +24,26 @@ class Case:
     """Empty where the pipeline cannot tell the depth from the patch."""
 
 
-def standard_cases(thickness_mm: float, length_mm: float, width_mm: float) -> tuple[Case, ...]:
-    """Press, press with shear, twist, rod: depths of 15 % of the gel, reached in six steps."""
-    depth = 0.15 * thickness_mm
-    radius = max(2.0, min(length_mm, width_mm) / 3)
-    aside = 0.12 * length_mm
-    ball = Sphere(shape="sphere", radius_mm=radius)
-    rod = Cylinder(shape="cylinder", radius_mm=radius / 2, length_mm=2 * length_mm)
-    punch = FlatPunch(shape="flat_punch", radius_mm=radius / 3)
+def other_contacts(thickness_mm: float, length_mm: float, width_mm: float) -> tuple[Case, ...]:
+    """Depths of 15 % of the gel, reached in three steps, then shear or twist in three."""
+    depth = DEPTH_SHARE * thickness_mm
+    radius = max(1.0, min(length_mm, width_mm) / 6)
+    shear = 0.05 * thickness_mm
+    punch = FlatPunch(shape="flat_punch", radius_mm=radius * 2 / 3)
     down = Pose(1.0, 0.0, 0.0, depth)
-    side = Pose(1.0, aside, -aside / 2, depth)
+    known = f"cylinder:{radius:g}"
+    # Rods reach over both rims: where they end is another question.
+    along = Cylinder(shape="cylinder", radius_mm=radius, length_mm=2 * length_mm)
+    across = Cylinder(shape="cylinder", radius_mm=radius, length_mm=2 * width_mm, axis_deg=90)
     return (
-        Case("press", ball, path(down), f"sphere:{radius:g}"),
-        Case(
-            "press aside and shear",
-            ball,
-            path(side, Pose(2.0, aside + 0.1, -aside / 2 + 0.06, depth)),
-            f"sphere:{radius:g}",
-        ),
-        Case(
-            "rod and shear", rod, path(down, Pose(2.0, 0.0, 0.1, depth)), f"cylinder:{radius / 2:g}"
-        ),
+        Case("rod along, sheared across", along, path(down, Pose(2.0, 0.0, shear, depth)), known),
+        Case("rod across, sheared along", across, path(down, Pose(2.0, shear, 0.0, depth)), known),
         Case("punch and twist", punch, path(down, Pose(2.0, 0.0, 0.0, depth, 3.0)), ""),
     )
 
 
 def path(*ends: Pose) -> tuple[Pose, ...]:
-    """From just over the first end's place through every end, six steps each."""
+    """From just over the first end's place through every end, three steps each."""
     first = ends[0]
     poses = [Pose(0.0, first.x_mm, first.y_mm, 0.0)]
     for end in ends:

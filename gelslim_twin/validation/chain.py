@@ -1,7 +1,7 @@
 """The chains that a validation compares: ours, and the paper's choices.
 
-The paper's: one layer of full cells, the printed compensation, and for a known shape the cap of
-the indenter below the rim of the patch.
+The paper's: one layer of full cells, the printed compensation, forces straight from the
+stiffness, and for a known shape the cap of the indenter below the rim of the patch.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ from typing import Literal
 
 from gelslim_force.force_estimator import ForceSettings
 from gelslim_force.pipeline_settings import PipelineSettings
+from ifem_export.bundle import Bundle
 
-Knows = Literal["depth", "shape", "cap", "nothing"]
-"""The surface's true height, or the indenter's shape (`cap`: with the paper's model of it)."""
+Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
+"""The surface's true height, with or without the nodes touched, or the indenter's shape (`cap`:
+with the paper's model of it)."""
 
 
 @dataclass(frozen=True)
@@ -23,25 +25,26 @@ class Chain:
     name: str
     settings: PipelineSettings
     knows: Knows
+    needs_even_layers: bool = False
+    """Not for crowned pads and cut cells."""
 
 
+_PAPER = PipelineSettings(
+    rung="paper", compensation="printed", force=ForceSettings(method="direct")
+)
 CHAINS: tuple[Chain, ...] = (
+    Chain("ours, contact known", PipelineSettings(), "contact"),
     Chain("ours, depth known", PipelineSettings(), "depth"),
-    Chain("ours, depth, pcg", PipelineSettings(rung="pcg"), "depth"),
+    Chain("ours, depth, neo-Hookean", PipelineSettings(gel="neo_hookean"), "depth", True),
     Chain("ours, shape known", PipelineSettings(), "shape"),
     Chain("ours, tangential", PipelineSettings(), "nothing"),
-    Chain(
-        "paper, shape known",
-        PipelineSettings(
-            rung="paper", compensation="printed", force=ForceSettings(method="direct")
-        ),
-        "cap",
-    ),
-    Chain(
-        "paper, depth known",
-        PipelineSettings(
-            rung="paper", compensation="printed", force=ForceSettings(method="direct")
-        ),
-        "depth",
-    ),
+    Chain("paper, depth known", _PAPER, "depth", True),
+    Chain("paper, shape known", _PAPER, "cap", True),
 )
+
+
+def chains_for(bundle: Bundle) -> tuple[Chain, ...]:
+    """The chains that a bundle's pad can take."""
+    mesh = bundle.mesh
+    even = mesh.fill is None and mesh.surface_shift is None
+    return tuple(c for c in CHAINS if even or not c.needs_even_layers)

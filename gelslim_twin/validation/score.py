@@ -1,0 +1,174 @@
+"""How far one estimate is from the truth: resultant, field, place and direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_twin.simulation.gel_state import GelState
+
+Array = NDArray[np.float64]
+SHEARED = 0.2
+"""Shear over normal force from which a direction is worth comparing."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """One chain on one frame; forces in N. NaN where the chain does not know."""
+
+    test: int
+    frame: int
+    chain: str
+    true_n: tuple[float, float, float]
+    found_n: tuple[float, float, float]
+    field_error: float
+    """Of the nodal forces it knows, against the true ones, relative L2."""
+    outside_share: float
+    """Share of the tangential force on nodes that nothing touches."""
+    centre_error_mm: float
+    """Between the centres of pressure."""
+    direction_error_deg: float
+    """Between the shear resultants; NaN where there is little shear."""
+    marker_error_mm: float
+    """Root mean square of the markers' motion in the plane."""
+    sigma_n: tuple[float, float, float]
+    """The chain's own statement of its standard deviation."""
+    milliseconds: float
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Errors of a chain over many frames, as the paper states its own."""
+
+    name: str
+    frames: int
+    without: tuple[int, int, int]
+    """Frames that give no force along x, y, z."""
+    deviation_n: tuple[float, float, float]
+    """Standard deviation of found minus true, about its mean."""
+    bias_n: tuple[float, float, float]
+    """Mean of found minus true."""
+    relative: float
+    """Root mean square of the error over that of the true force, of the components given."""
+    field_error: float = float("nan")
+    outside_share: float = float("nan")
+    centre_error_mm: float = float("nan")
+    direction_error_deg: float = float("nan")
+    milliseconds: float = float("nan")
+
+
+def spread(name: str, true_n: Array, found_n: Array) -> Spread:
+    """Statistics of resultants (n, 3); a component that no frame gives stays NaN."""
+    off = found_n - true_n
+    known = np.isfinite(off)
+    size = float(np.sqrt((true_n[known] ** 2).sum()))
+    kept = [off[known[:, k], k] for k in range(3)]
+    return Spread(
+        name,
+        len(found_n),
+        _counts(~known),
+        _three([e.std() if len(e) else np.nan for e in kept]),
+        _three([e.mean() if len(e) else np.nan for e in kept]),
+        float(np.sqrt((off[known] ** 2).sum()) / size) if size > 0 else float("nan"),
+    )
+
+
+def summary(name: str, scores: Sequence[Score]) -> Spread:
+    """Statistics of one chain; errors of the field are medians over the frames."""
+    true, found = (np.array([getattr(s, a) for s in scores]) for a in ("true_n", "found_n"))
+    base = spread(name, true, found)
+
+    def middle(attribute: str) -> float:
+        values = np.array([getattr(s, attribute) for s in scores])
+        values = values[np.isfinite(values)]
+        return float(np.median(values)) if len(values) else float("nan")
+
+    return replace(
+        base,
+        field_error=middle("field_error"),
+        outside_share=middle("outside_share"),
+        centre_error_mm=middle("centre_error_mm"),
+        direction_error_deg=middle("direction_error_deg"),
+        milliseconds=middle("milliseconds"),
+    )
+
+
+def field_errors(
+    points_mm: Array, truth: GelState, found_n: Array
+) -> tuple[float, float, float, float]:
+    """Field error, share outside, centre error in mm and direction error in degrees.
+
+    `found_n` (c, 3), NaN in components that are not known.
+    """
+    known = np.isfinite(found_n)
+    true = np.where(known, truth.force_n, 0.0)
+    found = np.where(known, found_n, 0.0)
+    size = np.linalg.norm(true)
+    error = float(np.linalg.norm(found - true) / size) if size > 0 else float("nan")
+    tangential = np.hypot(found[:, 0], found[:, 1])
+    whole = tangential.sum()
+    outside = float(tangential[truth.touch == 0].sum() / whole) if whole > 0 else float("nan")
+    centres = [_centre(points_mm, f) for f in (truth.force_n, found)]
+    apart = float(np.hypot(*(centres[1] - centres[0])))
+    return error, outside, apart, _turn(truth.force_n.sum(axis=0), found.sum(axis=0))
+
+
+def score(
+    test: int,
+    frame: int,
+    chain: str,
+    points_mm: Array,
+    truth: GelState,
+    result: FrameResult,
+    marker_error_mm: float,
+) -> Score:
+    """The score of one result."""
+    nan = float("nan")
+    found, sigma = np.full(3, nan), np.full(3, nan)
+    errors = nan, nan, nan, nan
+    if result.wrench is not None and result.field is not None:
+        found, sigma = result.wrench.force_n, result.wrench.standard_deviation[:3]
+        errors = field_errors(points_mm, truth, result.field.force_n)
+    return Score(
+        test=test,
+        frame=frame,
+        chain=chain,
+        true_n=_three(truth.force_n.sum(axis=0)),
+        found_n=_three(found),
+        field_error=errors[0],
+        outside_share=errors[1],
+        centre_error_mm=errors[2],
+        direction_error_deg=errors[3],
+        marker_error_mm=marker_error_mm,
+        sigma_n=_three(sigma),
+        milliseconds=sum(result.stage_ms.values()),
+        problems=result.problems,
+    )
+
+
+def _centre(points_mm: Array, force_n: Array) -> Array:
+    push = np.maximum(-force_n[:, 2], 0.0)
+    total = push.sum()
+    return np.asarray(push @ points_mm[:, :2] / total) if total > 0 else np.full(2, np.nan)
+
+
+def _turn(true_n: Array, found_n: Array) -> float:
+    if np.hypot(*true_n[:2]) < SHEARED * abs(true_n[2]) or not found_n[:2].any():
+        return float("nan")
+    a, b = (np.arctan2(f[1], f[0]) for f in (true_n, found_n))
+    return float(abs(np.degrees((b - a + np.pi) % (2 * np.pi) - np.pi)))
+
+
+def _counts(missing: NDArray[np.bool_]) -> tuple[int, int, int]:
+    x, y, z = (int(v) for v in missing.sum(axis=0))
+    return x, y, z
+
+
+def _three(values: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in np.asarray(values))
+    return x, y, z

@@ -1,0 +1,65 @@
+"""All that a validation finds, and what it says about itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.frame_result import FrameResult
+from gelslim_force.sensor_calibration import SensorCalibration
+from gelslim_twin.simulation.gel_state import GelState
+from gelslim_twin.validation.experiment import FRICTION, Experiment
+from gelslim_twin.validation.score import Score, Spread
+
+Image = NDArray[np.uint8]
+PAPER_N = (0.244, 0.201, 0.322)
+"""Standard deviations in x, y and z that Ma, Donlon, Dong and Rodriguez (ICRA 2019) measured."""
+PAPER_RELATIVE = 0.15
+"""Of the true force, as they state it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One frame with its truth and what chains made of it, for pictures."""
+
+    name: str
+    image: Image
+    truth: GelState
+    results: Mapping[str, FrameResult]
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """The slides frame by frame, their statistics, the budget, and other contacts' last frames."""
+
+    truth: str
+    """Which model made the frames, and how it differs from the pipeline's."""
+    experiment: Experiment
+    scores: tuple[Score, ...]
+    chains: tuple[Spread, ...]
+    budget: tuple[Spread, ...]
+    others: Mapping[str, tuple[Score, ...]]
+    samples: tuple[Sample, ...]
+    points_mm: NDArray[np.float64]
+    calibration: SensorCalibration
+
+    def to_record(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "format": "gelslim-validation/1",
+            "truth": self.truth,
+            "paper": {"deviation_n": PAPER_N, "relative": PAPER_RELATIVE},
+            "experiment": {
+                "ball_radius_mm": self.experiment.ball.radius_mm,
+                "friction": FRICTION,
+                "slides": [asdict(test) for test in self.experiment.tests],
+            },
+            "chains": [asdict(s) for s in self.chains],
+            "budget": [asdict(s) for s in self.budget],
+            "frames": [asdict(s) for s in self.scores],
+            "other_contacts": {n: [asdict(s) for s in v] for n, v in self.others.items()},
+        }
