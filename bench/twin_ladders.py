@@ -1,90 +1,153 @@
-"""Twin: cost and worth of every effect on the gallery, and the contact's tolerance ladder.
+"""Twin: cost and worth of every effect on the gallery, the contact's ladders, planning's cost.
 
-python bench/twin_ladders.py            # writes docs/data
-python bench/twin_ladders.py --quick    # two scenes without large strain, prints only
+    python bench/twin_ladders.py                  # writes docs/data, docs/images and the guide
+    python bench/twin_ladders.py --only contact   # measures one part anew, keeps the others
+    python bench/twin_ladders.py --quick          # two scenes in a linear gel; printed only
+
+Every effect's milliseconds with and without it, and the error of leaving it out; what is left
+when effects are dropped one by one, with the planner's choice; solver tolerance, load steps and
+mesh layers against a tighter or finer solution; `simulate` against a loop by hand. Medians of
+calls in turns. Set OMP_NUM_THREADS=1.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from bench_data import DOCS, write_data
+from bench_data import DOCS, write_data, write_whole
 from machine import machine
-from twin_effects import Bench, measured
+from twin_contact import contact_ladders
+from twin_gallery import drops, effect_rows
+from twin_overhead import overhead
+from twin_rig import SPEC, KeptBench, gallery, kept_sensor
 
-from gelslim_cad.cli.twin_sensor import spec_sensor
-from gelslim_twin.contact.compliance import SurfaceCompliance
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
-from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
+from gelslim_twin.simulation.twin_sensor import TwinSensor
 
-ROOT = Path(__file__).parents[1]
-TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-FINEST = 1e-7
-MOST_POSES = 8
-QUICK = ("press_sphere", "release")
+NAME = "twin_ladders"
+POSES = 5
+"""Of a scene, with its last and its deepest: up to two more."""
+
+Part = Callable[[TwinSensor, Path, bool], Any]
+
+
+def scenes_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
+    """Every effect on every scene, and effects dropped one by one."""
+    effects: list[dict[str, Any]] = []
+    dropped: list[dict[str, Any]] = []
+    for loaded in gallery(quick):
+        started = time.perf_counter()
+        bench = KeptBench(loaded, sensor, folder, POSES)
+        rows = effect_rows(bench, 2 if quick else 5, quick)
+        effects += rows
+        dropped += drops(bench, rows, 2 if quick else 5, quick)
+        print(f"{loaded.scene.name}: {time.perf_counter() - started:.0f} s", flush=True)
+        for row in rows:
+            print("  " + effect_line(row))
+    return {"poses_at_most": POSES + 2, "effects": effects, "drops": dropped}
+
+
+def contact_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
+    """The solver's tolerance under its old name, and the two other ladders."""
+    found = contact_ladders(sensor, folder, quick)
+    return {"contact": found["tolerance"], "steps": found["steps"], "layers": found["layers"]}
+
+
+def overhead_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
+    """Planning and bookkeeping against a loop by hand."""
+    return {"overhead": overhead(sensor, folder, quick)}
+
+
+PARTS: dict[str, Part] = {
+    "overhead": overhead_part,
+    "contact": contact_part,
+    "scenes": scenes_part,
+}
 
 
 def main() -> None:
-    """Measure, print, write JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--docs", type=Path, help="folder to write data/ in")
-    asked = parser.parse_args()
-    quick = asked.quick
+    """Measure, print, write JSON, figures and tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="reduced, printed only")
+    parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
+    parser.add_argument("--only", choices=list(PARTS), help="one part, the others as they were")
+    options = parser.parse_args()
+    docs = options.docs or (None if options.quick else DOCS)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        store_sensor(spec_sensor(ROOT / "designs" / "gelslim2.yaml"), folder, True)
-        sensor, rows = stored_sensor(folder), []
-        for path in sorted((ROOT / "designs" / "scenes").glob("*.yaml")):
-            if quick and path.stem not in QUICK:
+        sensor = kept_sensor(folder)
+        for name, part in PARTS.items():
+            if options.only in (None, name):
+                # How busy the machine was with other work, whose noise the medians still have.
+                load = round(os.getloadavg()[0], 1)
+                found = part(sensor, folder, options.quick)
+                show(found)
+                if docs is not None:
+                    write(docs, name, load, found)
+    if docs is not None:
+        finish(docs)
+
+
+def held(docs: Path) -> dict[str, Any]:
+    """What has been measured already."""
+    path = docs / "data" / f"{NAME}.json"
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
+
+
+def write(docs: Path, name: str, load: float, found: dict[str, Any]) -> None:
+    """Put one part into the JSON: a stop loses one part only."""
+    before = held(docs)
+    loads = {**before.get("load_average", {}), name: load}
+    about = {**machine(), "seed": "of each scene", "design": SPEC.name, "load_average": loads}
+    write_data(
+        NAME, {**about, **{k: v for k, v in before.items() if k not in about}, **found}, docs
+    )
+
+
+def finish(docs: Path) -> None:
+    """Figures of what has been measured, and the guide's tables."""
+    from twin_figures import draw_contact, draw_scenes
+    from twin_tables import main as write_tables
+
+    data = held(docs)
+    if "drops" in data:
+        write_whole(docs / "images" / "twin_effects.png", draw_scenes(data["drops"]))
+    if "layers" in data:
+        write_whole(docs / "images" / "twin_contact.png", draw_contact(data))
+    if docs == DOCS:
+        write_tables()
+
+
+def effect_line(row: dict[str, Any]) -> str:
+    """One effect of one scene."""
+    errors = ", ".join(f"{k} {v:.3g} <= {row['bound'][k]:.3g}" for k, v in row["error"].items())
+    short = f"  BOUND TOO SMALL: {row['short']}" if row["short"] else ""
+    return (
+        f"{row['effect']:15s} {row['ms_with']:8.2f} {row['ms_without']:8.2f} ms  "
+        f"{row['auto']:12s} {errors}{short}"
+    )
+
+
+def show(found: dict[str, Any]) -> None:
+    """A line per rung; effects are printed as they come."""
+    for key, value in found.items():
+        for row in value if isinstance(value, list) else [value]:
+            if key == "effects" or not isinstance(row, dict):
                 continue
-            bench = Bench(read_scene(path), sensor, folder, MOST_POSES)
-            rows += measured(bench, quick)
-        for r in rows:
-            errors = ", ".join(f"{k} {v:.3g} <= {r['bound'][k]:.3g}" for k, v in r["error"].items())
-            print(
-                f"{r['scene']:15s} {r['effect']:15s} {r['ms_with']:8.2f} {r['ms_without']:8.2f} ms"
-                f"  {errors}{'  BOUND TOO SMALL: ' + str(r['short']) if r['short'] else ''}"
-            )
-        contact = [r for mu in (0.0, 0.6) for r in ladder(sensor, folder, mu)]
-        for r in contact:
-            print(r)
-    if asked.docs or not quick:
-        about = {**machine(), "seed": "of each scene", "poses_at_most": MOST_POSES}
-        data = {**about, "effects": rows, "contact": contact}
-        write_data("twin_ladders", data, asked.docs or DOCS)
-
-
-def ladder(sensor: Any, folder: Path, friction: float) -> list[dict[str, Any]]:
-    """Error against the finest tolerance, and time, along shear_sphere."""
-    loaded = read_scene(ROOT / "designs" / "scenes" / "shear_sphere.yaml")
-    tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
-    compliance = SurfaceCompliance(sensor.bundle, folder)
-
-    def solved(tolerance: float) -> tuple[Any, float]:
-        solver = ContactSolver(compliance, tool, ContactSettings(tolerance, friction))
-        started = time.perf_counter()
-        force = list(solver.states(loaded.poses))[-1].force_n
-        return force, 1000 * (time.perf_counter() - started) / len(loaded.poses)
-
-    true, _ = solved(FINEST)
-    rows = []
-    for tolerance in TOLERANCES:
-        force, ms = solved(tolerance)
-        whole = float(np.linalg.norm((force - true).sum(axis=0)))
-        field = float(np.linalg.norm(force - true) / np.linalg.norm(true))
-        rows.append(
-            {"friction": friction, "tolerance": tolerance, "ms": ms,
-             "resultant_error_n": whole, "field_error": field}
-        )  # fmt: skip
-    return rows
+            cells = [
+                f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}"
+                for k, v in row.items()
+                if k not in ("effects", "error")
+            ]
+            print(f"  {key}: " + "  ".join(cells), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,118 @@
+"""Figures of the twin's ladders: error on one axis, time on the other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+Rows = list[dict[str, Any]]
+FRICTIONLESS, FRICTIONAL, CHOSEN, FRONT = "#1f4e8c", "#c4580a", "#2d8a57", "#555555"
+FLOOR = 1e-3
+"""Where errors of nothing are drawn, as a share of the tolerance."""
+COLUMNS = 4
+
+
+def draw_scenes(drops: Rows) -> bytes:
+    """A panel per scene: effects dropped one by one, the front, the planner's choice."""
+    from gelslim_cad.figure import as_png, new_figure
+
+    names = list(dict.fromkeys(r["scene"] for r in drops))
+    rows = -(-len(names) // COLUMNS)
+    figure, axes = new_figure(16.0, 3.7 * rows, columns=COLUMNS, rows=rows)
+    panels = list(axes.flat)
+    for panel, name in zip(panels, names, strict=False):
+        draw_scene(panel, name, [r for r in drops if r["scene"] == name])
+    for panel in panels[len(names) :]:
+        panel.set_visible(False)
+    for panel in panels[::COLUMNS][:rows]:
+        panel.set_ylabel("error over tolerance")
+    panels[0].legend(fontsize=7, frameon=False, loc="lower left")
+    return as_png(figure)
+
+
+def draw_scene(panel: Any, name: str, rows: Rows) -> None:
+    """One scene."""
+    steps = [r for r in rows if r["label"] != "auto"]
+    (auto,) = (r for r in rows if r["label"] == "auto")
+    best = sorted((r for r in rows if r["front"]), key=lambda r: r["ms"])
+    panel.plot([r["ms"] for r in best], [shown(r) for r in best], color=FRONT, lw=1, label="front")
+    panel.scatter(
+        [r["ms"] for r in steps], [shown(r) for r in steps], s=16, color=FRICTIONLESS,
+        label="one effect less each", zorder=3,
+    )  # fmt: skip
+    panel.scatter(
+        auto["ms"], shown(auto), s=110, facecolors="none", edgecolors=CHOSEN, lw=2,
+        label="planner's choice", zorder=4,
+    )  # fmt: skip
+    for k, row in enumerate(steps):
+        panel.annotate(
+            row["label"].replace("_", " "), (row["ms"], shown(row)), fontsize=6.5,
+            xytext=(5, 4 if k % 2 else -7), textcoords="offset points",
+        )  # fmt: skip
+    panel.axhline(1.0, color="#c03060", lw=1, ls="--")
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.set_ylim(FLOOR / 2, 3e3)
+    times = [r["ms"] for r in rows]
+    panel.set_xlim(min(times) / 1.6, max(times) * 6)
+    panel.set_xlabel("ms per pose and frame", fontsize=8)
+    panel.set_title(name, fontsize=10)
+    panel.grid(alpha=0.3)
+
+
+def shown(row: dict[str, Any]) -> float:
+    """Error over tolerance; none is drawn at the lower edge."""
+    return max(FLOOR, float(row["of_tolerance"]))
+
+
+def draw_contact(data: dict[str, Any]) -> bytes:
+    """Three panels: tolerance, load steps, layers."""
+    from gelslim_cad.figure import as_png, new_figure
+
+    figure, axes = new_figure(15.0, 4.6, columns=3)
+    ladder(axes[0], data["contact"], "tolerance", "auto", "planner's choice")
+    ladder(axes[1], data["steps"], "steps", "", "")
+    ladder(axes[2], data["layers"], "layers", "design", "the design's")
+    axes[0].set_title("solver tolerance, against 1e-9", fontsize=11)
+    axes[1].set_title("load steps per movement, against many, last pose", fontsize=11)
+    axes[2].set_title(f"mesh layers, against {data['layers'][0]['against']}", fontsize=11)
+    axes[0].set_xlabel("ms per pose")
+    axes[1].set_xlabel("ms for the whole path")
+    axes[2].set_xlabel("seconds of set-up, once per pad")
+    axes[0].set_ylabel("error of the force field (relative L2)")
+    return as_png(figure)
+
+
+def ladder(panel: Any, rows: Rows, knob: str, mark: str, meaning: str) -> None:
+    """One ladder with and without friction; time is set-up's for layers, solving's else."""
+    key = "setup_s" if knob == "layers" else "ms"
+    for friction, colour in ((0.0, FRICTIONLESS), (0.6, FRICTIONAL)):
+        able = [r for r in rows if r["friction"] == friction and "failed" not in r]
+        # Without friction the path does not matter: what is left is rounding.
+        errors = [max(1e-8, r["field_error"]) for r in able]
+        label = f"μ {friction:g}" if friction else "frictionless"
+        panel.scatter([r[key] for r in able], errors, color=colour, s=18, label=label, zorder=3)
+        best = sorted(front_of([(r[key], e) for r, e in zip(able, errors, strict=True)]))
+        panel.plot([t for t, _ in best], [e for _, e in best], color=colour, lw=1, alpha=0.7)
+        for row, error in zip(able, errors, strict=True):
+            place = (row[key], error)
+            panel.annotate(
+                f"{row[knob]:g}", place, fontsize=7, color=colour,
+                xytext=(4, 4), textcoords="offset points",
+            )  # fmt: skip
+            if mark and row[mark]:
+                panel.scatter(*place, s=120, facecolors="none", edgecolors=CHOSEN, lw=2, zorder=4)
+    if mark:
+        panel.scatter([], [], s=80, facecolors="none", edgecolors=CHOSEN, lw=2, label=meaning)
+    panel.plot([], [], color=FRONT, lw=1, label="front")
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.grid(alpha=0.3)
+    panel.legend(fontsize=8, frameon=False)
+
+
+def front_of(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Points (time, error) that no other one beats in both."""
+    return [
+        p for p in points
+        if not any(o[0] <= p[0] and o[1] <= p[1] and o != p for o in points)
+    ]  # fmt: skip
