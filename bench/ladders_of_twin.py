@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from ladder_record import LadderRecord, RungRecord
 
-from gelslim_twin.contact.solver import ContactSettings
 from gelslim_twin.render.shading import Shading
 
 Data = Mapping[str, Any]
@@ -17,19 +17,41 @@ FRAME = "time per frame, one thread"
 
 
 def twin(data: Data, header: Data) -> list[LadderRecord]:
-    """Contact's tolerance and, over the gallery, the effects."""
-    return [contact(data["contact"], header), effects(data["effects"], header)]
+    """Contact's tolerance and layers; effects alone, and dropped one after the other."""
+    found = [contact(data[c.part], c, header) for c in CONTACT if c.part in data]
+    if "effects" in data:
+        found.append(effects(data["effects"], header))
+    if "drops" in data:
+        found.append(drops(data["drops"], header))
+    return found
 
 
-def contact(rows: Iterable[Data], header: Data) -> LadderRecord:
-    """Tolerance of the contact solver with and without friction."""
-    own = ContactSettings().tolerance
+@dataclass(frozen=True)
+class Knob:
+    """What is varied in the contact: where its rows are, and which of them is ours."""
+
+    part: str
+    key: str
+    own: str
+    title: str
+    reference: str
+
+
+CONTACT = (
+    Knob("contact", "tolerance", "auto", "tolerance of the solver", "A far finer tolerance"),
+    Knob("layers", "layers", "design", "layers of the gel", "The same pad with more layers"),
+)
+
+
+def contact(rows: Iterable[Data], knob: Knob, header: Data) -> LadderRecord:
+    """One knob of the contact with and without friction."""
     return LadderRecord(
-        name="contact",
-        title="Contact: tolerance of the solver",
-        question="A sphere pressed in and dragged (`shear_sphere`), linear gel.",
+        name=f"contact-{knob.key}",
+        title=f"Contact: {knob.title}",
+        question="A ball pressed in and dragged until it slips (`shear_sphere`), linear gel, "
+        "without and with friction.",
         paper=NO_PAPER,
-        reference="The same contact solved to 1e-7",
+        reference=knob.reference,
         error_label="error of the contact forces",
         error_unit="relative",
         time_label=POSE,
@@ -37,17 +59,48 @@ def contact(rows: Iterable[Data], header: Data) -> LadderRecord:
         source="twin_ladders",
         rungs=tuple(
             RungRecord(
-                f"tolerance {r['tolerance']:g}, μ = {r['friction']:g}",
+                f"{knob.key} {r[knob.key]:g}, μ = {r['friction']:g}",
                 r["field_error"],
                 r["ms"],
                 f"μ = {r['friction']:g}",
-                is_ours=r["tolerance"] == own,
+                is_ours=bool(r.get(knob.own)),
                 count=1000 * r["resultant_error_n"],
             )
             for r in rows
         ),
         header=header,
         count_label="mN error of the resultant",
+        kind="problems",
+    )
+
+
+def drops(rows: Iterable[Data], header: Data) -> LadderRecord:
+    """Effects left out one after the other on every scene, and the planner's choice."""
+    return LadderRecord(
+        name="planner",
+        title="The planner's choice of effects",
+        question="Scenes with every effect, then one less after the other; errors as shares of "
+        "each scene's tolerance. Ours is what the planner keeps.",
+        paper=NO_PAPER,
+        reference="Everything on",
+        error_label="error over the scene's tolerance",
+        error_unit="relative",
+        time_label=POSE,
+        time_unit="ms",
+        source="twin_ladders",
+        rungs=tuple(
+            RungRecord(
+                f"{r['label'].replace('_', ' ')}, {r['scene']}",
+                r["of_tolerance"],
+                r["ms"],
+                r["scene"],
+                is_ours=r["label"] == "auto",
+                count=len(r["effects"]),
+            )
+            for r in rows
+        ),
+        header=header,
+        count_label="effects kept",
         kind="problems",
     )
 
@@ -62,7 +115,7 @@ def effects(rows: Iterable[Data], header: Data) -> LadderRecord:
         name="effects",
         title="Effects of the digital twin",
         question="What each effect costs per frame, and how far it moves markers in the picture of "
-        "the scene that shows it most. The planner leaves out what a scene cannot show.",
+        "the scene that shows it most.",
         paper=NO_PAPER,
         reference="The same frame with the effect: largest shift of a marker",
         error_label="shift of a marker without the effect",
