@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 PAGE = ROOT / "docs" / "gallery.md"
 FOLDER = "out/gallery"
+SHEAR = f"{FOLDER}/shear_sphere"
 WIDTH_PX = 900
 COLOURS = 160
 
@@ -114,11 +115,19 @@ PICTURES = (
     _scene("press_ring", "A ring, as the camera sees it", "Simulated; forces known at every node."),
     _scene("textured_plane", "A knurled plane", "Simulated, with the same camera and light."),
     Picture(
-        "rod_forces",
-        "Forces of a rod pressed and pushed aside",
-        "Estimated: motion yellow, shear red, pressure shaded.",
-        (f"validate designs/gelslim2.yaml -o {FOLDER}/validation",),
-        f"{FOLDER}/validation/rod_and_shear.png",
+        "forces",
+        "Forces of a ball pressed and pushed aside",
+        "Estimated from simulated frames: motion yellow, shear red, pressure shaded. The true"
+        " wrench is in the simulation's `truth.csv`.",
+        (
+            f"bundle designs/gelslim2.yaml -o {FOLDER}/bundle",
+            f"simulate designs/scenes/shear_sphere.yaml -o {SHEAR}",
+            f"calibrate {FOLDER}/bundle {SHEAR}/frames/frame_000000.png"
+            f" -o {FOLDER}/calibration.json",
+            f"force {FOLDER}/bundle {SHEAR}/frames -c {FOLDER}/calibration.json"
+            f" -r {SHEAR}/frames/frame_000000.png --indenter sphere:10 -o {FOLDER}/forces --force",
+        ),
+        f"{FOLDER}/forces/pictures/*.png",
     ),
 )
 _HEAD = """\
