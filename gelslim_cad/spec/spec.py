@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gelslim_cad.spec.camera import Camera
 from gelslim_cad.spec.design import Design
@@ -12,6 +12,7 @@ from gelslim_cad.spec.manufacturing import Manufacturing
 from gelslim_cad.spec.material import Material
 from gelslim_cad.spec.mesh import Mesh
 from yaml_model.base import Block
+from yaml_model.folder_name import require_folder_name
 
 
 class Spec(Block):
@@ -33,3 +34,8 @@ class Spec(Block):
         default=Manufacturing(), description="Processes, tolerances, stock"
     )
     mesh: Mesh = Field(default=Mesh(), description="Finite-element mesh of the pad")
+
+    @model_validator(mode="after")
+    def _names_a_folder(self) -> Spec:
+        require_folder_name("name", self.name)
+        return self

@@ -13,6 +13,7 @@ from gelslim_twin.scene.sensor import Sensor
 from gelslim_twin.scene.variation import Variation
 from yaml_model.base import Block
 from yaml_model.errors import FieldError
+from yaml_model.folder_name import require_folder_name
 
 FORMAT = "gelslim-scene/1"
 
@@ -80,6 +81,7 @@ class Scene(Block):
 
     @model_validator(mode="after")
     def _once(self) -> Scene:
+        require_folder_name("name", self.name)
         for index, name in enumerate(self.observe):
             if name in self.observe[:index]:
                 raise FieldError(f"observe[{index}]", f"{name} is listed twice", "delete one")
