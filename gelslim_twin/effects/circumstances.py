@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TypeVar
 
 from gelslim_twin.effects.parameters import EffectParameters
-from gelslim_twin.effects.touch import Footprint, Touch, touch
+from gelslim_twin.effects.touch import RIDGES, Footprint, Touch, touch
 
 P = TypeVar("P", bound=EffectParameters)
 
@@ -131,9 +131,10 @@ class Circumstances:
 
     @property
     def force_n(self) -> float:
-        """Of the deepest contact, normal and tangential together, with this friction."""
+        """Of the deepest contact, normal and tangential together, with friction; linear gel."""
         t, mu = self.touch, self.friction
-        return math.hypot(1.0, mu) * (t.normal_n + min(mu, 1.0) * (t.stick_n - t.normal_n))
+        normal = t.normal_n + min(mu, 1.0) * (t.stick_n - t.normal_n)
+        return RIDGES * math.hypot(1.0, mu) * normal
 
     @property
     def blur_px(self) -> float:

@@ -7,6 +7,7 @@ import math
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
 from gelslim_twin.effects.parameters import EffectParameters
+from gelslim_twin.effects.touch import RIDGES
 
 
 class FrictionParameters(EffectParameters):
@@ -20,23 +21,34 @@ LOCAL = 4.0
 def dragged_mm(c: Circumstances) -> float:
     """How far the surface is dragged at most: the tool's way, its turn, and the depth.
 
-    A frictionless press moves the surface sideways by up to 0.73 of its depth (a wedge, measured),
-    which friction hinders.
+    A frictionless press moves the surface aside, which friction hinders.
     """
     turn = math.radians(c.motion.twist_deg) * c.footprint.reach_mm(c.touch.depth_mm)
     tilt = math.radians(c.motion.tilt_deg) * c.touch.depth_mm
-    return c.motion.lateral_mm + turn + tilt + c.touch.depth_mm
+    return c.motion.lateral_mm + turn + tilt + math.hypot(c.touch.depth_mm, c.touch.sideways_mm)
+
+
+def moved_mm(c: Circumstances) -> float:
+    """How far the surface moves sideways by friction: with the tool, or as its force can."""
+    t = c.touch
+    if c.friction == 0 or t.normal_n == 0:
+        return 0.0
+    tangential = min(c.friction * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
+    return min(dragged_mm(c), LOCAL * tangential / t.shear_n_per_mm)
 
 
 def bound(c: Circumstances) -> Bound:
-    """Tangential force: the friction limit, or full stick if that is less; stiffer layer too."""
+    """Tangential force: the friction limit, or full stick if that is less; stiffer layer too.
+
+    On a gel at large strain all forces are larger.
+    """
     t, mu = c.touch, c.friction
     if mu == 0 or t.normal_n == 0:
         return Bound()
-    tangential = min(mu * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
-    stiffer = min(mu, 1.0) * (t.stick_n - t.normal_n)
-    moved = min(dragged_mm(c), LOCAL * tangential / t.shear_n_per_mm)
-    return geometry(moved * c.sensor.px_per_mm, math.hypot(tangential, stiffer))
+    tangential = min(mu * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
+    stiffer = RIDGES * min(mu, 1.0) * (t.stick_n - t.normal_n)
+    larger = 1 + t.nonlinear_excess
+    return geometry(moved_mm(c) * c.sensor.px_per_mm, larger * math.hypot(tangential, stiffer))
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung, never_null
 from gelslim_twin.effects.parameters import EffectParameters
+from gelslim_twin.effects.touch import RIDGES
 
 
 class NormalContactParameters(EffectParameters):
     """Contact of rigid indenters with the gel."""
 
 
-RIDGES, ROUNDING = 1.25, 1.05
-"""Rings and bumps press up to 1.19 as hard as the disc of their area; nodes turn aside by 1 %."""
-
-
 def bound(c: Circumstances) -> Bound:
-    """All the force, and a surface pushed in by the whole depth."""
-    px = ROUNDING * c.touch.depth_mm * c.sensor.px_per_mm
+    """All the force, and a surface pushed in by the whole depth and aside."""
+    px = math.hypot(c.touch.depth_mm, c.touch.sideways_mm) * c.sensor.px_per_mm
     return Bound(RIDGES * c.touch.normal_n, px, px, px)
 
 

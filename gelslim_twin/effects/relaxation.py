@@ -43,11 +43,12 @@ class RelaxationParameters(EffectParameters):
 def bound(c: Circumstances) -> Bound:
     """What decays from the first contact to the end of the motion, of the whole force.
 
-    Where the depth is prescribed the surface stays as it is: stress alone relaxes.
+    The force lost is a mean of past elastic forces, so no more than the largest. Where the depth
+    is prescribed the surface stays as it is: stress alone relaxes.
     """
     terms = c.given("relaxation", RelaxationParameters).terms
     lost = sum(t.fraction * -math.expm1(-c.motion.contact_s / t.time_s) for t in terms)
-    return Bound(force_n=lost * c.force_n)
+    return Bound(force_n=lost * c.force_n * (1 + c.touch.nonlinear_excess))
 
 
 EFFECT = Effect(

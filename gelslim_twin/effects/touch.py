@@ -11,6 +11,10 @@ NONLINEAR_EXCESS = ((0.0, 0.0), (0.05, 0.02), (0.15, 0.08), (0.30, 0.21), (0.50,
 """Neo-Hookean over linear force, less one, by indentation over thickness (measured, PHYSICS 5)."""
 
 
+RIDGES = 1.25
+"""Rings and bumps press up to 1.19 as hard as the disc of their area."""
+
+
 @dataclass(frozen=True)
 class Footprint:
     """Of the undeformed shapes below the gel's surface, by depth."""
@@ -21,6 +25,8 @@ class Footprint:
     """Largest distance from the tool's axis."""
     steepest: Callable[[float], float]
     """Largest slope; infinite for shapes with walls."""
+    width_mm: Callable[[float], float]
+    """Across the narrowest shape."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,35 @@ class Touch:
     """The same with full stick, which keeps an incompressible layer from squeezing out."""
     shear_n_per_mm: float
     """Tangential force per mm of sideways motion with full stick, G A / h and the border's part."""
+    squeezed: float
+    """Share of the indentation that goes sideways, the rest compresses the gel."""
+    squeezed_at_rim: float
+    """The same where no gel lies around the contact: at the rim of the pad."""
+    strain: float
+    """Depth over thickness, or over the width of the narrowest shape if that is more."""
+
+    @property
+    def sideways_mm(self) -> float:
+        """How far a frictionless surface moves aside at most.
+
+        By 0.75 of the depth (0.73 at a wedge, measured); under wide tools by what is squeezed out
+        past the rim: a d/(2 h) in the mean over the layer, half as much again at its face
+        (lubrication with a free face), 1.2 times that in the middle of a square's sides, and as
+        much again where the pad's rim cuts the contact (measured: 1.09 of that).
+        """
+        wide = self.squeezed_at_rim * self.radius_mm * self.indentation
+        return 0.75 * max(self.depth_mm, 1.2 * 1.2 * wide)
+
+    @property
+    def nonlinear_excess(self) -> float:
+        """Share by which a linear gel under-reads the force.
+
+        The measured table, of a compressible gel under a ball; of what is squeezed out, the layer
+        that gets thinner: d/h³ becomes the integral of 1/(h - d)³, ((1 - e)^-2 - 1)/(2 e) as much.
+        """
+        table, e = nonlinear_excess(self.strain), min(self.indentation, 0.8)
+        thinner = ((1 - e) ** -2 - 1) / (2 * e) - 1 if e > 0 else 0.0
+        return table + self.squeezed * max(0.0, thinner - table)
 
 
 def nonlinear_excess(indentation: float) -> float:
@@ -73,7 +108,7 @@ def touch(
     d = max(0.0, depth_mm)
     area = footprint.area_mm2(d) if d > 0 else 0.0
     if area <= 0:
-        return Touch(d, d / thickness_mm, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Touch(d, d / thickness_mm, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, d / thickness_mm)
     volume, h = footprint.volume_mm3(d), thickness_mm
     e, nu = youngs_modulus_mpa, poissons_ratio
     g = e / (2 * (1 + nu))
@@ -82,13 +117,15 @@ def touch(
     half_space = 2 * e / (1 - nu * nu) * a * volume / area
     squeeze = 3 * g * volume * area / (8 * math.pi * h**3)
 
+    compress = confined * volume / h
+
     def layer(stronger: float, further: float) -> float:
         out = stronger * squeeze * (1 + further * h / a) ** 4
-        compress = confined * volume / h
         # A thin layer cannot be softer than in uniaxial stress, E V / h.
         return max(e * volume / h, compress * out / (compress + out))
 
     normal = 1.1 * half_space + layer(1.0, 1.2)
+    free = squeeze * (1 + 1.2 * h / a) ** 4
     return Touch(
         d,
         d / h,
@@ -97,4 +134,7 @@ def touch(
         normal,
         max(normal, 1.1 * half_space + layer(4.0, 0.5)),
         g * area / h + 8 * g * a / (2 - nu),
+        compress / (compress + free),
+        compress / (compress + squeeze),
+        max(d / h, d / footprint.width_mm(d)),
     )

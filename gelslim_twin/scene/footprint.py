@@ -18,32 +18,67 @@ from gelslim_twin.scene.indenter import (
     TexturedPlane,
     Wedge,
 )
-from gelslim_twin.scene.reach import tool_reach_mm, tool_steepness
+from gelslim_twin.scene.reach import shape_reach_mm, tool_reach_mm, tool_steepness
 from gelslim_twin.scene.stl_extent import footprint_mm
 
 Pair = Callable[[float], tuple[float, float]]
 """Area in mm² and volume in mm³ at a depth above 0."""
 
 
-def tool_footprint(indenters: Sequence[Indenter], folder: Path, pad_mm2: float) -> Footprint:
+def tool_footprint(
+    indenters: Sequence[Indenter], folder: Path, pad_mm2: float, node_pitch_mm: float = 0.0
+) -> Footprint:
     """Sum over the indenters of a tool, held to a pad of `pad_mm2`; overlaps count twice.
+
+    As nodes `node_pitch_mm` apart feel it: what is narrower than that is as wide for the node that
+    it meets, and pushes it down by its whole depth.
 
     Raises ValueError or OSError for an STL file (in `folder`) that cannot be read.
     """
-    shapes = [(_pair(one, folder), one.raised_mm) for one in indenters]
+    shapes = [(_felt(one, folder, node_pitch_mm), one.raised_mm) for one in indenters]
+
+    def parts(depth: float) -> list[tuple[float, float, float]]:
+        return [shape(depth - raised) for shape, raised in shapes if depth > raised]
 
     def total(depth: float) -> tuple[float, float]:
-        parts = [shape(depth - raised) for shape, raised in shapes if depth > raised]
-        area = sum(a for a, _ in parts)
+        found = parts(depth)
+        area = sum(a for a, _, _ in found)
         held = min(1.0, pad_mm2 / area) if area > 0 else 0.0
-        return held * area, held * sum(v for _, v in parts)
+        return held * area, held * sum(v for _, v, _ in found)
 
     return Footprint(
         lambda d: total(d)[0],
         lambda d: total(d)[1],
         lambda d: tool_reach_mm(indenters, folder, d),
         lambda d: tool_steepness(indenters, d),
+        lambda d: min((w for _, _, w in parts(d)), default=0.0),
     )
+
+
+def _felt(
+    indenter: Indenter, folder: Path, pitch: float
+) -> Callable[[float], tuple[float, float, float]]:
+    """Area, volume and width of the narrowest part, as nodes `pitch` apart feel a shape."""
+    pair = _pair(indenter, folder)
+
+    def felt(d: float) -> tuple[float, float, float]:
+        area, volume = pair(d)
+        length, most = 2 * shape_reach_mm(indenter, folder, d), math.inf
+        width = area / length
+        if isinstance(indenter, Ring):
+            most = math.pi * indenter.outer_radius_mm**2
+            width = min(width, indenter.outer_radius_mm - indenter.inner_radius_mm)
+        if isinstance(indenter, TexturedPlane):
+            most = indenter.length_mm * indenter.width_mm
+            if d < indenter.relief_mm:
+                width = min(width, indenter.pitch_mm * area / most)
+        wider = max(1.0, pitch / width) * max(1.0, pitch / length)
+        if wider > 1:
+            area = min(max(most, area), area * wider)
+            volume = area * d
+        return area, volume, max(width, pitch)
+
+    return felt
 
 
 def _pair(indenter: Indenter, folder: Path) -> Pair:

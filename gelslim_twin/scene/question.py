@@ -33,7 +33,9 @@ def plan_scene(loaded: LoadedScene, sensor: SensorFigures) -> Plan:
 def question(loaded: LoadedScene, sensor: SensorFigures) -> Question:
     """What the scene asks of a plan."""
     scene = loaded.scene
-    footprint = tool_footprint(scene.indenters, loaded.folder, sensor.length_mm * sensor.width_mm)
+    footprint = tool_footprint(
+        scene.indenters, loaded.folder, sensor.length_mm * sensor.width_mm, sensor.node_pitch_mm
+    )
     return Question(
         scene.name,
         scene.observe,

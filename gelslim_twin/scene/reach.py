@@ -28,7 +28,7 @@ def tool_reach_mm(indenters: Sequence[Indenter], folder: Path, depth_mm: float) 
     """
     return max(
         (
-            math.hypot(one.x_mm, one.y_mm) + _reach(one, folder, depth_mm - one.raised_mm)
+            math.hypot(one.x_mm, one.y_mm) + shape_reach_mm(one, folder, depth_mm - one.raised_mm)
             for one in indenters
             if depth_mm > one.raised_mm
         ),
@@ -44,7 +44,11 @@ def tool_steepness(indenters: Sequence[Indenter], depth_mm: float) -> float:
     )
 
 
-def _reach(indenter: Indenter, folder: Path, d: float) -> float:
+def shape_reach_mm(indenter: Indenter, folder: Path, d: float) -> float:
+    """Largest distance from the axis of a shape, at a depth `d` above 0.
+
+    Raises as `tool_reach_mm`.
+    """
     match indenter:
         case Sphere():
             return _circle(indenter.radius_mm, d)

@@ -249,7 +249,7 @@ def _effect(name: str, error: float, rungs: tuple[tuple[float, float], ...], **m
 
 
 def _ask(effects: tuple[Effect, ...], tolerance: float, **use: str) -> Question:
-    nothing = Footprint(*[lambda _d: 0.0] * 4)
+    nothing = Footprint(*[lambda _d: 0.0] * 5)
     parameters = {e.name: _Quiet(use=use.get(e.name, "auto")) for e in effects}
     c = Circumstances(SENSOR, MotionFigures(), nothing, 0.0, parameters)
     return Question("stub", ("image",), 0.0, tolerance, c)

@@ -122,7 +122,11 @@ def test_an_stl_file_is_read_as_by_trimesh(tmp_path, kind):
 def punch(radius: float) -> Footprint:
     area = math.pi * radius**2
     return Footprint(
-        lambda _d: area, lambda d: area * d, lambda _d: radius, lambda _d: math.inf
+        lambda _d: area,
+        lambda d: area * d,
+        lambda _d: radius,
+        lambda _d: math.inf,
+        lambda _d: 2 * radius,
     )
 
 
