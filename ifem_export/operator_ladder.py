@@ -18,6 +18,12 @@ WORDING = Wording(
 )
 
 
+def operator_label(rung: str, parameters: Mapping[str, float]) -> str:
+    """Name of an operator with its parameters."""
+    inside = ", ".join(f"{k} {v:g}" for k, v in parameters.items())
+    return f"{rung} ({inside})" if inside else rung
+
+
 @dataclass(frozen=True)
 class MeasuredRung:
     """One operator. Errors are relative: of the field (L2, worst of the fields) and resultant.
@@ -40,8 +46,7 @@ class MeasuredRung:
     @property
     def label(self) -> str:
         """Name with parameters."""
-        inside = ", ".join(f"{k} {v:g}" for k, v in self.parameters.items())
-        return f"{self.rung} ({inside})" if inside else self.rung
+        return operator_label(self.rung, self.parameters)
 
 
 @dataclass(frozen=True)

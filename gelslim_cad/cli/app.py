@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from gelslim_cad import __version__
+from gelslim_cad.cli.bench import bench
 from gelslim_cad.cli.build import build
 from gelslim_cad.cli.bundle import bundle
 from gelslim_cad.cli.bundle_export import bundle_export
@@ -75,6 +76,7 @@ for _command in (
     bundle,
     bundle_info,
     bundle_export,
+    bench,
     calibrate,
     force,
     track,

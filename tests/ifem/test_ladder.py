@@ -15,7 +15,7 @@ from ifem_export.bundle import build_bundle
 from ifem_export.bundle_io import load_bundle, write_bundle
 from ifem_export.element import Formulation
 from ifem_export.errors import BundleError, IfemError
-from ifem_export.ladder import lumped, measure_ladder, refined, retimed
+from ifem_export.ladder import lumped, measure_ladder, operator_choices, refined, time_operators
 from ifem_export.material import Material
 from ifem_export.operator_ladder import OperatorLadder
 from ifem_export.outline import RoundedRectangle
@@ -147,7 +147,7 @@ def test_an_error_picks_the_same_operator_and_the_same_bits_whatever_the_clock(
 
 
 def test_times_are_measured_anew_for_every_rung(ladder: OperatorLadder) -> None:
-    times = retimed(ladder, pad(), GEL, "bbar")
+    times = time_operators(operator_choices(pad()), pad(), GEL, "bbar")
     assert list(times) == [r.label for r in ladder.rungs]
     assert all(ms > 0 for ms in times.values())
     again = ladder.timed(times)

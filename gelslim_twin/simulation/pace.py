@@ -1,0 +1,95 @@
+"""How long this machine takes for a simulated pose, over what the effects declare.
+
+A sphere is pressed into the sensor and slid, once on a linear gel and once at large strain; the
+time of each part of the simulation is set against the times its effects declare.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from gelslim_twin.effects.circumstances import SensorFigures
+from gelslim_twin.plan import Plan
+from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.sensor_figures import bundle_figures
+from gelslim_twin.simulation.scene_task import job_of
+from gelslim_twin.simulation.simulate import Ledger, simulate
+from gelslim_twin.simulation.stored_sensor import BUNDLE, store_sensor, stored_sensor
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE, pace_group
+
+Progress = Callable[[str, int, int], None]
+DEPTH, RADIUS = 0.1, 2.0
+"""Of the sphere's press and of the sphere, over the thickness of the gel."""
+RUNS = (("first", "off"), ("linear", "off"), ("large", "on"))
+"""Names, and whether the gel is strained largely."""
+SCENE = """\
+format: gelslim-scene/1
+name: pace
+sensor: {{bundle: {bundle}}}
+indenters:
+  - {{shape: sphere, radius_mm: {radius:.6g}}}
+motion:
+  waypoints:
+    - {{move: press, depth_mm: {depth:.6g}, steps: 8, duration_s: 0.8}}
+    - {{move: shear, x_mm: {depth:.6g}, steps: 4, duration_s: 0.4}}
+contact: {{friction: 0.6}}
+observe: [displacement, force, markers, image]
+effects:
+  nonlinearity: {{use: {large_strain}}}
+"""
+
+
+def measure_paces(
+    sensor: TwinSensor, progress: Progress | None = None
+) -> tuple[dict[str, float], SensorFigures]:
+    """Times over declared times by group of effects (`tolerance_ladder.pace_group`).
+
+    With them the figures of the sensor as planning sees it. Raises what `simulate` raises.
+    """
+    tell = progress or (lambda text, done, total: None)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        store_sensor(sensor, folder / "sensor", True)
+        runs = {}
+        # The first run computes the compliance of the pad and compiles what is not compiled yet.
+        for step, (name, strain) in enumerate(
+            (("first", "off"), ("linear", "off"), ("large", "on"))
+        ):
+            tell(f"simulation, {name} run", step, 3)
+            runs[name] = _run(folder, name, strain)
+        figures = bundle_figures(folder / "sensor" / BUNDLE)
+    (linear, plan), (large, strained) = runs["linear"], runs["large"]
+    poses = plan.poses
+    gel_ms = 1000 * linear.seconds.get("gel", 0.0) / poses
+    more_ms = 1000 * large.seconds.get("gel", 0.0) / poses - gel_ms
+    seen = sum(linear.seconds.get(part, 0.0) for part in ("markers", "image"))
+    found = {
+        GEL: gel_ms / _declared(plan, GEL),
+        LARGE_STRAIN: more_ms / _declared(strained, LARGE_STRAIN),
+        PICTURE: 1000 * seen / max(1, linear.frames_drawn) / _declared(plan, PICTURE),
+    }
+    return {group: pace for group, pace in found.items() if pace > 0}, figures
+
+
+def _run(folder: Path, name: str, large_strain: str) -> tuple[Ledger, Plan]:
+    kept = folder / "sensor"
+    sensor = stored_sensor(kept)
+    mesh = sensor.bundle.mesh
+    thickness = mesh.layers * mesh.cell_size_mm[2]
+    text = SCENE.format(
+        bundle=f"sensor/{BUNDLE}",
+        radius=RADIUS * thickness,
+        depth=DEPTH * thickness,
+        large_strain=large_strain,
+    )
+    path = folder / f"{name}.yaml"
+    path.write_text(text, encoding="utf-8")
+    job = job_of(read_scene(path), sensor, kept)
+    return simulate(job, folder / name), job.plan
+
+
+def _declared(plan: Plan, group: str) -> float:
+    return sum(c.predicted_ms for c in plan.included if pace_group(c.effect) == group)
