@@ -38,6 +38,7 @@ docs: $(VENV)/.installed-dev
 	$(BIN)/gelslim schema --scene -o docs/gelslim-scene-1.schema.json
 	$(BIN)/gelslim schema --markdown -o docs/spec_reference.md
 	$(BIN)/gelslim schema --scene --markdown -o docs/scene_reference.md
+	$(BIN)/python bench/accuracy_page.py
 	$(BIN)/python tools/sensitivities.py
 	$(BIN)/python tools/gallery.py
 
