@@ -1,0 +1,155 @@
+"""Killed at random moments, whatever the command: nothing lost, nothing half-written, no junk."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from sweep_commands import COMMANDS, NAMED, Command, digests, environment, finished, prepare
+
+pytest.importorskip("cadquery", reason="building needs the [cad] extra")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills process groups")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = prepare(tmp_path_factory.mktemp("inputs") / "in puts é")
+    done = finished(NAMED["simulate"].argv(folder, folder / "run"), folder.parent / "tmp")
+    assert done.returncode == 0, done.stderr
+    (folder / "run" / "frames").rename(folder / "drawn")
+    return folder
+
+
+def killed(argv: list[str], scratch: Path, after_s: float) -> bool:
+    """Start, kill the whole group after a while; whether it was still at work."""
+    process = subprocess.Popen(
+        argv, env=environment(scratch), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )  # fmt: skip
+    try:
+        process.wait(after_s)
+        return False
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return True
+
+
+def kill_and_finish(command: Command, place: Path, tmp_path: Path, kills: int) -> None:
+    clean, scratch = tmp_path / "clean" / "out", tmp_path / "tmp"
+    started = time.monotonic()
+    done = finished(command.argv(place, clean), scratch)
+    took = time.monotonic() - started
+    assert done.returncode == 0, done.stderr
+    whole = digests(clean.parent, command.ignored)
+    assert whole
+    out = tmp_path / "killed" / "out"
+    moments = random.Random(f"kill {command.name}")
+    for k in range(kills):
+        # Most of the first seconds go to imports: kill late rather than early.
+        killed(command.argv(place, out), scratch, took * moments.uniform(0.3, 1.0))
+        if k == kills // 2 and command.name not in ("force", "new"):
+            # Once over halfway, so that a resumed run is killed too.
+            assert finished(command.argv(place, out), scratch).returncode == 0
+            assert digests(out.parent, command.ignored) == whole
+            shutil.rmtree(out.parent)
+    done = finished(command.argv(place, out), scratch)
+    assert done.returncode == 0, done.stderr
+    found = digests(out.parent, command.ignored)
+    assert {n for n in found if n not in whole} == set()
+    assert found == whole
+    left = [p.name for p in scratch.iterdir() if p.name.startswith("gelslim")]
+    assert left == []
+
+
+def old_or_new(command: Command, place: Path, tmp_path: Path, kills: int) -> None:
+    """Over an earlier output of another kind every file is the old or the new one, whole."""
+    scratch, versions = tmp_path / "tmp", []
+    for other in (True, False):
+        folder = tmp_path / f"other_{other}" / "out"
+        assert finished(command.argv(place, folder, other), scratch).returncode == 0
+        versions.append(digests(folder))
+    old, new = versions
+    assert old != new
+    moments = random.Random(f"over {command.name}")
+    for k in range(kills):
+        out = tmp_path / f"over_{k}" / "out"
+        started = time.monotonic()
+        assert finished(command.argv(place, out, other=True), scratch).returncode == 0
+        took = time.monotonic() - started
+        killed(command.argv(place, out), scratch, took * moments.uniform(0.5, 1.1))
+        shown = {n: d for n, d in digests(out).items() if not n.rpartition("/")[2].startswith(".")}
+        if command.name == "bundle":
+            assert shown in (old, new)
+        for name, digest in shown.items():
+            assert digest in (old.get(name), new.get(name)), name
+        assert set(old) & set(new) <= set(shown)
+
+
+def test_markers_killed_now_and_then(place: Path, tmp_path: Path) -> None:
+    kill_and_finish(NAMED["markers"], place, tmp_path, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
+def test_killed_at_random_moments_it_ends_with_the_same_bytes(
+    command: Command, place: Path, tmp_path: Path
+) -> None:
+    kill_and_finish(command, place, tmp_path, command.kills)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c.other], ids=lambda c: c.name)
+def test_killed_over_an_earlier_output_each_file_is_whole(
+    command: Command, place: Path, tmp_path: Path
+) -> None:
+    old_or_new(command, place, tmp_path, 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
+def test_two_at_once_into_one_folder_end_whole_or_say_why(
+    command: Command, place: Path, tmp_path: Path
+) -> None:
+    clean, out, scratch = tmp_path / "clean" / "out", tmp_path / "both" / "out", tmp_path / "tmp"
+    assert finished(command.argv(place, clean), scratch).returncode == 0
+    both = [
+        subprocess.Popen(
+            command.argv(place, out), env=environment(scratch), text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )
+        for _ in range(2)
+    ]  # fmt: skip
+    told = [process.communicate(timeout=600) for process in both]
+    for process, (_, err) in zip(both, told, strict=True):
+        assert "Traceback" not in err
+        if process.returncode:
+            assert process.returncode == 2, err
+            assert "another process" in err or "another gelslim" in err
+    assert 0 in [process.returncode for process in both], told
+    assert digests(out.parent, command.ignored) == digests(clean.parent, command.ignored)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
+def test_an_interrupt_is_one_line(command: Command, place: Path, tmp_path: Path) -> None:
+    """Ctrl-C at a terminal reaches every process of the group."""
+    moments, scratch = random.Random(f"interrupt {command.name}"), tmp_path / "tmp"
+    for k in range(3):
+        process = subprocess.Popen(
+            command.argv(place, tmp_path / f"out_{k}" / "out"), env=environment(scratch),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        )  # fmt: skip
+        time.sleep(moments.uniform(0.6, 3.0))
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        assert "Traceback" not in out + err, err
+        assert process.returncode in (0, 130), err
