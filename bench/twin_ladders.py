@@ -2,12 +2,13 @@
 
     python bench/twin_ladders.py                  # writes docs/data, docs/images and the guide
     python bench/twin_ladders.py --only contact   # measures one part anew, keeps the others
+    python bench/twin_ladders.py --scene tilt     # one scene anew
     python bench/twin_ladders.py --quick          # two scenes in a linear gel; printed only
 
 Every effect's milliseconds with and without it, and the error of leaving it out; what is left
 when effects are dropped one by one, with the planner's choice; solver tolerance, load steps and
-mesh layers against a tighter or finer solution; `simulate` against a loop by hand. Medians of
-calls in turns. Set OMP_NUM_THREADS=1.
+mesh layers against a tighter or finer solution; `simulate` against a loop by hand. Medians of CPU
+time of calls in turns. Set OMP_NUM_THREADS=1.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import argparse
 import json
 import os
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -28,29 +28,25 @@ from twin_gallery import drops, effect_rows
 from twin_overhead import overhead
 from twin_rig import SPEC, KeptBench, gallery, kept_sensor
 
+from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 
 NAME = "twin_ladders"
-POSES = 5
+POSES = 4
 """Of a scene, with its last and its deepest: up to two more."""
 
 Part = Callable[[TwinSensor, Path, bool], Any]
 
 
-def scenes_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
-    """Every effect on every scene, and effects dropped one by one."""
-    effects: list[dict[str, Any]] = []
-    dropped: list[dict[str, Any]] = []
-    for loaded in gallery(quick):
-        started = time.perf_counter()
-        bench = KeptBench(loaded, sensor, folder, POSES)
-        rows = effect_rows(bench, 2 if quick else 5, quick)
-        effects += rows
-        dropped += drops(bench, rows, 2 if quick else 5, quick)
-        print(f"{loaded.scene.name}: {time.perf_counter() - started:.0f} s", flush=True)
-        for row in rows:
-            print("  " + effect_line(row))
-    return {"poses_at_most": POSES + 2, "effects": effects, "drops": dropped}
+def scene_part(
+    loaded: LoadedScene, sensor: TwinSensor, folder: Path, quick: bool
+) -> dict[str, Any]:
+    """Every effect on one scene, and effects dropped one by one."""
+    bench, rounds = KeptBench(loaded, sensor, folder, POSES), 2 if quick else 5
+    rows = effect_rows(bench, rounds, quick)
+    for row in rows:
+        print("  " + effect_line(row))
+    return {"poses_at_most": POSES + 2, "effects": rows, "drops": drops(bench, rows, rounds, quick)}
 
 
 def contact_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
@@ -67,8 +63,8 @@ def overhead_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, An
 PARTS: dict[str, Part] = {
     "overhead": overhead_part,
     "contact": contact_part,
-    "scenes": scenes_part,
 }
+SCENES = "scenes"
 
 
 def main() -> None:
@@ -78,20 +74,21 @@ def main() -> None:
     )
     parser.add_argument("--quick", action="store_true", help="reduced, printed only")
     parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
-    parser.add_argument("--only", choices=list(PARTS), help="one part, the others as they were")
+    parser.add_argument("--only", choices=[*PARTS, SCENES], help="keep the rest")
+    parser.add_argument("--scene", help="one scene of the gallery, the others as they were")
     options = parser.parse_args()
     docs = options.docs or (None if options.quick else DOCS)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         sensor = kept_sensor(folder)
+        asked = SCENES if options.scene else options.only
         for name, part in PARTS.items():
-            if options.only in (None, name):
-                # How busy the machine was with other work, whose noise the medians still have.
-                load = round(os.getloadavg()[0], 1)
-                found = part(sensor, folder, options.quick)
-                show(found)
-                if docs is not None:
-                    write(docs, name, load, found)
+            if asked in (None, name):
+                keep(docs, name, part(sensor, folder, options.quick))
+        for loaded in gallery(options.quick) if asked in (None, SCENES) else []:
+            if options.scene in (None, loaded.scene.name):
+                print(f"{loaded.scene.name}:", flush=True)
+                keep(docs, SCENES, scene_part(loaded, sensor, folder, options.quick))
     if docs is not None:
         finish(docs)
 
@@ -102,11 +99,20 @@ def held(docs: Path) -> dict[str, Any]:
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
 
-def write(docs: Path, name: str, load: float, found: dict[str, Any]) -> None:
-    """Put one part into the JSON: a stop loses one part only."""
+def keep(docs: Path | None, name: str, found: dict[str, Any]) -> None:
+    """Print one part or scene and put it into the JSON: a stop loses one only."""
+    show(found)
+    if docs is None:
+        return
     before = held(docs)
-    loads = {**before.get("load_average", {}), name: load}
+    # How busy the machine was with other work, whose noise the medians still have.
+    loads = {**before.get("load_average", {}), name: round(os.getloadavg()[0], 1)}
     about = {**machine(), "seed": "of each scene", "design": SPEC.name, "load_average": loads}
+    if name == SCENES:
+        (scene,) = {r["scene"] for r in found["effects"]}
+        for key in ("effects", "drops"):
+            others = [r for r in before.get(key, []) if r["scene"] != scene]
+            found[key] = sorted([*others, *found[key]], key=lambda r: str(r["scene"]))
     write_data(
         NAME, {**about, **{k: v for k, v in before.items() if k not in about}, **found}, docs
     )

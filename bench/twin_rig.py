@@ -48,16 +48,17 @@ def gallery(quick: bool) -> list[LoadedScene]:
 
 
 def turns_ms(calls: Sequence[Callable[[], Any]], rounds: int) -> list[float]:
-    """Median milliseconds of calls made in turns, so that a busy machine hinders all alike.
+    """Median milliseconds of CPU of calls made in turns, so that a busy machine hinders all alike.
 
-    The first round (compiling, set-up) does not count.
+    CPU time of the process, which runs one thread: waiting for other work does not count. Nor does
+    the first round (compiling, set-up).
     """
     spent = np.empty((rounds + 1, len(calls)))
     for row in spent:
         for k, call in enumerate(calls):
-            started = time.perf_counter()
+            started = time.process_time()
             call()
-            row[k] = time.perf_counter() - started
+            row[k] = time.process_time() - started
     return [float(v) for v in 1000 * np.median(spent[1:], axis=0)]
 
 
@@ -89,9 +90,9 @@ class KeptBench(Bench):
             if "nonlinearity" not in plan.order:
                 # The first time compiles, and makes columns of the compliance.
                 self.solve(plan)
-            started = time.perf_counter()
+            started = time.process_time()
             states = self.solve(plan)
-            self.kept[key] = states, 1000 * (time.perf_counter() - started) / len(states)
+            self.kept[key] = states, 1000 * (time.process_time() - started) / len(states)
         return self.kept[key]
 
     def solve(self, plan: Plan) -> list[GelState]:

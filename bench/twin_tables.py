@@ -41,7 +41,7 @@ def blocks() -> dict[str, str]:
 def where(data: dict[str, Any], part: str) -> str:
     """Machine and load in words."""
     return (
-        f"{data['processor']}, one thread, with other work on the machine (load "
+        f"{data['processor']}, CPU time of one thread, medians; other work on the machine (load "
         f"{data['load_average'][part]:g} on {data['cores']} cores)"
     )
 
