@@ -50,7 +50,7 @@ class Rungs:
     most_steps: int = MOST_STEPS
     layers: tuple[int, ...] = LAYERS
     most_layers: int = MOST_LAYERS
-    rounds: int = 9
+    rounds: int = 5
 
 
 FULL, QUICK = Rungs(), Rungs((1e-1, 1e-3, 1e-5), (1, 3, 10), 20, (1, 2, 4), 6, 2)

@@ -25,7 +25,8 @@ def draw_scenes(drops: Rows) -> bytes:
         panel.set_visible(False)
     for panel in panels[::COLUMNS][:rows]:
         panel.set_ylabel("error over tolerance")
-    panels[0].legend(fontsize=7, frameon=False, loc="lower left")
+    marks, texts = panels[0].get_legend_handles_labels()
+    figure.legend(marks, texts, fontsize=9, frameon=False, loc="outside lower center", ncols=3)
     return as_png(figure)
 
 
@@ -45,15 +46,18 @@ def draw_scene(panel: Any, name: str, rows: Rows) -> None:
     )  # fmt: skip
     for k, row in enumerate(steps):
         panel.annotate(
-            row["label"].replace("_", " "), (row["ms"], shown(row)), fontsize=6.5,
-            xytext=(5, 4 if k % 2 else -7), textcoords="offset points",
-        )  # fmt: skip
+            str(k), (row["ms"], shown(row)), fontsize=7, xytext=(-3, 5), textcoords="offset points"
+        )
+    names = [f"{k}  {row['label'].replace('_', ' ')}" for k, row in enumerate(steps)]
+    panel.text(
+        0.98, 0.97, "\n".join(names), transform=panel.transAxes, fontsize=7, ha="right", va="top"
+    )
     panel.axhline(1.0, color="#c03060", lw=1, ls="--")
     panel.set_xscale("log")
     panel.set_yscale("log")
-    panel.set_ylim(FLOOR / 2, 3e3)
+    panel.set_ylim(FLOOR / 2, 1e4)
     times = [r["ms"] for r in rows]
-    panel.set_xlim(min(times) / 1.6, max(times) * 6)
+    panel.set_xlim(min(times) / 1.6, max(times) * 2)
     panel.set_xlabel("ms per pose and frame", fontsize=8)
     panel.set_title(name, fontsize=10)
     panel.grid(alpha=0.3)

@@ -75,7 +75,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="reduced, printed only")
     parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
     parser.add_argument("--only", choices=[*PARTS, SCENES], help="keep the rest")
-    parser.add_argument("--scene", help="one scene of the gallery, the others as they were")
+    parser.add_argument("--scene", nargs="+", help="of the gallery; the others as they were")
     options = parser.parse_args()
     docs = options.docs or (None if options.quick else DOCS)
     with tempfile.TemporaryDirectory() as place:
@@ -86,7 +86,7 @@ def main() -> None:
             if asked in (None, name):
                 keep(docs, name, part(sensor, folder, options.quick))
         for loaded in gallery(options.quick) if asked in (None, SCENES) else []:
-            if options.scene in (None, loaded.scene.name):
+            if not options.scene or loaded.scene.name in options.scene:
                 print(f"{loaded.scene.name}:", flush=True)
                 keep(docs, SCENES, scene_part(loaded, sensor, folder, options.quick))
     if docs is not None:

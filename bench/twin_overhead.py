@@ -117,7 +117,7 @@ def overhead(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
 
     pairs = [
         (spent(planned, ours), spent(lambda: hand.run(theirs), theirs))
-        for _ in range(4 if quick else 25)
+        for _ in range(4 if quick else 12)
     ][1:]
     same_files(ours, theirs)
     cpu = np.array([[a[0], b[0]] for a, b in pairs])
