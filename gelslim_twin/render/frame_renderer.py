@@ -21,6 +21,7 @@ from gelslim_twin.render.surroundings import Pad, still_irradiance
 if TYPE_CHECKING:
     from gelslim_optics.virtual_camera import VirtualCamera
     from gelslim_twin.render.defocus import BlurField
+    from gelslim_twin.render.domed_top import DomedTop
     from gelslim_twin.render.light_map import LightMap
     from gelslim_twin.render.marker_motion import MarkerMotion
     from ifem_export.marker_grid import MarkerGrid
@@ -45,6 +46,8 @@ class FrameRenderer:
     light: LightMap
     pad: Pad
     look: Look
+    top: DomedTop | None = None
+    """The outer surface at rest; None is flat."""
 
     @cached_property
     def dots(self) -> PrintedDots:
@@ -61,7 +64,8 @@ class FrameRenderer:
     @cached_property
     def still(self) -> Image:
         """Light (h, w, k) of the pad at rest without dots: edge, dirt and blur included."""
-        light = still_irradiance(self.camera, self.sight, self.light, self.pad)
+        seen = None if self.top is None else self.top.seen_mm(self.sight)
+        light = still_irradiance(self.camera, self.sight, self.light, self.pad, seen)
         if self.look.dirt is not None:
             light = self.look.dirt.apply(
                 self.camera, (self.pad.length_mm, self.pad.width_mm), light
@@ -113,6 +117,10 @@ class FrameRenderer:
         where it is known better than by interpolating the surface; shading is the surface's.
         Raises ValueError for dots behind the camera.
         """
+        if self.top is not None:
+            surface = self.top.carrying(surface)
+            before = self.top.carrying(before) if before is not None else None
+            markers, markers_before = self._raised(markers), self._raised(markers_before)
         start, now = self._outlines(surface, before, markers, markers_before)
         middle = now if start is now else (start + now) / 2
         centres, area = centroids_px(middle)
@@ -128,6 +136,7 @@ class FrameRenderer:
     def values(self, ink: Image, surface: SurfaceState | None = None) -> Image:
         """Grey values (h, w, 3) before noise and rounding, for dots' coverage `ink` (h, w)."""
         out = np.empty((*ink.shape, 3), dtype=np.float32)
+        surface = surface if self.top is None else self.top.carrying(surface)
         self._composer(ink, surface)(0, out)
         return out
 
@@ -139,6 +148,8 @@ class FrameRenderer:
         if self.look.shading is not None and surface is not None and surface.moves:
             assert self._shading_sight is not None
             gain = self.look.shading.gain(self._shading_sight, surface, self.light)
+            if self.top is not None:
+                gain = 1 + (gain - 1) * self._on_pad
             step = self.look.shading.pixel_step
         colour = (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
         contrast = np.float32(self.look.contrast)
@@ -181,9 +192,23 @@ class FrameRenderer:
         then = outlines_px(self.camera, self.dots, earlier)
         return self.look.motion_blur.start(then, now), now
 
+    def _raised(self, motion: MarkerMotion | None) -> MarkerMotion | None:
+        if motion is None or self.top is None:
+            return motion
+        return self.top.carrying_markers(motion, self.dots.centres_mm)
+
+    @cached_property
+    def _on_pad(self) -> Image:
+        """Share (rows, columns, 1) of the pad on the shading's lattice; the frame is no dome."""
+        assert self._shading_sight is not None
+        places = self._shading_sight.rest_mm
+        beyond = self.pad.beyond_mm(places[..., 0], places[..., 1])
+        return np.clip(1 - beyond, 0.0, 1.0).astype(np.float32)[..., None]
+
     @cached_property
     def _rest_outlines(self) -> Array:
         rest = SurfaceState.at_rest(self.pad.length_mm, self.pad.width_mm)
+        rest = rest if self.top is None else self.top.rest
         return outlines_px(self.camera, self.dots, rest)
 
     @cached_property

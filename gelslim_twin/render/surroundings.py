@@ -65,19 +65,27 @@ class Pad:
 
 
 def still_irradiance(
-    camera: VirtualCamera, sight: Sight, light: LightMap, pad: Pad
+    camera: VirtualCamera,
+    sight: Sight,
+    light: LightMap,
+    pad: Pad,
+    seen_mm: Array | None = None,
 ) -> NDArray[np.float32]:
-    """Light (h, w, k) that each pixel receives from each source, pad at rest, no dots."""
-    x, y = sight.rest_mm[..., 0], sight.rest_mm[..., 1]
+    """Light (h, w, k) that each pixel receives from each source, pad at rest, no dots.
+
+    `seen_mm` (h, w, 2) is where each pixel's ray meets the gel: at z = 0 where None.
+    """
+    seen = sight.rest_mm if seen_mm is None else seen_mm
+    x, y = seen[..., 0], seen[..., 1]
     beyond = pad.beyond_mm(x, y)
     on_pad = np.clip(0.5 - beyond / sight.pixel_mm(), 0.0, 1.0)
     frame = pad.frame_level * np.exp(-np.maximum(beyond, 0) / pad.frame_decay_mm)
     coat = light.at(x, y) * (on_pad * _mottled(pad, x, y))[..., None]
     halfway = [np.clip(v, -s / 2, s / 2) / 2 for v, s in ((x, pad.length_mm), (y, pad.width_mm))]
-    seen = coat + light.at(*halfway) * ((1 - on_pad) * frame)[..., None]
+    lit = coat + light.at(*halfway) * ((1 - on_pad) * frame)[..., None]
     if pad.vignetting > 0:
-        seen = seen * (1 - pad.vignetting * (1 - _cos4(camera)))[..., None]
-    return np.ascontiguousarray(seen, dtype=np.float32)
+        lit = lit * (1 - pad.vignetting * (1 - _cos4(camera)))[..., None]
+    return np.ascontiguousarray(lit, dtype=np.float32)
 
 
 def _mottled(pad: Pad, x: Array, y: Array) -> Array:

@@ -72,6 +72,7 @@ class Viewer:
     @cached_property
     def renderer(self) -> FrameRenderer:
         """Draws frames. Raises ValueError where the plan draws none."""
+        from gelslim_twin.render.domed_top import DomedTop
         from gelslim_twin.render.frame_renderer import FrameRenderer
         from gelslim_twin.render.surroundings import Pad
         from gelslim_twin.view.look import plan_look
@@ -90,7 +91,8 @@ class Viewer:
             vignetting=VIGNETTING,
             seed=self.scene.seed,
         )
-        return FrameRenderer(self.camera, self.sensor.grid, self.sensor.light(), pad, look)
+        top = DomedTop.of_nodes(self.sensor.points_mm)
+        return FrameRenderer(self.camera, self.sensor.grid, self.sensor.light(), pad, look, top)
 
     def surface(self, state: GelState) -> SurfaceState:
         """The state as the renderer takes it; the last two are kept, as a frame needs the one

@@ -17,6 +17,7 @@ from gelslim_force.calibration import calibrate
 from gelslim_force.force_pipeline import ForcePipeline
 from gelslim_force.frame_result import FrameResult
 from gelslim_force.sensor_calibration import SensorCalibration
+from gelslim_twin.render.domed_top import DomedTop
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.sensor_look import sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
@@ -179,7 +180,8 @@ def sensor_renderer(sensor: TwinSensor, seed: int) -> FrameRenderer:
     focus = float(record.get("focus_mm") or 1e6)
     pad = Pad(*sensor.size_mm, sensor.corner_radius_mm, mottle=0.04, vignetting=0.7, seed=seed)
     look = sensor_look(aperture, focus, seed)
-    return FrameRenderer(bundle_camera(sensor.bundle), sensor.grid, sensor.light(), pad, look)
+    camera, top = bundle_camera(sensor.bundle), DomedTop.of_nodes(sensor.points_mm)
+    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, look, top)
 
 
 def _statement(gel: TruthGel, layers: int) -> str:
