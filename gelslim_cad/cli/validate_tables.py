@@ -29,7 +29,10 @@ def print_validation(found: Validation) -> None:
         f"true forces up to {max(sizes):.2f} N."
     )
     say(f"{found.truth}\n")
-    print("Resultant, found minus true, standard deviation and mean in N:")
+    say(
+        "Resultant, found minus true: standard deviation and mean of x, y, z in N; error: root "
+        "mean square over that of the force; good: frames within 15 % of the force:"
+    )
     screen.print(_resultants("chain", found.chains))
     print("\nForce field, medians over the frames:")
     screen.print(_fields(found.chains))
@@ -50,7 +53,7 @@ def print_validation(found: Validation) -> None:
 def _table(*heads: str) -> Table:
     from rich.table import Table
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
+    table = Table(box=None, padding=(0, 1, 0, 0))
     for number, head in enumerate(heads):
         table.add_column(head, justify="right" if number else "left", no_wrap=True)
     return table
@@ -59,16 +62,17 @@ def _table(*heads: str) -> Table:
 def _resultants(title: str, rows: Sequence[Spread]) -> Table:
     from gelslim_twin.validation.validation import PAPER_N, PAPER_RELATIVE
 
-    table = _table(title, "deviation x, y, z", "mean x, y, z", "error/force")
+    table = _table(title, "deviation", "mean", "error", "good")
     for row in rows:
         table.add_row(
             row.name,
-            " ".join(_number(v, "{:5.3f}") for v in row.deviation_n),
+            " ".join(_number(v, "{:.3f}") for v in row.deviation_n),
             " ".join(_number(v, "{:+6.3f}") for v in row.bias_n),
             _number(row.relative, "{:.1%}"),
+            _number(row.within, "{:.0%}"),
         )
     paper = " ".join(f"{v:5.3f}" for v in PAPER_N)
-    table.add_row("the paper, measured", paper, "", f"{PAPER_RELATIVE:.0%}", style="bold")
+    table.add_row("the paper, measured", paper, "", f"{PAPER_RELATIVE:.0%}", "", style="bold")
     return table
 
 

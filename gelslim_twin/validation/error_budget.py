@@ -48,18 +48,18 @@ class Source:
 
 
 SOURCES = (
-    Source("none: linear gel, all known"),
-    Source("nonlinearity of the gel", strained=True),
+    Source("none: linear, all known"),
+    Source("nonlinearity", strained=True),
     Source(f"thickness {THICKNESS_OFF:+.0%}", thickness=1 + THICKNESS_OFF),
     Source(f"modulus E {MODULUS_OFF:+.0%}", modulus=1 + MODULUS_OFF),
-    Source(f"pose {POSE_OFF_DEG:g}° about x and y", pose_deg=POSE_OFF_DEG),
+    Source(f"pose {POSE_OFF_DEG:g}° about x, y", pose_deg=POSE_OFF_DEG),
     Source("projection as printed", compensation="printed"),
     Source("projection ignored", compensation="none"),
-    Source("normal motion: cap of the ball only", cap=True),
+    Source("ball's cap for normal motion", cap=True),
 )
 TOGETHER = Source(
-    "nonlinearity to pose, printed projection", True, 1 + THICKNESS_OFF, 1 + MODULUS_OFF,
-    POSE_OFF_DEG, "printed",
+    "the first four together", True, 1 + THICKNESS_OFF, 1 + MODULUS_OFF,
+    POSE_OFF_DEG,
 )  # fmt: skip
 
 
@@ -122,7 +122,7 @@ class BudgetRig:
 def error_budget(
     bundle: Bundle, strained: Sequence[GelState], linear: Sequence[GelState]
 ) -> tuple[Spread, ...]:
-    """Errors of the resultant with each source alone, and with those of the paper together.
+    """Errors of the resultant with each source alone, and with the first four together.
 
     Args:
         bundle: the sensor.

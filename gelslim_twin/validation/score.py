@@ -12,6 +12,8 @@ from gelslim_force.frame_result import FrameResult
 from gelslim_twin.simulation.gel_state import GelState
 
 Array = NDArray[np.float64]
+NEAR = 0.15
+"""The paper's own measure."""
 SHEARED = 0.2
 """Shear over normal force from which a direction is worth comparing."""
 
@@ -55,6 +57,8 @@ class Spread:
     """Mean of found minus true."""
     relative: float
     """Root mean square of the error over that of the true force, of the components given."""
+    within: float
+    """Share of the frames whose error is at most 15 % of the true force, of components given."""
     field_error: float = float("nan")
     outside_share: float = float("nan")
     centre_error_mm: float = float("nan")
@@ -75,7 +79,14 @@ def spread(name: str, true_n: Array, found_n: Array) -> Spread:
         _three([e.std() if len(e) else np.nan for e in kept]),
         _three([e.mean() if len(e) else np.nan for e in kept]),
         float(np.sqrt((off[known] ** 2).sum()) / size) if size > 0 else float("nan"),
+        _within(true_n, np.where(known, off, 0.0), known),
     )
+
+
+def _within(true_n: Array, off_n: Array, known: NDArray[np.bool_]) -> float:
+    size = np.linalg.norm(np.where(known, true_n, 0.0), axis=1)
+    near = np.linalg.norm(off_n, axis=1) <= NEAR * size
+    return float((near & known.any(axis=1)).mean())
 
 
 def summary(name: str, scores: Sequence[Score]) -> Spread:
