@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung
 from gelslim_twin.effects.friction import moved_mm
@@ -22,13 +24,23 @@ def bound(c: Circumstances) -> Bound:
     Under the indenter the depth is prescribed; sideways, where it is not, the surface moves by
     about half of the depth and with the tool, which errs by the same share, twice that at the
     edges of flat tools. A node there may be held by one gel and free in the other, a whole depth
-    apart; dots are carried by several nodes.
+    apart; dots are carried by several nodes. Its force is then one node's share of the whole where
+    walls slide over nodes, which a small tool's few nodes show.
     """
     excess = c.touch.nonlinear_excess
     sideways = excess * (c.touch.depth_mm / 2 + moved_mm(c)) * c.sensor.px_per_mm
     px = c.touch.depth_mm * c.sensor.px_per_mm if excess > 0 else 0.0
     seen = MARKERS * sideways
-    return Bound(excess * c.force_n, px + seen, seen, seen)
+    return Bound((excess + _one_node(c)) * c.force_n, px + seen, seen, seen)
+
+
+def _one_node(c: Circumstances) -> float:
+    """Share of the force on one node, for a tool with walls that drags the gel; else 0."""
+    t = c.touch
+    if t.area_mm2 == 0 or c.motion.lateral_mm + c.motion.twist_deg + c.motion.tilt_deg == 0:
+        return 0.0
+    walls = math.isinf(c.footprint.steepest(t.depth_mm))
+    return min(1.0, c.sensor.node_pitch_mm**2 / t.area_mm2) if walls else 0.0
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
