@@ -29,8 +29,8 @@ SMALLER = (
     ("gel.thickness_mm=0.5:5:0.25", "gel.thickness_mm=1:5:2"),
 )
 """The same work, less of it."""
-ELSEWHERE = ("--scheduler", "--install-completion", "--video")
-"""Needs a cluster, a shell of one's own, or minutes of frames."""
+ELSEWHERE = ("--scheduler", "--install-completion")
+"""Needs a cluster, or a shell of one's own."""
 PRESS = """\
 format: gelslim-scene/1
 name: frames
