@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gelslim_cad.cli.budget import FieldError, FrameTime
 from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
     from gelslim_twin.validation.validation import Validation
+    from ifem_export.bundle import Bundle
+    from ifem_export.ladder import Progress
+    from ifem_export.operator_ladder import OperatorLadder
 
 
 def validate(
@@ -20,6 +25,8 @@ def validate(
         Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-validation if left out.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of noise, dirt and print faults.")] = 0,
+    error: FieldError = None,
+    within: FrameTime = None,
     pictures: Annotated[bool, typer.Option(help="Write plots and overlay pictures.")] = True,
     as_json: AsJson = False,
 ) -> int:
@@ -28,9 +35,12 @@ def validate(
     The experiment of the GelSlim 2.0 paper: a ball pressed into the gel and slid in many
     directions, simulated on a finer gel at large strain, drawn as this sensor's camera would see
     it, and put through the force pipeline and through the paper's choices. Then an error budget,
-    and rods and a punch.
+    and rods and a punch. --error and --time pick the pipeline's operator from a ladder measured
+    first.
     """
     from gelslim_cad.cli.answer import print_json
+    from gelslim_cad.cli.budget import budget_of
+    from gelslim_cad.cli.bundle import chosen_label
     from gelslim_cad.cli.output import replace_file
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.twin_sensor import spec_sensor
@@ -42,13 +52,24 @@ def validate(
     from gelslim_twin.validation.validate import validate as validated
 
     started = time.monotonic()
+    budget = budget_of(error, within)
     name = read_spec(spec).spec.name
     folder = out or Path("out") / f"{name}-validation"
     with progress_bar(quiet=as_json) as tell:
         kept = folder / "sensor"
-        store_sensor(spec_sensor(spec), kept, True)
-        found = validated(stored_sensor(kept), kept, seed, tell)
+        made = spec_sensor(spec)
+        ladder = None if budget.unlimited else _ladder(spec, made.bundle, tell)
+        label = "" if ladder is None else chosen_label(ladder, budget)
+        store_sensor(made, kept, True)
+        sensor = stored_sensor(kept)
+        if label:
+            # The pipeline starts with its bundle's choice wherever a chain names no other.
+            chosen = replace(sensor.bundle, ladder=ladder, operator=label)
+            sensor = replace(sensor, bundle=chosen)
+        found = validated(sensor, kept, seed, tell)
     record = plain(found.to_record())
+    if label:
+        record["operator"] = label
     replace_file(folder / "validation.json", json_bytes(record))
     written = ["validation.json", *(_draw(found, folder) if pictures else [])]
     if as_json:
@@ -57,6 +78,19 @@ def validate(
     print_validation(found)
     print(f"\nIn {folder}/: {', '.join(written)} ({time.monotonic() - started:.0f} s).")
     return 0
+
+
+def _ladder(spec: Path, bundle: Bundle, tell: Progress | None) -> OperatorLadder:
+    """The operators of the sensor, measured here and now."""
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.pad import reference_mesh
+    from gelslim_cad.spec.reader import read_spec
+    from ifem_export.ladder import measure_ladder
+
+    fine = reference_mesh(derive(read_spec(spec).spec), bundle.mesh)
+    return measure_ladder(
+        bundle.mesh, bundle.material, bundle.formulation, progress=tell, reference=fine
+    )
 
 
 def _draw(found: Validation, folder: Path) -> list[str]:
