@@ -16,8 +16,10 @@ from ifem_export.finite_strain import NeoHookeanPad
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-STIFFENINGS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-"""Shares of the stiffness at rest that are added where the tangent is not positive definite."""
+SPRINGS = (0.0, 0.3, 3.0)
+"""Shares of the touched nodes' own stiffness at rest that hold them."""
+STIFFENINGS = (0.1, 0.3, 1.0, 3.0)
+"""Shares of the whole stiffness at rest that are added where springs do not do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +62,37 @@ class GelBody:
         whole = sparse.csr_array(self.pad.tangent(whole_mm))
         return sparse.csr_array(whole[self.free][:, self.free])
 
-    def tangent(self, whole_mm: Array) -> Tangent:
-        """The gel about a displacement (n, 3). Raises ContactError, FiniteStrainError."""
+    def tangent(self, whole_mm: Array, touched: NDArray[np.bool_], least: float = 0.0) -> Tangent:
+        """The gel about a displacement (n, 3), its `touched` (c,) surface nodes held by springs.
+
+        Pressed hard, the gel would buckle away from under the forces of nodes that a rigid tool
+        holds in place: the tangent is positive definite with springs there only. They do not
+        change where Newton's steps end, as they pull nowhere once nothing moves. `least` is the
+        smallest share tried; raises ContactError, FiniteStrainError.
+        """
         matrix = self._tangent(whole_mm)
+        own = (3 * self.surface[touched][:, None] + np.arange(3)).ravel()
+        place = np.searchsorted(self.free, own)
+        for share in SPRINGS:
+            if share < least:
+                continue
+            springs = np.zeros(len(self.free))
+            springs[place] = share * self._at_rest.diagonal()[place]
+            try:
+                stiff = (
+                    matrix if share == 0 else sparse.csr_array(matrix + sparse.diags_array(springs))
+                )
+                whole = np.zeros(3 * self.bundle.mesh.n_nodes)
+                whole[self.free] = springs
+                held = whole.reshape(-1, 3)[self.surface]
+                return Tangent(self, RowFactor.of(stiff, self._rows), held, share)
+            except LinAlgError:
+                continue
+        none = np.zeros((len(self.surface), 3))
         for share in STIFFENINGS:
             try:
-                stiff = matrix if share == 0 else sparse.csr_array(matrix + share * self._at_rest)
-                return Tangent(self, RowFactor.of(stiff, self._rows))
+                stiff = sparse.csr_array(matrix + share * self._at_rest)
+                return Tangent(self, RowFactor.of(stiff, self._rows), none, SPRINGS[-1])
             except LinAlgError:
                 continue
         raise ContactError("the gel buckles: its tangent stiffness is far from positive definite")
@@ -78,6 +104,10 @@ class Tangent:
 
     body: GelBody
     factor: RowFactor
+    springs: Array
+    """(c, 3) in N/mm along the axes of the surface nodes."""
+    share: float
+    """Of `SPRINGS`."""
     _nodes: Nodes = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     _block: Array = field(default_factory=lambda: np.zeros((0, 0)))
 

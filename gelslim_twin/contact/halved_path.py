@@ -25,6 +25,11 @@ def between(before: Pose, after: Pose, count: int) -> Iterator[Pose]:
     yield after
 
 
+def rests(before: Pose, pose: Pose) -> bool:
+    """Whether the tool stays where it is: without motion, contact changes nothing."""
+    return all(getattr(before, name) == getattr(pose, name) for name in COORDINATES[1:])
+
+
 def reached(
     step: Callable[[State, Pose, Pose], State],
     state: State,

@@ -30,6 +30,10 @@ MOST_STEPS = 40
 STALE = 0.3
 """Gain of a step below which the tangent is made anew."""
 SHORTEST = 1 / 32
+MOST_AHEAD = 2.0
+"""Longest step, of the last one, that is begun on along it."""
+ARM_MM = 3.0
+MOST_PULLS, PULLED = 20, 0.3
 BALANCE = (0.01, 1.0)
 """Tolerances of the linear contact within a step, of that of the whole."""
 
@@ -51,6 +55,7 @@ class NewtonContact:
 
     def __post_init__(self) -> None:
         self._tangent: Tangent | None = None
+        self._come: tuple[SolidState, Pose, SolidState] | None = None
 
     def released(self) -> SolidState:
         """Nothing touches."""
@@ -63,12 +68,28 @@ class NewtonContact:
 
         Raises ContactError where it is not found, FiniteStrainError where `last` is impossible.
         """
-        walk = _Walk(self, last, before, pose)
+        state = self._walked(last, before, pose)
+        self._come = (last, before, state)
+        return state
+
+    def _walked(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
+        ahead = self._ahead(last, before, pose)
+        if ahead is not None:
+            try:
+                return self._found(_Walk(self, last, before, pose, *ahead))
+            except (ContactError, FiniteStrainError):
+                pass
+        assert last.whole_mm is not None
+        return self._found(_Walk(self, last, before, pose, last.whole_mm, last.force_n))
+
+    def _found(self, walk: _Walk) -> SolidState:
         if walk.deepest_mm <= 0:
+            self._tangent = None
             return self.released()
         for done in range(1, MOST_STEPS + 1):
             if self._tangent is None or walk.stale:
-                self._tangent = self.body.tangent(walk.whole)
+                least = 0.0 if self._tangent is None else self._tangent.share
+                self._tangent = self.body.tangent(walk.whole, walk.touch > 0, least)
             found = walk.forward(self._tangent, done)
             if found is not None:
                 return found
@@ -78,16 +99,47 @@ class NewtonContact:
             walk.rest,
         )
 
+    def _ahead(self, last: SolidState, before: Pose, pose: Pose) -> tuple[Array, Array] | None:
+        """Displacement and forces on along the last step, where this one goes the same way."""
+        if self._come is None or self._come[2] is not last:
+            return None
+        first, start, _ = self._come
+        assert first.whole_mm is not None
+        assert last.whole_mm is not None
+        if not first.force_n.any() or not last.force_n.any():
+            return None
+        came, goes = _way(start, before), _way(before, pose)
+        share = float(came @ goes) / max(float(came @ came), 1e-300)
+        if not 0.0 < share <= MOST_AHEAD:
+            return None
+        whole = last.whole_mm + share * (last.whole_mm - first.whole_mm)
+        return whole, last.force_n + share * (last.force_n - first.force_n)
+
+
+def _way(start: Pose, end: Pose) -> Array:
+    """From one pose to another in mm, angles on an arm of a typical contact."""
+    turns = [f"{name}_deg" for name in ("twist", "tilt_x", "tilt_y")]
+    moved = [getattr(end, n) - getattr(start, n) for n in ("x_mm", "y_mm", "depth_mm")]
+    return np.array(moved + [ARM_MM * np.radians(getattr(end, n) - getattr(start, n))
+                             for n in turns])  # fmt: skip
+
 
 class _Walk:
     """Newton's steps to one pose."""
 
-    def __init__(self, owner: NewtonContact, last: SolidState, before: Pose, pose: Pose) -> None:
-        assert last.whole_mm is not None
+    def __init__(
+        self,
+        owner: NewtonContact,
+        last: SolidState,
+        before: Pose,
+        pose: Pose,
+        whole: Array,
+        force: Array,
+    ) -> None:
         self.solver, self.body, self.tolerance = owner.solver, owner.body, owner.tolerance
         self.pose = pose
-        self.whole = last.whole_mm
-        self.force = last.force_n
+        self.whole = whole
+        self.force = force.copy()
         self.inner = self.body.pad.force(self.whole)
         self.target, ahead = self.solver.targets(last, before, pose)
         points = self.solver.points_mm
@@ -96,7 +148,7 @@ class _Walk:
         self.wanted = last.touch > 0
         self.surface: ToolSurface | None = None
         self.deepest_mm = -float(np.min(clearance_mm(tool, pose, points), initial=0.0))
-        self.rest, self.off_mm, self.stale = np.inf, np.inf, False
+        self.rest, self.off_mm, self.stale = 1.0, np.inf, True
         self.size = 1e-300
         self.touch, self.memory = last.touch, Anderson()
 
@@ -112,12 +164,43 @@ class _Walk:
         room = room_to_tool(surface, points + u, u - offset)
         self.wanted |= room < REACH * self.deepest_mm
         nodes = np.flatnonzero(self.wanted)
-        balance = self._balance(tangent, surface.at(nodes), room, offset, nodes)
+        balance, pull = self._held(tangent, surface.at(nodes), room, offset, nodes)
         self.force, load = np.zeros_like(points), np.zeros_like(self.whole)
         self.force[nodes] = balance.force_n
         load[self.body.surface] = self.force
-        self._move(self._accelerated(free + tangent.motion(load), balance, nodes))
+        pulled = load.copy()
+        pulled[self.body.surface[nodes]] += pull
+        self._move(self._accelerated(free + tangent.motion(pulled), balance, nodes))
         return self._judged(balance, nodes, load, done)
+
+    def _held(
+        self, tangent: Tangent, surface: ToolSurface, room: Array, offset: Array, nodes: Nodes
+    ) -> tuple[Balance, Array]:
+        """Balance, and what the tangent's springs pull at nodes (m, 3) that move.
+
+        The springs are not there: their pull under the motion found is added to the load until
+        it is that under which it was found.
+        """
+        spring, u = tangent.springs[nodes], self.whole[self.body.surface][nodes]
+        pull, memory = np.zeros((len(nodes), 3)), Anderson()
+        block = tangent.block(nodes)
+        for _ in range(MOST_PULLS):
+            moved = (block @ pull.reshape(-1)).reshape(-1, 3)
+            more = offset.copy()
+            more[nodes] += moved
+            # Room is what forces may move a node, beyond what it moves without.
+            left = room.copy()
+            left[nodes] -= (surface.normal * moved).sum(axis=1)
+            balance = self._balance(tangent, surface, left, more, nodes)
+            if not spring.any():
+                break
+            self.force[nodes] = balance.force_n
+            found = spring * (balance.motion_mm + more[nodes] - u)
+            change = found - pull
+            if np.linalg.norm(change) <= PULLED * self.tolerance * np.linalg.norm(balance.force_n):
+                break
+            pull = memory.next(pull.reshape(-1), change.reshape(-1)).reshape(-1, 3)
+        return balance, pull
 
     def _balance(
         self, tangent: Tangent, surface: ToolSurface, room: Array, offset: Array, nodes: Nodes

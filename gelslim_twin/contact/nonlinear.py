@@ -22,7 +22,7 @@ from gelslim_force.anderson import Anderson
 from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.gel_body import GelBody
-from gelslim_twin.contact.halved_path import reached
+from gelslim_twin.contact.halved_path import reached, rests
 from gelslim_twin.contact.held_state import held_mm
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver
@@ -60,7 +60,8 @@ class NonlinearContact:
         before: Pose | None = None
         for pose in poses:
             for middle in self.solver.steps_to(state, before, pose):
-                state = self._advanced(state, before or middle, middle)
+                if before is None or not rests(before, middle):
+                    state = self._advanced(state, before or middle, middle)
                 before = middle
             yield GelState(state.displacement_mm, state.force_n, state.touch, state.solver)
         self.solver.compliance.store()

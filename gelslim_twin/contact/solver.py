@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_balance import STICK
-from gelslim_twin.contact.halved_path import between, reached
+from gelslim_twin.contact.halved_path import between, reached, rests
 from gelslim_twin.contact.held_state import HeldState, held_mm
 from gelslim_twin.contact.reach import Reach, reach_of
 from gelslim_twin.contact.settling import Settled, Settling, room_to_tool, slack_mm
@@ -73,7 +73,8 @@ class ContactSolver:
         """A state per pose, from the untouched gel on. Raises ContactError."""
         state, before = GelState.at_rest(len(self.points_mm)), None
         for pose in poses:
-            state = self.advanced(state, before, pose)
+            if before is None or not rests(before, pose):
+                state = self.advanced(state, before, pose)
             before = pose
             yield state
         self.compliance.store()
