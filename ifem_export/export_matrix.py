@@ -56,7 +56,7 @@ def export_safetensors(bundle: Bundle, path: str | os.PathLike[str]) -> None:
         from safetensors.numpy import save
     except ImportError as error:
         raise IfemError(
-            "writing safetensors needs the package safetensors: pip install safetensors"
+            "writing safetensors needs the package safetensors: pip install 'gelslim-cad[export]'"
         ) from error
     matrix = bundle.stiffness_matrix
     arrays = {
