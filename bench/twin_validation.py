@@ -1,12 +1,16 @@
 """`gelslim validate` on the design, kept for the guide's table.
 
-    python bench/twin_validation.py    # some minutes; writes docs/data and the guide's table
+    python bench/twin_validation.py                           # some minutes
+    python bench/twin_validation.py --from validation.json    # of a run just made
 
-The record is the command's own (`--json`), without its single frames.
+Writes docs/data/twin_validation.json and, where the guide has marks for it, the table.
+
+The record is the command's own, without its single frames.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -25,12 +29,17 @@ LEFT_OUT = ("frames",)
 
 
 def main() -> None:
-    """Run, keep, write the table."""
+    """Run or read, keep, write the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--from", dest="made", type=Path, help="validation.json of a run")
+    made = parser.parse_args().made
     started = time.perf_counter()
-    record = validated()
-    seconds = time.perf_counter() - started
+    record = json.loads(made.read_text(encoding="utf-8")) if made else validated()
+    seconds = None if made else round(time.perf_counter() - started)
     kept = {k: v for k, v in record.items() if k not in LEFT_OUT}
-    write_data("twin_validation", {**machine(0), "design": SPEC, "seconds": round(seconds), **kept})
+    write_data("twin_validation", {**machine(0), "design": SPEC, "seconds": seconds, **kept})
     write_tables()
 
 
