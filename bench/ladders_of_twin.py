@@ -13,7 +13,7 @@ from gelslim_twin.render.shading import Shading
 Data = Mapping[str, Any]
 NO_PAPER = "has no digital twin."
 POSE = "time per pose, one thread"
-FRAME = "time per frame, one thread"
+FRAME = "CPU time per frame, one thread"
 
 
 def twin(data: Data, header: Data) -> list[LadderRecord]:
@@ -213,7 +213,7 @@ def rendering(data: Data, header: Data) -> list[LadderRecord]:
             ),
             count_label="mean change, grey values",
             kind="omissions",
-            **(about | {"time_label": "time it costs per frame"}),
+            **(about | {"time_label": "CPU time it costs per frame"}),
         ),
     ]
 
