@@ -15,6 +15,8 @@ from gelslim_twin.scene.stl_extent import stl_corners
 Array = NDArray[np.float64]
 _WAVES = 64
 _MOST_CELLS = 4_000_000
+NEGLIGIBLE = 1e-9
+"""Weight of a grid point that counts as none."""
 
 
 def stl_profile(shape: Stl, folder: Path) -> Profile:
@@ -103,7 +105,9 @@ def _interpolated(x: Array, y: Array, height: Array) -> Profile:
             (1, 1, p * q),
         ):
             corner = height[i + a, j + b]
-            total += np.where(w > 0, w * np.where(w > 0, corner, 0.0), 0.0)
+            # Rounding must not let a grid point feel a neighbour that is beside the shape.
+            felt = w > NEGLIGIBLE
+            total += np.where(felt, w * np.where(felt, corner, 0.0), 0.0)
         return np.where(inside, total, np.inf)
 
     return profile
