@@ -104,7 +104,9 @@ def relax(
         internal[k] = math.exp(-ratio) * state.internal_n[k] + mean * change
         if g:
             force -= g * (new - internal[k])
-    return _held(force, new), RelaxationState(new.copy(), internal)
+    # A zero keeps its sign where nothing decays.
+    held = force if series.is_null else _held(force, new)
+    return held, RelaxationState(new.copy(), internal)
 
 
 def _held(force: Array, elastic: Array) -> Array:

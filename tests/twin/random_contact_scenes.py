@@ -81,6 +81,16 @@ def finger_bundle(finger: Finger) -> Bundle:
     )
 
 
+@cache
+def gel_mm(design: str) -> tuple[float, float, float]:
+    """Length, width and thickness of a design's gel."""
+    d = derive(read_spec(ROOT / "designs" / f"{design}.yaml").spec)
+    length, width, thick = (
+        float(d[f"design.gel.{name}_mm"]) for name in ("length", "width", "thickness")
+    )
+    return length, width, thick
+
+
 def placed_finger(finger: Finger, folder: Path) -> Path:
     """The folder of the finger's bundle, written if it is not there."""
     place = folder / finger.name
@@ -94,10 +104,7 @@ def random_contact(seed: int) -> tuple[Finger, Values]:
     """A finger and a legal scene on it, every choice from `seed`."""
     r = random.Random(seed)
     finger = r.choice(FINGERS)
-    spec = read_spec(ROOT / "designs" / f"{finger.design}.yaml").spec.design.gel
-    thick = float(derive(read_spec(ROOT / "designs" / f"{finger.design}.yaml").spec)[
-        "design.gel.thickness_mm"
-    ])  # fmt: skip
+    length, width, thick = gel_mm(finger.design)
     depth = thick * math.exp(r.uniform(math.log(0.004), math.log(0.4)))
     wanted = ("displacement", "force", "markers", "image")
     scene: Values = {
@@ -106,8 +113,8 @@ def random_contact(seed: int) -> tuple[Finger, Values]:
         "sensor": {"bundle": finger.name},
         "indenters": _tool(r, depth),
         "motion": {
-            "start_x_mm": r.choice([0.0, r.uniform(-0.5, 0.5) * spec.length_mm]),
-            "start_y_mm": r.choice([0.0, r.uniform(-0.5, 0.5) * spec.width_mm]),
+            "start_x_mm": r.choice([0.0, r.uniform(-0.5, 0.5) * length]),
+            "start_y_mm": r.choice([0.0, r.uniform(-0.5, 0.5) * width]),
             "waypoints": _moves(r, depth),
         },
         "contact": {"friction": r.choice([0.0, 0.0, 0.2, 0.5, 1.0, 3.0])},

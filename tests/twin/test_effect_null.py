@@ -1,0 +1,126 @@
+"""An effect whose parameters do nothing is the effect left out, bit for bit, scene to frame."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scene_samples import ROOT
+from sim_rig import small_sensor
+
+from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.sensor_figures import bundle_figures
+from gelslim_twin.simulation.mechanics import mechanics_of
+from gelslim_twin.simulation.picture import Viewer
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+from ifem_export.bundle_io import load_bundle
+
+NULL: dict[str, dict[str, Any]] = {
+    "friction": {},
+    "relaxation": {"terms": []},
+    "lens_distortion": {},
+    "marker_print": {"jitter_mm": 0, "missing_percent": 0, "odd_percent": 0},
+    "shading": {"ambient_share": 1},
+    "dirt": {"specks": 0, "hairs": 0},
+    "specular": {"spots": 0},
+    "motion_blur": {"shutter_ms": 0},
+    "exposure": {"time": 1, "gain": 1, "gamma": 1},
+    "sensor_noise": {"full_well_electrons": 0},
+    "compression": {},
+}
+"""Refraction and defocus stand in the sensor; their tests are with the camera and the renderer."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("null")
+    small_sensor(place)
+    return place
+
+
+def scene(effects: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "format": "gelslim-scene/1",
+        "name": "null",
+        "sensor": {"bundle": "bundle"},
+        "indenters": [{"shape": "sphere", "radius_mm": 6}],
+        "motion": {
+            "waypoints": [
+                {"move": "press", "depth_mm": 0.25, "steps": 2, "duration_s": 0.1},
+                {"move": "shear", "x_mm": 0.2, "steps": 1, "duration_s": 0.3},
+            ]
+        },
+        "observe": ["displacement", "force", "markers", "image"],
+        "effects": {"nonlinearity": "off"} | effects,
+        "seed": 3,
+    }
+
+
+@cache
+def _sensor(place: Path) -> TwinSensor:
+    return TwinSensor(load_bundle(place))
+
+
+def outcome(folder: Path, effects: dict[str, Any]) -> tuple[tuple[str, ...], bytes]:
+    """The plan's order, and every array that comes of the last pose."""
+    path = folder / "scene.yaml"
+    path.write_text(json.dumps(scene(effects)))
+    loaded, sensor = read_scene(path), _sensor(folder / "bundle")
+    plan = plan_scene(loaded, bundle_figures(folder / "bundle"))
+    states = list(mechanics_of(loaded, plan, sensor).states(loaded.poses))
+    viewer = Viewer(sensor, plan, loaded.scene, 0.05)
+    frame = viewer.frame(states[-1], states[-2], 3, 0.3)
+    arrays = (*(a for s in states for a in (s.displacement_mm, s.force_n)), frame.image)
+    return plan.order, b"".join(
+        np.ascontiguousarray(a).tobytes() for a in (*arrays, viewer.markers_px(states[-1]))
+    )
+
+
+@pytest.mark.parametrize("name", sorted(NULL))
+def test_switched_on_with_nothing_to_do_it_changes_nothing(folder: Path, name: str) -> None:
+    on_order, on = outcome(folder, {name: {"use": "on", **NULL[name]}})
+    off_order, off = outcome(folder, {name: {"use": "off"}})
+    assert name in on_order
+    assert name not in off_order
+    assert on == off
+
+
+def test_what_does_nothing_is_left_out_by_itself(folder: Path) -> None:
+    order, _ = outcome(folder, NULL)
+    assert not set(NULL) & set(order)
+
+
+def test_solving_a_bare_press_loads_no_other_mechanics(folder: Path) -> None:
+    text = scene({"sensor_noise": "off"}) | {"observe": ["force"]}
+    (folder / "bare.yaml").write_text(json.dumps(text))
+    code = f"""
+import sys
+from pathlib import Path
+from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.sensor_figures import bundle_figures
+from gelslim_twin.simulation.mechanics import mechanics_of
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.effects.registry import EFFECTS
+from ifem_export.bundle_io import load_bundle
+place = Path({str(folder)!r})
+loaded = read_scene(place / "bare.yaml")
+plan = plan_scene(loaded, bundle_figures(place / "bundle"))
+sensor = TwinSensor(load_bundle(place / "bundle"))
+assert len(list(mechanics_of(loaded, plan, sensor).states(loaded.poses))) == 4
+absent = [e.implementation for e in EFFECTS if e.name not in plan.order]
+assert "gelslim_twin.contact.nonlinear" in absent and "gelslim_twin.relaxation" in absent
+print(plan.order, [m for m in absent if m in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "('normal_contact',) []"
