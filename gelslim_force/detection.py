@@ -50,8 +50,10 @@ class Detector:
         starts, moments = _candidates(planes, self.settings)
         dots = _weighed(planes, starts, moments, self.settings)
         dots = dots[_believable(dots, self.settings)]
-        dots = _without_repeats(dots)
-        return _judged(dots)
+        found = _judged(_without_repeats(dots))
+        if self.settings.shape == "double":
+            return found
+        return found.take(np.flatnonzero(~_dark_corners(found.flags)))
 
     def detect_near(
         self,
@@ -251,6 +253,13 @@ def _without_repeats(dots: NDArray[np.float64]) -> NDArray[np.float64]:
         if gap < max(long[a], long[b]):
             drop[a if dots[a, 2] < dots[b, 2] else b] = True
     return dots[~drop]
+
+
+def _dark_corners(flags: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) what the picture's border cuts that is no ellipse and too faint or too large for a dot:
+    the dark wedge between the pad's corner and the border. A double dot cut by it looks so too."""
+    cut = (flags & BORDER > 0) & (flags & ODD_SHAPE > 0)
+    return np.asarray(cut & (flags & (FAINT | LARGE) > 0))
 
 
 def _judged(dots: NDArray[np.float64], compare: bool = True) -> Detections:

@@ -200,10 +200,8 @@ def _report(folder: Path, summary: dict[str, Any], rest: DotsAtRest, pictures: i
     from gelslim_cad.cli.answer import say
 
     rows, columns = rest.lattice_shape
-    most = rest.lines_in_view
-    cut = "" if most == (rows, columns) else f" ({most[0]} x {most[1]} at least half in view)"
     say(
-        f"{summary['markers']} dots on a lattice of {rows} x {columns}{cut}, "
+        f"{summary['markers']} dots on a lattice of {rows} x {columns}, "
         f"{summary['on_lattice']:.1%} of those found, pitch {rest.pitch_px:.1f} px."
     )
     bad, seen = summary["frames_without_tracks"], summary["coverage"]
