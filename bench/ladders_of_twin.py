@@ -115,7 +115,7 @@ def effects(rows: Iterable[Data], header: Data) -> LadderRecord:
         name="effects",
         title="Effects of the digital twin",
         question="What each effect costs per frame, and how far it moves markers in the picture of "
-        "the scene that shows it most.",
+        "the scene that shows it most. A cost lost in the noise of the clock counts as 0.",
         paper=NO_PAPER,
         reference="The same frame with the effect: largest shift of a marker",
         error_label="shift of a marker without the effect",
@@ -196,7 +196,8 @@ def rendering(data: Data, header: Data) -> list[LadderRecord]:
         LadderRecord(
             name="frame-effects",
             title="Effects of the camera on one frame",
-            question="A pressed frame with everything on; one effect left out at a time.",
+            question="A pressed frame with everything on; one effect left out at a time. A cost "
+            "lost in the noise of the clock counts as 0.",
             reference="The detector on the whole frame",
             error_label="shift of detected centres, RMS",
             error_unit="px",
