@@ -56,25 +56,31 @@ class Rungs:
 FULL, QUICK = Rungs(), Rungs((1e-1, 1e-3, 1e-5), (1, 3, 10), 20, (1, 2, 4), 6, 2)
 
 
-def contact_ladders(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Rows]:
-    """The three ladders, without and with friction."""
+def solver_ladders(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Rows]:
+    """Tolerance and load steps, without and with friction."""
     loaded, rungs = read_scene(SCENE), QUICK if quick else FULL
     compliance = SurfaceCompliance(sensor.bundle, folder)
+    found: dict[str, Rows] = {"contact": [], "steps": []}
+    for friction in FRICTIONS:
+        auto = chosen_tolerance(loaded, folder, friction)
+        found["contact"] += tolerances(loaded, compliance, friction, auto, rungs)
+        found["steps"] += steps(loaded, compliance, friction, rungs)
+    return found
+
+
+def layer_ladder(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Rows]:
+    """Layers, without and with friction; their pads are not kept."""
+    loaded, rungs = read_scene(SCENE), QUICK if quick else FULL
     pads = {
         n: SurfaceCompliance(with_layers(sensor.bundle, n))
         for n in (*rungs.layers, rungs.most_layers)
     }
     setup_s = {n: set_up(loaded, pad) for n, pad in pads.items()}
-    found: dict[str, Rows] = {"tolerance": [], "steps": [], "layers": []}
-    for friction in FRICTIONS:
-        auto = chosen_tolerance(loaded, folder, friction)
-        found["tolerance"] += tolerances(loaded, compliance, friction, auto, rungs)
-        found["steps"] += steps(loaded, compliance, friction, rungs)
-        for row in layers(loaded, pads, friction, rungs):
-            count = row["layers"]
-            design = count == sensor.bundle.mesh.layers
-            found["layers"].append({**row, "setup_s": setup_s[count], "design": design})
-    return found
+    rows = [row for friction in FRICTIONS for row in layers(loaded, pads, friction, rungs)]
+    design = sensor.bundle.mesh.layers
+    for row in rows:
+        row |= {"setup_s": setup_s[row["layers"]], "design": row["layers"] == design}
+    return {"layers": rows}
 
 
 def chosen_tolerance(loaded: LoadedScene, folder: Path, friction: float) -> float:

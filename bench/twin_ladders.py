@@ -23,7 +23,7 @@ from typing import Any
 
 from bench_data import DOCS, write_data, write_whole
 from machine import machine
-from twin_contact import contact_ladders
+from twin_contact import layer_ladder, solver_ladders
 from twin_gallery import drops, effect_rows
 from twin_overhead import overhead
 from twin_rig import SPEC, KeptBench, gallery, kept_sensor
@@ -49,12 +49,6 @@ def scene_part(
     return {"poses_at_most": POSES + 2, "effects": rows, "drops": drops(bench, rows, rounds, quick)}
 
 
-def contact_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
-    """The solver's tolerance under its old name, and the two other ladders."""
-    found = contact_ladders(sensor, folder, quick)
-    return {"contact": found["tolerance"], "steps": found["steps"], "layers": found["layers"]}
-
-
 def overhead_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, Any]:
     """Planning and bookkeeping against a loop by hand."""
     return {"overhead": overhead(sensor, folder, quick)}
@@ -62,7 +56,8 @@ def overhead_part(sensor: TwinSensor, folder: Path, quick: bool) -> dict[str, An
 
 PARTS: dict[str, Part] = {
     "overhead": overhead_part,
-    "contact": contact_part,
+    "contact": solver_ladders,
+    "layers": layer_ladder,
 }
 SCENES = "scenes"
 
@@ -126,7 +121,7 @@ def finish(docs: Path) -> None:
     data = held(docs)
     if "drops" in data:
         write_whole(docs / "images" / "twin_effects.png", draw_scenes(data["drops"]))
-    if "layers" in data:
+    if "contact" in data:
         write_whole(docs / "images" / "twin_contact.png", draw_contact(data))
     if docs == DOCS:
         write_tables()

@@ -30,8 +30,8 @@ def blocks() -> dict[str, str]:
     found: dict[str, str] = {}
     if LADDERS.exists():
         data = json.loads(LADDERS.read_text(encoding="utf-8"))
-        makers = {"drops": scenes_text, "layers": contact_text, "overhead": overhead_text}
-        marks = {"drops": "twin-effects", "layers": "twin-contact", "overhead": "twin-overhead"}
+        makers = {"drops": scenes_text, "contact": contact_text, "overhead": overhead_text}
+        marks = {"drops": "twin-effects", "contact": "twin-contact", "overhead": "twin-overhead"}
         found |= {marks[key]: make(data) for key, make in makers.items() if key in data}
     if VALIDATION.exists():
         found["validation"] = validation_text(json.loads(VALIDATION.read_text(encoding="utf-8")))
@@ -104,16 +104,13 @@ def contact_text(data: dict[str, Any]) -> str:
         f"`shear_sphere` in a linear gel. Field: relative L2 error of the nodal forces; "
         f"{where(data, 'contact')}."
     ]
-    kinds = (
+    kinds = [
         ("tolerance", "contact", "solver tolerance (against 1e-9)", "ms per pose"),
         ("steps", "steps", "steps per movement (against many, last pose)", "ms per path"),
-        (
-            "layers",
-            "layers",
-            f"mesh layers (against {data['layers'][0]['against']})",
-            "ms per pose",
-        ),
-    )
+    ]
+    if "layers" in data:
+        against = data["layers"][0]["against"]
+        kinds.append(("layers", "layers", f"mesh layers (against {against})", "ms per pose"))
     for knob, key, title, time in kinds:
         rows, layered = data[key], knob == "layers"
         extra = " set-up, s |" if layered else ""
