@@ -85,7 +85,7 @@ def measure_ladder(
                 error_resultant=max(map(_resultant_off, found, expected)),
                 noise_node_n_per_mm=float(np.std(noise := noisy(operator, len(points)))),
                 noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
-                milliseconds=timed_ms(operator, moved),
+                milliseconds=_one_thread_ms(operator, moved),
                 n_bytes=operator.n_bytes,
             )
         )
@@ -121,7 +121,7 @@ def time_operators(
         tell(label, done, len(choices))
         operator = surface_operator(mesh, material, formulation, rung, **parameters)
         # The least of several medians: another program can only make one of them longer.
-        times[label] = min(timed_ms(operator, moved) for _ in range(TIMED_ROUNDS))
+        times[label] = min(_one_thread_ms(operator, moved) for _ in range(TIMED_ROUNDS))
     return times
 
 
@@ -204,6 +204,17 @@ def timed_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
         operator.force(fields[len(times) % len(fields)])
         times.append(time.perf_counter() - started)
     return float(np.median(times)) * 1000
+
+
+def _one_thread_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
+    """`timed_ms` with one BLAS thread, as the force pipeline runs its frames.
+
+    More of them wait for each other: on a busy machine up to forty times longer (pcg).
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        return timed_ms(operator, fields)
 
 
 def _bump(place: Array, width: float, way: Array) -> Callable[[Array], Array]:

@@ -75,13 +75,17 @@ def _beside(folder: Path) -> Path:
 
 
 def _one(loaded: LoadedScene, folder: Path, overwrite: bool, tell: Any) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
     from gelslim_twin.simulation.scene_task import job_of
     from gelslim_twin.simulation.simulate import simulate as simulated
     from gelslim_twin.simulation.stored_sensor import stored_sensor
 
     sensor = _beside(folder)
     job = job_of(loaded, stored_sensor(sensor), sensor)
-    ledger = simulated(job, folder, overwrite=overwrite, progress=tell)
+    # As in the workers of a data set: threads that wait for each other cost more than they save.
+    with threadpool_limits(limits=1, user_api="blas"):
+        ledger = simulated(job, folder, overwrite=overwrite, progress=tell)
     return {"folder": str(folder), "scenes": 1, "poses": len(loaded.poses), **ledger.to_record()}
 
 

@@ -10,6 +10,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from gelslim_twin.effects.circumstances import SensorFigures
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.reader import read_scene
@@ -88,7 +90,8 @@ def _run(folder: Path, name: str, large_strain: str) -> tuple[Ledger, Plan]:
     path = folder / f"{name}.yaml"
     path.write_text(text, encoding="utf-8")
     job = job_of(read_scene(path), sensor, kept)
-    return simulate(job, folder / name), job.plan
+    with threadpool_limits(limits=1, user_api="blas"):
+        return simulate(job, folder / name), job.plan
 
 
 def _declared(plan: Plan, group: str) -> float:

@@ -155,6 +155,27 @@ def test_times_are_measured_anew_for_every_rung(ladder: OperatorLadder) -> None:
     assert [r.error_field for r in again.rungs] == [r.error_field for r in ladder.rungs]
 
 
+def test_operators_are_timed_with_one_blas_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the pipeline runs them: threads that wait for each other took forty times as long."""
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    from ifem_export import ladder as measuring
+
+    seen: list[int] = []
+
+    def counted(*_: object) -> float:
+        seen.extend(i["num_threads"] for i in threadpool_info() if i["user_api"] == "blas")
+        return 1.0
+
+    monkeypatch.setattr(measuring, "timed_ms", counted)
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = threadpool_info()
+        time_operators(operator_choices(pad(2))[:2], pad(2), GEL, "bbar")
+        assert threadpool_info() == before
+    assert seen
+    assert set(seen) == {1}
+
+
 def test_the_key_of_a_machines_times_tells_sensors_apart() -> None:
     def key(mesh: PadMesh, gel: Material, element: Formulation) -> str:
         return build_bundle(mesh, gel, element, with_stiffness=False).times_key
