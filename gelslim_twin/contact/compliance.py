@@ -8,9 +8,8 @@ pad.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import os
-import tempfile
 from functools import cached_property
 from pathlib import Path
 
@@ -24,11 +23,12 @@ from ifem_export.bundle import Bundle
 from ifem_export.pad_system import PadSystem
 from ifem_export.sparse_factor import Factor, factored
 from ifem_export.surface_operator import SurfaceOperator
+from whole_files.replaced_file import replacement
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 BATCH = 64
-FORMAT = "gelslim-compliance/2"
+FORMAT = "gelslim-compliance/3"
 MOST_BYTES = 4_000_000_000
 """Largest table: pads of some 18 000 surface nodes need another method."""
 MOST_ROW = 1500
@@ -102,13 +102,21 @@ class SurfaceCompliance:
         if len(missing) == 0:
             return
         self._fresh = True
-        originals = np.unique(self._originals[missing])
+        originals = self._filled(np.unique(self._originals[missing]))
         for first in range(0, len(originals), BATCH):
             part = originals[first : first + BATCH]
             self._rows.reshape(self.nodes, 3, self.nodes, 3)[part] = self._solved(part)
             self._made[part] = True
             for symmetry in self._symmetries[1:]:
                 self._copy(part, symmetry)
+
+    def _filled(self, wanted: Nodes) -> Nodes:
+        """`wanted` and its nearest neighbours in number, to whole batches: those come next."""
+        room = -len(wanted) % BATCH
+        unmade = np.flatnonzero(~self._made & (self._originals == np.arange(self.nodes)))
+        others = np.setdiff1d(unmade, wanted)
+        near = np.argsort(np.abs(others - np.median(wanted)), kind="stable")[:room]
+        return np.sort(np.concatenate([wanted, others[near]]))
 
     def _copy(self, nodes: Nodes, symmetry: Symmetry) -> None:
         """Columns of the images of `nodes`: C(Pi, Pj) = Q C(i, j) Q'."""
@@ -168,18 +176,9 @@ class SurfaceCompliance:
         """Write new columns to the folder, whole; not at all where it takes no file."""
         if self._folder is None or not self._fresh:
             return
-        target, part = self._path, None
-        try:
-            handle, part = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-            with os.fdopen(handle, "wb") as out:
-                np.save(out, self._rows)
-            os.replace(part, target)
-        except OSError:
-            # Read-only or full: the next run makes the columns again.
-            pass
-        finally:
-            if part is not None:
-                Path(part).unlink(missing_ok=True)
+        # Read-only or full: the next run makes the columns again.
+        with contextlib.suppress(OSError), replacement(self._path) as out:
+            np.save(out, self._rows)
         self._fresh = False
 
     @property
@@ -206,10 +205,12 @@ class SurfaceCompliance:
             return np.stack([[self._one(node, axis) for axis in range(3)] for node in nodes])
         unknowns = self._operator.system.stiffness.shape[0]  # type: ignore[attr-defined]
         first = unknowns - 3 * self.nodes
-        loads = np.zeros((unknowns, 3 * n))
+        # Always as many right-hand sides: with another number the last bits would be others, and
+        # a simulation would depend on what was asked before.
+        loads = np.zeros((unknowns, 3 * BATCH))
         own = (3 * nodes[:, None] + np.arange(3)).ravel()
         loads[first + own, np.arange(3 * n)] = 1.0
-        moved = np.asarray(factor.solve(loads))[first:]
+        moved = np.asarray(factor.solve(loads))[first:, : 3 * n]
         return np.asarray(moved.T.reshape(n, 3, self.nodes, 3))
 
     def _one(self, node: int, axis: int) -> Array:
