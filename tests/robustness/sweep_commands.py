@@ -11,8 +11,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MINI20 = ROOT / "designs" / "mini20.yaml"
-UNTIMED = {"ledger.json", "stages.jsonl"}
-"""Files that tell how long things took, and so never are the same twice."""
+UNTIMED = {"ledger.json", "stages.jsonl", ".lock", ".in_use"}
+"""Files that tell how long things took, and so never are the same twice; marks of locks."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,7 @@ COMMANDS = (
     Command("track", "track {place}/dots -o {out}", "dots=>more_dots"),
     Command("light", f"light {SPEC} --rays 2048 -o {{out}}", "-o=>--seed 3 -o"),
     Command("simulate", "simulate {place}/scene.yaml -o {out}"),
-    Command(
-        "data set", "simulate {place}/varied.yaml --count 3 -j 2 -o {out}",
-        ignored=frozenset({".lock"}),
-    ),
+    Command("data set", "simulate {place}/varied.yaml --count 3 -j 2 -o {out}"),
     Command("explore", f"explore {SPEC} --vary gel.length_mm=16:24:0.02 -j 2 -o {{out}}"),
     Command(
         "optimise", f"optimise {SPEC} --vary gel.length_mm=16:24:0.5 --rounds 1 -j 1 -o {{out}}"
@@ -134,5 +131,5 @@ def digests(folder: Path, ignored: frozenset[str] = frozenset()) -> dict[str, st
     return {
         p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest()
         for p in sorted(folder.rglob("*"))
-        if p.is_file() and p.name not in skipped
+        if p.is_file() and p.name not in skipped and not p.name.startswith("compliance-")
     }
