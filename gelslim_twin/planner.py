@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from accuracy_budget.budget import Budget
+from accuracy_budget.ladder import Ladder
+from accuracy_budget.rung import Rung as BudgetRung
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
 from gelslim_twin.effects.registry import EFFECTS
@@ -188,17 +191,21 @@ def _in(
 
 
 def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
-    """The cheapest within the shares, else the one that exceeds them least."""
-    able = [rung for rung in ladder if _within(rung.error, shares)]
-    if able:
-        return min(able, key=lambda rung: rung.milliseconds)
+    """The cheapest within the shares, else the one that exceeds them least.
 
-    def excess(rung: Rung) -> tuple[float, float]:
-        errors = [(rung.error.of(o), share) for o, share in shares.items()]
-        worst = max((_excess(error, share) for error, share in errors), default=0.0)
-        return worst, sum(error for error, _ in errors)
-
-    return min(ladder, key=excess)
+    Its error is put to the budget as the largest part of a share that it uses up.
+    """
+    errors = [
+        max((_excess(r.error.of(o), s) for o, s in shares.items()), default=0.0) for r in ladder
+    ]
+    rungs = tuple(
+        BudgetRung(str(k), error, rung.milliseconds, rung.milliseconds)
+        for k, (rung, error) in enumerate(zip(ladder, errors, strict=True))
+    )
+    if min(errors) <= 1.0:
+        return ladder[int(Ladder(rungs).choose(Budget(error=1.0)).rung.name)]
+    totals = [sum(r.error.of(o) for o in shares) for r in ladder]
+    return ladder[min(range(len(ladder)), key=lambda k: (errors[k], totals[k]))]
 
 
 def _as_pairs(shares: dict[str, float]) -> tuple[tuple[str, float], ...]:

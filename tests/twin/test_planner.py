@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import subprocess
 import sys
 from dataclasses import replace
@@ -297,3 +298,38 @@ def test_deeper_slower_and_rougher_scenes_have_larger_bounds(tmp_path):
             grown = [new.of(o) - old.of(o) for o in OBSERVABLES]
             assert min(grown) >= 0, name
             assert max(grown) > 0, name
+
+
+def worst(rung: Rung, shares: dict[str, float]) -> float:
+    """Largest error against its share; without a share any error is endless."""
+    ratios = [
+        rung.error.of(o) / s if s else float("inf")
+        for o, s in shares.items()
+        if s or rung.error.of(o)
+    ]
+    return max(ratios, default=0.0)
+
+
+def test_the_budgets_choice_of_rungs_is_the_cheapest_within_the_shares() -> None:
+    """Against a choice by hand over random ladders, shares of nil and rungs without error too."""
+    from gelslim_twin.planner import _rung
+
+    rng = random.Random(5)
+    kept = missed = 0
+    for _ in range(400):
+        sizes = [0.0, 0.01, 0.1, 1.0, rng.random()]
+        ladder = [
+            Rung(str(k), Bound(*(rng.choice(sizes) for _ in range(4))), rng.choice([1.0, 2.0, 5.0]))
+            for k in range(rng.randint(1, 5))
+        ]
+        shares = {o: rng.choice([0.0, 0.01, 0.1, 1.0]) for o in rng.sample(OBSERVABLES, 2)}
+        able = [r for r in ladder if all(r.error.of(o) <= s for o, s in shares.items())]
+        found = _rung(ladder, shares)
+        if able:
+            kept += 1
+            assert found is min(able, key=lambda r: r.milliseconds)
+        else:
+            missed += 1
+            assert worst(found, shares) == min(worst(r, shares) for r in ladder)
+    assert kept > 50
+    assert missed > 50
