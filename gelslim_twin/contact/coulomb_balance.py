@@ -47,7 +47,7 @@ class Balance:
 
 
 def balanced(
-    compliance: Array,
+    compliance: Array | NDArray[np.float32],
     height_mm: Array,
     target_mm: Array,
     friction: float,
@@ -89,7 +89,9 @@ def balanced(
     return found.balance(start, start_mm, tolerance)
 
 
-def _frictionless(compliance: Array, height: Array, start: Array, frames: Array | None) -> Balance:
+def _frictionless(
+    compliance: Array | NDArray[np.float32], height: Array, start: Array, frames: Array | None
+) -> Balance:
     n = len(height)
     if frames is None:
         across = compliance[:, 2::3].astype(float)
@@ -118,7 +120,12 @@ def _left(changes: list[float], relaxation: float) -> float:
 
 class _Frictional:
     def __init__(
-        self, compliance: Array, height: Array, target: Array, friction: float, frames: Array | None
+        self,
+        compliance: Array | NDArray[np.float32],
+        height: Array,
+        target: Array,
+        friction: float,
+        frames: Array | None,
     ) -> None:
         n = len(height)
         self.c = np.ascontiguousarray(compliance)

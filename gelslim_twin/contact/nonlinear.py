@@ -28,10 +28,29 @@ from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.simulation.gel_state import GelState
+from ifem_export.bundle import Bundle
 from ifem_export.finite_strain import FiniteStrainError
 from ifem_export.solver import ConvergenceError
 
 Array = NDArray[np.float64]
+
+
+def unfit(bundle: Bundle) -> tuple[str, str] | None:
+    """Why a pad cannot be strained far, and what to do; None for one that can.
+
+    The neo-Hookean law is made for flat pads of whole cells.
+    """
+    mesh = bundle.mesh
+    if mesh.surface_shift is None and mesh.fill is None:
+        return None
+    crowned = mesh.surface_shift is not None
+    what = "the sensor's gel is crowned" if crowned else "the sensor's pad has cut cells"
+    change = "design.gel.crown_height_mm to 0" if crowned else "mesh.weighting to cell_centre"
+    return (
+        f"{what}, large deformation takes flat pads of whole cells only",
+        "switch it off for the linear gel (effects: {nonlinearity: off}) or set the sensor's "
+        + change,
+    )
 
 
 @dataclass(eq=False)
@@ -46,6 +65,10 @@ class NonlinearContact:
     law: FiniteStrainForce = field(init=False)
 
     def __post_init__(self) -> None:
+        """Raises ContactError for a pad that the neo-Hookean law does not take."""
+        problem = unfit(self.solver.compliance.bundle)
+        if problem is not None:
+            raise ContactError("; ".join(problem))
         inner = min(3e-3, 0.3 * self.tolerance)
         self.law = FiniteStrainForce(
             self.solver.compliance.bundle, tolerance=inner, most_steps=40, inner_rtol=inner

@@ -16,7 +16,7 @@ from gelslim_twin.scene.pose import Pose
 Array = NDArray[np.float64]
 GEOMETRY_STEPS = 40
 DAMPED_FROM = 8
-BALANCE, OFF, MOST_OFF = 0.5, 0.1, 1e-3
+BALANCE, OFF, MOST_OFF = 0.5, 0.1, 1e-2
 """Shares of the tolerance: the balance's, and how far off the tool nodes may be over the depth."""
 ROUNDING_MM = 1e-8
 """Slopes by differences do not find planes more closely."""

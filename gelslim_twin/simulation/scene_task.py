@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,16 @@ def perform(task: SceneTask) -> dict[str, Any]:
 
 
 def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJob:
-    """Plan a scene for a sensor stored in `folder`."""
+    """Plan a scene for a sensor stored in `folder`.
+
+    Raises InputError where the plan needs an effect that the sensor's pad does not allow.
+    """
     plan = plan_scene(loaded, bundle_figures(folder / BUNDLE))
+    for choice in plan.included:
+        if choice.effect == "nonlinearity":
+            problem = import_module(choice.implementation).unfit(sensor.bundle)
+            if problem is not None:
+                raise loaded.problem("effects.nonlinearity", None, *problem)
     return SimulationJob(
         loaded.scene,
         loaded.poses,
