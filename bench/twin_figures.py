@@ -35,7 +35,10 @@ def draw_scene(panel: Any, name: str, rows: Rows) -> None:
     steps = [r for r in rows if r["label"] != "auto"]
     (auto,) = (r for r in rows if r["label"] == "auto")
     best = sorted((r for r in rows if r["front"]), key=lambda r: r["ms"])
-    panel.plot([r["ms"] for r in best], [shown(r) for r in best], color=FRONT, lw=1, label="front")
+    panel.plot(
+        [r["ms"] for r in best], [shown(r) for r in best], color=FRONT, lw=1, label="front",
+        drawstyle="steps-post",
+    )  # fmt: skip
     panel.scatter(
         [r["ms"] for r in steps], [shown(r) for r in steps], s=16, color=FRICTIONLESS,
         label="one effect less each", zorder=3,
@@ -50,10 +53,18 @@ def draw_scene(panel: Any, name: str, rows: Rows) -> None:
         )
     names = [f"{k}  {row['label'].replace('_', ' ')}" for k, row in enumerate(steps)]
     panel.text(
-        0.98, 0.97, "\n".join(names), transform=panel.transAxes, fontsize=7, ha="right", va="top"
+        0.98,
+        0.97,
+        "\n".join(names),
+        transform=panel.transAxes,
+        fontsize=7,
+        ha="right",
+        va="top",
+        multialignment="left",
     )
     panel.axhline(1.0, color="#c03060", lw=1, ls="--")
     panel.set_xscale("log")
+    panel.xaxis.set_minor_formatter("")
     panel.set_yscale("log")
     panel.set_ylim(FLOOR / 2, 1e4)
     times = [r["ms"] for r in rows]

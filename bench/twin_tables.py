@@ -154,8 +154,9 @@ def overhead_text(data: dict[str, Any]) -> str:
         f"`{part['scene']}`, {part['poses']} poses with pictures, written to disk: "
         f"{part['planned_ms']:.0f} ms of CPU planned, {part['by_hand_ms']:.0f} ms by a loop with "
         f"the same stages written by hand, the same bytes. Planning and bookkeeping cost "
-        f"{part['overhead']:+.2%} (median of {part['pairs']} pairs run in turns; quartiles "
-        f"{low:+.2%} and {high:+.2%}); making the plan takes {part['plan_ms']:.1f} ms."
+        f"{part['overhead']:+.2%} (least times of {part['pairs']} pairs run in turns; of their "
+        f"ratios the median is {part['median']:+.2%}, the quartiles {low:+.2%} and {high:+.2%}); "
+        f"making the plan takes {part['plan_ms']:.1f} ms."
     )
 
 
