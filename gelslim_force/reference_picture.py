@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.calibration_error import CalibrationError
-from gelslim_force.outputs.optional_library import load
-from gelslim_force.outputs.output_error import OutputError
+from gelslim_force.frames.frame import FrameSourceError
+from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
 
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp")
 MOST_PICTURES = 100
 """Pictures averaged at most: a tenth of the noise is left."""
 
@@ -27,9 +26,9 @@ def read_reference(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """
     place = Path(path)
     if place.is_dir():
-        files = sorted(f for f in place.iterdir() if f.suffix.lower() in (*PICTURES, ".npy"))
+        files = sorted(f for f in place.iterdir() if f.suffix.lower() in PICTURE_ENDINGS)
         if not files:
-            raise CalibrationError(f"{place}: no pictures in it ({', '.join(PICTURES)} or .npy)")
+            raise CalibrationError(f"{place}: no pictures in it ({', '.join(PICTURE_ENDINGS)})")
         return _mean([_frames(f) for f in files[:MOST_PICTURES]], place)
     if not place.is_file():
         raise CalibrationError(f"{place}: no such file; give a picture without contact")
@@ -55,17 +54,11 @@ def _array(file: Path) -> NDArray[Any]:
         raise CalibrationError(f"{file} is no NumPy array that can be read: {error}") from error
 
 
-def _picture(file: Path) -> NDArray[Any]:
+def _picture(file: Path) -> NDArray[np.uint8]:
     try:
-        cv = load("cv2", "vision", "reading pictures")
-    except OutputError as error:
-        raise CalibrationError(str(error)) from error
-    data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-    # OpenCV refuses an empty buffer with an error of its own, other rubbish with None.
-    found = cv.imdecode(data, cv.IMREAD_COLOR) if len(data) else None
-    if found is None:
-        raise CalibrationError(f"{file} is no picture that OpenCV can read: damaged or no picture")
-    return np.ascontiguousarray(found[:, :, ::-1])
+        return read_picture(file)
+    except (PictureError, FrameSourceError) as error:
+        raise CalibrationError(f"{file}: {error}") from error
 
 
 def _mean(stacks: list[NDArray[np.uint8]], place: Path) -> NDArray[np.uint8]:

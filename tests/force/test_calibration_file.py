@@ -139,7 +139,7 @@ def test_what_is_no_picture_is_named(tmp_path):
     (tmp_path / "none").mkdir()
     pytest.importorskip("cv2")
     for name, words in (
-        ("empty.png", "no picture"),
+        ("empty.png", "the file is empty"),
         ("text.png", "no picture"),
         ("bad.npy", "no NumPy array"),
         ("object.npy", "no NumPy array"),
@@ -151,9 +151,20 @@ def test_what_is_no_picture_is_named(tmp_path):
             read_reference(tmp_path / name)
 
 
-def test_missing_opencv_names_the_extra(tmp_path, monkeypatch):
+def test_half_a_picture_is_no_reference(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    noise = np.random.default_rng(0).integers(0, 256, (60, 80, 3)).astype(np.uint8)
+    image.fromarray(noise).save(tmp_path / "whole.jpg")
+    whole = (tmp_path / "whole.jpg").read_bytes()
+    (tmp_path / "half.jpg").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(CalibrationError, match=r"half.jpg: damaged"):
+        read_reference(tmp_path / "half.jpg")
+
+
+def test_missing_readers_of_pictures_name_the_extra(tmp_path, monkeypatch):
     import sys
 
+    monkeypatch.setitem(sys.modules, "PIL", None)
     (tmp_path / "picture.png").write_bytes(b"x")
     monkeypatch.setitem(sys.modules, "cv2", None)
     with pytest.raises(CalibrationError, match="gelslim-cad\\[vision\\]"):
