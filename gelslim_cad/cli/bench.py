@@ -28,7 +28,8 @@ def bench(
 
     Times the force operators, of a spec also the light tracer, and a simulated pose. The times are
     kept in the user's cache, outside the bundle, and budgets of time (--time) use them from then
-    on. No bundle and no result is changed by them.
+    on. No bundle and no result is changed by them. Other programs running meanwhile count as
+    slowness.
     """
     from accuracy_budget.machine_times import cache_folder, this_machine
     from gelslim_cad.cli.answer import print_json
