@@ -92,7 +92,7 @@ def _read_bytes(name: str, max_bytes: int) -> bytes:
     except FileNotFoundError:
         raise refusal(name, "no such file", "check the path") from None
     except IsADirectoryError:
-        raise refusal(name, "is a directory", "name a YAML file in it") from None
+        raise refusal(name, "is a directory", "name a file in it") from None
     except PermissionError:
         raise refusal(name, "may not be read", "give yourself permission to read it") from None
     except OSError as error:

@@ -28,12 +28,14 @@ def plan(
     time predicted for it. Nothing is simulated.
     """
     from gelslim_cad.cli.scene_budget import budgeted_scene
-    from gelslim_cad.cli.twin_sensor import sensor_figures
+    from gelslim_cad.cli.twin_sensor import require_within_gel, sensor_figures
     from gelslim_twin.scene.question import plan_scene
     from gelslim_twin.scene.reader import read_scene
 
     loaded = budgeted_scene(read_scene(scene), error, within)
-    made = plan_scene(loaded, sensor_figures(loaded))
+    figures = sensor_figures(loaded)
+    require_within_gel(loaded, figures.thickness_mm)
+    made = plan_scene(loaded, figures)
     if as_json:
         print(made.to_json(), end="")
     else:

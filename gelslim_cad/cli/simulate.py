@@ -46,7 +46,7 @@ def simulate(
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.scene_budget import budgeted_scene
-    from gelslim_cad.cli.twin_sensor import twin_sensor
+    from gelslim_cad.cli.twin_sensor import require_within_gel, twin_sensor
     from gelslim_twin.scene.reader import read_scene
     from gelslim_twin.simulation.stored_sensor import store_sensor
 
@@ -56,7 +56,10 @@ def simulate(
     with progress_bar(quiet=as_json) as tell:
         if tell:
             tell("sensor", 0, 1)
-        store_sensor(twin_sensor(loaded), _beside(folder), "image" in loaded.scene.observe)
+        sensor = twin_sensor(loaded)
+        mesh = sensor.bundle.mesh
+        require_within_gel(loaded, mesh.layers * mesh.cell_size_mm[2])
+        store_sensor(sensor, _beside(folder), "image" in loaded.scene.observe)
         if count is None:
             answer = _one(loaded, folder, overwrite, tell)
         else:

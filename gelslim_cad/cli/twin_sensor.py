@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from ifem_export.bundle import Bundle
     from yaml_model.errors import InputError
 
+DEEPEST_SHARE = 0.9
+"""Of the gel's thickness: what lies deeper is no contact with a gel that is still whole."""
 RAYS = 1 << 16
 RED_SHARE = 0.45
 """Red is seen weaker than green on published frames of this finger."""
@@ -106,6 +108,25 @@ def _traced(d: Dimensions) -> LightMap:
         elevation_deg=np.full(2, ELEVATION_DEG),
         colour=LED_COLOURS,
         smooth_mm=0.6,
+    )
+
+
+def require_within_gel(loaded: LoadedScene, thickness_mm: float) -> None:
+    """Raise `InputError` for a tool that is pressed through nearly the whole gel."""
+    most = DEEPEST_SHARE * thickness_mm
+    lowest = min(indenter.raised_mm for indenter in loaded.scene.indenters)
+    depth = max(pose.depth_mm for pose in loaded.poses) - lowest
+    if depth <= most:
+        return
+    field = "motion.csv" if loaded.scene.motion.csv is not None else "motion.waypoints"
+    for number, waypoint in enumerate(loaded.scene.motion.waypoints or ()):
+        if getattr(waypoint, "depth_mm", 0.0) and waypoint.move == "press":
+            field = f"motion.waypoints[{number}].depth_mm"
+    raise loaded.problem(
+        field,
+        f"{depth + lowest:g}",
+        f"the tool goes {depth:g} mm deep into a gel of {thickness_mm:g} mm",
+        f"press at most {most:.3g} mm deep, {DEEPEST_SHARE:.0%} of the gel",
     )
 
 
