@@ -130,6 +130,11 @@ class Circumstances:
         )
 
     @property
+    def contact_nodes(self) -> float:
+        """Nodes under the tool at the deepest contact."""
+        return self.touch.area_mm2 / self.sensor.node_pitch_mm**2
+
+    @property
     def force_n(self) -> float:
         """Of the deepest contact, normal and tangential together, with friction; linear gel."""
         t, mu = self.touch, self.friction

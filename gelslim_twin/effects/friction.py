@@ -62,7 +62,7 @@ def ladder(c: Circumstances) -> tuple[Rung, ...]:
             ms * nodes,
             {"tolerance": t},
         )
-        for name, t, ms in (("coarse", 1e-2, 2.0), ("medium", 1e-3, 3.0), ("fine", 1e-5, 6.0))
+        for name, t, ms in (("coarse", 1e-2, 0.3), ("medium", 1e-3, 0.5), ("fine", 1e-5, 1.0))
     )
 
 

@@ -33,7 +33,7 @@ def ladder(c: Circumstances) -> tuple[Rung, ...]:
     dots = c.sensor.markers / 575
     return (
         Rung("apparent depth", optics(paraxial_px(c)), 0.02 * dots, {"rays": "paraxial"}),
-        Rung("exact", Bound(), 0.3 * dots, {"rays": "exact"}),
+        Rung("exact", Bound(), 0.1 * dots, {"rays": "exact"}),
     )
 
 

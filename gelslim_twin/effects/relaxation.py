@@ -57,7 +57,7 @@ EFFECT = Effect(
     parameters=RelaxationParameters,
     bound=bound,
     formula="F x sum of g (1 - exp(-T/tau)), T from first contact to the end",
-    ladder=lambda c: (Rung("recursive", Bound(), 0.01 + 1e-5 * c.sensor.surface_nodes),),
+    ladder=lambda c: (Rung("recursive", Bound(), 0.01 + 8e-5 * c.sensor.surface_nodes),),
     is_null=lambda c: all(
         t.fraction == 0 for t in c.given("relaxation", RelaxationParameters).terms
     ),
