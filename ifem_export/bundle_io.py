@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,11 +134,18 @@ def _files_of(folder: Path) -> set[str]:
     return {MANIFEST, LADDER, *(str(e.get("file")) for e in entries if isinstance(e, dict))}
 
 
+class _Plain:
+    """A stream that NumPy writes through, and not past: past it, a full disk has no reason."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self.write = stream.write
+
+
 def _write_array(folder: Path, name: str, array: NDArray[Any]) -> dict[str, Any]:
     file = f"{name}.npy"
     contiguous = np.ascontiguousarray(array)
     with open(folder / file, "wb") as stream:
-        np.save(stream, contiguous, allow_pickle=False)
+        np.save(_Plain(stream), contiguous, allow_pickle=False)
     return {
         "file": file,
         "sha256": _sha256(folder / file),

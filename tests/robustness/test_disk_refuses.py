@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from sweep_commands import COMMANDS, NAMED, Command, digests, environment, finished, prepare
+from sweep_commands import COMMANDS, MINI20, NAMED, Command, digests, environment, finished, prepare
 
 pytest.importorskip("cadquery", reason="building needs the [cad] extra")
 
@@ -83,6 +83,20 @@ def judged(command: Command, files: dict[str, str], whole: dict[str, str]) -> No
 
 def test_markers_on_a_disk_that_is_too_small(place: Path, tmp_path: Path) -> None:
     refuses_full(NAMED["markers"], place, tmp_path, 0.5)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
+def test_a_bundle_too_large_for_the_disk_says_so(tmp_path: Path) -> None:
+    code = (
+        "import resource, sys; from gelslim_cad.cli import main;"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000));"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    words = ["bundle", str(MINI20), "--no-ladder", "-o", str(tmp_path / "made" / "out")]
+    done = finished([sys.executable, "-c", code, *words], tmp_path / "tmp")
+    assert done.returncode == 2, done.stderr
+    assert "File too large" in done.stderr
+    assert list((tmp_path / "made").iterdir()) == []
 
 
 @pytest.mark.slow
