@@ -25,6 +25,7 @@ SLOW = 0.7
 """Gain of CHECK_EVERY sweeps below which Newton is tried."""
 NEWTON_STEPS = 12
 RELAXATIONS = (1.0, 0.6, 0.3)
+PATIENCE = 50
 SURE = 0.1
 """Share of the tolerance that Newton goes on to: its steps tell nothing of what is left."""
 LEAST_RATE = 0.5
@@ -161,7 +162,10 @@ class _Frictional:
                 near = _left(changes, relaxation) <= tolerance * size
                 if near or (turn + 1) % CHECK_EVERY == 0:
                     residual = self._residual(f, u)
-                    if near and residual <= tolerance:
+                    # Sweeps that never show a steady rate are judged by what nodes want alone.
+                    if residual <= (tolerance if near else SURE * tolerance) and (
+                        near or turn >= PATIENCE
+                    ):
                         return self._balance(f, u, residual, sweeps)
                     best = min(best, residual)
                     if residual > SLOW * last:

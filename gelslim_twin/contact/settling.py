@@ -16,11 +16,13 @@ from gelslim_twin.scene.pose import Pose
 Array = NDArray[np.float64]
 GEOMETRY_STEPS = 40
 DAMPED_FROM = 8
+EDGES_FROM, EDGE = 20, 1e-3
+"""Turns after which a node astride an edge may stay this share of the depth off the tool."""
 BALANCE, OFF, MOST_OFF = 0.5, 0.1, 1e-2
 """Shares of the tolerance: the balance's, and how far off the tool nodes may be over the depth."""
 ROUNDING_MM = 1e-8
 """Slopes by differences do not find planes more closely."""
-FINER = 0.1
+FINER, FINEST = 0.1, 1e-4
 LOOSE, AHEAD = 0.1, 0.1
 """Balances on the way: the first one's tolerance, then this share of how far nodes were off."""
 
@@ -50,6 +52,10 @@ class Settling:
         """How far off the tool nodes may be."""
         return slack_mm(self.tolerance, self.deepest_mm)
 
+    @property
+    def _edge_mm(self) -> float:
+        return min(self.tolerance, EDGE) * self.deepest_mm
+
     def settled(self, surface: ToolSurface, motion_mm: Array, force_n: Array) -> Settled:
         """Forces with the tool's planes where the nodes are, from planes, motion and forces.
 
@@ -66,11 +72,12 @@ class Settling:
             shape = tool_surface(self.tool, self.pose, self.points_mm + new, shape)
             gap = shape.gap_mm(self.points_mm + new)
             before, worst = worst, self._worst(gap, balance)
-            if worst <= self.slack_mm and (within <= fine or self.friction == 0):
+            slack = self.slack_mm if turn < EDGES_FROM else max(self.slack_mm, self._edge_mm)
+            if worst <= slack and (within <= fine or self.friction == 0):
                 return Settled(balance, used, gap, sweeps)
             if within <= fine:
                 # What the balance leaves keeps nodes off the tool.
-                fine *= FINER
+                fine = max(FINER * fine, FINEST * self.tolerance)
             # Where balances gain little, it is they that keep the nodes off.
             finer = within * (FINER if worst > FINER * before else 1.0)
             within = max(fine, min(finer, AHEAD * worst / self.deepest_mm))
