@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from accuracy_budget.budget import Budget
     from gelslim_force.force_pipeline import ForcePipeline, NormalSource
-    from gelslim_force.force_run import RunSummary
-    from gelslim_force.outputs.overlay import Overlay
     from gelslim_force.sensor_calibration import SensorCalibration
     from ifem_export.bundle import Bundle
 
@@ -88,6 +86,8 @@ def force(
     """
     from gelslim_cad.cli.budget import budget_of
     from gelslim_cad.cli.failure import CommandError
+    from gelslim_cad.cli.force_report import answer_json, report
+    from gelslim_cad.cli.force_sinks import result_sinks
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.status import BAD_INPUT
     from gelslim_force.force_estimator import ForceSettings
@@ -129,7 +129,7 @@ def force(
             "calibration": str(calibration) if calibration else None,
         }  # fmt: skip
         with ExitStack() as stack, progress_bar(quiet=as_json) as tell:
-            sinks, written = _sinks(
+            sinks, written = result_sinks(
                 stack, pipeline, folder, chosen, fields, pictures, video, mcap, view, overwrite,
                 source.frames_per_s or 30.0, quiet=as_json,
             )  # fmt: skip
@@ -138,9 +138,9 @@ def force(
             )
         files = [] if written is None else [str(f) for f in written.write()]
     if as_json:
-        _answer_json(folder, pipeline, summary, files)
+        answer_json(folder, pipeline, summary, files)
     else:
-        _report(folder, pipeline, summary, files)
+        report(folder, pipeline, summary, files)
     return 0 if summary.with_forces else BAD_INPUT
 
 
@@ -203,130 +203,3 @@ def _first(source: Any, most: int | None) -> Any:
     from itertools import islice
 
     return source if most is None else islice(source, most)
-
-
-def _sinks(
-    stack: ExitStack,
-    pipeline: ForcePipeline,
-    folder: Path,
-    chosen: dict[str, Any],
-    fields: str,
-    pictures: int,
-    video: Path | None,
-    mcap: Path | None,
-    view: bool,
-    overwrite: bool,
-    frames_per_s: float,
-    quiet: bool,
-) -> tuple[list[Any], Any]:
-    """What takes the results; and the picture sink, which writes at the end."""
-    from gelslim_cad.cli.failure import CommandError
-    from gelslim_cad.cli.output import spare_strangers
-    from gelslim_force.outputs.result_sinks import RecorderSink
-    from gelslim_force.outputs.run_manifest import bundle_identity
-    from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
-
-    identity = bundle_identity(pipeline.bundle)
-    overlay = _overlay(pipeline)
-    sinks: list[Any] = []
-    if mcap is not None:
-        from gelslim_force.outputs.mcap_recording import McapRecording
-
-        if overwrite:
-            spare_strangers(mcap, b"gelslim", "recording of gelslim")
-            mcap.unlink(missing_ok=True)
-        sinks.append(RecorderSink(stack.enter_context(McapRecording(mcap, about=identity))))
-    if video is not None:
-        from gelslim_force.outputs.arrow_scale import Extent, LiveScale
-        from gelslim_force.outputs.overlay_sink import VideoSink
-        from gelslim_force.outputs.overlay_video import OverlayVideo
-
-        if video.exists() and not overwrite:
-            raise CommandError(f"{video} exists; give another --video, or --force to replace it")
-        made = stack.enter_context(OverlayVideo(video, overlay.size_px, frames_per_s))
-        sinks.append(VideoSink(overlay, made, LiveScale(Extent())))
-    keep = RecorderSettings(fields=None if fields == "none" else fields)  # type: ignore[arg-type]
-    recorder = stack.enter_context(RunRecorder(folder, identity, chosen, keep, overwrite))
-    sinks.insert(0, RecorderSink(recorder))
-    if view:
-        sinks.append(_view_sink(stack, overlay, quiet))
-    if not pictures:
-        return sinks, None
-    from gelslim_force.outputs.overlay_sink import PictureSink
-
-    kept = PictureSink(overlay, folder / "pictures", pictures)
-    return [*sinks, kept], kept
-
-
-def _view_sink(stack: ExitStack, overlay: Overlay, quiet: bool) -> Any:
-    from gelslim_force.outputs.arrow_scale import Extent, LiveScale
-    from gelslim_force.outputs.live_view import LiveView
-    from gelslim_force.outputs.overlay_sink import ViewSink
-
-    live = stack.enter_context(LiveView())
-    if not quiet:
-        print(f"Watch at {live.url}", flush=True)
-    return ViewSink(overlay, live.show, LiveScale(Extent()))
-
-
-def _overlay(pipeline: ForcePipeline) -> Overlay:
-    from gelslim_force.outputs.overlay import Overlay
-
-    camera = pipeline.calibration.camera
-    return Overlay(
-        (camera.image_height_px, camera.image_width_px),
-        camera.project,
-        pipeline.calibration.reference.places_px,
-    )
-
-
-def _answer_json(
-    folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]
-) -> None:
-    from gelslim_cad.cli.answer import print_json
-    from gelslim_force.outputs.packed_frame import plain
-
-    wrench = summary.last.wrench if summary.last is not None else None
-    print_json(
-        {
-            "folder": str(folder),
-            "operator": pipeline.operator_name,
-            "frames": summary.frames,
-            "frames_with_forces": summary.with_forces,
-            "problems": summary.problems,
-            "least_coverage": summary.least_coverage,
-            "last_wrench": None if wrench is None else plain(wrench.vector),
-            "last_sigma": None if wrench is None else plain(wrench.standard_deviation),
-            "stages_ms": {t.stage: t.median_ms for t in summary.stages},
-            "pictures": pictures,
-        }
-    )
-
-
-def _report(
-    folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]
-) -> None:
-    from gelslim_cad.cli.answer import say
-
-    say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")
-    wrench = summary.last.wrench if summary.last is not None else None
-    if wrench is not None:
-        names = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-        units = ("N",) * 3 + ("N mm",) * 3
-        parts = [
-            f"{n} unknown" if v != v else f"{n} {v:+.3f} ± {s:.3f} {u}"
-            for n, v, s, u in zip(
-                names, wrench.vector, wrench.standard_deviation, units, strict=True
-            )
-        ]
-        say("Last frame: " + ", ".join(parts) + ".")
-    for problem, count in sorted(summary.problems.items(), key=lambda item: -item[1])[:5]:
-        say(f"{count} frames: {problem}.", style="yellow")
-    total = next((t for t in summary.stages if t.stage == "total"), None)
-    if total is not None:
-        stages = ", ".join(
-            f"{t.stage} {t.median_ms:.1f}" for t in summary.stages if t.stage != "total"
-        )
-        say(f"Median {total.median_ms:.1f} ms per frame ({stages}).")
-    say(f"Run in {folder}/" + (f", {len(pictures)} pictures in {folder}/pictures/" if pictures
-                               else ""))  # fmt: skip

@@ -88,7 +88,7 @@ def _run(folder: Path, name: str, large_strain: str) -> tuple[Ledger, Plan]:
         large_strain=large_strain,
     )
     path = folder / f"{name}.yaml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     job = job_of(read_scene(path), sensor, kept)
     with threadpool_limits(limits=1, user_api="blas"):
         return simulate(job, folder / name), job.plan
