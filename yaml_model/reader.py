@@ -101,8 +101,10 @@ def _problems(
 ) -> tuple[list[Problem], int]:
     """The problems behind `error`, the first of them in file order, and how many more there are."""
     complaints = [_complaint(root, item) for item in error.errors(include_url=False)]
-    heard = [c for c in complaints if not _answered(c, {p.field for p in refused})]
-    heard = [c for c in heard if not _follows(c, heard)]
+    fields = {p.field for p in refused}
+    heard = [c for c in complaints if not _answered(c, fields)]
+    blamed = fields | {c.place.path for c in heard}
+    heard = [c for c in heard if not _follows(c, blamed)]
     translator = Translator(source.path, root, model)
     ordered = sorted(settle_unions(heard), key=lambda complaint: complaint.place.position)
     # Suggestions compare a key with every field: a file of nonsense pays for the listed ones only.
@@ -131,10 +133,10 @@ def _answered(complaint: Complaint, refused: set[str]) -> bool:
     return False
 
 
-def _follows(complaint: Complaint, others: list[Complaint]) -> bool:
+def _follows(complaint: Complaint, blamed: set[str]) -> bool:
     """Whether a list is only called too short because its items were refused."""
     items = f"{complaint.place.path}["
-    return complaint.kind == "too_short" and any(c.place.path.startswith(items) for c in others)
+    return complaint.kind == "too_short" and any(path.startswith(items) for path in blamed)
 
 
 def _defaulted(model: BaseModel, prefix: tuple[str | int, ...] = ()) -> Iterator[str]:

@@ -32,7 +32,7 @@ def _scene(folder: Path, *changes: tuple[str, str]) -> Path:
         ("depth_mm: 0.8", "depth_mm: .nan", "must be a finite number"),
         ("duration_s: 0.8", "duration_s: 0", "must be > 0"),
         (str(SENSOR), "nowhere.yaml", "sensor.spec = nowhere.yaml: no such file"),
-        ("seed: 1", "effects: {normal_contact: off}\n#", "it alone provides the force"),
+        ("effects:\n", "effects:\n  normal_contact: off\n", "it alone provides the force"),
         ("[displacement, force, markers, image]", "[]", "must have at least 1 item"),
     ],
 )
@@ -46,6 +46,20 @@ def test_faults_are_told_by_line(tmp_path, capsys, command, old, new, told):
     assert told in error
     assert "Traceback" not in error
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("value", "told"), [(".nan", "must be a finite number"), ("NaN", "text")])
+def test_the_only_waypoint_refused_is_one_fault(tmp_path, capsys, value, told):
+    path = _scene(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    start, end = text.index("motion:"), text.index("contact:")
+    only = f"{{move: press, depth_mm: {value}, steps: 2, duration_s: 0.1}}"
+    motion = f"motion:\n  waypoints:\n    - {only}\n"
+    path.write_text(text[:start] + motion + text[end:], encoding="utf-8")
+    assert main(["plan", str(path)]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert told in lines[0]
 
 
 def test_a_tool_held_above_its_origin_may_go_deeper(tmp_path):
