@@ -34,6 +34,15 @@ class Bound:
         """The error of one observable, in its unit."""
         return float(getattr(self, f"{observable}_{unit_of(observable)}"))
 
+    def at_most(self, other: Bound) -> Bound:
+        """The smaller error of each observable."""
+        return Bound(
+            min(self.force_n, other.force_n),
+            min(self.displacement_px, other.displacement_px),
+            min(self.markers_px, other.markers_px),
+            min(self.image_px, other.image_px),
+        )
+
     def to_record(self) -> dict[str, float]:
         """By observable with its unit."""
         return {f"{o}_{unit_of(o)}": self.of(o) for o in OBSERVABLES}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.contact_rungs import RUNGS, left_over
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
 from gelslim_twin.effects.parameters import EffectParameters
 from gelslim_twin.effects.touch import RIDGES
@@ -52,17 +53,20 @@ def bound(c: Circumstances) -> Bound:
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """Tolerance of the block Gauss-Seidel sweeps."""
+    """Tolerance of the solver with Coulomb's cone: no error beyond what any contact leaves.
+
+    Never more than friction itself, which may be next to nothing.
+    """
     whole = bound(c)
     nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
     return tuple(
         Rung(
             name,
-            geometry(t * whole.displacement_px, t * whole.force_n),
+            left_over(c, tolerance).at_most(whole),
             ms * nodes,
-            {"tolerance": t},
+            {"tolerance": tolerance},
         )
-        for name, t, ms in (("coarse", 1e-2, 0.3), ("medium", 1e-3, 0.5), ("fine", 1e-5, 1.0))
+        for (name, tolerance), ms in zip(RUNGS, (0.2, 0.3, 0.4, 0.6), strict=True)
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.contact_rungs import RUNGS, left_over
 from gelslim_twin.effects.effect import Bound, Effect, Rung, never_null
 from gelslim_twin.effects.parameters import EffectParameters
 from gelslim_twin.effects.touch import RIDGES
@@ -21,18 +22,15 @@ def bound(c: Circumstances) -> Bound:
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """Tolerance of the active set and of the gel's inner solve, relative to the force.
+    """Tolerance of the active set, relative to the force.
 
     Time grows with the square of the nodes in contact, whose compliance is dense (measured).
     """
     nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
     dense_ms = c.contact_nodes**2 / 1e4
-    force, px = c.touch.normal_n, c.touch.depth_mm * c.sensor.px_per_mm
     return tuple(
-        Rung(
-            name, Bound(t * force, t * px, t * px, t * px), ms * nodes + dense_ms, {"tolerance": t}
-        )
-        for name, t, ms in (("coarse", 1e-2, 1.5), ("medium", 1e-3, 2.0), ("fine", 1e-5, 2.5))
+        Rung(name, left_over(c, tolerance), ms * nodes + dense_ms, {"tolerance": tolerance})
+        for (name, tolerance), ms in zip(RUNGS, (1.2, 1.3, 1.5, 1.8), strict=True)
     )
 
 
