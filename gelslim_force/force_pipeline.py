@@ -7,21 +7,22 @@ the stream goes on.
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_force.force_estimator import ForceEstimator
+from gelslim_force.frame_clock import FrameClock
 from gelslim_force.frame_result import ForceField, FrameResult
 from gelslim_force.indenter_source import NormalReading
 from gelslim_force.marker_heights import marker_heights_mm
 from gelslim_force.marker_motion import MarkerView
 from gelslim_force.marker_noise import node_noise_n_per_px, noise_px
+from gelslim_force.normal_source import NormalSource
 from gelslim_force.pipeline_settings import PipelineSettings
 from gelslim_force.sensor_calibration import SensorCalibration
 from gelslim_force.single_thread import single_threaded
@@ -39,17 +40,11 @@ _SHIFT_MM = 0.03
 """Change of the lateral motion in the contact that its normal motion need not follow."""
 _MISFIT = 0.35
 _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the motion unexplained"
+_OVERDONE = 4.0
+"""Motion that sinking alone should show, over what the markers show, from which on what was seen
+is no contact. Right ones stay below 2."""
+_CONTRADICTED = "a contact as seen would show {:.0f} times the motion that the markers show"
 _UNSEEN = "the markers move, but no contact patch is seen"
-
-
-class NormalSource(Protocol):
-    """Finds the normal motion of a frame in two steps, as `IndenterSource` does."""
-
-    def look(self, image: NDArray[np.uint8], markers_px: Array) -> Any:
-        """What the frame (h, w, 3) shows; its markers are at (n, 2), NaN for lost ones."""
-
-    def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
-        """Normal motion; `lateral_mm` (2,) is that of the gel where it is touched."""
 
 
 class ForcePipeline:
@@ -144,7 +139,7 @@ class ForcePipeline:
 
         Never raises for the frame's content: see `FrameResult.problems`.
         """
-        clock = _Clock()
+        clock = FrameClock()
         problem = self._misfit(image)
         if problem:
             return self._numbered(time_s, problems=(problem,))
@@ -210,7 +205,7 @@ class ForcePipeline:
         return ""
 
     def _motions(
-        self, image: NDArray[np.uint8], places_px: Array, given: ArrayLike | None, clock: _Clock
+        self, image: NDArray[np.uint8], places_px: Array, given: ArrayLike | None, clock: FrameClock
     ) -> tuple[NormalReading | None, Array]:
         """Normal motion, and the motion (n, 3) of the reference's markers."""
         motion_of = self._motion.of_markers
@@ -228,6 +223,10 @@ class ForcePipeline:
         if seen is None and self._motion.moved(motion):
             # Nothing shows, yet the gel moves: no force at all would be a false statement.
             return replace(reading, problem=_UNSEEN), motion_of(places_px, None)
+        overdone = self._motion.overdone(motion, reading)
+        if overdone > _OVERDONE:
+            doubtful = replace(reading, problem=_CONTRADICTED.format(overdone))
+            return doubtful, motion_of(places_px, None)
         lateral = self._motion.of_touched(motion, reading)
         used, self._last_lateral = self._last_lateral, lateral
         before = 0.0 if used is None else used
@@ -291,20 +290,6 @@ class ForcePipeline:
     @property
     def _low_passed(self) -> bool:
         return self.settings.force.method in ("auto", "low_pass")
-
-
-class _Clock:
-    """Time per stage of one frame, ms."""
-
-    def __init__(self) -> None:
-        self.stages: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def stage(self, name: str) -> None:
-        """Close a stage."""
-        now = time.perf_counter()
-        self.stages[name] = self.stages.get(name, 0.0) + (now - self._last) * 1000
-        self._last = now
 
 
 def _complaints(tracked: TrackedFrame) -> tuple[str, ...]:

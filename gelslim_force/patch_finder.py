@@ -13,11 +13,12 @@ from scipy.spatial import cKDTree
 from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.gel_bins import bin_sizes, gel_places, near_surface
 from gelslim_force.indenter import Flat, Indenter
+from gelslim_force.patch_follow import STARTS, Region, settled, values_of
 from gelslim_force.patch_outline import fit_circle, fit_strip
 from gelslim_force.patch_place import flat_patch, rim_share, strip_covariance, strip_patch
 from gelslim_force.patch_region import changed_region
 from gelslim_force.patch_settings import PatchSettings
-from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit
+from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit, moved_on
 from gelslim_force.shading_change import ShadingChange, ShadingReference
 from gelslim_optics.virtual_camera import VirtualCamera
 
@@ -26,8 +27,6 @@ Mask = NDArray[np.bool_]
 PASSES = 3
 CUT_ERROR = 0.05
 """Relative error of a size of which all of the rim is hidden, over that of none."""
-STARTS = ((0.7, 0.5), (0.85, 1.5), (1.0, 4.0))
-"""Sizes, over the outline's, and decays that the fit to the shading starts from."""
 
 
 class PatchFinder:
@@ -54,7 +53,7 @@ class PatchFinder:
     ) -> None:
         self.settings = settings or PatchSettings()
         self.indenter = indenter
-        self._last: tuple[ContactPatch, ShadingFit] | None = None
+        self._last: tuple[ContactPatch, ShadingFit, Region] | None = None
         self._asked: tuple[Array, tuple[int, int]] | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
@@ -105,7 +104,8 @@ class PatchFinder:
             start = self._outline(region, light)
             if start is None:
                 return None
-            patch = start if isinstance(self.indenter, Flat) else self._refined(start, light)
+            flat = isinstance(self.indenter, Flat)
+            patch = start if flat else self._refined(start, region, light)
         share = 0.0
         if not self._well_inside(patch):
             share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
@@ -151,40 +151,48 @@ class PatchFinder:
         last, self._last = self._last, None
         if last is None:
             return None
-        middle = np.array([self._x[region].mean(), self._y[region].mean()])
-        reach = np.sqrt((self._bin_mm[region] ** 2).sum() / np.pi) / last[0].size_mm
-        if last[0].outside_mm(*middle) > -0.3 * last[0].size_mm or not 0.6 < reach < 2.5:
+        now, size = self._measured(region), last[0].size_mm
+        if last[0].outside_mm(*now.middle_mm) > -0.3 * size or not 0.6 < now.reach_mm / size < 2.5:
             return None
-        found = self._shading(last[0], [last[1].values], light)
+        found = self._shading(last[0], [last[1].values], light, (last[2], now))
         if found is None or found[1].explained < last[1].explained - 0.03:
             return None
-        if not _settled(last[0], found[0]):
+        if not settled(last[0], found[0]):
             return None
-        self._last = found
+        self._last = *found, now
         return found[0]
 
-    def _refined(self, start: ContactPatch, light: ShadingChange) -> ContactPatch:
+    def _measured(self, region: Mask) -> Region:
+        middle = np.array([self._x[region].mean(), self._y[region].mean()])
+        return Region(middle, float(np.sqrt((self._bin_mm[region] ** 2).sum() / np.pi)))
+
+    def _refined(self, start: ContactPatch, region: Mask, light: ShadingChange) -> ContactPatch:
         """The outline's patch moved to where the shading puts its rim, if it tells."""
         patch, found = start, None
-        begins = [_values(start, k, q) for k, q in STARTS]
+        begins = [values_of(start, k, q) for k, q in STARTS]
         for _ in range(PASSES):
             found = self._shading(patch, begins, light)
             if found is None:
                 return start
             before, patch = patch, found[0]
-            if _settled(before, patch):
+            if settled(before, patch):
                 break
             # What the edge cuts looks small at first: look again, further out.
-            begins = [found[1].values, _values(patch, 1.0, 1.5), _values(patch, 1.3, 1.5)]
+            begins = [found[1].values, values_of(patch, 1.0, 1.5), values_of(patch, 1.3, 1.5)]
         if found is None or found[1].explained < self.settings.least_explained:
             return start
-        self._last = found
+        self._last = *found, self._measured(region)
         return patch
 
     def _shading(
-        self, patch: ContactPatch, begins: list[Array], light: ShadingChange
+        self,
+        patch: ContactPatch,
+        begins: list[Array],
+        light: ShadingChange,
+        change: tuple[Region, Region] | None = None,
     ) -> tuple[ContactPatch, ShadingFit] | None:
-        """The fit to the shading about a patch, if it stays of that size."""
+        """The fit to the shading about a patch, if it stays of that size; with the regions of
+        both frames it is taken up from the fit of the frame before."""
         window = self._window(patch, light)
         if window is None:
             return None
@@ -192,6 +200,10 @@ class PatchFinder:
         curvature = 1 / known if known else 0.0
         blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
         blur = float(np.hypot(window.bin_mm / 2, blur))
+        if change is not None:
+            shift = change[1].middle_mm - change[0].middle_mm
+            growth = change[1].reach_mm / change[0].reach_mm
+            begins = [moved_on(window, begins[0], shift, growth, self._strip, curvature, blur)]
         fit = best_shading_fit(window, begins, self._strip, curvature, blur)
         if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
             return None
@@ -242,7 +254,7 @@ class PatchFinder:
             (
                 most
                 * np.tanh(light.change[:, rows, columns].astype(float) / most)
-                / light.noise[:, None]
+                / np.median(light.noise[:, rows, columns], axis=1)[:, None]
             ).T,
             self._local_bin(start),
             (np.flatnonzero(have), partner[have]),
@@ -282,21 +294,6 @@ class PatchFinder:
 
     def _local_bin(self, patch: ContactPatch) -> float:
         return float(self._bin_mm[self._nearest(patch.centre_mm)])
-
-
-def _settled(before: ContactPatch, after: ContactPatch) -> bool:
-    """Whether the bins about the one patch serve for the other."""
-    shift = float(np.linalg.norm(after.centre_mm - before.centre_mm)) / before.size_mm
-    return shift < 0.3 and 0.7 < after.size_mm / before.size_mm < 1.15
-
-
-def _values(patch: ContactPatch, scale: float, decay: float) -> Array:
-    """Start (4,) of the fit to the shading from a patch."""
-    if patch.kind == "disc":
-        return np.array([*patch.centre_mm, scale * patch.size_mm, decay])
-    turn = np.deg2rad(patch.angle_deg)
-    across = float(patch.centre_mm @ np.array([-np.sin(turn), np.cos(turn)]))
-    return np.array([across, turn, scale * patch.size_mm, decay])
 
 
 def _with(

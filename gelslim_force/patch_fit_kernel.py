@@ -21,6 +21,7 @@ drop_stale(["patch_fit_kernel"], ["slope_kernel"], Path(__file__).parent)
 GAINS = 6
 RIDGE = 1e-9
 TRIES = 6
+MOST_DECAY = 5.0
 SETTLED = 3e-3
 """Move, over the patch's size, that ends the fit."""
 
@@ -59,12 +60,15 @@ def settle(
         normal, gradient = _normal(jacobian, residual)
         improved = False
         for _ in range(TRIES):
-            move = _damped(normal, gradient, damping)
+            move = _damped(normal, gradient, damping, False)
+            # At a bound of the decay the others move without it, or its cut step spoils theirs.
+            if (theta[3] >= MOST_DECAY and move[3] > 0) or (theta[3] <= 0 and move[3] < 0):
+                move = _damped(normal, gradient, damping, True)
             for k in range(4):
                 most = 0.4 * theta[2] * scale[k]
                 trial[k] = theta[k] + min(max(move[k], -most), most)
             trial[2] = max(trial[2], 0.3 * theta[2])
-            trial[3] = min(max(trial[3], 0.0), 5.0)
+            trial[3] = min(max(trial[3], 0.0), MOST_DECAY)
             new = _residual(x, y, lean, change, trial, strip, curvature, blur, basis, tried)
             if new <= cost:
                 improved = True
@@ -95,6 +99,23 @@ def settle(
         if settled:
             break
     return cost
+
+
+@njit(**COMPILED)
+def squares_left(
+    x: Any,
+    y: Any,
+    lean: Any,
+    change: Any,
+    theta: Any,
+    strip: Any,
+    curvature: Any,
+    blur: Any,
+    residual: Any,
+) -> Any:
+    """Squares that a trial of `theta` (4,) leaves; arguments as for `settle`."""
+    basis = np.empty((len(x), GAINS))
+    return _residual(x, y, lean, change, theta, strip, curvature, blur, basis, residual)
 
 
 @njit(**COMPILED)
@@ -200,11 +221,13 @@ def _normal(jacobian: Any, residual: Any) -> Any:
 
 
 @njit(**COMPILED)
-def _damped(normal: Any, gradient: Any, damping: Any) -> Any:
+def _damped(normal: Any, gradient: Any, damping: Any, decay_held: Any) -> Any:
     system, move = normal.copy(), np.empty((4, 1))
     for i in range(4):
         system[i, i] = normal[i, i] * (1 + damping) + 1e-12
         move[i, 0] = -gradient[i]
+    if decay_held:
+        system[3, :3], system[3, 3], move[3, 0] = 0.0, 1.0, 0.0
     _solve(system, move)
     return move[:, 0].copy()
 

@@ -11,6 +11,8 @@ from gelslim_force.shading_change import ShadingChange
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+CLEAR = 2.0
+"""Change over the noise from which a bin's own change counts."""
 LEAST_AROUND = 2
 """Valid bins of 3 x 3 that a bin must have around it."""
 
@@ -20,11 +22,11 @@ def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask 
     s = settings
     change = light.change.astype(np.float32, copy=False)
     valid = light.valid.astype(np.float32)
-    scale = np.float32(1 / np.sqrt(len(change))) / light.noise.astype(np.float32)
-    power = np.square(change * scale[:, None, None]).sum(axis=0)
-    size = np.float32(s.largest_change) * np.tanh(
-        np.abs(change).max(axis=0) / np.float32(s.largest_change)
-    )
+    over_noise = np.square(change / light.noise)
+    power = over_noise.mean(axis=0)
+    # What noise may well have made has no size, or dark bins would outweigh a patch.
+    clear = np.abs(change) * (over_noise > CLEAR**2)
+    size = np.float32(s.largest_change) * np.tanh(clear.max(axis=0) / np.float32(s.largest_change))
     around = _around(np.stack([valid, power * valid, size * valid]))
     power, size = around[1:] / np.maximum(around[0], 1)
     changed = (power > s.least_power) & (size > s.least_change) & (around[0] >= LEAST_AROUND)

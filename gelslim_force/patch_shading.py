@@ -18,10 +18,14 @@ Array = NDArray[np.float64]
 
 STEPS = 12
 FIRST_STEPS = 5
+ABOUT = (1.0, 0.87, 1.14)
+AGAIN_DECAY = 1.5
+"""Sizes about the one expected, and the decay beside the last, that a fit is taken up from."""
 NEAR = 0.03
 """Move over the patch's size up to which a fit followed from the frame before goes on with the
 derivative it has."""
 LOOK_AT = 300
+GLANCE_AT = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,46 @@ def best_shading_fit(
 
     _, best = min((tried(s) for s in starts), key=lambda t: t[0])
     return fit_shading(window, best, strip, curvature_per_mm, blur_mm)
+
+
+def moved_on(
+    window: Window,
+    last: Array,
+    shift_mm: Array,
+    growth: float,
+    strip: bool,
+    curvature_per_mm: float,
+    blur_mm: float,
+) -> Array:
+    """Where to start from the fit of the frame before, (4,): of other places, sizes and decays,
+    that which leaves least.
+
+    `shift_mm` (2,) is the way of what changed in the picture, `growth` that of its size. A rim
+    that has moved by a tenth of the size is not found from where it was: the crease fits a steep
+    decay there.
+    """
+    part = window.thinned(GLANCE_AT)
+    residual = np.empty(part.change.shape)
+    here, there = last.copy(), last.copy()
+    if strip:
+        there[0] += shift_mm @ [-np.sin(last[1]), np.cos(last[1])]
+    else:
+        there[:2] += shift_mm
+    sizes = [s * g for g in {1.0, growth} for s in ABOUT]
+    starts = [place * [1, 1, size, 1] for place in (here, there) for size in sizes]
+    starts += [np.array([*s[:3], AGAIN_DECAY]) for s in starts]
+
+    def left(start: Array) -> float:
+        from gelslim_force.patch_fit_kernel import squares_left
+
+        return float(
+            squares_left(
+                part.x_mm, part.y_mm, part.lean, part.change, start, strip, curvature_per_mm,
+                blur_mm, residual,
+            )
+        )  # fmt: skip
+
+    return min(starts, key=left)
 
 
 def fit_shading(

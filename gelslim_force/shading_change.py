@@ -32,8 +32,9 @@ class ShadingChange:
     """(c, rows, columns) about the median over the pad; 0 where not valid."""
     valid: Mask
     """(rows, columns) bins on the pad with enough free pixels."""
-    noise: Array
-    """(c,) standard deviation of a bin, from the spread off the patch."""
+    noise: NDArray[np.floating]
+    """(c, rows, columns) standard deviation of each bin, from the spread off the patch; where there
+    is little light, or few free pixels, it is larger."""
 
 
 class ShadingReference:
@@ -62,12 +63,28 @@ class ShadingReference:
         whole_sums(self.image, bin_px, self._sums[0], self._glaring[0])
         self._ratios = np.ones((channels, *self.shape), dtype=np.float32)
         self._counts = np.zeros(self.shape, dtype=np.int64)
+        levels = self._levels()
         level = self.image.reshape(-1, channels).mean(axis=0)
         self._used = np.flatnonzero(level >= LEAST_LEVEL)
         if not len(self._used):
             raise ValueError(
                 f"the reference frame is dark (mean {level.max():.0f} of 255): no shading"
             )
+        self._unrest = _unrest(levels[self._used])
+
+    def _levels(self) -> NDArray[np.float32]:
+        """Mean grey value (c, rows, columns) of the free pixels of each bin; 0 where none is."""
+        rows, columns = self.shape
+        size = self.bin_px
+        cut = slice(0, rows * size), slice(0, columns * size)
+        free = (self._blocked[cut] == 0).astype(np.float32)
+
+        def summed(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+            return picture.reshape(rows, size, columns, size).sum(axis=(1, 3))
+
+        count = np.maximum(summed(free), 1)
+        channels = np.moveaxis(self.image[cut], 2, 0)
+        return np.stack([summed(c * free) / count for c in channels])
 
     def centres_px(self) -> Array:
         """Centres (rows * columns, 2) of the bins."""
@@ -106,7 +123,11 @@ class ShadingReference:
             self._ratios, self._counts,
         )  # fmt: skip
         free = self._counts >= LEAST_FREE * self.bin_px**2
-        return _about_median(_combined(np.log(self._ratios[self._used])), free & self.on_pad)
+        share = np.sqrt(np.float32(self.bin_px**2) / np.maximum(self._counts, 1))
+        unrest = self._unrest * share.astype(np.float32)
+        return _about_median(
+            _combined(np.log(self._ratios[self._used])), free & self.on_pad, unrest
+        )
 
 
 def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -135,17 +156,33 @@ def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
     return out
 
 
-def _about_median(change: NDArray[np.floating], valid: Mask) -> ShadingChange:
+def _unrest(levels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How noisy each bin of each layer of `_combined` is, up to a factor per layer.
+
+    Noise of one size in grey values, whatever the light (gamma takes away most of what shot noise
+    adds to bright pixels), makes a logarithm err as 1 over the level.
+    """
+    square = 1 / np.square(levels + np.float32(FLOOR))
+    if len(square) == 1:
+        return np.sqrt(square)
+    both = square[:1] + square[1:2]
+    return np.sqrt(np.concatenate([both, both / 4, square[2:] + both / 4]))
+
+
+def _about_median(
+    change: NDArray[np.floating], valid: Mask, unrest: NDArray[np.floating]
+) -> ShadingChange:
     layers = len(change)
     used = np.flatnonzero(valid)
     if not len(used):
-        return ShadingChange(np.zeros_like(change), valid, np.full(layers, np.inf))
-    some = change.reshape(layers, -1)[:, used[:: max(1, len(used) // MEDIAN_OF)]]
-    middle = _middles(some)
-    noise = np.maximum(ROBUST * _middles(np.abs(some - middle))[:, 0], 1e-4)
+        return ShadingChange(np.zeros_like(change), valid, np.full_like(change, np.inf))
+    some = used[:: max(1, len(used) // MEDIAN_OF)]
+    seen, scale = (a.reshape(layers, -1)[:, some] for a in (change, unrest))
+    middle = _middles(seen)
+    spread = ROBUST * _middles(np.abs(seen - middle) / scale)
     change -= middle[:, :, None]
     change *= valid
-    return ShadingChange(change, valid, noise.astype(float))
+    return ShadingChange(change, valid, np.maximum(spread[:, :, None] * unrest, 1e-4))
 
 
 def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -18,6 +18,7 @@ from ifem_export.marker_interpolation import FilledInterpolation
 Array = NDArray[np.float64]
 _SMALL_MM = 1e-3
 _MOVED_MM = 0.03
+_UNSURE_MM = 0.01
 _FEW = 4
 """Markers that must move: one or two may be mistaken."""
 
@@ -64,6 +65,24 @@ class SurfaceMotion:
         seen = motion_mm[near, :2]
         seen = seen[np.isfinite(seen).all(axis=1)]
         return seen.mean(axis=0) if len(seen) else None
+
+    def overdone(self, motion_mm: Array, reading: NormalReading) -> float:
+        """How much farther the markers in the contact should seem to move, by their normal motion
+        alone, than they do; 0 where none is seen there, or the camera looks straight on.
+
+        What sinks moves in the picture. A patch that is none asks for a motion that nobody sees,
+        and compensating for it invents a lateral motion that forces then explain.
+        """
+        if not reading.known or reading.touched is None or not reading.touched.any():
+            return 0.0
+        near = self.nodes_to_markers @ reading.touched.astype(float) > 0.5
+        near &= np.isfinite(motion_mm[:, 0])
+        if not near.any():
+            return 0.0
+        height = (self.nodes_to_markers @ reading.w_mm)[near]
+        apparent = self.apparent_per_mm[self.markers][near] * height[:, None]
+        shown = motion_mm[near, :2] + apparent
+        return float(np.sqrt((apparent**2).mean()) / (np.sqrt((shown**2).mean()) + _UNSURE_MM))
 
     def of_nodes(
         self, motion_mm: Array, reading: NormalReading | None

@@ -87,12 +87,22 @@ def shaded(
     seed: int = 1,
     moved_mm: Vector | None = None,
     brightness: float = 1.0,
+    dark_sides: float = 0.0,
 ) -> Frame:
-    """A 480 x 640 frame; without slopes, of a level surface."""
+    """A 480 x 640 frame; without slopes, of a level surface.
+
+    With `dark_sides` each colour falls off as exp(-dark_sides · share of the way) across the gel,
+    and blue is all but missing.
+    """
     frame = render(GRID, CAMERA, Look(blur=0.0, noise=0.0, seed=7), moved_mm)
     image = frame.image.astype(float) * brightness
     if slopes is not None:
         image *= lit(*slopes).reshape(480, 640, 3)
+    if dark_sides:
+        across = np.linspace(0, 1, 640)[None, :]
+        image[:, :, 0] *= np.exp(-dark_sides * across)
+        image[:, :, 1] *= np.exp(-dark_sides * (1 - across))
+        image[:, :, 2] *= 0.08
     image = gaussian_filter(image, (blur, blur, 0))
     image += np.random.default_rng(seed).normal(0, noise, image.shape)
     picture = np.clip(np.rint(image), 0, 255).astype(np.uint8)

@@ -12,8 +12,10 @@ from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, strea
 from synthetic import Look
 
 from gelslim_force.calibration import calibrate
+from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.force_estimator import ForceSettings
 from gelslim_force.force_pipeline import ForcePipeline
+from gelslim_force.indenter_source import NormalReading
 from gelslim_force.pipeline_settings import PipelineSettings
 
 
@@ -176,3 +178,30 @@ def test_importing_the_pipeline_loads_no_cad_and_no_vtk() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+class WrongPatch:
+    """A source that takes a tenth of the pad for a deep contact."""
+
+    def __init__(self, chain: ForcePipeline, depth_mm: float) -> None:
+        x, y = chain.points_mm[:, 0] + 5.0, chain.points_mm[:, 1]
+        self._touched = np.hypot(x, y) < 3.0
+        self._w = np.where(self._touched, -depth_mm, 0.0)
+
+    def look(self, image, markers_px):
+        return ContactPatch("disc", np.array([-5.0, 0.0]), 3.0)
+
+    def motion(self, seen, lateral_mm=None):
+        return NormalReading(self._w, 0 * self._w, self._touched, seen)
+
+
+def test_a_patch_that_the_markers_contradict_gives_no_normal_force(calibration, frames) -> None:
+    """The misfit does not show it: compensating for the false depth invents a motion to fit."""
+    chain = pipeline(calibration)
+    chain.normal = WrongPatch(chain, depth_mm=1.5)
+    result = last(chain, frames, normal=False)
+    assert result.field.misfit == 0.0
+    assert not result.normal_known
+    assert any("times the motion that the markers show" in text for text in result.problems)
+    assert np.isnan(result.wrench.force_n[2])
+    np.testing.assert_allclose(result.wrench.force_n[:2], SHEAR_N, atol=0.12)

@@ -114,6 +114,37 @@ def test_patch_cut_by_the_pads_edge(centre):
     assert sigma[2] > whole.sigma_mm
 
 
+@pytest.mark.parametrize(("dark_sides", "noise"), [(1.0, 4.0), (2.0, 2.0)])
+def test_noise_of_dark_sides_is_no_patch(dark_sides, noise):
+    """Where one colour is all but gone its logarithm is noisy: once taken for a patch along the
+    gel's whole side, wider than the pad, which drowned a light press in the middle."""
+    rest = shaded(seed=0, noise=noise, dark_sides=dark_sides)
+    find = PatchFinder(CAMERA, rest.image, rest.centres_px,
+                       marker_radius_px=rest.diameter_px / 2,
+                       surface_mm=pad_nodes(), indenter=Sphere(BALL_MM)).find  # fmt: skip
+    for seed in range(1, 7):
+        assert find(shaded(seed=seed, noise=noise, dark_sides=dark_sides).image) is None
+    centre, radius = np.array([0.5, -0.8]), 1.8
+    sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+    for seed in range(10, 14):
+        image = shaded((sx, sy), seed=seed, noise=noise, dark_sides=dark_sides).image
+        patch = find(image).at_height(rim_height(radius))
+        assert np.abs(patch.centre_mm - centre).max() < 0.1
+        assert abs(patch.size_mm - radius) < 0.1
+
+
+@pytest.mark.parametrize("sizes", [(1.4, 2.0), (2.0, 2.6), (2.0, 1.5)])
+def test_a_patch_that_jumps_in_size_is_followed(sizes):
+    """A rim a third of the size away: the fit once stayed at the old size with a steep decay."""
+    follow, centre = finder(), np.array([-0.5, 2.0])
+    for k, radius in enumerate(sizes):
+        sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+        image = shaded((sx, sy), seed=50 + k).image
+        patch, fresh = follow.find(image), finder().find(image)
+        assert abs(patch.size_mm - fresh.size_mm) < 0.05
+        assert np.abs(patch.centre_mm - fresh.centre_mm).max() < 0.03
+
+
 def test_a_patch_is_followed_from_frame_to_frame():
     """A press that grows and slides: the same errors as afresh; then it lifts off, then returns."""
     follow = finder()
