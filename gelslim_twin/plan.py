@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from gelslim_twin.effects.effect import Bound, unit_of
@@ -129,6 +130,10 @@ class Plan:
 
     def to_json(self) -> str:
         """The same as JSON text; equal plans give equal bytes."""
+        return self._json
+
+    @cached_property
+    def _json(self) -> str:
         return json.dumps(self.to_record(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
     def __str__(self) -> str:

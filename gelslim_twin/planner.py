@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from accuracy_budget.budget import Budget
 from accuracy_budget.ladder import Ladder
@@ -33,6 +33,20 @@ class Question:
     force_n: float
     image_px: float
     circumstances: Circumstances
+    _kept: dict[int, tuple[Effect, Bound, tuple[Rung, ...]]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+    """Bounds and ladders are asked for at every turn of the planning."""
+
+    def weighed(self, effect: Effect) -> tuple[Effect, Bound, tuple[Rung, ...]]:
+        """An effect with its bound, nil where its parameters do nothing, and its ladder."""
+        found = self._kept.get(id(effect))
+        if found is None:
+            c = self.circumstances
+            bound = Bound() if effect.is_null(c) else effect.bound(c)
+            # The effect is kept too: its id is not given to another one.
+            found = self._kept[id(effect)] = effect, bound, tuple(effect.ladder(c))
+        return found
 
     def tolerance(self, observable: str) -> float:
         """Of one observable, in its unit."""
@@ -123,15 +137,13 @@ def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
 
     One that must be in and has none but exact rungs costs nothing.
     """
-    lost = _bound(question, effect).of(observable)
-    may_go = not effect.provides and lost <= question.tolerance(observable)
-    inexact = any(r.error.of(observable) > 0 for r in effect.ladder(question.circumstances))
-    return lost > 0 and (may_go or inexact)
-
-
-def _bound(question: Question, effect: Effect) -> Bound:
-    c = question.circumstances
-    return Bound() if effect.is_null(c) else effect.bound(c)
+    _, bound, ladder = question.weighed(effect)
+    lost = bound.of(observable)
+    if lost <= 0:
+        return False
+    if not effect.provides and lost <= question.tolerance(observable):
+        return True
+    return any(r.error.of(observable) > 0 for r in ladder)
 
 
 def _within(error: Bound, shares: dict[str, float]) -> bool:
@@ -140,23 +152,23 @@ def _within(error: Bound, shares: dict[str, float]) -> bool:
 
 def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str, float]) -> Choice:
     c, use = question.circumstances, question.use(effect)
-    bound = _bound(question, effect)
+    _, bound, ladder = question.weighed(effect)
     if use == "off":
         cost = "not observed" if not relevant else "switched off"
         return _out(effect, bound, cost, shares if relevant else {})
     if not relevant:
         return _out(effect, bound, "not observed", {})
     if use == "on":
-        return _in(effect, c, bound, "switched on", shares)
+        return _in(effect, ladder, bound, "switched on", shares)
     if effect.provides:
         made = ", ".join(effect.provides)
-        return _in(effect, c, bound, f"provides {made}", shares)
+        return _in(effect, ladder, bound, f"provides {made}", shares)
     if effect.is_null(c):
         return _out(effect, bound, "parameters nil", shares)
     if _within(bound, shares):
         return _out(effect, bound, "below its share", shares)
     worst = max(shares, key=lambda o: _excess(bound.of(o), shares[o]))
-    return _in(effect, c, bound, f"matters to {worst}", shares)
+    return _in(effect, ladder, bound, f"matters to {worst}", shares)
 
 
 def _excess(error: float, share: float) -> float:
@@ -171,9 +183,9 @@ def _out(effect: Effect, bound: Bound, why: str, shares: dict[str, float]) -> Ch
 
 
 def _in(
-    effect: Effect, c: Circumstances, bound: Bound, why: str, shares: dict[str, float]
+    effect: Effect, ladder: Sequence[Rung], bound: Bound, why: str, shares: dict[str, float]
 ) -> Choice:
-    rung = _rung(effect.ladder(c), shares)
+    rung = _rung(ladder, shares)
     return Choice(
         effect.name,
         effect.title,

@@ -13,6 +13,7 @@ OBSERVABLES = ("displacement", "force", "markers", "image")
 """Data that a scene may observe."""
 GIVEN = frozenset({"poses"})
 """Data that need no effect: they come with scene and sensor."""
+_FIELDS = {o: f"{o}_n" if o == "force" else f"{o}_px" for o in OBSERVABLES}
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,8 @@ class Bound:
     image_px: float = 0.0
 
     def of(self, observable: str) -> float:
-        """The error of one observable, in its unit."""
-        return float(getattr(self, f"{observable}_{unit_of(observable)}"))
+        """The error of one observable, in its unit. Raises KeyError."""
+        return float(getattr(self, _FIELDS[observable]))
 
     def at_most(self, other: Bound) -> Bound:
         """The smaller error of each observable."""
