@@ -33,7 +33,7 @@ BUMP_MM = (1.8, 4.0)
 METHODS = {
     "direct": ForceSettings(method="direct"),
     "low-pass": ForceSettings(method="low_pass"),
-    "low-pass 0.4 mm": ForceSettings(method="low_pass", low_pass_mm=0.4),
+    "low-pass 0.75 mm": ForceSettings(method="low_pass", low_pass_mm=0.75),
     "masked": ForceSettings(method="masked"),
 }
 OPERATORS: dict[str, tuple[str, dict[str, float]]] = {

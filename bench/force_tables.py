@@ -21,7 +21,7 @@ STAGES = {
     "force": "forces",
     "wrench": "wrench with σ",
 }
-SHOWN = ("tangential", "depth given", "sphere seen", "paper's choices")
+SHOWN = ("tangential, 5%", "depth given, 5%", "depth given", "sphere seen, 5%", "paper's choices")
 
 
 def main() -> None:

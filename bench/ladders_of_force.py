@@ -10,8 +10,8 @@ from ladder_record import LadderRecord, RungRecord
 Data = Mapping[str, Any]
 OURS_DETECTOR, OURS_MATCHING = "near predictions", "robust"
 OURS_INTERPOLATION, OURS_COMPENSATION = "sparse", "exact"
-OURS_METHODS = ("low-pass 0.4 mm", "low-pass")
-"""The default low-pass under the names it had; the first that is there counts."""
+OURS_METHODS = ("low-pass",)
+"""The method that the pipeline takes where the contact is not known."""
 FRAME: Final = {"source": "force_ladders", "time_unit": "ms"}
 PER_FRAME = "time per frame, one thread"
 
