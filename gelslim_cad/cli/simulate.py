@@ -153,4 +153,8 @@ def _report(folder: Path, answer: dict[str, Any]) -> None:
             f"Worst of any pose: residual {worst['residual']:.1e}, penetration "
             f"{1000 * worst['penetration_mm']:.2g} µm."
         )
-    print(f"In {folder}/: truth.csv, truth.npz, plan.json, ledger.json, frames/.")
+    first = sorted(folder.glob("scene_*"))[:1]
+    where = f"In {folder}/scene_*/" if many > 1 or first else f"In {folder}/"
+    drawn = any(((first or [folder])[0] / "frames").glob("*.png"))
+    names = ["truth.csv", "truth.npz", "plan.json", "ledger.json", *(["frames/"] if drawn else [])]
+    print(f"{where}: {', '.join(names)}.")
