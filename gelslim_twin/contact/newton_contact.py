@@ -268,7 +268,7 @@ class _Walk:
         if self.rest > self.tolerance or self.off_mm > slack or into.any():
             return None
         push = np.linalg.norm(balance.force_n, axis=1)
-        across = float(np.abs(push * gap[nodes])[balance.touch > 0].max(initial=0.0))
+        across = float((push * off[nodes])[balance.touch > 0].max(initial=0.0))
         report = {
             "residual": self.rest,
             "penetration_mm": max(0.0, -float(gap[nodes].min(initial=0.0))),

@@ -11,6 +11,7 @@ from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_balance import Balance, balanced
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.contact.tool_surface import ToolSurface, tool_surface
+from gelslim_twin.contact.turning import EvenTurns, HalvedTurns, Turning
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
@@ -61,6 +62,14 @@ class Settling:
 
         Raises ContactError.
         """
+        try:
+            return self._settled(surface, motion_mm, force_n, EvenTurns())
+        except ContactError:
+            return self._settled(surface, motion_mm, force_n, HalvedTurns())
+
+    def _settled(
+        self, surface: ToolSurface, motion_mm: Array, force_n: Array, turning: Turning
+    ) -> Settled:
         shape, u, force, known = surface, motion_mm, force_n, None
         goal, fine = self.target_mm - self.offset_mm, BALANCE * self.tolerance
         sweeps, worst, within = 0, np.inf, max(fine, LOOSE)
@@ -84,7 +93,8 @@ class Settling:
             u_before, u = u, new
             if turn >= DAMPED_FROM:
                 # A node astride an edge goes from one flank to the other and back.
-                mixed = shape.turned(used, 1 / (turn - DAMPED_FROM + 2))
+                share = turning.share(shape.normal - used.normal)
+                mixed = shape.turned(used, share)
                 u = u_before + 0.5 * (u - u_before)
                 shape = tool_surface(self.tool, self.pose, self.points_mm + u, mixed)
                 shape = ToolSurface(shape.met_mm, mixed.normal)

@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 DIFFERENCE_MM = 1e-4
 MOST_SLOPE = 10.0
 """Steeper flanks count as this steep: a wall is a flank that nothing slips past."""
+BENT = 0.03
+"""Rise over the last plane, per way, from which a wall is looked for on the way."""
+ROUNDING_MM = 1e-7
 _SIDES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * DIFFERENCE_MM
 
 
@@ -41,9 +44,9 @@ class ToolSurface:
         met[~kept, 2] = np.inf
         return ToolSurface(met, self.normal)
 
-    def turned(self, other: ToolSurface, share: float) -> ToolSurface:
-        """The same points with normals `share` of the way from another's."""
-        mixed = other.normal + share * (self.normal - other.normal)
+    def turned(self, other: ToolSurface, share: Array) -> ToolSurface:
+        """The same points with normals `share` (n,) of the way from another's."""
+        mixed = other.normal + share[:, None] * (self.normal - other.normal)
         return ToolSurface(self.met_mm, mixed / np.linalg.norm(mixed, axis=1)[:, None])
 
     def gap_mm(self, points_mm: Array) -> Array:
@@ -85,8 +88,9 @@ def tool_surface(
     """The tool by points (n, 3).
 
     A point beside the tool meets nothing, or where `before` meets it, that one's plane: a node
-    that slips off an edge on the way to a solution is not let go at once. Planes are tilted as
-    the tool is where a point is nearer than `reach_mm`, else level on the tool.
+    that slips off an edge on the way to a solution is not let go at once. The same holds where
+    another part of the tool stands above the edge. Planes are tilted as the tool is where a point
+    is nearer than `reach_mm`, else level on the tool.
     """
     own, turn = _own(pose, points_mm), rotation(pose)
     height = tool.local(own[:, 0], own[:, 1])
@@ -105,7 +109,11 @@ def tool_surface(
     if pose.tilt_x_deg != 0 or pose.tilt_y_deg != 0 or slopes.any():
         normal = normal @ turn.T
     if before is not None:
-        off = np.flatnonzero(~np.isfinite(height) & before.is_met)
+        off = before.is_met & ~np.isfinite(height)
+        held = np.flatnonzero(before.is_met & np.isfinite(height))
+        last = _own(pose, before.met_mm[held])
+        facing = before.normal[held] @ turn
+        off[held] = _past_walls(tool, last, facing, own[held, :2], height[held])
         met[off], normal[off] = before.met_mm[off], before.normal[off]
     return ToolSurface(met, normal)
 
@@ -115,12 +123,45 @@ def _own(pose: Pose, points_mm: Array) -> Array:
     return np.asarray((points_mm - [pose.x_mm, pose.y_mm, -pose.depth_mm]) @ rotation(pose))
 
 
+def _past_walls(
+    tool: Tool, last: Array, facing: Array, now: Array, height: Array
+) -> NDArray[np.bool_]:
+    """Whether (n,) the tool jumps up on the straight ways from `last` (n, 3) on it to `now` (n, 2).
+
+    All in the tool's own frame; `facing` (n, 3) are the normals at `last`, `height` (n,) is that
+    of the tool at `now`.
+    """
+    way = now - last[:, :2]
+    plane = last[:, 2] - (way * facing[:, :2]).sum(axis=1) / np.maximum(facing[:, 2], 1e-9)
+    far = np.hypot(way[:, 0], way[:, 1])
+    jumps = height - plane > BENT * far + ROUNDING_MM
+    some = np.flatnonzero(jumps)
+    if len(some) == 0:
+        return jumps
+    a, b, low, high = last[some, :2], now[some], last[some, 2], height[some]
+    # The half with the steeper rise, down to where a slope would be measured.
+    while far[some].max() > DIFFERENCE_MM:
+        middle = (a + b) / 2
+        between = tool.local(middle[:, 0], middle[:, 1])
+        first = between >= (low + high) / 2
+        a, low = np.where(first[:, None], a, middle), np.where(first, low, between)
+        b, high = np.where(first[:, None], middle, b), np.where(first, between, high)
+        far = far / 2
+    jumps[some] = high - low > 2 * MOST_SLOPE * far[some] + ROUNDING_MM
+    return jumps
+
+
 def _slope(behind: Array, here: Array, ahead: Array) -> Array:
     """Central difference; at a rim the one to the side where the tool goes on."""
     with np.errstate(invalid="ignore"):
         up, down = (ahead - here) / DIFFERENCE_MM, (here - behind) / DIFFERENCE_MM
     up = np.where(np.isfinite(up), up, down)
     down = np.where(np.isfinite(down), down, up)
+    # Beside a wall the tool is as it is on this side of it.
+    up, down = (
+        np.where((np.abs(one) > 2 * MOST_SLOPE) & (np.abs(other) <= MOST_SLOPE), other, one)
+        for one, other in ((up, down), (down, up))
+    )
     mean = np.where(np.isfinite(up), (up + down) / 2, 0.0)
     # What differences of a level face leave is rounding.
     return np.where(np.abs(mean) < 1e-9, 0.0, np.clip(mean, -MOST_SLOPE, MOST_SLOPE))
