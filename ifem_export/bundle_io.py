@@ -21,6 +21,7 @@ from ifem_export.bundle_ladder import LADDER, ladder_json, read_ladder
 from ifem_export.bundle_layout import bundle_arrays, bundle_from
 from ifem_export.bundle_manifest import MANIFEST, REBUILD, describe, read_manifest, to_json
 from ifem_export.errors import BundleError
+from whole_files.beside import beside
 from whole_files.file_lock import locked
 from whole_files.replaced_folder import FolderError, recover, replaced_folder
 
@@ -40,7 +41,7 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
     target = Path(os.path.abspath(path))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with locked(target.with_name(f".{target.name}.lock")):
+        with locked(beside(target, ".lock")):
             recover(target)
             _require_replaceable(target)
             with replaced_folder(target, _files_of(target)) as staging:
@@ -49,7 +50,9 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
         raise BundleError(str(target), "cannot be written", str(error)) from error
     except OSError as error:
         raise BundleError(
-            str(target), f"cannot be written ({error.strerror or error})", "check the disk"
+            str(target),
+            f"cannot be written ({error.strerror or error})",
+            "check the path and the disk",
         ) from error
 
 

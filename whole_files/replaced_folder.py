@@ -13,6 +13,8 @@ import sys
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from whole_files.beside import beside
+
 _AT_FDCWD = -100
 _EXCHANGE = 2
 
@@ -31,7 +33,7 @@ def replaced_folder(target: Path, ours: Collection[str]) -> Iterator[Path]:
     """
     place = Path(os.path.realpath(target))
     _require_movable(place, target)
-    staging = place.with_name(f".{place.name}.building")
+    staging = beside(place, ".building")
     try:
         shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir(parents=True)
@@ -103,7 +105,7 @@ def _swap(staging: Path, place: Path) -> None:
 
 
 def _retired(place: Path) -> Path:
-    return place.with_name(f".{place.name}.old")
+    return beside(place, ".old")
 
 
 def _exchanged(staging: Path, place: Path) -> bool:

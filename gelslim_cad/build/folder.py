@@ -12,6 +12,7 @@ import sys
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from whole_files.beside import beside
 from whole_files.file_lock import locked as lock_file
 from whole_files.replaced_folder import FolderError, replaced_folder
 
@@ -30,7 +31,7 @@ def locked(target: Path) -> Iterator[None]:
 
     Raises OutputError when the folder's parent cannot be written.
     """
-    lock = target.with_name(f".{target.name}.lock")
+    lock = beside(target, ".lock")
     with contextlib.ExitStack() as stack:
         try:
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -13,10 +13,14 @@ from gelslim_cad.cli.budget import FieldError, FrameTime
 from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
     from gelslim_twin.validation.validation import Validation
     from ifem_export.bundle import Bundle
     from ifem_export.ladder import Progress
     from ifem_export.operator_ladder import OperatorLadder
+
+RECORD = "validation.json"
+PLOTS = ("resultants.png", "fields.png", "error_budget.png")
 
 
 def validate(
@@ -41,7 +45,7 @@ def validate(
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.budget import budget_of
     from gelslim_cad.cli.bundle import chosen_label
-    from gelslim_cad.cli.output import replace_file
+    from gelslim_cad.cli.output import replace_file, spare_strangers_in
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.twin_sensor import spec_sensor
     from gelslim_cad.cli.validate_tables import print_validation
@@ -58,6 +62,8 @@ def validate(
     with progress_bar(quiet=as_json) as tell:
         kept = folder / "sensor"
         made = spec_sensor(spec)
+        names = [RECORD, *(picture_names(made) if pictures else [])]
+        spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
         ladder = None if budget.unlimited else _ladder(spec, made.bundle, tell)
         label = "" if ladder is None else chosen_label(ladder, budget)
         store_sensor(made, kept, True)
@@ -70,8 +76,8 @@ def validate(
     record = plain(found.to_record())
     if label:
         record["operator"] = label
-    replace_file(folder / "validation.json", json_bytes(record))
-    written = ["validation.json", *(_draw(found, folder) if pictures else [])]
+    replace_file(folder / RECORD, json_bytes(record))
+    written = [RECORD, *(_draw(found, folder) if pictures else [])]
     if as_json:
         print_json(record)
         return 0
@@ -103,9 +109,10 @@ def _draw(found: Validation, folder: Path) -> list[str]:
 
     slides = len(found.experiment.tests)
     deepest, others = found.samples[slides - 1], found.samples[slides:]
-    plots = {"resultants.png": resultants_png(found), "fields.png": fields_png(found, deepest)}
+    resultants, fields, budget = PLOTS
+    plots = {resultants: resultants_png(found), fields: fields_png(found, deepest)}
     if found.budget:
-        plots["error_budget.png"] = budget_png(found.budget, PAPER_N, PAPER_RELATIVE)
+        plots[budget] = budget_png(found.budget, PAPER_N, PAPER_RELATIVE)
     for name, content in plots.items():
         replace_file(folder / name, content)
     camera = found.calibration.camera
@@ -115,6 +122,22 @@ def _draw(found: Validation, folder: Path) -> list[str]:
     for sample in (deepest, *others):
         result = next(iter(sample.results.values()))
         picture = overlay.draw(sample.image, result, scale_of_run([result]))
-        names.append(f"{sample.name.replace(' ', '_').replace(',', '')}.png")
+        names.append(picture_name(sample.name))
         write_overlay(folder / names[-1], picture)
     return names
+
+
+def picture_names(sensor: TwinSensor) -> list[str]:
+    """All that `_draw` may write, known before the minutes that the experiment takes."""
+    from gelslim_twin.validation.case import other_contacts
+    from gelslim_twin.validation.experiment import DIRECTIONS
+
+    mesh = sensor.bundle.mesh
+    cases = other_contacts(mesh.layers * mesh.cell_size_mm[2], *sensor.size_mm)
+    samples = (f"slide {DIRECTIONS}", *(case.name for case in cases))
+    return [*PLOTS, *map(picture_name, samples)]
+
+
+def picture_name(sample: str) -> str:
+    """The file that shows a sample of this name."""
+    return f"{sample.replace(' ', '_').replace(',', '')}.png"

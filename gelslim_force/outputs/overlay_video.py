@@ -13,6 +13,7 @@ import numpy as np
 from gelslim_force.outputs import optional_library
 from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.picture_file import Image
+from whole_files.beside import beside
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
 
@@ -40,7 +41,7 @@ class OverlayVideo:
             raise OutputError(f"{frames_per_s!r} frames per second: must be in 0.1 ... 1000")
         self._size = size_px
         self._padded = (size_px[0] + size_px[0] % 2, size_px[1] + size_px[1] % 2)
-        self._part = self.path.with_name(f".{self.path.stem}.part{self.path.suffix.lower()}")
+        self._part = beside(self.path.with_suffix(""), f".part{self.path.suffix.lower()}")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._part.write_bytes(b"")

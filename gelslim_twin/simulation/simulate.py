@@ -35,6 +35,7 @@ from gelslim_twin.simulation.run_folder import (
 from gelslim_twin.simulation.state_store import StateStore
 from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
 from gelslim_twin.simulation.twin_sensor import TwinSensor
+from whole_files.beside import beside
 from whole_files.file_lock import locked
 
 Progress = Callable[[str, int, int], None]
@@ -123,7 +124,7 @@ def simulate(
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SimulationError(f"{folder}: {reason}; choose a folder you can write to") from error
-    with locked(place.with_name(f".{place.name}.lock"), _say_waiting):
+    with locked(beside(place, ".lock"), _say_waiting):
         return _simulated(job, folder, overwrite, progress or (lambda text, done, total: None))
 
 

@@ -26,7 +26,8 @@ def store_sensor(sensor: TwinSensor, folder: Path, with_light: bool) -> None:
     """Write what is not there yet; another sensor there is replaced, its light included.
 
     The sensor is in use by this process from then on. Raises SimulationError where another process
-    uses another sensor there, or the folder cannot be written.
+    uses another sensor there, files of other origin are in the way, or the folder cannot be
+    written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -48,7 +49,8 @@ def _store(sensor: TwinSensor, folder: Path, with_light: bool) -> None:
                 f"{folder} holds the sensor of another simulation that is still running; "
                 "wait for it, or choose an output folder whose parent is another"
             )
-        for name in (OUTLINE, LIGHT):
+        _spare_strangers(folder)
+        for name in (LIGHT, OUTLINE):  # never a light without the outline that tells whose it is
             (folder / name).unlink(missing_ok=True)
         write_bundle(held, sensor.bundle)
         _forget_compliances(folder)
@@ -61,6 +63,17 @@ def _store(sensor: TwinSensor, folder: Path, with_light: bool) -> None:
         stream = io.BytesIO()
         np.savez(stream, **{name: getattr(light, name) for name in LIGHT_FIELDS})
         replace_file(folder / LIGHT, stream.getvalue())
+
+
+def _spare_strangers(folder: Path) -> None:
+    """Raise SimulationError where files of these names are not what `_store` wrote."""
+    known = bool(_stored_key(folder))
+    for name in (OUTLINE, LIGHT):
+        if not known and (folder / name).exists():
+            raise SimulationError(
+                f"{folder}: holds a {name} of other origin, which the sensor would replace; "
+                "choose an output folder whose parent is another"
+            )
 
 
 def _forget_compliances(folder: Path) -> None:

@@ -12,19 +12,11 @@ import time
 from pathlib import Path
 
 import pytest
-from sweep_commands import COMMANDS, NAMED, Command, digests, environment, finished, prepare
+from clean_run import CleanRun, CleanRuns
+from sweep_commands import COMMANDS, NAMED, Command, digests, environment, finished
 
 pytest.importorskip("cadquery", reason="building needs the [cad] extra")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills process groups")
-
-
-@pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = prepare(tmp_path_factory.mktemp("inputs") / "in puts é")
-    done = finished(NAMED["simulate"].argv(folder, folder / "run"), folder.parent / "tmp")
-    assert done.returncode == 0, done.stderr
-    (folder / "run" / "frames").rename(folder / "drawn")
-    return folder
 
 
 def killed(argv: list[str], scratch: Path, after_s: float) -> bool:
@@ -42,20 +34,17 @@ def killed(argv: list[str], scratch: Path, after_s: float) -> bool:
         return True
 
 
-def kill_and_finish(command: Command, place: Path, tmp_path: Path, kills: int) -> None:
-    clean, scratch = tmp_path / "clean" / "out", tmp_path / "tmp"
-    started = time.monotonic()
-    done = finished(command.argv(place, clean), scratch)
-    took = time.monotonic() - started
-    assert done.returncode == 0, done.stderr
-    whole = digests(clean.parent, command.ignored)
+def kill_and_finish(
+    command: Command, place: Path, clean: CleanRun, tmp_path: Path, kills: int
+) -> None:
+    scratch, whole, took = tmp_path / "tmp", clean.whole, clean.took_s
     assert whole
     out = tmp_path / "killed" / "out"
     moments = random.Random(f"kill {command.name}")
     for k in range(kills):
         # Most of the first seconds go to imports: kill late rather than early.
         killed(command.argv(place, out), scratch, took * moments.uniform(0.3, 1.0))
-        if k == kills // 2 and command.name not in ("force", "new"):
+        if kills > 3 and k == kills // 2 and command.name not in ("force", "new"):
             # Once over halfway, so that a resumed run is killed too.
             assert finished(command.argv(place, out), scratch).returncode == 0
             assert digests(out.parent, command.ignored) == whole
@@ -93,16 +82,16 @@ def old_or_new(command: Command, place: Path, tmp_path: Path, kills: int) -> Non
         assert set(old) & set(new) <= set(shown)
 
 
-def test_markers_killed_now_and_then(place: Path, tmp_path: Path) -> None:
-    kill_and_finish(NAMED["markers"], place, tmp_path, 2)
+def test_markers_killed_now_and_then(place: Path, clean_runs: CleanRuns, tmp_path: Path) -> None:
+    kill_and_finish(NAMED["markers"], place, clean_runs(NAMED["markers"]), tmp_path, 2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
 def test_killed_at_random_moments_it_ends_with_the_same_bytes(
-    command: Command, place: Path, tmp_path: Path
+    command: Command, place: Path, clean_runs: CleanRuns, tmp_path: Path
 ) -> None:
-    kill_and_finish(command, place, tmp_path, command.kills)
+    kill_and_finish(command, place, clean_runs(command), tmp_path, command.kills)
 
 
 @pytest.mark.slow
@@ -116,10 +105,9 @@ def test_killed_over_an_earlier_output_each_file_is_whole(
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
 def test_two_at_once_into_one_folder_end_whole_or_say_why(
-    command: Command, place: Path, tmp_path: Path
+    command: Command, place: Path, clean_runs: CleanRuns, tmp_path: Path
 ) -> None:
-    clean, out, scratch = tmp_path / "clean" / "out", tmp_path / "both" / "out", tmp_path / "tmp"
-    assert finished(command.argv(place, clean), scratch).returncode == 0
+    out, scratch = tmp_path / "both" / "out", tmp_path / "tmp"
     both = [
         subprocess.Popen(
             command.argv(place, out), env=environment(scratch), text=True,
@@ -134,7 +122,7 @@ def test_two_at_once_into_one_folder_end_whole_or_say_why(
             assert process.returncode == 2, err
             assert "another process" in err or "another gelslim" in err
     assert 0 in [process.returncode for process in both], told
-    assert digests(out.parent, command.ignored) == digests(clean.parent, command.ignored)
+    assert digests(out.parent, command.ignored) == clean_runs(command).whole
 
 
 @pytest.mark.slow

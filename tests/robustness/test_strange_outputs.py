@@ -10,9 +10,14 @@ from sweep_commands import MINI20
 
 from gelslim_cad.build.folder import OutputError, require_ours
 from gelslim_cad.cli import main
+from gelslim_cad.cli.twin_sensor import spec_sensor
+from gelslim_cad.cli.validate import PLOTS, picture_name, picture_names
 from gelslim_force.outputs.output_error import OutputError as RunError
 from gelslim_force.outputs.run_recorder import RunRecorder
 from gelslim_twin.simulation.run_folder import RunFolder, SimulationError
+from gelslim_twin.simulation.stored_sensor import store_sensor
+from gelslim_twin.validation.case import other_contacts
+from gelslim_twin.validation.experiment import sphere_experiment
 
 
 def holding(folder: Path, name: str, content: object) -> Path:
@@ -78,3 +83,32 @@ def test_files_of_the_users_are_not_written_over(
     assert "markers.svg" in capsys.readouterr().err
     assert mine.read_text() == "mine"
     assert [p.name for p in tmp_path.iterdir()] == ["markers.svg"]
+
+
+@pytest.mark.parametrize("name", ["validation.json", "fields.png", "punch_and_twist.png"])
+def test_pictures_of_others_stop_a_validation_before_it_starts(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / name).write_text("mine")
+    assert main(["validate", str(MINI20), "-o", str(tmp_path)]) == 2
+    assert f"holds a {name} of other origin" in capsys.readouterr().err
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [(name, "mine")]
+
+
+def test_every_picture_of_a_validation_was_looked_for() -> None:
+    sensor = spec_sensor(MINI20)
+    mesh = sensor.bundle.mesh
+    thickness = mesh.layers * mesh.cell_size_mm[2]
+    slides = len(sphere_experiment(thickness, *sensor.size_mm).tests)
+    names = [f"slide {slides}", *(c.name for c in other_contacts(thickness, *sensor.size_mm))]
+    assert picture_names(sensor) == [*PLOTS, *(picture_name(name) for name in names)]
+
+
+@pytest.mark.parametrize("name", ["sensor.json", "light.npz"])
+def test_a_sensor_spares_files_of_others(name: str, tmp_path: Path) -> None:
+    sensor = spec_sensor(MINI20)
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(SimulationError, match=f"{name} of other origin"):
+        store_sensor(sensor, tmp_path, False)
+    assert (tmp_path / name).read_text() == "mine"
+    assert {p.name for p in tmp_path.iterdir()} <= {name, ".lock"}

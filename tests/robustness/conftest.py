@@ -1,0 +1,40 @@
+"""Inputs and undisturbed outputs of the sweep, made once."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from clean_run import CleanRun, CleanRuns
+from sweep_commands import NAMED, Command, digests, finished, prepare
+
+
+@pytest.fixture(scope="session")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of inputs, with a blank and a letter that is not ASCII in its path."""
+    folder = prepare(tmp_path_factory.mktemp("inputs") / "in puts é")
+    done = finished(NAMED["simulate"].argv(folder, folder / "run"), folder.parent / "tmp")
+    assert done.returncode == 0, done.stderr
+    (folder / "run" / "frames").rename(folder / "drawn")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def clean_runs(place: Path, tmp_path_factory: pytest.TempPathFactory) -> CleanRuns:
+    """A command's undisturbed run."""
+    made: dict[str, CleanRun] = {}
+
+    def clean(command: Command) -> CleanRun:
+        if command.name not in made:
+            out = tmp_path_factory.mktemp("clean") / "out"
+            started = time.monotonic()
+            done = finished(command.argv(place, out), place.parent / "tmp")
+            took = time.monotonic() - started
+            assert done.returncode == 0, done.stderr
+            files = [p for p in out.parent.rglob("*") if p.is_file()]
+            size = sum(p.stat().st_size for p in files if not p.name.startswith("compliance-"))
+            made[command.name] = CleanRun(out, digests(out.parent, command.ignored), size, took)
+        return made[command.name]
+
+    return clean

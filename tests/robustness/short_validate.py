@@ -1,0 +1,16 @@
+"""`gelslim` with an experiment of seconds, where that of `validate` takes minutes."""
+
+from __future__ import annotations
+
+import sys
+
+from gelslim_cad.cli import main
+from gelslim_twin.validation import experiment, truth_gel
+from gelslim_twin.validation import validate as validation
+
+if __name__ == "__main__":
+    experiment.DIRECTIONS, experiment.PRESS_STEPS, experiment.SLIDE_STEPS = 2, 1, 1
+    validation.other_contacts = lambda *size: ()  # type: ignore[assignment]
+    truth_gel.truth_pad = lambda bundle: bundle  # type: ignore[assignment]
+    validation.error_budget = lambda *states: ()  # type: ignore[assignment]
+    sys.exit(main(sys.argv[1:]))
