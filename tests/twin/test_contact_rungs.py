@@ -57,10 +57,7 @@ def test_no_rung_leaves_more_than_it_says(
     The wedge is not dragged: which nodes its ends hold is not decided by any tolerance.
     """
     text = SCENE.format(bundle=sensor).replace(BALL, TOOLS[tool]).replace("0.6", f"{mu}")
-    if tool != "wedge":
-        text = text.replace(DRAG, SLIDE)
-    else:
-        text = text.replace(f"    - {DRAG}\n", "")
+    text = text.replace(DRAG, SLIDE) if tool != "wedge" else text.replace(f"    - {DRAG}\n", "")
     path = tmp_path / "scene.yaml"
     path.write_text(text, encoding="utf-8")
     loaded = read_scene(path)
