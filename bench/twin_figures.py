@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 Rows = list[dict[str, Any]]
@@ -47,21 +48,11 @@ def draw_scene(panel: Any, name: str, rows: Rows) -> None:
         auto["ms"], shown(auto), s=110, facecolors="none", edgecolors=CHOSEN, lw=2,
         label="planner's choice", zorder=4,
     )  # fmt: skip
-    for k, row in enumerate(steps):
-        panel.annotate(
-            str(k), (row["ms"], shown(row)), fontsize=7, xytext=(-3, 5), textcoords="offset points"
-        )
     names = [f"{k}  {row['label'].replace('_', ' ')}" for k, row in enumerate(steps)]
     panel.text(
-        0.98,
-        0.97,
-        "\n".join(names),
-        transform=panel.transAxes,
-        fontsize=7,
-        ha="right",
-        va="top",
-        multialignment="left",
-    )
+        0.03, 0.04, "\n".join(names), transform=panel.transAxes, fontsize=7, ha="left", va="bottom",
+        zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+    )  # fmt: skip
     panel.axhline(1.0, color="#c03060", lw=1, ls="--")
     panel.set_xscale("log")
     panel.xaxis.set_minor_formatter("")
@@ -69,9 +60,31 @@ def draw_scene(panel: Any, name: str, rows: Rows) -> None:
     panel.set_ylim(FLOOR / 2, 1e4)
     times = [r["ms"] for r in rows]
     panel.set_xlim(min(times) / 1.6, max(times) * 2)
+    number(panel, steps)
     panel.set_xlabel("ms per pose and frame", fontsize=8)
     panel.set_title(name, fontsize=10)
     panel.grid(alpha=0.3)
+
+
+def number(panel: Any, steps: Rows) -> None:
+    """Numbers beside the points, one label for points that lie together, as 2-5."""
+    near = (0.035 * math.log(panel.get_xlim()[1] / panel.get_xlim()[0]), 0.7)
+    groups: list[list[int]] = []
+    for k, row in enumerate(steps):
+        for group in groups:
+            other = steps[group[-1]]
+            apart = abs(math.log(row["ms"] / other["ms"])), abs(math.log(shown(row) / shown(other)))
+            if group[-1] == k - 1 and apart[0] < near[0] and apart[1] < near[1]:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    for group in groups:
+        row = min((steps[k] for k in group), key=lambda r: r["ms"])
+        text = str(group[0]) if len(group) == 1 else f"{group[0]}-{group[-1]}"
+        panel.annotate(
+            text, (row["ms"], shown(row)), fontsize=7, xytext=(-3, 5), textcoords="offset points"
+        )
 
 
 def shown(row: dict[str, Any]) -> float:
