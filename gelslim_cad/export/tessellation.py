@@ -23,6 +23,9 @@ RUNGS = (
 )
 """Linear (mm) and angular (deg) tolerance, coarse to fine. A linear tolerance alone does not
 tame small curved faces, so both fall together."""
+FIRST = 2
+"""The first rung for files to print: 10 µm off at most on the parts of a finger, under a printer's
+resolution, in the time of the coarser ones, which keep the volume too but show their facets."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Tessellation:
 
 
 def tessellation_for(shape: Any, volume_tolerance: float = 1e-3) -> Tessellation:
-    """Find the coarsest rung whose mesh is closed and within `volume_tolerance`, relative.
+    """Find the coarsest rung from `FIRST` on that is closed and within `volume_tolerance`, relative.
 
     Raises:
         ExportError: see `mesh_for`.
@@ -49,7 +52,7 @@ def tessellation_for(shape: Any, volume_tolerance: float = 1e-3) -> Tessellation
 
 
 def mesh_for(shape: Any, volume_tolerance: float = 1e-3) -> tuple[TriangleMesh, Tessellation]:
-    """Mesh a solid on the coarsest rung that is closed and keeps its volume.
+    """Mesh a solid on the coarsest rung from `FIRST` on that is closed and keeps its volume.
 
     Raises:
         ExportError: the solid has no positive volume, or no rung qualifies; the message says
@@ -59,7 +62,7 @@ def mesh_for(shape: Any, volume_tolerance: float = 1e-3) -> tuple[TriangleMesh, 
     if not exact > 0:
         raise ExportError(f"tessellation: volume is {exact:g} mm3, must be > 0; solid inside out?")
     reason = ""
-    for linear, angular in RUNGS:
+    for linear, angular in RUNGS[FIRST:]:
         mesh = tessellate(shape, linear, angular)
         error = abs(volume_mm3(mesh) / exact - 1.0)
         bad = bad_edges(mesh)
