@@ -43,7 +43,7 @@ class Tessellation:
 
 
 def tessellation_for(shape: Any, volume_tolerance: float = 1e-3) -> Tessellation:
-    """Find the coarsest rung from `FIRST` on that is closed and within `volume_tolerance`, relative.
+    """Find the coarsest rung from `FIRST` on, closed and within `volume_tolerance`, relative.
 
     Raises:
         ExportError: see `mesh_for`.
