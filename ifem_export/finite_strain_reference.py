@@ -101,8 +101,19 @@ def element_forces(state: GaussStates, material: Material) -> Array:
     )
 
 
-def element_tangents(state: GaussStates, material: Material) -> Array:
+def ahead_pressures(state: GaussStates, material: Material, step_mm: Array) -> Array:
+    """Pressure κ (J̄ - 1) (m,) in MPa of cells whose corners go on by (m, 8, 3), to first order."""
+    swelling = np.einsum("cgij,gaj->cai", state.cofactor, state.gradients) / len(GAUSS)
+    ahead = state.mean_dilatation + (swelling * step_mm).sum(axis=(1, 2))
+    return np.asarray(material.bulk_modulus_mpa * ahead)
+
+
+def element_tangents(
+    state: GaussStates, material: Material, pressure_mpa: Array | None = None
+) -> Array:
     """Tangent stiffness (m, 24, 24) in N/mm, the Hessian of `element_energies`.
+
+    `pressure_mpa` (m,) takes the place of the cells' own κ (J̄ - 1) where it acts on their shape.
 
     With T = F⁻ᵀ, ∂P_iJ/∂F_kL = G J^(-2/3) (δ_ik δ_JL - 2/3 F_iJ T_kL - 2/3 T_iJ F_kL
     + 2/9 tr C T_iJ T_kL + 1/3 tr C T_iL T_kJ) + p J (T_iJ T_kL - T_iL T_kJ) at constant
@@ -111,7 +122,8 @@ def element_tangents(state: GaussStates, material: Material) -> Array:
     j = 1.0 + state.dilatation
     a = material.shear_modulus_mpa * j ** (-2.0 / 3.0)
     trace = _trace_c(state)
-    bulk_part = material.bulk_modulus_mpa * state.mean_dilatation[:, None] * j
+    own = material.bulk_modulus_mpa * state.mean_dilatation
+    bulk_part = (own if pressure_mpa is None else pressure_mpa)[:, None] * j
     # Gradients seen from the deformed cell (T ∇N) and F ∇N, both (m, 8 points, 8 corners, 3).
     inverse_t = state.cofactor / j[..., None, None]
     t = np.einsum("cgij,gaj->cgai", inverse_t, state.gradients)

@@ -58,19 +58,27 @@ class GelBody:
     def _at_rest(self) -> sparse.csr_array:
         return self._tangent(np.zeros((self.bundle.mesh.n_nodes, 3)))
 
-    def _tangent(self, whole_mm: Array) -> sparse.csr_array:
-        whole = sparse.csr_array(self.pad.tangent(whole_mm))
+    def _tangent(self, whole_mm: Array, pressure_mpa: Array | None = None) -> sparse.csr_array:
+        whole = sparse.csr_array(self.pad.tangent(whole_mm, pressure_mpa))
         return sparse.csr_array(whole[self.free][:, self.free])
 
-    def tangent(self, whole_mm: Array, touched: NDArray[np.bool_], least: float = 0.0) -> Tangent:
+    def tangent(
+        self,
+        whole_mm: Array,
+        pressure_mpa: Array,
+        touched: NDArray[np.bool_],
+        least: float = 0.0,
+    ) -> Tangent:
         """The gel about a displacement (n, 3), its `touched` (c,) surface nodes held by springs.
+
+        For the pressure of its cells (m,) see `NeoHookeanPad.tangent`.
 
         Pressed hard, the gel would buckle away from under the forces of nodes that a rigid tool
         holds in place: the tangent is positive definite with springs there only. They do not
         change where Newton's steps end, as they pull nowhere once nothing moves. `least` is the
         smallest share tried; raises ContactError, FiniteStrainError.
         """
-        matrix = self._tangent(whole_mm)
+        matrix = self._tangent(whole_mm, pressure_mpa)
         own = (3 * self.surface[touched][:, None] + np.arange(3)).ravel()
         place = np.searchsorted(self.free, own)
         for share in SPRINGS:

@@ -89,7 +89,7 @@ class NewtonContact:
         for done in range(1, MOST_STEPS + 1):
             if self._tangent is None or walk.stale:
                 least = 0.0 if self._tangent is None else self._tangent.share
-                self._tangent = self.body.tangent(walk.whole, walk.touch > 0, least)
+                self._tangent = self.body.tangent(walk.whole, walk.pressure, walk.touch > 0, least)
             found = walk.forward(self._tangent, done)
             if found is not None:
                 return found
@@ -141,6 +141,8 @@ class _Walk:
         self.whole = whole
         self.force = force.copy()
         self.inner = self.body.pad.force(self.whole)
+        assert last.whole_mm is not None
+        self.pressure = self.body.pad.ahead_pressure_mpa(last.whole_mm, whole - last.whole_mm)
         self.target, ahead = self.solver.targets(last, before, pose)
         points = self.solver.points_mm
         tool = self.solver.tool
@@ -242,6 +244,8 @@ class _Walk:
             try:
                 ahead = self.whole + share * step
                 self.inner = self.body.pad.force(ahead)
+                full = self.body.pad.ahead_pressure_mpa(self.whole, step)
+                self.pressure = self.pressure + share * (full - self.pressure)
                 self.whole = ahead
                 return
             except FiniteStrainError:

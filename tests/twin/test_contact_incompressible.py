@@ -1,0 +1,96 @@
+"""Nearly incompressible gel at large strain: pressures taken ahead, and presses that need them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_pads import small_pad
+
+from gelslim_twin.contact.compliance import SurfaceCompliance
+from gelslim_twin.contact.nonlinear import NonlinearContact
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
+from gelslim_twin.contact.tool import Tool
+from gelslim_twin.scene.indenter import Sphere
+from gelslim_twin.scene.pose import Pose
+from ifem_export.finite_strain import NeoHookeanPad
+from ifem_export.material import Material
+
+MATERIAL = Material(0.147, 0.4999, 1000.0)
+SPHERE = Sphere(shape="sphere", radius_mm=6)
+
+
+def pad() -> NeoHookeanPad:
+    return NeoHookeanPad.of((np.ones((2, 2, 2), dtype=bool), (0.5, 0.6, 0.4)), MATERIAL)
+
+
+def wobble(size: float, seed: int = 5) -> np.ndarray:
+    return size * np.random.default_rng(seed).standard_normal((pad().n_nodes, 3))
+
+
+def test_pressure_of_a_stretched_block() -> None:
+    """κ (J - 1) of an even stretch, and its first order in a further one."""
+    one, shear = pad(), np.array([[1.1, 0.2, 0.0], [0.0, 0.95, 0.1], [0.0, 0.0, 1.02]])
+    z, y, x = np.unravel_index(one.numbering.positions[np.arange(one.n_nodes)],
+                               one.numbering.shape)  # fmt: skip
+    corners = np.column_stack([x, y, z]) * one.cell_size_mm
+    u = corners @ (shear - np.eye(3)).T
+    bulk = MATERIAL.bulk_modulus_mpa
+    still = one.ahead_pressure_mpa(u, np.zeros_like(u))
+    np.testing.assert_allclose(still, bulk * (np.linalg.det(shear) - 1), rtol=1e-9)
+    more = 1e-6 * corners
+    ahead = one.ahead_pressure_mpa(u, more)
+    swollen = np.linalg.det(shear + 1e-6 * np.eye(3)) - 1
+    np.testing.assert_allclose(
+        (ahead - still) / bulk, swollen - np.linalg.det(shear) + 1, rtol=1e-4
+    )
+
+
+def test_tangent_under_a_given_pressure() -> None:
+    """Its own is the plain tangent; another adds the pressure times the change of the volume."""
+    one, u = pad(), wobble(0.02)
+    own = one.ahead_pressure_mpa(u, np.zeros_like(u))
+    plain = one.tangent(u).toarray()
+    np.testing.assert_allclose(one.tangent(u, own).toarray(), plain, atol=1e-9 * plain.max())
+    other = own + np.linspace(-1, 2, len(own))
+    change = one.tangent(u, other).toarray() - plain
+    way, small, volume = wobble(1.0, 6), 1e-5, float(np.prod(one.cell_size_mm))
+    slopes = []
+    for sign in (1, -1):
+        at = u + sign * small * way
+        slope = np.zeros(3 * one.n_nodes)
+        for k in range(len(slope)):
+            step = np.zeros(len(slope))
+            step[k] = 1.0
+            gain = one.ahead_pressure_mpa(at, step.reshape(-1, 3)) - one.ahead_pressure_mpa(
+                at, np.zeros_like(u)
+            )
+            slope[k] = ((other - own) * gain).sum() * volume / MATERIAL.bulk_modulus_mpa
+        slopes.append(slope)
+    expected = (slopes[0] - slopes[1]) / (2 * small)
+    found = change @ way.reshape(-1)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_pressed_to_half_in_a_few_steps(friction: float) -> None:
+    """Steps of 15 % of the thickness; forces balance, nodes are on the ball, few steps do."""
+    gel = small_pad(0.4999)
+    solver = ContactSolver(
+        SurfaceCompliance(gel), Tool.of([SPHERE], Path()), ContactSettings(1e-3, friction)
+    )
+    depths = (0.0, 0.1, 0.2, 0.3, 0.6, 0.9, 1.05, -0.1)
+    poses = tuple(Pose(time_s=k, depth_mm=d) for k, d in enumerate(depths))
+    model = NonlinearContact(solver, tolerance=3e-3)
+    states = list(model.states(poses))
+    for pose, state in zip(poses[4:-1], states[4:-1], strict=True):
+        assert state.solver["residual"] <= 3e-3
+        assert state.solver["iterations"] <= 20
+        places = solver.points_mm + state.displacement_mm
+        height = solver.tool.height_mm(pose, places[:, 0], places[:, 1])
+        assert (height - places[:, 2]).min() > -3e-3
+        assert np.abs(height - places[:, 2])[state.touch > 0].max() < 3e-3
+    pushes = [-s.force_n[:, 2].sum() for s in states[1:-1]]
+    assert (np.diff(pushes) > 0).all()
+    assert not states[-1].force_n.any()
