@@ -1,0 +1,114 @@
+"""Scenes that want large strain of a pad that has none: refused on the scene's line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from render_rig import finger_camera
+from sim_rig import written_scene
+
+from gelslim_cad.cli.main import main
+from gelslim_twin.scene.reader import LoadedScene, read_scene
+from gelslim_twin.simulation.scene_task import job_of
+from gelslim_twin.simulation.simulate import SimulationJob
+from gelslim_twin.simulation.stored_sensor import BUNDLE
+from gelslim_twin.simulation.twin_sensor import TwinSensor
+from ifem_export.bundle import build_bundle
+from ifem_export.bundle_io import load_bundle, write_bundle
+from ifem_export.crown import Paraboloid
+from ifem_export.marker_grid import build_marker_grid
+from ifem_export.material import Material
+from ifem_export.outline import RoundedRectangle
+from ifem_export.pad_mesh import build_pad_mesh
+from yaml_model.errors import InputError
+
+PADS = {
+    "crowned": (Paraboloid(0.4, 9.0), 8.0, "crown_height_mm"),
+    "cut": (None, 8.3, "mesh.weighting"),
+    "flat": (None, 8.0, ""),
+}
+UNFIT = ("crowned", "cut")
+
+
+@pytest.fixture(scope="module", params=PADS)
+def pad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder named after the pad, its bundle within."""
+    crown, size, _ = PADS[request.param]
+    mesh, _ = build_pad_mesh(
+        RoundedRectangle(size, size, 1.0), 2.0, cells=(8, 8, 2), crown=crown,
+        weighting="cell_centre" if request.param == "flat" else "volume_fraction",
+    )  # fmt: skip
+    folder = tmp_path_factory.mktemp("pad") / request.param
+    folder.mkdir()
+    grid = build_marker_grid(5, 5, 1.1, 0.5, anchors="odd_sized")
+    names = ("row", "column", "diameter_mm", "kind")
+    bundle = build_bundle(
+        mesh,
+        Material(0.147, 0.3223, 1000.0),
+        "bbar",
+        marker_positions_mm=grid.positions_mm,
+        marker_arrays={name: getattr(grid, name) for name in names},
+        camera={**finger_camera().to_record(), "aperture_mm": 1.0, "focus_mm": 36.0},
+        with_stiffness=False,
+    )
+    write_bundle(folder / BUNDLE, bundle)
+    return folder
+
+
+def scene(folder: Path, use: str) -> LoadedScene:
+    """Observes what needs no camera."""
+    path = written_scene(folder, ("use: off", f"use: {use}"))
+    text = path.read_text().replace("force, markers, image]", "force]")
+    path.write_text(text)
+    return read_scene(path)
+
+
+def job(folder: Path, loaded: LoadedScene) -> SimulationJob:
+    return job_of(loaded, TwinSensor(load_bundle(folder / BUNDLE)), folder)
+
+
+def test_wanted_by_name(pad: Path) -> None:
+    loaded = scene(pad, "on")
+    if pad.name not in UNFIT:
+        assert job(pad, loaded)
+        return
+    with pytest.raises(InputError) as caught:
+        job(pad, loaded)
+    problem = caught.value.problems[0]
+    lines = Path(loaded.path).read_text().splitlines()
+    assert problem.line is not None
+    assert lines[problem.line - 1].strip().startswith("nonlinearity")
+    assert pad.name in problem.message
+    assert "nonlinearity: off" in problem.remedy
+    assert PADS[pad.name][2] in problem.remedy
+
+
+def test_wanted_by_the_planner(pad: Path) -> None:
+    """`auto` takes large strain in for a tight tolerance and leaves it out for a loose one."""
+    loaded = scene(pad, "auto")
+    assert job(pad, loaded.with_tolerance(1000.0, 1000.0))
+    tight = loaded.with_tolerance(1e-4, 1e-3)
+    if pad.name not in UNFIT:
+        assert "nonlinearity" in job(pad, tight).plan.order
+        return
+    with pytest.raises(InputError, match=pad.name):
+        job(pad, tight)
+
+
+def test_switched_off(pad: Path) -> None:
+    assert "nonlinearity" not in job(pad, scene(pad, "off")).plan.order
+
+
+def test_the_command_says_so_and_writes_nothing(
+    pad: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if pad.name not in UNFIT:
+        pytest.skip("a flat pad is strained")
+    loaded, out = scene(pad, "on"), pad / "out" / "run"
+    assert main(["simulate", str(loaded.path), "-o", str(out)]) != 0
+    told = capsys.readouterr().err
+    assert "scene.yaml:" in told
+    assert pad.name in told
+    assert "Traceback" not in told
+    assert not out.exists()
