@@ -10,6 +10,8 @@ FRICTIONLESS, FRICTIONAL, CHOSEN, FRONT = "#1f4e8c", "#c4580a", "#2d8a57", "#555
 FLOOR = 1e-3
 """Where errors of nothing are drawn, as a share of the tolerance."""
 COLUMNS = 4
+DECADE = 3.0
+"""From this range of times on their axis is logarithmic."""
 
 
 def draw_scenes(drops: Rows) -> bytes:
@@ -124,21 +126,42 @@ def ladder(panel: Any, rows: Rows, knob: str, mark: str, meaning: str) -> None:
         panel.scatter([r[key] for r in able], errors, color=colour, s=18, label=label, zorder=3)
         best = sorted(front_of([(r[key], e) for r, e in zip(able, errors, strict=True)]))
         panel.plot([t for t, _ in best], [e for _, e in best], color=colour, lw=1, alpha=0.7)
-        for row, error in zip(able, errors, strict=True):
+        for row, error, text in zip(able, errors, knob_labels(able, knob), strict=True):
             place = (row[key], error)
             panel.annotate(
-                f"{row[knob]:g}", place, fontsize=7, color=colour,
-                xytext=(4, 4), textcoords="offset points",
+                text, place, fontsize=7, color=colour, ha="left" if friction else "right",
+                xytext=(4, 4) if friction else (-4, -9), textcoords="offset points",
             )  # fmt: skip
             if mark and row[mark]:
                 panel.scatter(*place, s=120, facecolors="none", edgecolors=CHOSEN, lw=2, zorder=4)
     if mark:
         panel.scatter([], [], s=80, facecolors="none", edgecolors=CHOSEN, lw=2, label=meaning)
     panel.plot([], [], color=FRONT, lw=1, label="front")
-    panel.set_xscale("log")
+    times = [r[key] for r in rows if "failed" not in r]
+    if max(times) > DECADE * min(times):
+        panel.set_xscale("log")
+        panel.xaxis.set_minor_formatter("")
+        panel.xaxis.set_major_formatter("{x:g}")
+    panel.margins(x=0.18)
     panel.set_yscale("log")
     panel.grid(alpha=0.3)
     panel.legend(fontsize=8, frameon=False)
+
+
+def knob_labels(rows: Rows, knob: str) -> list[str]:
+    """A label per row; rows after each other with one error have one, at the first."""
+    runs: list[list[float]] = []
+    for k, row in enumerate(rows):
+        same = k > 0 and abs(row["field_error"] / rows[k - 1]["field_error"] - 1) < 0.05
+        if same and row["field_error"] > 0 and knob == "tolerance":
+            runs[-1].append(row[knob])
+        else:
+            runs.append([row[knob]])
+    found = []
+    for run in runs:
+        text = f"{run[0]:g}" if len(run) == 1 else f"{run[0]:g} to {run[-1]:g}"
+        found += [text, *[""] * (len(run) - 1)]
+    return found
 
 
 def front_of(points: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -54,7 +54,8 @@ def scenes_text(data: dict[str, Any]) -> str:
     lines = [
         f"Milliseconds per pose or frame without → with the effect, and the largest error of "
         f"leaving it out, by scene and effect; **bold** where the planner takes it in. At most "
-        f"{data['poses_at_most']} poses of a scene; {where(data, 'scenes')}.",
+        f"{data['poses_at_most']} poses of a scene, each with the way to it from the last; "
+        f"{where(data, 'scenes')}.",
         "",
         "| scene | " + " | ".join(f"`{e}`" for e in effects) + " |",
         "|---|" + "---|" * len(effects),
