@@ -55,13 +55,18 @@ class Viewer:
         """Images (m, 2) of the dots' centres."""
         return self.camera.project(self._rest_mm + self._to_markers @ state.displacement_mm)
 
+    @cached_property
+    def _shutter_s(self) -> float:
+        # Reading parameters checks all of them: not at every frame.
+        blur = self.scene.effects.parameters()["motion_blur"]
+        return float(getattr(blur, "shutter_ms", 0.0)) / 1000
+
     def _usual(self, before: GelState, state: GelState, apart_s: float | None) -> GelState:
         """Where the gel was one usual step ago, for which the look has the shutter's share.
 
         The shutter is open for as long as it is, or since the frame before if that is less.
         """
-        blur = self.scene.effects.parameters()["motion_blur"]
-        shutter_s = float(getattr(blur, "shutter_ms", 0.0)) / 1000
+        shutter_s = self._shutter_s
         if apart_s is None or apart_s <= 0 or self.step_s <= 0 or shutter_s == 0:
             return before
         usual = min(1.0, shutter_s / self.step_s)
