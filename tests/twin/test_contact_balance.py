@@ -196,3 +196,24 @@ def test_refusals() -> None:
     kept = pickle.loads(pickle.dumps(ContactError("why", 0.1)))
     assert str(kept) == "why"
     assert kept.residual == 0.1
+
+
+@pytest.mark.parametrize(("friction", "refused"), [(0.3, 0), (1.0, 0), (3.0, 4), (30.0, 8)])
+def test_random_compliances_with_friction(friction: float, refused: int) -> None:
+    """Laws hold for what is found, however wild; what is not is refused with how far it got."""
+    rng, misses = np.random.default_rng(2), []
+    for _ in range(60):
+        n = int(rng.integers(1, 9))
+        root = rng.standard_normal((3 * n, 3 * n))
+        c = root @ root.T + 0.05 * np.eye(3 * n)
+        height, target = rng.standard_normal(n), rng.standard_normal((n, 2))
+        try:
+            found = balanced(c, height, target, friction, tolerance=1e-6)
+        except ContactError as error:
+            misses.append(error)
+            continue
+        broken = violations(c, found.force_n, height, target, friction)
+        assert broken.pop("angle_deg") < 0.1
+        assert all(v < 1e-3 for v in broken.values()), broken
+    assert len(misses) <= refused
+    assert all(e.residual > 1e-6 and "lower friction" in str(e) for e in misses)
