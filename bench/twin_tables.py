@@ -154,17 +154,21 @@ def overhead_text(data: dict[str, Any]) -> str:
     return (
         f"`{part['scene']}`, {part['poses']} poses with pictures, written to disk: "
         f"{part['planned_ms']:.0f} ms of CPU planned, {part['by_hand_ms']:.0f} ms by a loop with "
-        f"the same stages written by hand, the same bytes. Planning and bookkeeping cost "
-        f"{part['overhead']:+.2%} (least times of {part['pairs']} pairs run in turns; of their "
-        f"ratios the median is {part['median']:+.2%}, the quartiles {low:+.2%} and {high:+.2%}); "
-        f"making the plan takes {part['plan_ms']:.1f} ms."
+        f"the same stages written by hand, the same bytes. What the loop does without, plan, key "
+        f"and records, takes {part['bookkeeping_ms']:.1f} ms on its own, {part['bookkeeping']:.2%} "
+        f"(the plan {part['plan_ms']:.1f} ms). Whole runs scatter by more: their least times "
+        f"differ by {part['overhead']:+.2%}; of the ratios of {part['pairs']} pairs in turns the "
+        f"median is {part['median']:+.2%}, the quartiles {low:+.2%} and {high:+.2%} "
+        f"(load {data['load_average']['overhead']:g} on {data['cores']} cores)."
     )
 
 
 def validation_text(data: dict[str, Any]) -> str:
     """Spread per chain beside the paper's, the budget, and the other contacts."""
     paper, seconds = data["paper"], data["seconds"]
-    took = f", {seconds} s on {data['cores']} cores" if seconds else ""
+    load = data.get("load_average")
+    busy = f" shared with other work (load {load:g})" if load else ""
+    took = f", {seconds} s on {data['cores']} cores{busy}" if seconds else ""
     texts = [
         f"`{data['design']}`, seed {data['seed']}{took}. {data['truth']}",
         "\n".join(

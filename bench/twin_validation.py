@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -39,6 +40,8 @@ def main() -> None:
     record = json.loads(made.read_text(encoding="utf-8")) if made else validated()
     seconds = None if made else round(time.perf_counter() - started)
     kept = {k: v for k, v in record.items() if k not in LEFT_OUT}
+    # Of the last quarter of an hour: how busy the machine was with other work meanwhile.
+    kept |= {"load_average": round(os.getloadavg()[2], 1)} if seconds else {}
     write_data("twin_validation", {**machine(0), "design": SPEC, "seconds": seconds, **kept})
     write_tables()
 

@@ -68,11 +68,16 @@ def test_the_planners_choice_keeps_every_scenes_tolerance(data: dict[str, Any]) 
     assert over == []
 
 
-def test_planning_is_not_shown_to_cost_more_than_a_hundredth(data: dict[str, Any]) -> None:
-    if "overhead" not in data:
-        pytest.skip("overhead not measured")
-    # On a busy machine the pairs scatter by some hundredths: only their quartile is telling.
-    assert data["overhead"]["quartiles"][0] <= 0.01
+def test_planning_and_records_cost_no_more_than_a_hundredth(data: dict[str, Any]) -> None:
+    """By what they take on their own: whole runs of one second differ by more on a busy machine.
+
+    Pairs of whole runs must not tell otherwise either; nothing is hidden between the stages
+    (`tests/twin/test_simulate_overhead.py` counts calls).
+    """
+    part = data["overhead"]
+    assert 0 < part["plan_ms"] <= part["bookkeeping_ms"]
+    assert part["bookkeeping"] <= 0.01
+    assert part["quartiles"][0] <= 0.01
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.6])
