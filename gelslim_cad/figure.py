@@ -20,8 +20,8 @@ def new_figure(
     return figure, figure.subplots(rows, columns)
 
 
-def as_png(figure: Any) -> bytes:
-    """The figure as PNG."""
+def as_png(figure: Any, title: str | None = None) -> bytes:
+    """The figure as PNG; a `title` is kept in its text, to be known again."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", metadata={"Software": None})
+    figure.savefig(stream, format="png", metadata={"Software": None, "Title": title})
     return stream.getvalue()

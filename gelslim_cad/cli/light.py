@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from gelslim_cad.spec import Spec
     from gelslim_optics.light_result import Estimate, LightResult
 
+PICTURES = ("light_paths.png", "irradiance.png", "light_ratio.png")
+MARK = "gelslim light"
+"""In the first picture's text: it is one of an earlier run."""
+
 
 def light(
     spec: SpecFile,
@@ -51,7 +55,7 @@ def light(
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.budget import budget_of
     from gelslim_cad.cli.failure import CommandError
-    from gelslim_cad.cli.output import replace_file
+    from gelslim_cad.cli.output import replace_file, spare_strangers_in
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.record import study_record
@@ -64,17 +68,19 @@ def light(
     budget = budget_of(error, within)
     if rays is not None and not budget.unlimited:
         raise CommandError("give --rays or a budget, not both")
+    folder = out or Path("out") / f"{loaded.spec.name}-light"
+    if pictures:
+        spare_strangers_in(folder, PICTURES, PICTURES[0], MARK.encode())
     with progress_bar(quiet=as_json) as tell:
         if not budget.unlimited:
             rays = _budgeted(loaded.spec, d, budget, spec, tell)
         study = study_light(d, rays=rays or RAYS, seed=seed, progress=tell)
-    folder = out or Path("out") / f"{loaded.spec.name}-light"
     if pictures:
         from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
 
-        replace_file(folder / "light_paths.png", paths_png(d))
-        replace_file(folder / "irradiance.png", irradiance_png(d, study))
-        replace_file(folder / "light_ratio.png", ratio_png(study))
+        made = (paths_png(d, MARK), irradiance_png(d, study), ratio_png(study))
+        for name, content in zip(PICTURES, made, strict=True):
+            replace_file(folder / name, content)
     if as_json:
         print_json(study_record(study))
         return 0

@@ -15,7 +15,7 @@ from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.task import Task
 from whole_files.replaced_file import is_part, replace_file, sweep
 
-MARK = "explore.json"
+MARK, MARKED = "explore.json", b"{}\n"
 CHUNKS = "chunks"
 
 
@@ -41,7 +41,7 @@ class Store:
                     f"{folder} exists and holds no exploration; give another -o or remove it"
                 )
             if not (target / MARK).exists():
-                replace_file(target / MARK, b"{}\n", parents=True)
+                replace_file(target / MARK, MARKED, parents=True)
             (target / CHUNKS).mkdir(exist_ok=True)
             sweep(target, again=True)
             yield cls(target)
@@ -72,6 +72,7 @@ class Store:
 
 
 def _foreign(folder: Path) -> bool:
-    """Whether it holds more than a run killed at its start leaves."""
+    """Whether it holds more than a run killed at its start leaves, and no mark of ours."""
     strange = any(not is_part(path.name) for path in folder.iterdir())
-    return strange and not (folder / MARK).is_file()
+    mark = folder / MARK
+    return strange and not (mark.is_file() and mark.read_bytes() == MARKED)

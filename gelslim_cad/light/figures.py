@@ -19,8 +19,8 @@ ACRYLIC, GEL, INK = "#cfe6f5", "#f4efe2", "#333a44"
 RAY_COLOURS = {"red": "#d0342c", "green": "#1c9a3d"}
 
 
-def paths_png(d: Lookup, seed: int = 3) -> bytes:
-    """Cross-section with light paths from both LED rows."""
+def paths_png(d: Lookup, title: str | None = None, seed: int = 3) -> bytes:
+    """Cross-section with light paths from both LED rows; `title` goes into the file's text."""
     figure, axes = new_figure(9.0, 3.2)
     profile = guide_profile(d)
     for medium, colour in (("acrylic", ACRYLIC), ("gel", GEL)):
@@ -37,7 +37,7 @@ def paths_png(d: Lookup, seed: int = 3) -> bytes:
     axes.set_xlabel("y across the finger, mm")
     axes.set_ylabel("z, mm")
     axes.set_title("Light paths; where light splits, one branch is followed by chance", fontsize=10)
-    return as_png(figure)
+    return as_png(figure, title)
 
 
 def irradiance_png(d: Lookup, study: LightStudy) -> bytes:

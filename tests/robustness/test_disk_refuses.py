@@ -140,12 +140,12 @@ def test_a_folder_of_other_things_keeps_them(
     command: Command, place: Path, clean_runs: CleanRuns, tmp_path: Path
 ) -> None:
     """The command refuses; files of the user's are not touched, and none is added."""
+    if command.name == "new":
+        pytest.skip("is told to replace its file, and touches no other")
     theirs = tmp_path / "theirs" / "out"
     mine = {"notes.txt", "manifest.json", "run.json", "deep/er.txt"}
     clean = clean_runs(command)
-    if command.name != "new":  # which is told to replace its file
-        made = [p for p in clean.folder.rglob("*") if p.is_file()]
-        mine |= {p.relative_to(clean.folder).as_posix() for p in made}
+    mine |= {p.relative_to(clean.folder).as_posix() for p in clean.folder.rglob("*") if p.is_file()}
     for name in mine:
         (theirs / name).parent.mkdir(parents=True, exist_ok=True)
         (theirs / name).write_text(f"mine: {name}")
