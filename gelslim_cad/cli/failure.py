@@ -59,10 +59,18 @@ def _first_line(error: BaseException) -> str:
     return text.strip() or type(error).__name__
 
 
+def _cut_import(error: BaseException | None) -> bool:
+    """Whether Ctrl-C fell into a library's start, which then says that it cannot be imported."""
+    if not isinstance(error, ImportError):
+        return False
+    causes = (error.__cause__, error.__context__)
+    return any(isinstance(c, KeyboardInterrupt) or _cut_import(c) for c in causes)
+
+
 def _judge(error: BaseException) -> tuple[int, str]:
     """Exit status and message."""
     name = type(error).__name__
-    if isinstance(error, KeyboardInterrupt) or name == "Abort":
+    if isinstance(error, KeyboardInterrupt) or name == "Abort" or _cut_import(error):
         return INTERRUPTED, "Interrupted; every file that is there is whole."
     if isinstance(error, CommandError):
         return error.status, str(error)

@@ -120,6 +120,11 @@ def test_two_at_once_into_one_folder_end_whole_or_say_why(
     assert digests(out.parent, command.ignored) == clean_runs(command).whole
 
 
+def heeds_interrupts() -> None:
+    """A shell's background jobs ignore Ctrl-C, and so would all that they start."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
 def test_an_interrupt_is_one_line(command: Command, place: Path, tmp_path: Path) -> None:
@@ -129,6 +134,7 @@ def test_an_interrupt_is_one_line(command: Command, place: Path, tmp_path: Path)
         process = subprocess.Popen(
             command.argv(place, tmp_path / f"out_{k}" / "out"), env=environment(scratch),
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+            preexec_fn=heeds_interrupts,
         )  # fmt: skip
         time.sleep(moments.uniform(0.6, 3.0))
         if process.poll() is None:

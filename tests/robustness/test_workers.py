@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from gelslim_cad.cli.failure import explain_failure
+
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 
@@ -90,3 +92,12 @@ def test_ctrl_c_at_a_terminal_draws_no_traceback_from_workers(tmp_path: Path) ->
     os.killpg(parent.pid, signal.SIGINT)
     assert parent.wait(30) == 0
     assert parent.stderr.read() == ""
+
+
+def test_an_interrupt_in_a_librarys_start_is_an_interrupt(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    error = ImportError("initialization failed")
+    error.__cause__ = KeyboardInterrupt()
+    assert explain_failure(error, False) == 130
+    assert capsys.readouterr().err.startswith("Interrupted")
