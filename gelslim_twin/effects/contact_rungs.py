@@ -16,7 +16,7 @@ import math
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, geometry
 
-RUNGS = (("coarse", 1e-2), ("medium", 1e-3), ("fine", 1e-4), ("finest", 1e-5))
+RUNGS = (("coarse", 1e-2), ("medium", 1e-3), ("fine", 1e-4), ("finer", 1e-5), ("finest", 1e-6))
 PLACES, MOST_PLACES = 0.14, 1.1
 """Of the depth, over the root of the tolerance: under wide tools, and under a ridge or a tip."""
 FORCE, MOST_FORCE = 0.07, 0.15

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from gelslim_twin.effects.circumstances import Circumstances
-from gelslim_twin.effects.contact_rungs import RUNGS, left_over
+from gelslim_twin.effects.contact_rungs import RUNGS
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
 from gelslim_twin.effects.parameters import EffectParameters
 from gelslim_twin.effects.touch import RIDGES
@@ -53,21 +53,12 @@ def bound(c: Circumstances) -> Bound:
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """Tolerance of the solver with Coulomb's cone: no error beyond what any contact leaves.
+    """Coulomb's cone in the contact's solver: its tolerance is the contact's, which errs for both.
 
-    Never more than friction itself, which may be next to nothing.
+    The solver takes the tighter of the two tolerances, so the loosest of all asks for nothing.
     """
-    whole = bound(c)
     nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
-    return tuple(
-        Rung(
-            name,
-            left_over(c, tolerance).at_most(whole),
-            ms * nodes,
-            {"tolerance": tolerance},
-        )
-        for (name, tolerance), ms in zip(RUNGS, (0.2, 0.3, 0.4, 0.6), strict=True)
-    )
+    return (Rung("as contact", Bound(), 0.4 * nodes, {"tolerance": RUNGS[0][1]}),)
 
 
 EFFECT = Effect(

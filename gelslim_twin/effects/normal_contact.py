@@ -30,7 +30,7 @@ def ladder(c: Circumstances) -> tuple[Rung, ...]:
     dense_ms = c.contact_nodes**2 / 1e4
     return tuple(
         Rung(name, left_over(c, tolerance), ms * nodes + dense_ms, {"tolerance": tolerance})
-        for (name, tolerance), ms in zip(RUNGS, (1.2, 1.3, 1.5, 1.8), strict=True)
+        for (name, tolerance), ms in zip(RUNGS, (1.2, 1.3, 1.5, 1.8, 2.1), strict=True)
     )
 
 
