@@ -34,7 +34,7 @@ OURS_AT_MOST = {
     "stiffness-0p49": 0.032,
     "light-delivered": 0.005,
     "light-leak": 0.01,
-    "tessellation-stl": 50.0,
+    "tessellation-stl": 12.0,
     "tessellation-glb": 50.0,
     "detection": 0.06,
     "matching": 0.001,
