@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 from gelslim_force.contact_patch import ContactPatch
 from gelslim_force.gel_bins import bin_sizes, gel_places, near_surface
 from gelslim_force.indenter import Flat, Indenter
-from gelslim_force.patch_follow import STARTS, Region, settled, values_of
-from gelslim_force.patch_outline import fit_circle, fit_strip
-from gelslim_force.patch_place import flat_patch, rim_share, strip_covariance, strip_patch
+from gelslim_force.patch_follow import AFRESH, STARTS, STEADY, Followed, Region, settled, values_of
+from gelslim_force.patch_place import rim_share, strip_covariance, strip_patch
 from gelslim_force.patch_region import changed_region
 from gelslim_force.patch_settings import PatchSettings
-from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit, moved_on
+from gelslim_force.patch_shading import ShadingFit, Window, best_shading_fit, leaves_less, moved_on
+from gelslim_force.region_outline import region_patch
 from gelslim_force.shading_change import ShadingChange, ShadingReference
 from gelslim_optics.virtual_camera import VirtualCamera
 
@@ -53,7 +53,7 @@ class PatchFinder:
     ) -> None:
         self.settings = settings or PatchSettings()
         self.indenter = indenter
-        self._last: tuple[ContactPatch, ShadingFit, Region] | None = None
+        self._last: Followed | None = None
         self._asked: tuple[Array, tuple[int, int]] | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
@@ -99,90 +99,89 @@ class PatchFinder:
         if region is None:
             self._last = None
             return None
-        patch = self._followed(region, light)
+        patch = self._tracked(region, light)
         if patch is None:
-            start = self._outline(region, light)
-            if start is None:
-                return None
-            flat = isinstance(self.indenter, Flat)
-            patch = start if flat else self._refined(start, region, light)
+            return None
         share = 0.0
         if not self._well_inside(patch):
             share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
         return _finished(patch, share, contrast)
 
-    def _outline(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
-        """Patch of the region's outline, from the part that the pad's edge does not cut."""
-        closed = ndimage.binary_closing(np.pad(region, 3), iterations=3)[3:-3, 3:-3]
-        filled = ndimage.binary_fill_holes(closed | region)
-        rim = filled & ~ndimage.binary_erosion(filled, border_value=1)
-        # Where the pad or the picture ends, the region's end is not the patch's.
-        rim &= ndimage.binary_erosion(self._light.on_pad, iterations=2, border_value=0)
-        points = np.column_stack([self._x[rim], self._y[rim]])
-        inside = np.column_stack([self._x[filled], self._y[filled]])
-        if len(points) < 6:
+    def _outline(self, region: Mask) -> ContactPatch | None:
+        found = region_patch(
+            region, self._light.on_pad, self._x, self._y, self.indenter, self.settings
+        )
+        if found is None:
             return None
-        if isinstance(self.indenter, Flat):
-            placed = flat_patch(self.indenter, points, inside)
-            # Its size is known, not seen: it does not grow with the height it is taken at.
-            return placed and replace(placed, lean=self._sight(placed.centre_mm)[0])
-        covariance = np.zeros((4, 4))
-        try:
-            if self._strip:
-                (offset, half, angle), found = fit_strip(points)
-                angle = self._known_axis(angle)
-                patch = strip_patch(offset, half, angle, inside.mean(axis=0))
-                covariance[:] = strip_covariance(found, angle)
-            else:
-                (x, y, half), found = fit_circle(points)
-                patch = ContactPatch("disc", np.array([x, y]), float(half))
-                covariance[:3, :3] = found
-        except (ValueError, np.linalg.LinAlgError):
-            return None
-        if not (np.isfinite(half) and half < 1.2 * np.ptp(inside, axis=0).max()):
-            return None
-        spread = (self.settings.outline_error * float(half)) ** 2
-        covariance[2, 2] += spread
-        covariance[:2, :2] += np.eye(2) * spread / 4
-        return _with(patch, covariance, "outline", *self._sight(patch.centre_mm))
+        lean, growth = self._sight(found.centre_mm)
+        # A flat punch's size is known, not seen: it does not grow with the height it is taken at.
+        flat = isinstance(self.indenter, Flat)
+        return replace(found, lean=lean, growth_per_mm=0.0 if flat else growth)
 
-    def _followed(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
-        """The last frame's patch moved on, where the shading is explained as well as it was."""
+    def _tracked(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
+        """The last frame's patch followed, one sought afresh, or the better of both.
+
+        A rim that moved far may be missed by a fit that starts from where it was, and is then
+        missed in all frames that follow: now and then, and where what is seen grows or shrinks,
+        the patch is sought afresh as well.
+        """
         last, self._last = self._last, None
-        if last is None:
+        now = self._measured(region)
+        followed = None
+        if last is not None:
+            followed = self._followed(last, now, light)
+            steady = abs(now.reach_mm / last.region.reach_mm - 1) < STEADY
+            if followed is not None and steady and last.age < AFRESH:
+                self._last = Followed(*followed, now, last.age + 1)
+                return followed[0]
+        start = self._outline(region)
+        if start is None or isinstance(self.indenter, Flat):
+            return start if followed is None else followed[0]
+        fresh = self._refined(start, light)
+        best = fresh or followed
+        if fresh is not None and followed is not None:
+            law = self._strip, self._curvature, self._blur_mm(fresh[1].window.bin_mm)
+            best = followed if leaves_less(followed[1], fresh[1], *law) else fresh
+        if best is None:
+            return start
+        self._last = Followed(*best, now, 0)
+        return best[0]
+
+    def _followed(
+        self, last: Followed, now: Region, light: ShadingChange
+    ) -> tuple[ContactPatch, ShadingFit] | None:
+        """The last frame's patch moved on, where the shading is explained as well as it was."""
+        size = last.patch.size_mm
+        beside = last.patch.outside_mm(*now.middle_mm) > -0.3 * size
+        if beside or not 0.6 < now.reach_mm / size < 2.5:
             return None
-        now, size = self._measured(region), last[0].size_mm
-        if last[0].outside_mm(*now.middle_mm) > -0.3 * size or not 0.6 < now.reach_mm / size < 2.5:
+        found = self._shading(last.patch, [last.fit.values], light, (last.region, now))
+        if found is None or found[1].explained < last.fit.explained - 0.03:
             return None
-        found = self._shading(last[0], [last[1].values], light, (last[2], now))
-        if found is None or found[1].explained < last[1].explained - 0.03:
-            return None
-        if not settled(last[0], found[0]):
-            return None
-        self._last = *found, now
-        return found[0]
+        return found if settled(last.patch, found[0]) else None
 
     def _measured(self, region: Mask) -> Region:
         middle = np.array([self._x[region].mean(), self._y[region].mean()])
         return Region(middle, float(np.sqrt((self._bin_mm[region] ** 2).sum() / np.pi)))
 
-    def _refined(self, start: ContactPatch, region: Mask, light: ShadingChange) -> ContactPatch:
+    def _refined(
+        self, start: ContactPatch, light: ShadingChange
+    ) -> tuple[ContactPatch, ShadingFit] | None:
         """The outline's patch moved to where the shading puts its rim, if it tells."""
         patch, found = start, None
         begins = [values_of(start, k, q) for k, q in STARTS]
         for _ in range(PASSES):
             found = self._shading(patch, begins, light)
             if found is None:
-                return start
+                return None
             before, patch = patch, found[0]
             if settled(before, patch):
                 break
             # What the edge cuts looks small at first: look again, further out.
             begins = [found[1].values, values_of(patch, 1.0, 1.5), values_of(patch, 1.3, 1.5)]
         if found is None or found[1].explained < self.settings.least_explained:
-            return start
-        self._last = *found, self._measured(region)
-        return patch
+            return None
+        return found
 
     def _shading(
         self,
@@ -196,10 +195,7 @@ class PatchFinder:
         window = self._window(patch, light)
         if window is None:
             return None
-        known = getattr(self.indenter, "radius_mm", None)
-        curvature = 1 / known if known else 0.0
-        blur = self.settings.blur_px / self._light.bin_px * window.bin_mm
-        blur = float(np.hypot(window.bin_mm / 2, blur))
+        curvature, blur = self._curvature, self._blur_mm(window.bin_mm)
         if change is not None:
             shift = change[1].middle_mm - change[0].middle_mm
             growth = change[1].reach_mm / change[0].reach_mm
@@ -229,7 +225,10 @@ class PatchFinder:
             covariance += extra
         lean, growth = self._sight(patch.centre_mm)
         height = -0.1 * size * size * curvature
-        return _with(patch, covariance, "shading", lean, growth, height)
+        return replace(
+            patch, covariance=covariance, method="shading", lean=lean, growth_per_mm=growth,
+            z_mm=height,
+        )  # fmt: skip
 
     def _window(self, start: ContactPatch, light: ShadingChange) -> Window | None:
         s = self.settings
@@ -261,12 +260,17 @@ class PatchFinder:
         )
 
     @property
+    def _curvature(self) -> float:
+        """1/R of the indenter, 0 where unknown."""
+        known = getattr(self.indenter, "radius_mm", None)
+        return 1 / known if known else 0.0
+
+    def _blur_mm(self, bin_mm: float) -> float:
+        return float(np.hypot(bin_mm / 2, self.settings.blur_px / self._light.bin_px * bin_mm))
+
+    @property
     def _strip(self) -> bool:
         return self.indenter is not None and self.indenter.patch_kind == "strip"
-
-    def _known_axis(self, angle: float) -> float:
-        axis = getattr(self.indenter, "axis_deg", None)
-        return angle if axis is None else float(np.deg2rad(axis))
 
     def _well_inside(self, patch: ContactPatch) -> bool:
         """Whether all of a disc's rim is on the pad, without a look at its points."""
@@ -294,19 +298,6 @@ class PatchFinder:
 
     def _local_bin(self, patch: ContactPatch) -> float:
         return float(self._bin_mm[self._nearest(patch.centre_mm)])
-
-
-def _with(
-    patch: ContactPatch,
-    covariance: Array,
-    method: str,
-    lean: Array,
-    growth: float,
-    z_mm: float = 0.0,
-) -> ContactPatch:
-    return replace(
-        patch, covariance=covariance, method=method, lean=lean, growth_per_mm=growth, z_mm=z_mm
-    )
 
 
 def _finished(patch: ContactPatch, share: float, contrast: float) -> ContactPatch:

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.contact_patch import ContactPatch
+from gelslim_force.patch_shading import ShadingFit
 
 Array = NDArray[np.float64]
 STARTS = ((0.7, 0.5), (0.85, 1.5), (1.0, 4.0))
 """Sizes, over the outline's, and decays that the fit to the shading starts from."""
+AFRESH, STEADY = 12, 0.08
+"""Frames that a patch is followed for at most, and the change of its region, relative, up to
+which it is, before it is sought afresh as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +24,16 @@ class Region:
 
     middle_mm: Array
     reach_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What a frame hands on to the next; `age` frames ago the patch was sought afresh."""
+
+    patch: ContactPatch
+    fit: ShadingFit
+    region: Region
+    age: int
 
 
 def settled(before: ContactPatch, after: ContactPatch) -> bool:

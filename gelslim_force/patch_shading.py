@@ -59,6 +59,8 @@ class ShadingFit:
     covariance: Array
     explained: float
     """Share of the change that the fit explains."""
+    window: Window
+    """The bins it was fitted to."""
 
 
 def best_shading_fit(
@@ -75,6 +77,37 @@ def best_shading_fit(
 
     _, best = min((tried(s) for s in starts), key=lambda t: t[0])
     return fit_shading(window, best, strip, curvature_per_mm, blur_mm)
+
+
+def leaves_less(
+    one: ShadingFit, other: ShadingFit, strip: bool, curvature_per_mm: float, blur_mm: float
+) -> bool:
+    """Whether one fit leaves less than the other on the same bins, those of the wider window: a
+    narrow one knows little of the slope beside the patch."""
+    window = max(one.window, other.window, key=lambda w: len(w.x_mm))
+    residual = np.empty(window.change.shape)
+    first, second = (
+        _left(window, f.values, strip, curvature_per_mm, blur_mm, residual) for f in (one, other)
+    )
+    return first < second
+
+
+def _left(
+    window: Window,
+    values: Array,
+    strip: bool,
+    curvature_per_mm: float,
+    blur_mm: float,
+    residual: Array,
+) -> float:
+    from gelslim_force.patch_fit_kernel import squares_left
+
+    return float(
+        squares_left(
+            window.x_mm, window.y_mm, window.lean, window.change, values, strip,
+            curvature_per_mm, blur_mm, residual,
+        )
+    )  # fmt: skip
 
 
 def moved_on(
@@ -104,17 +137,7 @@ def moved_on(
     starts = [place * [1, 1, size, 1] for place in (here, there) for size in sizes]
     starts += [np.array([*s[:3], AGAIN_DECAY]) for s in starts]
 
-    def left(start: Array) -> float:
-        from gelslim_force.patch_fit_kernel import squares_left
-
-        return float(
-            squares_left(
-                part.x_mm, part.y_mm, part.lean, part.change, start, strip, curvature_per_mm,
-                blur_mm, residual,
-            )
-        )  # fmt: skip
-
-    return min(starts, key=left)
+    return min(starts, key=lambda s: _left(part, s, strip, curvature_per_mm, blur_mm, residual))
 
 
 def fit_shading(
@@ -139,7 +162,7 @@ def fit_shading(
     freedom = max(residual.size - 4 - 7 * residual.shape[1], 1)
     spread = cost / freedom * _together(residual, window)
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * spread
-    return ShadingFit(theta, covariance, explained)
+    return ShadingFit(theta, covariance, explained, window)
 
 
 def _settle(

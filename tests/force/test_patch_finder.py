@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded
 
 from gelslim_force.indenter import Cylinder, Flat, Sphere
 from gelslim_force.patch_finder import PatchFinder
+from gelslim_force.patch_follow import AFRESH
 from gelslim_force.patch_outline import circle_start, fit_circle, fit_strip
 from gelslim_force.patch_settings import PatchSettings
 
@@ -143,6 +145,21 @@ def test_a_patch_that_jumps_in_size_is_followed(sizes):
         patch, fresh = follow.find(image), finder().find(image)
         assert abs(patch.size_mm - fresh.size_mm) < 0.05
         assert np.abs(patch.centre_mm - fresh.centre_mm).max() < 0.03
+
+
+def test_a_patch_that_was_lost_to_a_wrong_size_comes_back():
+    """Whatever a fit was led to, it is sought afresh within a dozen frames, and the fit that leaves
+    less on the wider window is kept."""
+    follow, centre, radius = finder(), np.array([1.0, 1.5]), 2.2
+    sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
+    images = [shaded((sx, sy), seed=60 + k).image for k in range(3)]
+    true = follow.find(images[0]).size_mm
+    last = follow._last
+    wrong = replace(last.fit, values=last.fit.values * [1, 1, 0.75, 1] + [0, 0, 0, 2.0])
+    smaller = replace(last.patch, size_mm=0.75 * last.patch.size_mm)
+    follow._last = replace(last, fit=wrong, patch=smaller)
+    sizes = [follow.find(images[k % 3]).size_mm for k in range(AFRESH + 2)]
+    assert abs(sizes[-1] - true) < 0.05
 
 
 def test_a_patch_is_followed_from_frame_to_frame():
