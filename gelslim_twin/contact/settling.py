@@ -19,6 +19,8 @@ GEOMETRY_STEPS = 40
 DAMPED_FROM = 8
 EDGES_FROM, EDGE = 20, 1e-3
 """Turns after which a node astride an edge may stay this share of the depth off the tool."""
+EDGE_MM = 5e-5
+"""Off an edge in any case, whatever the tolerance: far below what a cell of the gel resolves."""
 BALANCE, OFF, MOST_OFF = 0.5, 0.1, 1e-2
 """Shares of the tolerance: the balance's, and how far off the tool nodes may be over the depth."""
 ROUNDING_MM = 1e-8
@@ -55,7 +57,7 @@ class Settling:
 
     @property
     def _edge_mm(self) -> float:
-        return min(self.tolerance, EDGE) * self.deepest_mm
+        return max(min(self.tolerance, EDGE) * self.deepest_mm, EDGE_MM)
 
     def settled(self, surface: ToolSurface, motion_mm: Array, force_n: Array) -> Settled:
         """Forces with the tool's planes where the nodes are, from planes, motion and forces.

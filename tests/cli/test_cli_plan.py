@@ -54,7 +54,7 @@ def test_json_from_a_bundle_is_that_from_its_spec(tmp_path, capsys):
         ("../gelslim2.yaml", "gone.yaml", "scene.yaml:5 sensor.spec = gone.yaml: no such file"),
         ("spec: ../gelslim2.yaml", "bundle: gone", "sensor.bundle = gone: no such folder"),
         ("outer_radius_mm: 6", "outer_radius_mm: 4", "must be below outer_radius_mm (4)"),
-        ("effects:", "effects:\n  drawing: off", "it alone provides the image"),
+        ("drawing: {contrast: 0.93}", "drawing: off", "it alone provides the image"),
     ],
 )
 def test_bad_scenes_are_refused_in_one_line(tmp_path, capsys, old, new, words):
