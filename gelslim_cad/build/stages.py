@@ -19,6 +19,7 @@ from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_cad.view_figures import view_inputs
 from ifem_export.marker_grid import MarkerGrid
 from whole_files.scratch import scratch_folder
+from work_pool.held_interrupt import interrupts_held
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,9 @@ class Stages:
 
     def plan(self) -> Plan:
         """Make the solids, check them and lay out the work. Loads the CAD kernel."""
+        with interrupts_held():
+            import cadquery  # noqa: F401
+
         from gelslim_cad.build.mould_checks import check_mould
         from gelslim_cad.build.solid_checks import check_solids
         from gelslim_cad.solids.finger import blanks, finger_parts
