@@ -9,10 +9,10 @@ from render_rig import finger_camera
 
 from ifem_export.bundle import build_bundle
 from ifem_export.bundle_io import write_bundle
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.marker_grid import MarkerGrid, build_marker_grid
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.pad_mesh import PadMesh, build_pad_mesh
 
 SCENE = """\
 format: gelslim-scene/1
@@ -44,7 +44,13 @@ def small_sensor(folder: Path) -> Path:
         2.0,
         cells=(20, 18, 3),
     )
-    grid = build_marker_grid(11, 9, 1.1, 0.5, anchors="odd_sized")
+    place = folder / "bundle"
+    write_sensor(place, mesh, build_marker_grid(11, 9, 1.1, 0.5, anchors="odd_sized"))
+    return place
+
+
+def write_sensor(place: Path, mesh: PadMesh, grid: MarkerGrid) -> None:
+    """Write the bundle of a pad with a finger's camera."""
     names = ("row", "column", "diameter_mm", "kind")
     bundle = build_bundle(
         mesh,
@@ -55,9 +61,7 @@ def small_sensor(folder: Path) -> Path:
         camera={**finger_camera().to_record(), "aperture_mm": 1.0, "focus_mm": 36.0},
         with_stiffness=False,
     )
-    place = folder / "bundle"
     write_bundle(place, bundle)
-    return place
 
 
 def written_scene(folder: Path, change: tuple[str, str] = ("", "")) -> Path:

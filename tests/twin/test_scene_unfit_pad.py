@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from render_rig import finger_camera
-from sim_rig import written_scene
+from sim_rig import write_sensor, written_scene
 
 from gelslim_cad.cli.main import main
 from gelslim_twin.scene.reader import LoadedScene, read_scene
@@ -14,11 +13,9 @@ from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.simulate import SimulationJob
 from gelslim_twin.simulation.stored_sensor import BUNDLE
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle import build_bundle
-from ifem_export.bundle_io import load_bundle, write_bundle
+from ifem_export.bundle_io import load_bundle
 from ifem_export.crown import Paraboloid
 from ifem_export.marker_grid import build_marker_grid
-from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import build_pad_mesh
 from yaml_model.errors import InputError
@@ -41,18 +38,7 @@ def pad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     )  # fmt: skip
     folder = tmp_path_factory.mktemp("pad") / request.param
     folder.mkdir()
-    grid = build_marker_grid(5, 5, 1.1, 0.5, anchors="odd_sized")
-    names = ("row", "column", "diameter_mm", "kind")
-    bundle = build_bundle(
-        mesh,
-        Material(0.147, 0.3223, 1000.0),
-        "bbar",
-        marker_positions_mm=grid.positions_mm,
-        marker_arrays={name: getattr(grid, name) for name in names},
-        camera={**finger_camera().to_record(), "aperture_mm": 1.0, "focus_mm": 36.0},
-        with_stiffness=False,
-    )
-    write_bundle(folder / BUNDLE, bundle)
+    write_sensor(folder / BUNDLE, mesh, build_marker_grid(5, 5, 1.1, 0.5, anchors="odd_sized"))
     return folder
 
 
