@@ -57,3 +57,10 @@ def test_make_targets_scripts_and_extras_exist(page: Path) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     for extras in re.findall(r"pip install '(?:\.|gelslim-cad)\[([a-z,]+)\]'", text):
         assert set(extras.split(",")) <= set(project["optional-dependencies"])
+
+
+@pytest.mark.parametrize(("page", "line"), CALLS, ids=[f"{named(p)}-{c}" for p, c in CALLS])
+def test_an_indenter_comes_with_a_picture_without_contact(page: Path, line: str) -> None:
+    """`force` refuses the one without the other, after parsing."""
+    if line.startswith("gelslim force ") and "--indenter" in line:
+        assert re.search(r"\s(-r|--reference)\s", line), f"{named(page)}: {line}"
