@@ -72,6 +72,17 @@ COMMANDS = (
 NAMED = {command.name: command for command in COMMANDS}
 
 
+def prepare_specs(place: Path) -> Path:
+    """Fill a folder with two specs, all that some commands read."""
+    place.mkdir(parents=True, exist_ok=True)
+    text = MINI20.read_text(encoding="utf-8")
+    (place / "mini20.yaml").write_text(text, encoding="utf-8")
+    other = text.replace("length_mm: 20\n    width_mm: 20", "length_mm: 19\n    width_mm: 20")
+    assert other != text
+    (place / "other.yaml").write_text(other, encoding="utf-8")
+    return place
+
+
 def prepare(place: Path) -> Path:
     """Fill a folder with the inputs: specs, a bundle, scenes and frames."""
     import numpy as np
@@ -83,12 +94,7 @@ def prepare(place: Path) -> Path:
 
     from gelslim_force.outputs.picture_file import encoded
 
-    place.mkdir(parents=True, exist_ok=True)
-    text = MINI20.read_text(encoding="utf-8")
-    (place / "mini20.yaml").write_text(text, encoding="utf-8")
-    other = text.replace("length_mm: 20\n    width_mm: 20", "length_mm: 19\n    width_mm: 20")
-    assert other != text
-    (place / "other.yaml").write_text(other, encoding="utf-8")
+    prepare_specs(place)
     small_sensor(place)
     scene = written_scene(place)
     varied = scene.read_text().replace("steps: 4", "steps: 2")

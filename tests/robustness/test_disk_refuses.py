@@ -71,9 +71,9 @@ def judged(command: Command, files: dict[str, str], whole: dict[str, str]) -> No
 
 
 def test_markers_on_a_disk_that_is_too_small(
-    place: Path, clean_runs: CleanRuns, tmp_path: Path
+    specs: Path, clean_runs: CleanRuns, tmp_path: Path
 ) -> None:
-    refuses_full(NAMED["markers"], place, clean_runs, tmp_path, 0.5)
+    refuses_full(NAMED["markers"], specs, clean_runs, tmp_path, 0.5)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
@@ -109,8 +109,8 @@ def refuses_readonly(command: Command, place: Path, tmp_path: Path) -> None:
     assert files == {}
 
 
-def test_markers_on_a_read_only_disk(place: Path, tmp_path: Path) -> None:
-    refuses_readonly(NAMED["markers"], place, tmp_path)
+def test_markers_on_a_read_only_disk(specs: Path, tmp_path: Path) -> None:
+    refuses_readonly(NAMED["markers"], specs, tmp_path)
 
 
 @pytest.mark.slow
