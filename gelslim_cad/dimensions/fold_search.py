@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import solver
-from gelslim_cad.dimensions.fold import FoldProblem
+from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 Array = NDArray[np.float64]
 NEWTON_STEPS = 40

@@ -17,7 +17,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold import Array, Fold, FoldProblem, fold
+from gelslim_cad.dimensions.fold import Fold, fold
+from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
 
 LOWER = np.array([np.radians(-12.0), 0.25, np.radians(12.0)])
 UPPER = np.array([np.radians(58.0), 1.0, np.radians(50.0)])

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold import Fold, FoldProblem
+from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold_problem import FoldProblem
 from gelslim_cad.dimensions.registry import dimension
 from gelslim_cad.dimensions.solver import solve_fold
 

@@ -12,7 +12,8 @@ from fold_samples import shipped
 
 from gelslim_cad.dimensions import Dimensions, derive_batch, fold_search, solver
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import Fold, FoldProblem, fold
+from gelslim_cad.dimensions.fold import Fold, fold
+from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 SPANS = {
     "design.gel.length_mm": (8.0, 60.0),

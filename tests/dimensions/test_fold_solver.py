@@ -14,7 +14,8 @@ from scipy.optimize import differential_evolution
 
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import FoldProblem, fold
+from gelslim_cad.dimensions.fold import fold
+from gelslim_cad.dimensions.fold_problem import FoldProblem
 from gelslim_cad.dimensions.solver import LOWER, UPPER, objective
 
 SPREADS: dict[str, tuple[float, float]] = {

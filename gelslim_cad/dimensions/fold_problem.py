@@ -1,0 +1,55 @@
+"""What the folded view must satisfy, from the spec and the dimensions before it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FoldProblem:
+    """What the fold must satisfy, each (n, 1, 1) for n designs."""
+
+    gel_length_mm: Array
+    gel_width_mm: Array
+    gel_total_mm: Array
+    gel_index: Array
+    guide_thickness_mm: Array
+    guide_index: Array
+    half_horizontal_tan: Array
+    half_vertical_tan: Array
+    focal_length_mm: Array
+    focal_px: Array
+    aperture_mm: Array
+    lens_travel_mm: Array
+    focus_nearest_mm: Array
+    module_height_mm: Array
+    module_depth_mm: Array
+    lens_diameter_mm: Array
+    lens_height_mm: Array
+    mirror_thickness_mm: Array
+    mirror_border_mm: Array
+    clearance_mm: Array
+    ledge_depth_mm: Array
+    ledge_reach_mm: Array
+    guide_stack_mm: Array
+    marker_diameter_mm: Array
+    blur_limit_mm: Array
+    min_px_per_marker: Array
+    max_keystone: Array
+
+    def __len__(self) -> int:
+        return len(self.gel_length_mm)
+
+    def rows(self, chosen: slice | NDArray[np.intp]) -> FoldProblem:
+        """The designs in `chosen`."""
+        return FoldProblem(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})
+
+    @property
+    def window_z_mm(self) -> Array:
+        """The guide's lower face, through which the camera looks."""
+        return -(self.guide_thickness_mm + self.gel_total_mm)
