@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -126,6 +127,11 @@ def environment(scratch: Path, **more: str) -> dict[str, str]:
     scratch.mkdir(parents=True, exist_ok=True)
     own = {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "TMPDIR": str(scratch)}
     return {**os.environ, **own, **more}
+
+
+def heeds_interrupts() -> None:
+    """A shell's background jobs ignore Ctrl-C, and so would all that they start."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def finished(argv: list[str], scratch: Path, cwd: Path | None = None, **more: str):  # type: ignore[no-untyped-def]

@@ -13,7 +13,15 @@ from pathlib import Path
 
 import pytest
 from clean_run import CleanRun, CleanRuns
-from sweep_commands import COMMANDS, NAMED, Command, digests, environment, finished
+from sweep_commands import (
+    COMMANDS,
+    NAMED,
+    Command,
+    digests,
+    environment,
+    finished,
+    heeds_interrupts,
+)
 
 pytest.importorskip("cadquery", reason="building needs the [cad] extra")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills process groups")
@@ -118,11 +126,6 @@ def test_two_at_once_into_one_folder_end_whole_or_say_why(
             assert "another process" in err or "another gelslim" in err
     assert 0 in [process.returncode for process in both], told
     assert digests(out.parent, command.ignored) == clean_runs(command).whole
-
-
-def heeds_interrupts() -> None:
-    """A shell's background jobs ignore Ctrl-C, and so would all that they start."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from sweep_commands import heeds_interrupts
 
 from gelslim_cad.cli.failure import explain_failure
 
@@ -55,6 +56,7 @@ def test_workers_do_not_outlive_their_parent(method: str, end: str, tmp_path: Pa
         [sys.executable, str(tmp_path / "pool_main.py"), method, end],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)}, start_new_session=True,
+        preexec_fn=heeds_interrupts,
     )  # fmt: skip
     assert parent.stdout is not None
     workers = [int(word) for word in parent.stdout.readline().split()]
@@ -85,6 +87,7 @@ def test_ctrl_c_at_a_terminal_draws_no_traceback_from_workers(tmp_path: Path) ->
         [sys.executable, str(tmp_path / "pool_main.py"), "fork", "interrupt"],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)}, start_new_session=True,
+        preexec_fn=heeds_interrupts,
     )  # fmt: skip
     assert parent.stdout is not None
     assert parent.stderr is not None
