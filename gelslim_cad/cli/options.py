@@ -12,3 +12,11 @@ AsJson = Annotated[bool, typer.Option("--json", help="Answer in JSON, for progra
 Force = Annotated[
     bool, typer.Option("--force", help="Write even where a rule on gel, mesh or markers fails.")
 ]
+DrawPictures = Annotated[bool, typer.Option(help="Draw the pictures.")]
+OverlayPictures = Annotated[
+    int, typer.Option(min=0, help="Overlay pictures to write, spread over the run.")
+]
+MostFrames = Annotated[
+    int | None, typer.Option("--frames", min=1, help="Stop after so many frames.")
+]
+SensorBundle = Annotated[Path, typer.Argument(metavar="BUNDLE", help="The sensor's bundle.")]

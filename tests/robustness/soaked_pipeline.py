@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import sensor_bundle
 from shaded_frames import pressed_heights, shaded
 
-from gelslim_cad.cli.force_sinks import result_sinks
+from gelslim_cad.cli.force_sinks import RunOutputs, result_sinks
 from gelslim_force.calibration import calibrate
 from gelslim_force.force_pipeline import ForcePipeline
 from gelslim_force.force_run import run_frames
@@ -68,15 +68,16 @@ def soak(out: Path) -> dict[str, object]:
         if done % EVERY == 0:
             memory.append(resident_kb())
 
+    outputs = RunOutputs(
+        out, "npz", 1, video=None, mcap=None, view=False, overwrite=False, quiet=True
+    )
     with ExitStack() as stack:
-        sinks, pictures = result_sinks(
-            stack, pipeline, out, {}, "npz", 1, None, None, False, False, 30.0, quiet=True
-        )
+        sinks, pictures = result_sinks(stack, pipeline, outputs, {}, 30.0)
         summary = run_frames(pipeline, pressed_again_and_again(), sinks, FRAMES, watch)
     return {
         "memory_kb": memory, "every": EVERY, "frames": summary.frames,
         "with_forces": summary.with_forces, "problems": summary.problems,
-        "pictures": len(pictures.write()),
+        "pictures": 0 if pictures is None else len(pictures.write()),
     }  # fmt: skip
 
 
