@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim_cad.cli.options import AsJson, SpecFile
+from gelslim_cad.cli.options import AsJson, DrawPictures, SpecFile
 
 if TYPE_CHECKING:
     from gelslim_cad.explore.study import Exploration
@@ -27,6 +28,7 @@ Scheduler = Annotated[
 NoisePx = Annotated[
     float, typer.Option(min=0.0, help="Error of a marker's position in px, for --force-error.")
 ]
+MOST_REASONS = 5
 Rays = Annotated[int, typer.Option(min=1024, max=1 << 24, help="Rays per guide, for --light.")]
 
 
@@ -47,7 +49,7 @@ def explore(
     scheduler: Scheduler = "",
     rays: Rays = 1 << 13,
     marker_noise_px: NoisePx = 0.05,
-    pictures: Annotated[bool, typer.Option(help="Draw the pictures.")] = True,
+    pictures: DrawPictures = True,
     as_json: AsJson = False,
 ) -> int:
     """Explore every combination of some values.
@@ -129,6 +131,7 @@ def _record(found: Exploration) -> dict[str, object]:
         "feasible": len(rows),
         "illegal": len(found.rows_where("illegal")),
         "binding": binding_counts(found),
+        "refusals": refusals(found),
         "pareto": fronts,
         "tasks": {"done": found.done, "taken_over": found.taken_over},
     }
@@ -141,18 +144,30 @@ def binding_counts(found: Exploration) -> dict[str, int]:
     return dict(sorted(((n, names.count(n)) for n in set(names)), key=lambda p: (-p[1], p[0])))
 
 
+def refusals(found: Exploration) -> dict[str, int]:
+    """Why the spec would not accept designs, the most frequent reasons first."""
+    counts = Counter(r for r in found.columns["reason"] if r)
+    return dict(sorted(counts.items(), key=lambda p: (-p[1], p[0]))[:MOST_REASONS])
+
+
 def _report(found: Exploration) -> None:
     from rich.table import Table
 
     from gelslim_cad.cli.answer import console, number, say
     from gelslim_cad.explore.axis import shown
+    from gelslim_cad.explore.judge import REFUSED
     from gelslim_cad.explore.pareto import THICKNESS, TRADES, front
 
     rows = found.rows_where("feasible")
     resumed = f", {found.taken_over} tasks taken over" if found.taken_over else ""
     say(f"{found.space.count} designs, {len(rows)} feasible{resumed}.")
     for name, count in binding_counts(found).items():
-        say(f"  {count:>6} stopped by {name}")
+        if name == REFUSED:
+            say(f"  {count:>6} refused by the spec")
+            for reason, times in refusals(found).items():
+                say(f"  {times:>10} {reason}")
+        else:
+            say(f"  {count:>6} stopped by {name}")
     if not rows:
         return
     table = Table("best feasible design", box=None, pad_edge=False)

@@ -136,21 +136,22 @@ def derive(spec: Spec) -> Dimensions:
 
 
 def derive_batch(
-    spec: Spec, overrides: Mapping[str, Any], *, jobs: int | None = None
+    spec: Spec, overrides: Mapping[str, Any], *, jobs: int | None = None, among: int = 0
 ) -> Dimensions:
     """Dimensions of n designs at once: `overrides` maps spec paths to arrays (n,).
 
     `jobs` threads search the folds of large batches (none: one per processor); the number never
-    changes a value. Raises KeyError for a path that the spec lacks and ValueError for `jobs` below
-    1. Values are not checked against the spec's
-    ranges: draw them from within.
+    changes a value. `among`: of how many designs these are a part, if more are to come, so that
+    small parts of many take the compiled search too. Raises KeyError for a path that the spec lacks
+    and ValueError for `jobs` below 1. Values are not checked against the spec's ranges: draw them
+    from within.
     """
     given: dict[str, Any] = dict(leaves(spec))
     for path, value in overrides.items():
         if path not in given:
             raise KeyError(f"no spec field is called {path}")
         given[path] = np.asarray(value)
-    with threads(jobs):
+    with threads(jobs, among):
         computed = _evaluate(given)
     fold = computed.pop("fold.layout")
     count = max((np.size(v) for v in overrides.values()), default=1)

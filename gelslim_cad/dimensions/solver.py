@@ -16,6 +16,7 @@ from contextvars import ContextVar
 from dataclasses import fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelslim_cad.dimensions.fold import Fold, fold
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
@@ -37,20 +38,23 @@ KEYSTONE_WEIGHT_MM = 0.02
 LENGTH_WEIGHT = 0.002
 
 _JOBS: ContextVar[int | None] = ContextVar("fold search threads", default=None)
+_AMONG: ContextVar[int] = ContextVar("designs of which this batch is a part", default=0)
 
 
 @contextmanager
-def threads(jobs: int | None) -> Iterator[None]:
+def threads(jobs: int | None, among: int = 0) -> Iterator[None]:
     """Let `solve_fold` use `jobs` threads for batches; None: as many as there are processors.
 
-    Raises ValueError for less than one. The number never changes a result.
+    `among` says of how many designs a batch is a part, where they come in several batches.
+    Raises ValueError for less than one job. The number of jobs never changes a result.
     """
     if jobs is not None and jobs < 1:
         raise ValueError(f"jobs is {jobs}; give 1 or more, or none for all processors")
-    token = _JOBS.set(jobs)
+    token, part = _JOBS.set(jobs), _AMONG.set(among)
     try:
         yield
     finally:
+        _AMONG.reset(part)
         _JOBS.reset(token)
 
 
@@ -66,10 +70,10 @@ def objective(candidates: Fold) -> Array:
 def solve_fold(problem: FoldProblem) -> Fold:
     """Best fold per design, every field (n,); infeasible designs keep violations > 0.
 
-    Batches of COMPILED_FROM designs or more are searched by the compiled twin of the same search,
-    in threads (see `threads`); smaller ones start none.
+    Batches of COMPILED_FROM designs or more, or part of as many, are searched by the compiled twin
+    of the same search, in threads (see `threads`); smaller ones start none.
     """
-    if len(problem) >= COMPILED_FROM:
+    if max(len(problem), _AMONG.get()) >= COMPILED_FROM:
         return _solve_compiled(problem)
     parts = [
         _solve_chunk(problem.rows(slice(start, start + CHUNK)))
@@ -83,15 +87,23 @@ def _solve_compiled(problem: FoldProblem) -> Fold:
 
     from gelslim_cad.dimensions.fold_search import search
 
-    pieces = [problem.rows(slice(start, start + PIECE)) for start in range(0, len(problem), PIECE)]
+    kinds, same = _distinct(problem)
+    pieces = [kinds.rows(slice(start, start + PIECE)) for start in range(0, len(kinds), PIECE)]
     jobs = min(_JOBS.get() or _processors(), len(pieces))
     if jobs == 1:
         found = [search(piece) for piece in pieces]
     else:
         with ThreadPoolExecutor(jobs) as pool:
             found = list(pool.map(search, pieces))
-    chosen = [np.concatenate(axis)[:, None, None] for axis in zip(*found, strict=True)]
+    chosen = [np.concatenate(axis)[same, None, None] for axis in zip(*found, strict=True)]
     return _squeeze(fold(problem, *chosen))
+
+
+def _distinct(problem: FoldProblem) -> tuple[FoldProblem, NDArray[np.intp]]:
+    """Problems that differ, and for each design which is its own: many fields leave it alone."""
+    columns = [np.ravel(getattr(problem, f.name)) for f in fields(FoldProblem)]
+    _, first, same = np.unique(np.stack(columns, 1), axis=0, return_index=True, return_inverse=True)
+    return problem.rows(first), same.ravel()
 
 
 def _processors() -> int:

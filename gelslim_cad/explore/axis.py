@@ -15,8 +15,11 @@ from yaml_model.fields import Field, field_table
 
 Value = float | int | str | None
 MOST_VALUES = 100_000
+MOST_TOLD = 4
 ON_STEP = 1e-9
 FORMS = "give PATH=FIRST:LAST:STEP or PATH=A,B,C"
+FIXED = ("format", "name")
+YES_NO = {"true": True, "false": False}
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Axis:
     @property
     def numeric(self) -> bool:
         """Whether every value is a number, so that designs along it are derived in one batch."""
-        return all(isinstance(v, int | float) for v in self.values)
+        return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.values)
 
 
 def parse_axis(text: str) -> Axis:
@@ -56,6 +59,10 @@ def _field(name: str, text: str) -> Field:
     for path in (name, f"design.{name}"):
         if path in known:
             return _variable(known[path], text)
+    inside = [p for p in known if p.startswith((f"{name}.", f"design.{name}."))]
+    if inside:
+        listed = ", ".join(inside[:MOST_TOLD]) + (", ..." if len(inside) > MOST_TOLD else "")
+        raise ExploreError(f"--vary {text}: {name} is a block; vary one of its fields: {listed}")
     close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
     last = name.rsplit(".", 1)[-1]
     close += [p for p in known if p.rsplit(".", 1)[-1] == last and p not in close][:3]
@@ -68,8 +75,12 @@ def _leaf(field: Field) -> bool:
 
 
 def _variable(field: Field, text: str) -> Field:
-    if list in field.types or field.path in ("format", "name"):
-        raise ExploreError(f"--vary {text}: {field.path} is not a field that can vary")
+    why = "is a list" if list in field.types else "names the spec" if field.path in FIXED else ""
+    if why:
+        raise ExploreError(
+            f"--vary {text}: {field.path} {why} and not a field that can vary; write a spec for "
+            "each and compare them with `gelslim diff`"
+        )
     return field
 
 
@@ -91,10 +102,12 @@ def _value(word: str, text: str, field: Field) -> Value:
         return word
     if word == "none" and field.nullable:
         return None
+    if bool in field.types and word.lower() in YES_NO:
+        return YES_NO[word.lower()]
     if not ({int, float} & set(field.types)):
         if str in field.types:
             return word
-        choices = ", ".join(map(str, field.choices))
+        choices = ", ".join([*map(str, field.choices), *(YES_NO if bool in field.types else ())])
         raise ExploreError(f"--vary {text}: {word!r} must be one of {choices}")
     return _typed(_number(word, text), text, field)
 
@@ -119,4 +132,6 @@ def _number(word: str, text: str) -> float:
 
 def shown(value: Any) -> str:
     """A value as the table writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
     return "none" if value is None else value if isinstance(value, str) else f"{value:g}"

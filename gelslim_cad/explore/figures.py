@@ -9,6 +9,7 @@ import numpy as np
 
 from gelslim_cad.checks import RULES
 from gelslim_cad.explore.axis import Axis, shown
+from gelslim_cad.explore.judge import REFUSED
 from gelslim_cad.explore.pareto import THICKNESS, TRADES, Goal, front
 from gelslim_cad.explore.study import Exploration
 from gelslim_cad.figure import as_png, new_figure
@@ -139,6 +140,8 @@ def legend_below(figure: Any, marks: list[Any], title: str) -> Any:
 
 def _told(binding: str) -> str:
     """A rule by its title, anything else as it is."""
+    if binding == REFUSED:
+        return "refused by the spec (column reason)"
     return f"{RULES[binding].title} ({binding})" if binding in RULES else binding
 
 

@@ -35,6 +35,8 @@ SHOWN = (
     "pad_mesh.node_count",
 )
 """Dimensions in every table."""
+REFUSED = "spec"
+"""What binds a design that the spec would not accept."""
 FOLD_RULE = "fold.feasible"
 DEPTHS = {
     "mirror": "finger.mirror_depth_mm",
@@ -59,12 +61,12 @@ def judge(
         overrides = dict(zip((a.path for a in axes), row, strict=True))
         reason = illegal(spec, overrides)
         if reason:
-            table[place] = {"status": "illegal", "binding": "spec", "reason": reason}
+            table[place] = {"status": "illegal", "binding": REFUSED, "reason": reason}
         else:
             legal.append(place)
     kept = [rows[p] for p in legal]
     for fixed, columns, places in grouped(axes, kept):
-        d = _derived(spec, fixed, columns)
+        d = _derived(spec, fixed, columns, len(kept))
         for k, entry in enumerate(_judged(d, len(places), (*SHOWN, *also))):
             table[legal[places[k]]] = entry
     names = (
@@ -82,7 +84,7 @@ def judge(
 
 
 def _derived(
-    spec: Spec, fixed: Mapping[str, Value], columns: Mapping[str, Sequence[float]]
+    spec: Spec, fixed: Mapping[str, Value], columns: Mapping[str, Sequence[float]], among: int
 ) -> Dimensions:
     base = spec
     if fixed:
@@ -92,7 +94,7 @@ def _derived(
     arrays = {path: np.asarray(values) for path, values in columns.items()}
     if not arrays:
         arrays = {"design.gel.length_mm": np.array([base.design.gel.length_mm])}
-    return derive_batch(base, arrays, jobs=1)
+    return derive_batch(base, arrays, jobs=1, among=among)
 
 
 def _judged(d: Dimensions, count: int, names: Sequence[str]) -> list[dict[str, Any]]:

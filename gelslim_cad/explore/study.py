@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -43,13 +44,18 @@ class Request:
     noise_px: float = MARKER_NOISE_PX
 
     def __post_init__(self) -> None:
-        names = {e.name for e in REGISTRY.values() if not e.internal} | set(PATHS.values())
-        unknown = [n for n in self.also if n not in names]
-        if unknown:
-            raise ExploreError(
-                f"no dimension or spec field is called {unknown[0]}; "
-                "`gelslim derive` lists all dimensions"
-            )
+        object.__setattr__(self, "also", tuple(map(_column, self.also)))
+
+
+def _column(name: str) -> str:
+    """A dimension or spec field by its full name; the `design.` may be left out, as of an axis."""
+    names = {e.name for e in REGISTRY.values() if not e.internal} | set(PATHS.values())
+    for full in (name, f"design.{name}"):
+        if full in names:
+            return full
+    close = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    hint = f"did you mean {' or '.join(close)}?" if close else "`gelslim derive` lists dimensions"
+    raise ExploreError(f"no dimension or spec field is called {name}; {hint}")
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,14 @@ def csv_bytes(columns: Mapping[str, Sequence[Any]]) -> bytes:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["design", *columns])
     for k, row in enumerate(zip(*columns.values(), strict=True)):
-        writer.writerow([k, *("" if v is None else v for v in row)])
+        writer.writerow([k, *map(_cell, row)])
     return stream.getvalue().encode()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return "" if value is None else value
 
 
 def parquet_bytes(columns: Mapping[str, Sequence[Any]]) -> bytes:
@@ -35,6 +41,8 @@ def _array(values: list[Any]) -> Any:
     import pyarrow as pa
 
     kinds = {type(v) for v in values if v is not None}
+    if kinds == {bool}:
+        return pa.array(values, pa.bool_())
     if kinds <= {int}:
         return pa.array(values, pa.int64() if kinds else pa.float64())
     if kinds <= {int, float}:

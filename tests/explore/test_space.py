@@ -51,7 +51,7 @@ def test_axes(text: str, path: str, values: tuple[object, ...]) -> None:
         ("camera.f_number=none", "no number"),
         ("leds.emission_angle_deg=1", "cannot vary|not a field that can vary"),
         ("name=a,b", "not a field that can vary"),
-        ("gel=1,2", "no field gel"),
+        ("gel=1,2", "gel is a block"),
     ],
 )
 def test_what_no_axis_can_be_is_refused_with_a_remedy(text: str, word: str) -> None:
