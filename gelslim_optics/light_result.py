@@ -13,6 +13,7 @@ from gelslim_optics import trace_geometry as column
 
 Array = NDArray[np.float64]
 LEAKED, STOPPED, RETURNED = "leaked", "stopped", "returned"
+PATCHES = 8
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,11 @@ def estimate(replicates: Array) -> Estimate:
 
 @dataclass(frozen=True)
 class Uniformity:
-    """Evenness of an irradiance map: smallest bin over mean, and standard deviation over mean."""
+    """Evenness of an irradiance map, without what the rays' scatter adds to it.
+
+    `min_over_mean` is of the darkest of PATCHES x PATCHES patches, `cv` the standard deviation of
+    the bins over their mean.
+    """
 
     min_over_mean: float
     cv: float
@@ -114,12 +119,21 @@ class LightResult:
         return np.asarray(flux / self.bin_area_mm2)
 
     def uniformity(self, colour: str | None = None) -> Uniformity:
-        """Evenness of the irradiance map; nan where no light arrives."""
-        flux = self.irradiance(colour)
-        mean = float(np.mean(flux))
+        """Evenness of the irradiance map; nan where no light arrives.
+
+        Squares are products of different replicates, whose scatter is independent, and the
+        darkest patch is measured by the replicates that did not choose it. A single replicate
+        leaves its scatter in.
+        """
+        maps = np.tensordot(self._weights(colour), self.maps, axes=(0, 0))
+        mean = float(np.mean(maps))
         if mean == 0:
             return Uniformity(math.nan, math.nan)
-        return Uniformity(float(np.min(flux)) / mean, float(np.std(flux)) / mean)
+        maps = maps / mean
+        excess = _mean_square(maps.reshape(len(maps), -1)) - _mean_square(
+            maps.mean(axis=(1, 2))[:, None]
+        )
+        return Uniformity(_darkest(_patches(maps)), math.sqrt(max(excess, 0.0)))
 
     def arrived(self, colour: str | None = None) -> Estimate:
         """Flux that reaches the gel's face, again after each reflection there."""
@@ -203,3 +217,28 @@ def paired_ratio(ours: LightResult, other: LightResult, entry: str = "delivered"
     # Linearised (delta method), so that the ratio of means keeps no bias of a mean of ratios.
     spread = estimate(ratio + (a - ratio * b) / float(np.mean(b)))
     return Estimate(ratio, spread.standard_error, spread.low, spread.high)
+
+
+def _mean_square(maps: Array) -> float:
+    """Mean over bins of the squared expectation, from maps (replicate, bin): no bias by scatter."""
+    count = len(maps)
+    if count < 2:
+        return float(np.mean(maps**2))
+    products = maps.sum(axis=0) ** 2 - (maps**2).sum(axis=0)
+    return float(np.mean(products)) / (count * (count - 1))
+
+
+def _darkest(maps: Array) -> float:
+    """Mean of each replicate's value where the others are darkest, maps (replicate, bin)."""
+    if len(maps) < 2:
+        return float(np.min(maps))
+    others = maps.sum(axis=0) - maps
+    return float(np.mean(maps[np.arange(len(maps)), np.argmin(others, axis=1)]))
+
+
+def _patches(maps: Array) -> Array:
+    """Maps (replicate, x, y) as means over PATCHES x PATCHES patches, (replicate, patch)."""
+    for axis in (1, 2):
+        parts = np.array_split(maps, min(PATCHES, maps.shape[axis]), axis=axis)
+        maps = np.stack([part.mean(axis=axis) for part in parts], axis=axis)
+    return np.asarray(maps.reshape(len(maps), -1))
