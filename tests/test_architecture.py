@@ -36,7 +36,8 @@ FORBIDDEN = {
     + CAD_LIBRARIES
     + ("numpy", "scipy"),
     "yaml_model": tuple(name for name in PACKAGES if name != "yaml_model") + CAD_LIBRARIES,
-    "work_pool": tuple(name for name in PACKAGES if name != "work_pool") + CAD_LIBRARIES,
+    "work_pool": tuple(name for name in PACKAGES if name not in ("work_pool", "whole_files"))
+    + CAD_LIBRARIES,
     "ifem_export": tuple(name for name in PACKAGES if name not in ("ifem_export", *LOWEST))
     + CAD_LIBRARIES,
     "gelslim_optics": tuple(name for name in PACKAGES if name not in ("gelslim_optics", *LOWEST))

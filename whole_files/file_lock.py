@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from whole_files.held_interrupt import LetThrough, interrupts_held
+
 _UNSUPPORTED = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 _POLL_S = 0.1
 _held: set[int] = set()
@@ -23,14 +25,17 @@ def locked(path: Path, waiting: Callable[[Path], None] | None = None) -> Iterato
     `waiting` is called once where another process holds it and this one has to wait. A file system
     without locks is used without. Raises OSError where the file cannot be made.
     """
-    descriptor = _acquired(path, waiting)
-    try:
-        yield
-    finally:
-        # Removed while still held: who waits for it notices that the name is gone and makes anew.
-        with contextlib.suppress(OSError):
-            path.unlink()
-        released(descriptor)
+    with interrupts_held() as let_through:
+        descriptor = _acquired(path, waiting, let_through)
+        try:
+            with let_through():
+                yield
+        finally:
+            # Removed while still held: who waits for it notices that the name is gone and
+            # makes anew.
+            with contextlib.suppress(OSError):
+                path.unlink()
+            released(descriptor)
 
 
 def locked_new(path: Path) -> int | None:
@@ -83,7 +88,7 @@ def try_lock(descriptor: int) -> bool | None:
     return True
 
 
-def _acquired(path: Path, waiting: Callable[[Path], None] | None) -> int:
+def _acquired(path: Path, waiting: Callable[[Path], None] | None, let_through: LetThrough) -> int:
     told = False
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | _BINARY, 0o666)
@@ -97,10 +102,11 @@ def _acquired(path: Path, waiting: Callable[[Path], None] | None) -> int:
             raise
         released(descriptor)
         if free is False:
-            if waiting is not None and not told:
-                waiting(path)
-            told = True
-            time.sleep(_POLL_S)
+            with let_through():
+                if waiting is not None and not told:
+                    waiting(path)
+                told = True
+                time.sleep(_POLL_S)
 
 
 def _is_named(descriptor: int, path: Path) -> bool:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO
 
 from whole_files.file_lock import locked_new, orphaned, released
+from whole_files.held_interrupt import interrupts_held
 
 PART = re.compile(r"\.[0-9a-f]{16}\.part")
 _swept: set[tuple[int, str]] = set()
@@ -79,24 +80,25 @@ def sweep(folder: Path, again: bool = False) -> None:
 
 @contextlib.contextmanager
 def _part_beside(target: Path) -> Iterator[IO[bytes]]:
-    part, descriptor = _new_part(target.parent)
-    try:
-        # closefd=False: the lock goes with the descriptor, which outlives the stream.
-        with open(descriptor, "wb", closefd=False) as stream:
-            yield stream
-            stream.flush()
-            os.fsync(descriptor)
-        if sys.platform == "win32":
-            released(descriptor)
-            descriptor = -1
-        os.replace(part, target)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise
-    finally:
-        if descriptor >= 0:
-            released(descriptor)
+    with interrupts_held() as let_through:
+        part, descriptor = _new_part(target.parent)
+        try:
+            # closefd=False: the lock goes with the descriptor, which outlives the stream.
+            with let_through(), open(descriptor, "wb", closefd=False) as stream:
+                yield stream
+                stream.flush()
+                os.fsync(descriptor)
+            if sys.platform == "win32":
+                released(descriptor)
+                descriptor = -1
+            os.replace(part, target)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise
+        finally:
+            if descriptor >= 0:
+                released(descriptor)
 
 
 def _new_part(folder: Path) -> tuple[Path, int]:

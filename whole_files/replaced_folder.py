@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from whole_files.beside import beside
+from whole_files.held_interrupt import interrupts_held
 
 _AT_FDCWD = -100
 _EXCHANGE = 2
@@ -34,14 +35,16 @@ def replaced_folder(target: Path, ours: Collection[str]) -> Iterator[Path]:
     place = Path(os.path.realpath(target))
     _require_movable(place, target)
     staging = beside(place, ".building")
-    try:
-        shutil.rmtree(staging, ignore_errors=True)
-        staging.mkdir(parents=True)
-        yield staging
-        _carry_over(place, staging, ours)
-        _swap(staging, place)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    with interrupts_held() as let_through:
+        try:
+            with let_through():
+                shutil.rmtree(staging, ignore_errors=True)
+                staging.mkdir(parents=True)
+                yield staging
+                _carry_over(place, staging, ours)
+            _swap(staging, place)
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 def recover(target: Path) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from whole_files.file_lock import locked_new, orphaned, released
+from whole_files.held_interrupt import interrupts_held
 
 _PREFIX = "gelslim-"
 _LOCK = ".lock"
@@ -21,17 +22,18 @@ def scratch_folder() -> Iterator[Path]:
 
     Raises OSError where the system has no place for temporary files.
     """
-    root = Path(tempfile.gettempdir())
-    _sweep(root)
-    folder, descriptor = _new(root)
-    try:
-        folder.mkdir(mode=0o700)
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        with contextlib.suppress(OSError):
-            folder.with_suffix(_LOCK).unlink()
-        released(descriptor)
+    sweep_scratch()
+    with interrupts_held() as let_through:
+        folder, descriptor = _new(Path(tempfile.gettempdir()))
+        try:
+            folder.mkdir(mode=0o700)
+            with let_through():
+                yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            with contextlib.suppress(OSError):
+                folder.with_suffix(_LOCK).unlink()
+            released(descriptor)
 
 
 def _new(root: Path) -> tuple[Path, int]:
@@ -43,9 +45,10 @@ def _new(root: Path) -> tuple[Path, int]:
                 return folder, descriptor
 
 
-def _sweep(root: Path) -> None:
+def sweep_scratch() -> None:
+    """Remove the folders of processes that were killed."""
     with contextlib.suppress(OSError):
-        for lock in list(root.glob(f"{_PREFIX}????????????????{_LOCK}")):
+        for lock in list(Path(tempfile.gettempdir()).glob(f"{_PREFIX}????????????????{_LOCK}")):
             with orphaned(lock) as free:
                 if free:
                     shutil.rmtree(lock.with_suffix(""), ignore_errors=True)

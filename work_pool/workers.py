@@ -7,10 +7,16 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.connection import wait
-from typing import Literal
+from typing import Any, Literal
+
+from whole_files.held_interrupt import interrupts_held
+
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+PATIENCE_S = 5
+"""Given to a worker that is told to end, before it is killed."""
 
 
 @contextlib.contextmanager
@@ -20,22 +26,51 @@ def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[Proc
     Left without one it waits for what is still to do. Workers of a killed parent end too.
     """
     context = multiprocessing.get_context(method)
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin_worker)
+    with interrupts_held() as let_through:
+        pool = _Pool(workers, mp_context=context, initializer=begin_worker)
+        try:
+            with let_through():
+                yield pool
+                pool.shutdown()
+        except BaseException:
+            _stop(pool)
+            raise
+
+
+class _Pool(ProcessPoolExecutor):
+    """Its workers start with Ctrl-C and SIGTERM blocked, until `begin_worker` says what they do.
+
+    A new interpreter would print a traceback until then, and a fork do what its parent does.
+    """
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """As of any executor; no interrupt falls into the start of a worker."""
+        with interrupts_held(), _blocked():
+            return super().submit(fn, *args, **kwargs)
+
+
+@contextlib.contextmanager
+def _blocked() -> Iterator[None]:
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
     try:
-        yield pool
-    except BaseException:
-        _stop(pool)
-        raise
-    pool.shutdown()
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def begin_worker() -> None:
-    """Make this process end with its parent, and end at Ctrl-C without a word: its parent speaks.
+    """Make this process end with its parent, and leave Ctrl-C to it: the parent ends its workers.
 
     Otherwise workers of a killed parent wait for work for ever, as each holds the queue open.
     """
     with contextlib.suppress(ValueError):  # not in the main thread
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
@@ -55,4 +90,5 @@ def _stop(pool: ProcessPoolExecutor) -> None:
             process.terminate()
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AssertionError):
-            process.join(10)
+            process.join(PATIENCE_S)
+            process.kill()

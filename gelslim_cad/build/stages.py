@@ -19,7 +19,7 @@ from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_cad.view_figures import view_inputs
 from ifem_export.marker_grid import MarkerGrid
 from whole_files.scratch import scratch_folder
-from work_pool.held_interrupt import interrupts_held
+from whole_files.held_interrupt import interrupts_held
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,177 @@
+"""Ctrl-C at the end of a stretch, not within; writers of whole files are cut nowhere between."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from whole_files import file_lock, replaced_file, replaced_folder, scratch
+from whole_files.held_interrupt import interrupts_held
+
+
+def test_an_interrupt_waits_for_the_end_of_the_stretch() -> None:
+    done = []
+
+    def stretch() -> None:
+        with interrupts_held():
+            signal.raise_signal(signal.SIGINT)
+            done.append("whole")
+
+    with pytest.raises(KeyboardInterrupt):
+        stretch()
+    assert done == ["whole"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_block_within_lets_one_through_that_came_before() -> None:
+    done = []
+
+    def stretch() -> None:
+        with interrupts_held() as let_through:
+            signal.raise_signal(signal.SIGINT)
+            try:
+                with let_through():
+                    done.append("cut here")
+            finally:
+                signal.raise_signal(signal.SIGINT)
+                done.append("removed")
+
+    with pytest.raises(KeyboardInterrupt):
+        stretch()
+    assert done == ["removed"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_nothing_happens_without_one_and_faults_pass() -> None:
+    with interrupts_held():
+        pass
+    with pytest.raises(ValueError, match="own"), interrupts_held():
+        raise ValueError("own")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_ignored_signal_stays_ignored(number: signal.Signals) -> None:
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with interrupts_held():
+            assert signal.getsignal(number) is signal.SIG_IGN
+            signal.raise_signal(number)
+    finally:
+        signal.signal(number, before)
+
+
+def test_both_signals_come_out_and_go_back_to_their_handlers() -> None:
+    seen: list[int] = []
+
+    def note(number: int, frame: object) -> None:
+        seen.append(number)
+
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, note) for number in numbers]
+    try:
+        with interrupts_held():
+            for number in (*numbers, *numbers):
+                signal.raise_signal(number)
+            assert seen == []
+        assert seen == list(numbers)
+        assert [signal.getsignal(number) for number in numbers] == [note, note]
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def test_other_threads_hold_nothing() -> None:
+    seen = []
+
+    def run() -> None:
+        with interrupts_held():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]
+
+
+def write_file(place: Path) -> None:
+    replaced_file.replace_file(place / "file", b"new" * 100)
+
+
+def write_folder(place: Path) -> None:
+    with replaced_folder.replaced_folder(place / "folder", ("inner",)) as staging:
+        (staging / "inner").write_bytes(b"new")
+
+
+def use_scratch(place: Path) -> None:
+    with scratch.scratch_folder() as folder:
+        (folder / "inner").write_bytes(b"new")
+
+
+def hold_lock(place: Path) -> None:
+    with file_lock.locked(place / ".lock"):
+        (place / "file").read_bytes()
+
+
+def contents(place: Path) -> dict[str, bytes]:
+    return {
+        p.relative_to(place).as_posix(): p.read_bytes() for p in place.rglob("*") if p.is_file()
+    }
+
+
+class Interrupter:
+    """Sends Ctrl-C after the n-th call of a C function while it is on."""
+
+    def __init__(self, at: int) -> None:
+        self.at, self.calls = at, 0
+
+    def __call__(self, frame: object, event: str, function: object) -> None:
+        if event == "c_return":
+            self.calls += 1
+            if self.calls == self.at:
+                signal.raise_signal(signal.SIGINT)
+
+
+@pytest.fixture
+def profiled() -> Iterator[None]:
+    before = sys.getprofile()
+    yield
+    sys.setprofile(before)
+
+
+@pytest.mark.usefixtures("profiled")
+@pytest.mark.parametrize("write", [write_file, write_folder, use_scratch, hold_lock])
+def test_cut_after_any_call_nothing_is_left_and_all_is_whole(
+    write: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / "folder").mkdir()
+    for first in (write_file, write):
+        first(tmp_path)  # what is done once in a process
+    cut = 0
+    for at in range(1, 2000):
+        (tmp_path / "file").write_bytes(b"old")
+        (tmp_path / "folder" / "inner").write_bytes(b"old")
+        sender = Interrupter(at)
+        try:
+            sys.setprofile(sender)
+            write(tmp_path)
+        except KeyboardInterrupt:
+            cut += 1
+        finally:
+            sys.setprofile(None)
+        found = contents(tmp_path)
+        assert set(found) == {"file", "folder/inner"}, at
+        assert found["file"] in (b"old", b"new" * 100)
+        assert found["folder/inner"] in (b"old", b"new")
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if sender.calls < at:
+            break
+    else:
+        pytest.fail("no run came to its end")
+    assert cut > 20
