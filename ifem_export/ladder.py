@@ -2,7 +2,8 @@
 
 The reference is the same pad at half the pitch with eight B-bar layers, its inner nodes solved for
 to 1e-8; its forces are lumped to the coarse nodes by the bilinear functions. Fields are smooth
-bumps about a pad thickness wide, sideways and down: narrower ones no marker grid resolves.
+bumps about a pad thickness wide, sideways and down: narrower ones no marker grid resolves. Those
+that reach the pad's edge err more and are told apart.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.element import Formulation
 from ifem_export.errors import MeshError
@@ -23,6 +24,7 @@ from ifem_export.surface_operator import CROWNED_RUNGS, Rung, SurfaceOperator, s
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
+SurfaceMotion = Callable[[Array], Array]
 REFERENCE_LAYERS = 8
 REFERENCE_ELEMENT: Formulation = "bbar"
 REFERENCE_RTOL = 1e-8
@@ -66,9 +68,14 @@ def measure_ladder(
     steps = len(choices) + 1
     tell("reference", 0, steps)
     fields = bumps(mesh)
-    expected = [reference_force(mesh, material, field, fine) for field in fields]
+    at_edge = edge_bumps(mesh)
+    expected, expected_at_edge = (
+        [reference_force(mesh, material, field, fine) for field in some]
+        for some in (fields, at_edge)
+    )
     points = np.asarray(mesh.nodes_mm)[mesh.surface]
     moved = [field(points) for field in fields]
+    moved_at_edge = [field(points) for field in at_edge]
     exact = surface_operator(mesh, material, formulation, "pcg", rtol=REFERENCE_RTOL)
     condensed = [exact.force(u) for u in moved]
     rungs = []
@@ -76,6 +83,7 @@ def measure_ladder(
         tell(rung, done + 1, steps)
         operator = surface_operator(mesh, material, formulation, rung, **parameters)
         found = [operator.force(u) for u in moved]
+        found_at_edge = [operator.force(u) for u in moved_at_edge]
         rungs.append(
             MeasuredRung(
                 rung=rung,
@@ -87,6 +95,7 @@ def measure_ladder(
                 noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
                 milliseconds=_one_thread_ms(operator, moved),
                 n_bytes=operator.n_bytes,
+                error_edge=max(map(_off, found_at_edge, expected_at_edge)),
             )
         )
     told = (
@@ -125,26 +134,41 @@ def time_operators(
     return times
 
 
-def bumps(mesh: PadMesh) -> list[Callable[[Array], Array]]:
-    """Smooth surface motions (n, 3) mm of points (n, 3), one per direction and one at an edge."""
+def bumps(mesh: PadMesh) -> list[SurfaceMotion]:
+    """Smooth surface motions (n, 3) mm of points (n, 3), one per direction and one off the middle.
+
+    They fade before they reach the pad's edge.
+    """
     rng = np.random.default_rng(FIELD_SEED)
+    places = [*rng.uniform(-0.4, 0.4, (3, 2)), (0.75, 0.0)]
+    ways = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.3, 0.1, -0.7)]
+    return _bumps(mesh, places, ways)
+
+
+def edge_bumps(mesh: PadMesh) -> list[SurfaceMotion]:
+    """Motions as those of `bumps`, but across an edge and at a corner: what errs most."""
+    return _bumps(mesh, [(0.95, 0.0), (-0.85, 0.85)], [(1.0, 0.0, 0.0), (0.8, 0.5, -0.3)])
+
+
+def _bumps(
+    mesh: PadMesh, places: Sequence[ArrayLike], ways: Sequence[ArrayLike]
+) -> list[SurfaceMotion]:
+    """Bumps at places in shares of the pad's half extent."""
     points = np.asarray(mesh.nodes_mm)[mesh.surface][:, :2]
     low, high = points.min(axis=0), points.max(axis=0)
     thickness = mesh.layers * mesh.cell_size_mm[2]
     width = max(thickness, 2.5 * max(mesh.cell_size_mm[:2]))
     middle, span = (low + high) / 2, (high - low) / 2
-    at_edge = middle + np.array([0.75, 0.0]) * span
-    places = [*(middle + rng.uniform(-0.4, 0.4, (3, 2)) * span), at_edge]
-    directions = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.3, 0.1, -0.7)]
     return [
-        _bump(place, width, np.array(way)) for place, way in zip(places, directions, strict=True)
+        _bump(middle + np.asarray(place) * span, width, np.asarray(way, dtype=float))
+        for place, way in zip(places, ways, strict=True)
     ]
 
 
 def reference_force(
     mesh: PadMesh,
     material: Material,
-    field: Callable[[Array], Array],
+    field: SurfaceMotion,
     fine: PadMesh | None = None,
 ) -> Array:
     """Forces (c, 3) on the coarse surface nodes, from the pad at half pitch and eight layers."""
@@ -217,7 +241,7 @@ def _one_thread_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
         return timed_ms(operator, fields)
 
 
-def _bump(place: Array, width: float, way: Array) -> Callable[[Array], Array]:
+def _bump(place: Array, width: float, way: Array) -> SurfaceMotion:
     def field(points: Array) -> Array:
         square = ((points[:, :2] - place) ** 2).sum(axis=1)
         return np.asarray(0.1 * np.exp(-square / (2 * width**2))[:, None] * way)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from accuracy_budget.budget import Budget
+from accuracy_budget.budget import Budget, shown_share
 from accuracy_budget.ladder import Choice, Ladder, Wording
 from accuracy_budget.rung import Rung
 from ifem_export.errors import IfemError
@@ -28,7 +28,9 @@ def operator_label(rung: str, parameters: Mapping[str, float]) -> str:
 class MeasuredRung:
     """One operator. Errors are relative: of the field (L2, worst of the fields) and resultant.
 
-    `error_operator` is against exact condensation on the same mesh, without the mesh's own error.
+    `error_edge` is that of fields that reach the pad's edge, which `error_field` leaves out; None
+    where nobody measured it. `error_operator` is against exact condensation on the same mesh,
+    without the mesh's own error.
     `noise_…` are gains: standard deviation of a force component, at a node and of the resultant,
     per mm of independent noise on every surface displacement.
     """
@@ -42,6 +44,7 @@ class MeasuredRung:
     noise_resultant_n_per_mm: float
     milliseconds: float
     n_bytes: int
+    error_edge: float | None = None
 
     @property
     def label(self) -> str:
@@ -70,8 +73,13 @@ class OperatorLadder:
         return Ladder(rungs, WORDING)
 
     def choose(self, budget: Budget) -> Choice:
-        """The operator's label for a budget. Raises BudgetError where none keeps it."""
-        return self.choices.choose(budget)
+        """The operator's label for a budget, kept by motions that stay off the pad's edge.
+
+        Where the edge errs more than asked, a remark says so. Raises BudgetError where none keeps
+        the budget.
+        """
+        choice = self.choices.choose(budget)
+        return replace(choice, remarks=(*choice.remarks, *self._at_edge(choice.rung, budget)))
 
     def named(self, label: str) -> MeasuredRung | None:
         """The rung called `label`, if there is one."""
@@ -102,6 +110,19 @@ class OperatorLadder:
             return cls(**{**record, "rungs": rungs})
         except (KeyError, TypeError) as error:
             raise IfemError(f"the ladder is malformed ({error!r})") from error
+
+    def _at_edge(self, rung: Rung, budget: Budget) -> tuple[str, ...]:
+        found = self.named(rung.name)
+        if found is None or found.error_edge is None or budget.allows_error(found.error_edge):
+            return ()
+        told = (
+            f"where the motion reaches the gel's edge the field error of {rung.name} is "
+            f"{shown_share(found.error_edge)}, outside the calibrated range"
+        )
+        able = [r for r in self._by_work() if r.error_edge is not None]
+        able = [r for r in able if budget.allows_error(max(r.error_edge or 0, r.error_field))]
+        within = [r for r in able if budget.allows_time(r.milliseconds)]
+        return (f"{told}; {within[0].label} keeps the budget there too" if within else told,)
 
     def _by_work(self) -> list[MeasuredRung]:
         return sorted(self.rungs, key=lambda r: r.n_bytes)
