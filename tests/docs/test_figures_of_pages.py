@@ -135,12 +135,17 @@ def physics_claims() -> list[str]:
         for r in data("force_ladders")["operators"]
         if r["gel"] == "neo-Hookean" and r["method"] == "direct"
     }
+    budget = {s["name"]: round(100 * s["relative"]) for s in data("twin_validation")["budget"]}
     linear, nonlinear = strain["linear pcg 1e-2"], strain["neo-Hookean"]
     return [
         f"| `paper`, one layer | {percent(paper['error_field'])} % | "
         f"{percent(paper['error_resultant'])} % |",
         f"condensed exactly | {percent(best['error_field'])} % | "
         f"{percent(best['error_resultant'])} % |",
+        f"large strain {budget['nonlinearity']} % of the force, E off by a tenth "
+        f"{budget['modulus E +10%']} %, projection ignored {budget['projection ignored']} %, "
+        f"thickness off by a twentieth {budget['thickness +5%']} %, a pose off by 2° about two "
+        f"axes {budget['pose 2° about x, y']} %",
         f"the one-layer field is {percent(at[0.45])} % and {percent(at[0.49])} % off",
         f"the linear law is {100 * linear['error_field']:.0f} % off in the field and "
         f"{100 * linear['error_resultant']:.0f} % in the resultant, the neo-Hookean one "

@@ -1,0 +1,133 @@
+"""What docs/physics.md says against the paper, shown by numbers of its own."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from page_text import DOCS, ROOT, text_of
+
+from gelslim_cad.dimensions import derive
+from gelslim_cad.sight import virtual_camera
+from gelslim_cad.spec.reader import read_spec
+from gelslim_optics.pad_grid import pad_axes
+from gelslim_optics.projection_error import Model, error_map
+from ifem_export.material import Material
+from ifem_export.outline import RoundedRectangle
+from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.surface_operator import Rung, surface_operator
+
+GEL = Material(0.147, 0.3223, 1020.0)
+THICKNESS_MM = 2.0
+
+
+def bumped_pad(layers: int) -> tuple[PadMesh, NDArray[np.float64], float]:
+    """A pad, a push with shear in its middle (mm), and a node's share of the surface (mm²)."""
+    outline = RoundedRectangle(20.0, 20.0, 0.0)
+    mesh = build_pad_mesh(outline, THICKNESS_MM, pitch_mm=0.5, layers=layers)[0]
+    x, y = np.asarray(mesh.nodes_mm)[np.asarray(mesh.surface), :2].T
+    bump = np.exp(-(x**2 + y**2) / (2 * 1.5**2))
+    return mesh, np.column_stack([0.1 * bump, 0 * bump, -0.2 * bump]), 0.25
+
+
+@pytest.fixture(scope="module")
+def forces() -> dict[int, NDArray[np.float64]]:
+    """Nodal forces (s, 3) in N of the same motion, on one, two and four layers."""
+    found = {}
+    for layers in (1, 2, 4):
+        mesh, motion, _ = bumped_pad(layers)
+        rung: Rung = "paper" if layers == 1 else "factor"
+        found[layers] = surface_operator(mesh, GEL, "bbar", rung).force(motion)
+    return found
+
+
+def test_the_resultant_is_an_average_of_the_motion(forces: dict[int, NDArray[np.float64]]) -> None:
+    """Betti: F_x = (G/h) ∫ u_x dA and F_z = (M/h) ∫ u_z dA, whatever the layers."""
+    e, nu = GEL.youngs_modulus_mpa, GEL.poissons_ratio
+    shear = e / (2 * (1 + nu))
+    press = e * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    _, motion, area = bumped_pad(1)
+    volume = motion.sum(axis=0) * area
+    for layers, force in forces.items():
+        total = force.sum(axis=0)
+        assert total[0] == pytest.approx(shear / THICKNESS_MM * volume[0], rel=5e-3), layers
+        assert total[2] == pytest.approx(press / THICKNESS_MM * volume[2], rel=5e-3), layers
+
+
+def test_the_field_tells_what_the_resultant_hides(
+    forces: dict[int, NDArray[np.float64]],
+) -> None:
+    four = forces[4]
+    total = four.sum(axis=0)
+
+    def off(force: NDArray[np.float64]) -> tuple[float, float]:
+        field = np.linalg.norm(force - four) / np.linalg.norm(four)
+        return float(field), float(np.linalg.norm(force.sum(axis=0) - total)) / float(
+            np.linalg.norm(total)
+        )
+
+    one, two = off(forces[1]), off(forces[2])
+    assert one[1] < 5e-3
+    assert two[1] < 5e-3
+    assert one[0] > 0.25
+    assert one[0] > 50 * one[1]
+    assert two[0] < 0.3 * one[0]
+
+
+def test_projection_errors_are_as_told() -> None:
+    """The table's figures, for a press of 0.5 mm anywhere on the gel of gelslim2."""
+    camera = virtual_camera(derive(read_spec(ROOT / "designs" / "gelslim2.yaml").spec))
+    height, foot = -camera.position_mm[2], camera.position_mm[0]
+    seen = error_map(camera, *pad_axes(28.0, 28.0), -0.5)
+
+    def between(model: Model) -> tuple[float, float]:
+        off = 100 * seen.relative(model)
+        return float(np.nanmin(off)), float(np.nanmax(off))
+
+    assert between("arctan") == pytest.approx((-5.0, -4.6), abs=0.06)
+    assert between("effective_height") == pytest.approx((-1.7, -1.0), abs=0.05)
+    assert between("printed") == pytest.approx((-5, 16), abs=0.5)
+    reach = np.linspace(0.05, 2.0, 200)
+    along = error_map(camera, foot + reach * height, [0.0], -0.5).relative("printed")[0]
+    assert height == pytest.approx(35.5, abs=0.05)
+    assert reach[np.argmax(along > 0)] == pytest.approx(0.4, abs=0.02)
+    assert (reach[np.argmax(along)], along.max()) == pytest.approx((1.4, 0.33), abs=0.01)
+    part = text_of(DOCS / "physics.md").partition("\n### Projection error\n")[2]
+    part = part.partition("\n### ")[0]
+    for told in (
+        "35.5 mm",
+        "4.6 to 5.0 % low",
+        "1.0 to 1.7 % low",
+        "16 % high",
+        "33 % at r/H = 1.4",
+    ):
+        assert told in part, told
+
+
+def test_best_focus_evens_the_blur_of_the_picture_not_of_the_gel() -> None:
+    d = derive(read_spec(ROOT / "designs" / "mini20.yaml").spec)
+    near, far = float(d["view.near_distance_mm"]), float(d["view.far_distance_mm"])
+    focus, aperture = float(d["view.focus_mm"]), float(d["view.aperture_mm"])
+    assert focus == pytest.approx(2 * near * far / (near + far))
+    # In the picture, c = A f |Z - s| / (Z (s - f)), the same at both edges.
+    assert (far - focus) / far == pytest.approx((focus - near) / near)
+    on_gel = [aperture * abs(z - focus) / focus for z in (near, far)]
+    assert on_gel == pytest.approx([d["view.near_blur_mm"], d["view.far_blur_mm"]])
+    assert on_gel[1] / on_gel[0] == pytest.approx(far / near)
+    assert far / near == pytest.approx(float(d["view.keystone"]))
+
+
+def test_every_correction_names_a_test_that_there_is() -> None:
+    """Each row of the table ends in evidence: a section of the page or a test with its name."""
+    page = text_of(DOCS / "physics.md")
+    table = page.partition("\n## Corrections to the paper\n")[2].partition("\n### ")[0]
+    rows = re.findall(r"^\| (?!the paper|---).*\|$", table, re.MULTILINE)
+    assert len(rows) >= 6
+    for row in rows:
+        linked = re.findall(r"\]\(#([\w-]+)\)", row)
+        tested = re.findall(r"`(tests/[\w/]+\.py)[:`]", row)
+        assert linked or tested or "`gelslim " in row, row
+    for path, name in re.findall(r"`(tests/[\w/]+\.py)::(test_\w+)`", page):
+        assert f"def {name}(" in (ROOT / path).read_text("utf-8"), f"{path}: {name}"
