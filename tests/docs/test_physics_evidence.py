@@ -13,7 +13,7 @@ from gelslim_cad.dimensions import derive
 from gelslim_cad.sight import virtual_camera
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.pad_grid import pad_axes
-from gelslim_optics.projection_error import Model, error_map
+from gelslim_optics.projection_error import ErrorModel, error_map
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
 from ifem_export.pad_mesh import PadMesh, build_pad_mesh
@@ -82,7 +82,7 @@ def test_projection_errors_are_as_told() -> None:
     height, foot = -camera.position_mm[2], camera.position_mm[0]
     seen = error_map(camera, *pad_axes(28.0, 28.0), -0.5)
 
-    def between(model: Model) -> tuple[float, float]:
+    def between(model: ErrorModel) -> tuple[float, float]:
         off = 100 * seen.relative(model)
         return float(np.nanmin(off)), float(np.nanmax(off))
 
