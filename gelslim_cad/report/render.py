@@ -60,8 +60,6 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
     found = [
         ("view", "View", _viewer(data)),
         ("pictures", "Pictures", _pictures(data.pictures)),
-        ("thickness", "What sets the thickness", _binding(data.binding)),
-        ("rules", f"Design rules <small>{text(_tally(data))}</small>", rules(data.rules)),
         (
             "camera",
             "What the camera sees",
@@ -69,6 +67,8 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
             + _told(data.sight_notes, data.sight),
         ),
         *_light(data),
+        ("thickness", "What sets the thickness", _binding(data.binding)),
+        ("rules", f"Design rules <small>{text(_tally(data))}</small>", rules(data.rules)),
         ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),
         ("files", "Files", tables.files(data.files)),
         ("bom", "Bill of materials", tables.bom(data.bom)),

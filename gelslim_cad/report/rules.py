@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Literal
 
 from gelslim_cad.report.data import ReportData, RuleRow, Status
@@ -12,6 +13,8 @@ MARKS: dict[Status, str] = {"pass": "✓", "warn": "!", "fail": "✕"}
 ORDER: dict[Status, int] = {"fail": 0, "warn": 1, "pass": 2}
 WIDTH = 240.0
 LIMIT_AT = 0.62
+LEAST_MARGIN = 1e-5
+"""Of the larger of value and limit, which are written with four digits."""
 
 
 def rules(rows: tuple[RuleRow, ...]) -> str:
@@ -70,7 +73,7 @@ def _rule(row: RuleRow) -> str:
         f'<span class="mark" role="img" aria-label="{row.status}">{MARKS[row.status]}</span>'
         f"<div><h3>{text(row.title)}</h3><code>{text(row.id)}</code></div></div>"
         f'<div class="gauge">{_gauge(row)}</div>'
-        f'<div class="why"><p>{text(row.reason)}</p>{change}</div></article>'
+        f'<div class="why"><p>{text(_sentences(row.reason))}</p>{change}</div></article>'
     )
 
 
@@ -79,7 +82,7 @@ def _gauge(row: RuleRow) -> str:
     sign = {"max": "≤ ", "min": "≥ ", "": ""}[sense]
     margin = ""
     if row.margin is not None:
-        margin = f"margin {with_unit(row.margin, row.unit, 3)}"
+        margin = f"margin {with_unit(_told_margin(row), row.unit, 3)}"
     if isinstance(row.limit, bool | str):
         sign = "wanted: "
     limit = "" if row.limit is None else f"{sign}{with_unit(row.limit, row.unit, 4)}"
@@ -128,6 +131,18 @@ def _real(value: object) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return float(value)
+
+
+def _told_margin(row: RuleRow) -> float:
+    """Write a margin that the value and its limit do not show as zero: 3e-7 mm is the solver's."""
+    assert row.margin is not None
+    scale = max((abs(x) for x in (_real(row.value), _real(row.limit)) if x is not None), default=0)
+    return 0.0 if abs(row.margin) < LEAST_MARGIN * scale else row.margin
+
+
+def _sentences(reason: str) -> str:
+    """Start every sentence of a reason with a capital letter."""
+    return re.sub(r"(^|[.!?] )([a-z])", lambda hit: hit[1] + hit[2].upper(), reason)
 
 
 def _many(count: int, noun: str) -> str:

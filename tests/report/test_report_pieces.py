@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gelslim_cad.report.camera_view import LEVELS, colour, levels
 from gelslim_cad.report.data import CameraView, FileRow, ReportData, RuleRow
 from gelslim_cad.report.markup import coordinate, href, number, size, text
-from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_places, sense_of, verdict
+from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_places, rules, sense_of, verdict
 from gelslim_cad.report.tables import substituted
 
 REAL = st.floats(-1e6, 1e6, allow_nan=False)
@@ -142,3 +142,15 @@ def test_verdict_counts():
     assert verdict(data("pass", "warn")) == ("warn", "passes, 1 warning")
     assert verdict(data("pass", "pass")) == ("pass", "passes all 2 rules")
     assert verdict(data())[0] == "warn"
+
+
+def test_a_margin_below_what_value_and_limit_show_is_none():
+    row = rule(0.16666634, 0.16666667, 3.24e-7, sense="max")
+    assert "margin 0<" in rules((row,)).replace('<span class="unit">\u2009mm</span>', "")
+    real = rule(0.1666, 0.16666667, 6.7e-5, sense="max")
+    assert "margin 6.7e\u22125" in rules((real,))
+
+
+def test_every_sentence_of_a_reason_starts_large():
+    row = RuleRow("a", "t", 1, 2, "mm", 1, "pass", "stop it by f²/(s - f). take more", "p", "max")
+    assert "<p>Stop it by f²/(s - f). Take more</p>" in rules((row,))
