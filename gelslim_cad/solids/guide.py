@@ -13,6 +13,7 @@ import cadquery as cq
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.guide_section import guide_profile
 from gelslim_cad.part import Part
+from gelslim_cad.solids.closed_wire import Piece, closed_wire
 from gelslim_cad.solids.materials import ACRYLIC
 from gelslim_cad.solids.shapes import single
 from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Point, Segment
@@ -24,12 +25,11 @@ def profile_wire(profile: GuideProfile, x_mm: float) -> cq.Wire:
     def at(point: Point) -> cq.Vector:
         return cq.Vector(x_mm, *point)
 
-    def edge(curve: Segment | Arc) -> cq.Edge:
-        if isinstance(curve, Segment):
-            return cq.Edge.makeLine(at(curve.start), at(curve.end))
-        return cq.Edge.makeThreePointArc(at(curve.start), at(curve.at(0.5)), at(curve.end))
+    def piece(curve: Segment | Arc) -> Piece:
+        straight = isinstance(curve, Segment)
+        return Piece(at(curve.start), None if straight else at(curve.at(0.5)))
 
-    return cq.Wire.assembleEdges([edge(e.curve) for e in joined(profile.outline("acrylic"))])
+    return closed_wire([piece(e.curve) for e in joined(profile.outline("acrylic"))])
 
 
 def joined(outline: tuple[Edge, ...]) -> list[Edge]:

@@ -9,6 +9,7 @@ import cadquery as cq
 import numpy as np
 
 from gelslim_cad.markers.outline import Outline
+from gelslim_cad.solids.closed_wire import Piece, closed_wire
 
 Point2 = tuple[float, float]
 Hole = tuple[float, float, float]
@@ -17,21 +18,21 @@ Hole = tuple[float, float, float]
 
 def outline_wire(outline: Outline, z_mm: float) -> cq.Wire:
     """Closed wire of `outline` at height z."""
-    edges: list[cq.Edge] = []
+    pieces: list[Piece] = []
     points = outline.points_mm
     for (x0, y0), (x1, y1), bulge in zip(
         points.tolist(), np.roll(points, -1, axis=0).tolist(), outline.bulges.tolist(), strict=True
     ):
-        start, end = cq.Vector(x0, y0, z_mm), cq.Vector(x1, y1, z_mm)
+        start = cq.Vector(x0, y0, z_mm)
         if bulge == 0:
-            edges.append(cq.Edge.makeLine(start, end))
+            pieces.append(Piece(start))
             continue
         # The arc's middle lies to the right of the chord for a left turn, by bulge * chord / 2.
         middle = cq.Vector(
             (x0 + x1) / 2 + bulge * (y1 - y0) / 2, (y0 + y1) / 2 - bulge * (x1 - x0) / 2, z_mm
         )
-        edges.append(cq.Edge.makeThreePointArc(start, middle, end))
-    return cq.Wire.assembleEdges(edges)
+        pieces.append(Piece(start, middle))
+    return closed_wire(pieces)
 
 
 def prism(

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import cadquery as cq
 
+from gelslim_cad.solids.closed_wire import Piece, closed_wire
+
 Point2 = tuple[float, float]
 
 
@@ -30,31 +32,19 @@ def rounded_wire(x: Point2, y: Point2, radii: Sequence[float], z: float) -> cq.W
     limit = min(x[1] - x[0], y[1] - y[0]) / 2 - 1e-6
     corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
     into = [(0, -1), (1, 0), (0, 1), (-1, 0)]
-    edges: list[cq.Edge] = []
-    starts: list[cq.Vector] = []
-    ends: list[cq.Vector] = []
-    arcs: list[cq.Edge | None] = []
+    pieces: list[Piece] = []
     for k, (cx, cy) in enumerate(corners):
         r = max(0.0, min(radii[k], limit))
         (ax, ay), (bx, by) = into[k], into[(k + 1) % 4]
+        if r <= 1e-6:
+            pieces.append(Piece(cq.Vector(cx, cy, z)))
+            continue
         start = cq.Vector(cx - ax * r, cy - ay * r, z)
         end = cq.Vector(cx + bx * r, cy + by * r, z)
-        arc = None
-        if r > 1e-6:
-            bulge = r * (1 - math.sqrt(0.5))
-            mid = cq.Vector(cx - (ax - bx) * bulge, cy - (ay - by) * bulge, z)
-            arc = cq.Edge.makeThreePointArc(start, mid, end)
-        starts.append(start)
-        ends.append(end)
-        arcs.append(arc)
-    for k in range(4):
-        arc = arcs[k]
-        if arc is not None:
-            edges.append(arc)
-        follow = starts[(k + 1) % 4]
-        if (follow - ends[k]).Length > 1e-7:
-            edges.append(cq.Edge.makeLine(ends[k], follow))
-    return cq.Wire.assembleEdges(edges)
+        bulge = r * (1 - math.sqrt(0.5))
+        mid = cq.Vector(cx - (ax - bx) * bulge, cy - (ay - by) * bulge, z)
+        pieces += [Piece(start, mid), Piece(end)]
+    return closed_wire(pieces)
 
 
 def rounded_box(x: Point2, y: Point2, z: Point2, radii: Sequence[float]) -> cq.Solid:
