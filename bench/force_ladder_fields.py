@@ -33,6 +33,7 @@ BUMP_MM = (1.8, 4.0)
 METHODS = {
     "direct": ForceSettings(method="direct"),
     "low-pass": ForceSettings(method="low_pass"),
+    "low-pass 0.4 mm": ForceSettings(method="low_pass", low_pass_mm=0.4),
     "low-pass 0.75 mm": ForceSettings(method="low_pass", low_pass_mm=0.75),
     "masked": ForceSettings(method="masked"),
 }
@@ -127,7 +128,7 @@ def operators(rig: Rig, quick: bool) -> list[dict[str, Any]]:
         for method in METHODS:
             if method == "masked" and name not in ("fft lumped", "pcg 1e-2"):
                 continue
-            row = forces(rig, operator, method, None, shown, truth)
+            row = forces(rig, operator, method, None, shown, truth, motion)
             rows.append({"gel": "linear", "operator": name, "method": method, **row})
     if quick:
         return rows
@@ -136,7 +137,7 @@ def operators(rig: Rig, quick: bool) -> list[dict[str, Any]]:
     for name, chosen in (("linear pcg 1e-2", None), ("neo-Hookean", law)):
         operator = rig.bundle.surface_operator("pcg", rtol=1e-2)
         for method in ("direct", "low-pass"):
-            row = forces(rig, operator, method, chosen, shown, large)
+            row = forces(rig, operator, method, chosen, shown, large, motion)
             rows.append({"gel": "neo-Hookean", "operator": name, "method": method, **row})
     return rows
 
@@ -148,15 +149,16 @@ def forces(
     law: FiniteStrainForce | None,
     shown: list[Array],
     truth: Array,
+    motion: SurfaceMotion,
 ) -> dict[str, float]:
     """Mean errors and median time of one estimator; a masked fit starts from the last forces."""
-    estimator = ForceEstimator(rig.bundle.mesh, operator, METHODS[method], law)
+    estimator = ForceEstimator(rig.bundle.mesh, operator, METHODS[method], law, motion)
     touched = rig.press.touched if method == "masked" else None
-    found = [estimator.estimate(u.copy(), touched).force_n for u in shown]
+    found = [estimator.estimate(u.copy(), touched, noise_px=PLACE_NOISE_PX).force_n for u in shown]
     start = found[0] if method == "masked" else None
 
     def once(k: int) -> None:
-        estimator.estimate(shown[k % len(shown)].copy(), touched, start)
+        estimator.estimate(shown[k % len(shown)].copy(), touched, start, PLACE_NOISE_PX)
 
     resultant = truth.sum(axis=0)
     miss = [np.linalg.norm(f.sum(axis=0) - resultant) for f in found]

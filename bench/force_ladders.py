@@ -31,7 +31,7 @@ LABELS = ("look", "detector", "mode", "peak_pitch", "interpolation", "gel", "ope
           "compensation")  # fmt: skip
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#555555", "#c03060", "#30a0b0")
 MARKS = {"clean": "o", "noise 8": "s", "blur 1.5 px": "D", "direct": "o", "low-pass": "s",
-         "low-pass 0.75 mm": "v", "masked": "D"}  # fmt: skip
+         "low-pass 0.4 mm": "^", "low-pass 0.75 mm": "v", "masked": "D"}  # fmt: skip
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
 """From the motion of the surface nodes to the forces on them.
 
 `direct` is F = S u, as in the paper. It amplifies noise; `low_pass` spreads each nodal force over
-its neighbours and keeps the resultant. Where the contact is known, `masked` fits the whole motion
-by forces there that push and keep Coulomb's cone.
+its neighbours, as far as the frame's noise calls for, and keeps the resultant. Where the contact is
+known, `masked` fits the whole motion by forces there that push and keep Coulomb's cone.
 
 Without the normal motion the tangential forces are those of S (u_x, u_y, 0). Their resultant and
 their torque about z are right all the same, because in a wide pad a normal motion calls for
@@ -19,9 +19,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from gelslim_force.force_noise import (
+    ForceNoise,
+    MotionNoise,
+    lattice_curvature,
+    normal_noise_mm,
+)
 from gelslim_force.frame_result import ForceField
+from gelslim_force.low_pass import LowPass, SmoothedForce, widths_mm
+from gelslim_force.surface_motion import SurfaceMotion
 from gelslim_force.surface_share import surface_share_mm2
-from ifem_export.contact_inverse import masked_force, smoothing
+from ifem_export.contact_inverse import masked_force
 from ifem_export.pad_mesh import PadMesh
 from ifem_export.surface_operator import SurfaceOperator
 
@@ -29,6 +37,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Method = Literal["auto", "direct", "low_pass", "masked"]
 METHODS: tuple[Method, ...] = get_args(Method)
+_CONTACT_SIGMAS = 5.0
 
 
 class SurfaceForce(Protocol):
@@ -46,8 +55,9 @@ class ForceSettings:
     """`auto`: masked where the contact is known, else low-passed."""
     friction: float = 1.0
     """Coulomb coefficient of the cone and of the slip margin."""
-    low_pass_mm: float = 0.4
-    """Standard deviation of the low-pass."""
+    low_pass_mm: float | None = None
+    """Standard deviation of the low-pass; None takes in each frame the one of the least expected
+    error, which is none at all without noise."""
     most_steps: int = 60
     """Steps of the masked fit per frame; it starts from the last frame's forces."""
     tolerance: float = 3e-3
@@ -58,8 +68,9 @@ class ForceSettings:
             raise ValueError(f"method = {self.method!r}: must be one of {', '.join(METHODS)}")
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ValueError(f"friction = {self.friction!r}: must be a number >= 0")
-        if not (np.isfinite(self.low_pass_mm) and self.low_pass_mm > 0):
-            raise ValueError(f"low_pass_mm = {self.low_pass_mm!r}: must be > 0")
+        width = self.low_pass_mm
+        if width is not None and not (np.isfinite(width) and width > 0):
+            raise ValueError(f"low_pass_mm = {width!r}: must be > 0")
         if self.most_steps < 1 or not 0 < self.tolerance < 1:
             raise ValueError("most_steps must be >= 1 and tolerance in 0 ... 1")
 
@@ -74,6 +85,9 @@ class ForceEstimator:
     settings: ForceSettings
     law: SurfaceForce | None = None
     """Another law for `direct` and `low_pass`, such as a neo-Hookean pad."""
+    motion: SurfaceMotion | None = None
+    """The sensor's markers, whose noise the low-pass and the contact are judged by; without them
+    the motion is taken to be free of noise."""
 
     @cached_property
     def points_mm(self) -> Array:
@@ -86,21 +100,26 @@ class ForceEstimator:
         return surface_share_mm2(self.mesh)
 
     @cached_property
-    def spread(self) -> sparse.csr_array:
-        """The low-pass (c, c)."""
-        return smoothing(self.points_mm, self.settings.low_pass_mm)
+    def low_pass(self) -> LowPass:
+        """What `direct` and `low_pass` pass the forces through; of width 0 for `direct`."""
+        cell_mm = np.asarray(self.mesh.cell_size_mm[:2])
+        fixed_mm = 0.0 if self.settings.method == "direct" else self.settings.low_pass_mm
+        if self.motion is None:
+            noise = ForceNoise.none(len(self.points_mm))
+        else:
+            noise = ForceNoise.of(self.operator, self.motion)
+        return LowPass.of(self.points_mm, widths_mm(cell_mm, fixed_mm), noise)
 
-    @property
-    def low_passed(self) -> SurfaceForce:
-        """The linear operator with the low-pass."""
-        return _LowPassed(self.operator, self.spread)
+    @cached_property
+    def _curvature(self) -> sparse.csr_array:
+        return lattice_curvature(self.points_mm, np.asarray(self.mesh.cell_size_mm[:2]))
 
     def estimate(
         self,
         displacement_mm: Array,
         touched: Mask | None = None,
         start_n: Array | None = None,
-        least_force_n: Array | float = 0.0,
+        noise_px: float = 0.0,
     ) -> ForceField:
         """Forces for a motion (c, 3) in mm whose z is NaN where the normal motion is unknown.
 
@@ -108,8 +127,8 @@ class ForceEstimator:
             displacement_mm: (c, 3).
             touched: (c,) nodes in contact, or None where that is not known.
             start_n: (c, 3) forces of the frame before.
-            least_force_n: one or (c,), that noise alone does not reach; tells the contact where
-                `touched` is None.
+            noise_px: standard deviation of a marker's place; sets the low-pass, and tells the
+                contact where `touched` is None.
 
         Raises:
             IfemError: x or y not finite, or a wrong shape.
@@ -118,11 +137,17 @@ class ForceEstimator:
         u = displacement_mm if normal_known else displacement_mm * [1.0, 1.0, 0.0]
         if not normal_known:
             u[:, 2] = 0.0
-        force, misfit = self._force(u, touched if normal_known else None, start_n)
-        contact = touched
-        if contact is None:
-            sizes = np.linalg.norm(force[:, : 3 if normal_known else 2], axis=1)
-            contact = sizes > least_force_n
+        misfit, smoothed = 0.0, None
+        if self._masked(touched if normal_known else None):
+            assert touched is not None
+            force, misfit = self._fitted(u, touched, start_n)
+        else:
+            noise = MotionNoise(noise_px, normal_noise_mm(self._curvature, u[:, 2]))
+            smoothed = self.low_pass.applied((self.law or self.operator).force(u), noise)
+            force = smoothed.force_n
+        if touched is None:
+            assert smoothed is not None
+            touched = _above_noise(smoothed, normal_known)
         if not normal_known:
             force[:, 2] = np.nan
         return ForceField(
@@ -130,29 +155,27 @@ class ForceEstimator:
             displacement_mm=displacement_mm,
             force_n=force,
             traction_mpa=force / self.area_mm2[:, None],
-            contact=contact,
+            contact=touched,
             centre_of_pressure_mm=self._centre(force),
             slip_margin=self._slip_margin(force),
             misfit=misfit,
+            low_pass_mm=None if smoothed is None else smoothed.width_mm,
         )
 
-    def _force(self, u: Array, touched: Mask | None, start_n: Array | None) -> tuple[Array, float]:
-        method = self.settings.method
-        if method == "auto":
-            method = "low_pass" if touched is None else "masked"
-        if method == "masked" and touched is not None:
-            fit = masked_force(
-                self.operator,
-                u,
-                touched,
-                friction=self.settings.friction,
-                start_n=start_n,
-                most_steps=self.settings.most_steps,
-                tolerance=self.settings.tolerance,
-            )
-            return fit.force_n, fit.misfit
-        force = np.array((self.law or self.operator).force(u))
-        return (force if method == "direct" else np.asarray(self.spread @ force)), 0.0
+    def _masked(self, touched: Mask | None) -> bool:
+        return touched is not None and self.settings.method in ("auto", "masked")
+
+    def _fitted(self, u: Array, touched: Mask, start_n: Array | None) -> tuple[Array, float]:
+        fit = masked_force(
+            self.operator,
+            u,
+            touched,
+            friction=self.settings.friction,
+            start_n=start_n,
+            most_steps=self.settings.most_steps,
+            tolerance=self.settings.tolerance,
+        )
+        return fit.force_n, fit.misfit
 
     def _centre(self, force: Array) -> Array:
         push = np.maximum(-force[:, 2], 0.0)
@@ -168,11 +191,9 @@ class ForceEstimator:
         return float(1 - np.hypot(total[0], total[1]) / (self.settings.friction * -total[2]))
 
 
-@dataclass(frozen=True, eq=False)
-class _LowPassed:
-    operator: SurfaceOperator
-    spread: sparse.csr_array
-
-    def force(self, displacement_mm: ArrayLike) -> Array:
-        """S u, low-passed."""
-        return np.asarray(self.spread @ self.operator.force(displacement_mm))
+def _above_noise(smoothed: SmoothedForce, normal_known: bool) -> Mask:
+    """(c,) nodes whose force noise alone does not reach."""
+    parts = slice(0, 3) if normal_known else slice(0, 2)
+    size = np.linalg.norm(smoothed.force_n[:, parts], axis=1)
+    sigma = np.linalg.norm(smoothed.sigma_n[:, : 2 if normal_known else 1], axis=1)
+    return np.asarray(size > _CONTACT_SIGMAS * sigma)

@@ -8,7 +8,6 @@ the stream goes on.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from gelslim_force.frame_result import ForceField, FrameResult
 from gelslim_force.indenter_source import NormalReading
 from gelslim_force.marker_heights import marker_heights_mm
 from gelslim_force.marker_motion import MarkerView
-from gelslim_force.marker_noise import node_noise_n_per_px, noise_px
+from gelslim_force.marker_noise import noise_px
 from gelslim_force.normal_source import NormalSource
 from gelslim_force.pipeline_settings import PipelineSettings
 from gelslim_force.sensor_calibration import SensorCalibration
@@ -35,7 +34,6 @@ from ifem_export.errors import IfemError
 from ifem_export.marker_interpolation import FilledInterpolation
 
 Array = NDArray[np.float64]
-_CONTACT_SIGMAS = 5.0
 _SHIFT_MM = 0.03
 """Change of the lateral motion in the contact that its normal motion need not follow."""
 _MISFIT = 0.35
@@ -78,14 +76,13 @@ class ForcePipeline:
         """May be set later; the patch finder of an indenter needs the pipeline's nodes."""
         self._tracker = calibration.tracker()
         reference = self._tracker.reference
-        markers = bundle.markers
+        markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
         operator = self.settings.operator(bundle)
         law = FiniteStrainForce(bundle) if self.settings.gel == "neo_hookean" else None
-        self._estimator = ForceEstimator(bundle.mesh, operator, self.settings.force, law)
         self._fitter = ForceEstimator(
             bundle.mesh, self.settings.compliance(bundle), self.settings.force
         )
-        self._wrench = WrenchNoise.of(operator, self.points_mm)
+        self._wrench = WrenchNoise.of(operator, points_mm)
         self._motion = SurfaceMotion(
             MarkerView(
                 calibration.camera,
@@ -94,8 +91,11 @@ class ForcePipeline:
             ),
             reference.markers,
             markers.sparse if self.settings.interpolation == "sparse" else markers.thin_plate,
-            self.points_mm,
+            points_mm,
             self.settings.compensation,
+        )
+        self._estimator = ForceEstimator(
+            bundle.mesh, operator, self.settings.force, law, self._motion
         )
         self._index = 0
         self._last_force: Array | None = None
@@ -187,7 +187,7 @@ class ForcePipeline:
             normal_known=known,
             stage_ms=clock.stages,
             problems=problems,
-            extra={} if reading is None else {"normal": reading.summary()},
+            extra=_findings(field, reading),
         )
 
     def _numbered(self, time_s: float | None, **found: Any) -> FrameResult:
@@ -250,14 +250,12 @@ class ForcePipeline:
         touched = reading.touched if reading is not None and reading.known else None
         masked = touched is not None and self.settings.force.method in ("auto", "masked")
         estimator = self._fitter if masked else self._estimator
-        least = _CONTACT_SIGMAS * noise * self._restlessness
-        return estimator.estimate(displacement, touched, self._last_force, least)
+        return estimator.estimate(displacement, touched, self._last_force, noise)
 
     def _noise_px(self, displacement_px: Array) -> float:
         if self.settings.noise_px is not None:
             return self.settings.noise_px
-        found = noise_px(self._tracker.reference, displacement_px)
-        return found if np.isfinite(found) else 0.0
+        return noise_px(self._tracker.reference, displacement_px)
 
     def _covariance(
         self,
@@ -281,15 +279,12 @@ class ForcePipeline:
             self._kept_gains = lost, self._wrench.gains(interpolation)
         return self._kept_gains[1]
 
-    @cached_property
-    def _restlessness(self) -> Array:
-        """(c,) N per px at each node."""
-        law = self._estimator.low_passed if self._low_passed else self._estimator.operator
-        return node_noise_n_per_px(law, self._motion)
 
-    @property
-    def _low_passed(self) -> bool:
-        return self.settings.force.method in ("auto", "low_pass")
+def _findings(field: ForceField, reading: NormalReading | None) -> dict[str, Any]:
+    found: dict[str, Any] = {} if reading is None else {"normal": reading.summary()}
+    if field.low_pass_mm is not None:
+        found["low_pass_mm"] = [round(float(width), 4) for width in field.low_pass_mm]
+    return found
 
 
 def _complaints(tracked: TrackedFrame) -> tuple[str, ...]:

@@ -36,6 +36,8 @@ class ForceField:
     """1 - |tangential| / (friction |normal|) of the resultant; NaN where unknown."""
     misfit: float = 0.0
     """Share of the motion that the masked forces leave unexplained; 0 without a mask."""
+    low_pass_mm: Array | None = None
+    """(2,) standard deviation of the low-pass, tangential and normal; None for masked forces."""
 
 
 @dataclass(frozen=True, eq=False)
