@@ -1,10 +1,48 @@
-"""`python -m gelslim_cad` is `gelslim`."""
+"""The program: `gelslim` and `python -m gelslim_cad`.
 
-from __future__ import annotations
+Its first lines see to Ctrl-C, before anything else is imported. Worker processes import this module
+too and leave Ctrl-C to their parent. Import `gelslim_cad.cli` to run commands from Python.
+"""
 
 import sys
+from collections.abc import Callable
 
-from gelslim_cad.cli import main
+try:
+    from gelslim_cad.ending import Ending
+
+    _ending = Ending()
+    if "__mp_main__" not in sys.modules:
+        _ending.arm()
+except KeyboardInterrupt:
+    # In the middle of the lines that are to see to it.
+    sys.stderr.write("Interrupted; every file that is there is whole.\n")
+    raise SystemExit(130) from None
+
+
+def main() -> int:
+    """Run `gelslim` with the process's arguments and return its exit status."""
+    from gelslim_cad.cli.main import main as command
+
+    return run(command)
+
+
+def run(command: Callable[..., int]) -> int:
+    """Run a command line, which is to call what it is given as `loaded` before its work begins."""
+    status = command(loaded=_ending.begin)
+    if status > 128:
+        _tidy()
+    return _ending.end(status)
+
+
+def _tidy() -> None:
+    """Remove what workers had no time to remove, and close what an error still holds open."""
+    import gc
+
+    from whole_files.scratch import sweep_scratch
+
+    gc.collect()
+    sweep_scratch()
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -7,16 +7,25 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.connection import wait
+from types import FrameType
 from typing import Any, Literal
 
 from whole_files.held_interrupt import interrupts_held
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
-PATIENCE_S = 5
-"""Given to a worker that is told to end, before it is killed."""
+PATIENCE_S = 2
+"""Given to workers that are told to end, before they are killed."""
+TOLD = 128 + signal.SIGTERM
+_at_work = False
+"""Whether this worker is in the middle of a task."""
+
+
+class _ToldToEnd(BaseException):
+    """Closes what a worker has open; handlers of errors leave it alone."""
 
 
 @contextlib.contextmanager
@@ -46,7 +55,7 @@ class _Pool(ProcessPoolExecutor):
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """As of any executor; no interrupt falls into the start of a worker."""
         with interrupts_held(), _blocked():
-            return super().submit(fn, *args, **kwargs)
+            return super().submit(_perform, fn, *args, **kwargs)
 
 
 @contextlib.contextmanager
@@ -61,6 +70,25 @@ def _blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def _perform(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
+    """A task in a worker, which ends by SIGTERM once what the task has open is closed."""
+    global _at_work
+    try:
+        _at_work = True
+        return fn(*args, **kwargs)
+    except _ToldToEnd:
+        os._exit(TOLD)
+    finally:
+        _at_work = False
+
+
+def _told(number: int, frame: FrameType | None) -> None:
+    if not _at_work:
+        os._exit(TOLD)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise _ToldToEnd
+
+
 def begin_worker() -> None:
     """Make this process end with its parent, and leave Ctrl-C to it: the parent ends its workers.
 
@@ -68,7 +96,7 @@ def begin_worker() -> None:
     """
     with contextlib.suppress(ValueError):  # not in the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(signal.SIGTERM, _told)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     parent = multiprocessing.parent_process()
@@ -88,7 +116,12 @@ def _stop(pool: ProcessPoolExecutor) -> None:
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             process.terminate()
+    deadline = time.monotonic() + PATIENCE_S
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AssertionError):
-            process.join(PATIENCE_S)
+            process.join(max(0.0, deadline - time.monotonic()))
+            # In compiled code, which hears nothing until it returns.
             process.kill()
+    for process in processes:
+        with contextlib.suppress(OSError, ValueError, AssertionError):
+            process.join()

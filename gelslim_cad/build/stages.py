@@ -18,8 +18,8 @@ from gelslim_cad.part import Part
 from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_cad.view_figures import view_inputs
 from ifem_export.marker_grid import MarkerGrid
-from whole_files.scratch import scratch_folder
 from whole_files.held_interrupt import interrupts_held
+from whole_files.scratch import scratch_folder
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import traceback
 
 import typer
 
-from gelslim_cad.cli.status import BAD_INPUT, FAULT, INTERRUPTED, RULE_FAILED
+from gelslim_cad.cli.status import BAD_INPUT, FAULT, RULE_FAILED
+from gelslim_cad.ending import SAID, asked_to_end
 from gelslim_cad.extras import extra_of
 
 # typer brings its own click from 0.20 on and uses the installed one before: ask typer for it.
@@ -59,19 +61,13 @@ def _first_line(error: BaseException) -> str:
     return text.strip() or type(error).__name__
 
 
-def _cut_import(error: BaseException | None) -> bool:
-    """Whether Ctrl-C fell into a library's start, which then says that it cannot be imported."""
-    if not isinstance(error, ImportError):
-        return False
-    causes = (error.__cause__, error.__context__)
-    return any(isinstance(c, KeyboardInterrupt) or _cut_import(c) for c in causes)
-
-
 def _judge(error: BaseException) -> tuple[int, str]:
     """Exit status and message."""
     name = type(error).__name__
-    if isinstance(error, KeyboardInterrupt) or name == "Abort" or _cut_import(error):
-        return INTERRUPTED, "Interrupted; every file that is there is whole."
+    # Libraries turn Ctrl-C into errors of their own, such as that they cannot be imported.
+    number = signal.SIGINT if name == "Abort" else asked_to_end(error)
+    if number is not None:
+        return 128 + number, SAID[signal.Signals(number)][1]
     if isinstance(error, CommandError):
         return error.status, str(error)
     if name == "BuildRefusedError":
@@ -137,5 +133,6 @@ def _as_json(error: BaseException, message: str, status: int) -> str:
     own = getattr(error, "to_json", None)
     if own is not None:
         return str(own())
-    kinds = {RULE_FAILED: "design rule failed", BAD_INPUT: "bad input", INTERRUPTED: "interrupted"}
+    kinds = {RULE_FAILED: "design rule failed", BAD_INPUT: "bad input"}
+    kinds |= {128 + number: kind for number, (kind, _) in SAID.items()}
     return json.dumps({"error": kinds.get(status, "internal error"), "message": message}, indent=2)

@@ -5,19 +5,20 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, loaded: Callable[[], None] = lambda: None) -> int:
     """Run `gelslim` with `argv` (default: the process's) and return its exit status.
 
     0: done. 1: a design rule fails. 2: bad input. 3: a fault of gelslim itself. As shells have it,
-    130 after an interrupt and 141 when the reader of a pipe has gone.
+    130 after an interrupt, 141 when the reader of a pipe has gone and 143 after SIGTERM.
+    `loaded` is called once the command line is imported and before a command begins.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        return _run(arguments)
+        return _run(arguments, loaded)
     except SystemExit as ended:
         # Only shell completion ends this way: it has printed its answer.
         return ended.code if isinstance(ended.code, int) else 0
@@ -25,10 +26,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(raised, as_json="--json" in arguments)
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], loaded: Callable[[], None]) -> int:
     _open_streams()
     # Loaded here, so that an interrupt meanwhile is caught too.
     from gelslim_cad.cli.app import app
+
+    loaded()
 
     status = app(args=arguments, prog_name="gelslim", standalone_mode=False)
     sys.stdout.flush()

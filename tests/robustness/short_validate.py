@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 
-from gelslim_cad.cli import main
-from gelslim_twin.validation import experiment, truth_gel
-from gelslim_twin.validation import validate as validation
+from gelslim_cad.__main__ import run
 
-if __name__ == "__main__":
+
+def main(loaded: Callable[[], None]) -> int:
+    """The command line, its experiment cut short before it begins."""
+    from gelslim_cad.cli import main as command
+    from gelslim_twin.validation import experiment, truth_gel
+    from gelslim_twin.validation import validate as validation
+
     experiment.DIRECTIONS, experiment.PRESS_STEPS, experiment.SLIDE_STEPS = 2, 1, 1
     validation.other_contacts = lambda *size: ()  # type: ignore[assignment]
     truth_gel.truth_pad = lambda bundle: bundle  # type: ignore[assignment]
     validation.error_budget = lambda *states: ()  # type: ignore[assignment]
-    sys.exit(main(sys.argv[1:]))
+    return command(loaded=loaded)
+
+
+if __name__ == "__main__":
+    sys.exit(run(main))

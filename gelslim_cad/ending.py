@@ -1,0 +1,173 @@
+"""What Ctrl-C and SIGTERM do to `gelslim`, from its first line to its last.
+
+Nothing is begun while the command line itself loads: the program says so and ends. Later a
+KeyboardInterrupt is raised, so that whatever is open is closed and removed on the way out; not
+within the import of a library, which may crash or call itself missing, but after it. Whoever asks
+again meanwhile waits for that, PATIENCE_S at most.
+"""
+
+from __future__ import annotations
+
+import _thread
+import atexit
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
+
+PATIENCE_S = 3.0
+"""After the first signal or the end of the work; the next one then ends the process as it is."""
+RETRY_S = 0.02
+"""Between looks at whether an import is over."""
+SAID = {
+    signal.SIGINT: ("interrupted", "Interrupted; every file that is there is whole."),
+    signal.SIGTERM: ("terminated", "Terminated; every file that is there is whole."),
+}
+"""Kind, as in answers in JSON, and line for people."""
+_IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a command as Ctrl-C does but for its status."""
+
+
+class Ending:
+    """One run of the program; `arm` it as early as can be, `begin` the work, `end` with a status.
+
+    All of it lives in the main thread, where Python runs signal handlers.
+    """
+
+    def __init__(self) -> None:
+        self._begun = False
+        self._status: int | None = None
+        self._since: float | None = None
+        self._retrying = False
+
+    def arm(self) -> None:
+        """Take both signals over where nobody has them ignored, as `nohup` and shells do."""
+        for number in SAID:
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                signal.signal(number, self._asked)
+        # The first to be registered is the last to run: only the interpreter's own end follows.
+        atexit.register(_deafen)
+        sys.unraisablehook = self._unraisable(sys.unraisablehook)
+        threading.excepthook = self._in_thread(threading.excepthook)
+
+    def begin(self) -> None:
+        """From now on there may be something to close."""
+        self._begun = True
+
+    def end(self, status: int) -> int:
+        """The work is done and said; a signal changes nothing any more. Returns `status`."""
+        self._status = status
+        self._since = time.monotonic()
+        return status
+
+    def _asked(self, number: int, frame: FrameType | None) -> None:
+        if self._since is not None:
+            if time.monotonic() - self._since > PATIENCE_S:
+                self._leave(number)
+        elif not self._begun:
+            self._leave(number)
+        elif _importing(frame):
+            self._ask_again(number)
+        else:
+            self._since = time.monotonic()
+            raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+
+    def _leave(self, number: int) -> None:
+        """End here and now; buffered streams may be in use, and are left alone."""
+        status = self._status
+        if status is None:
+            status = 128 + number
+            say(number)
+        os._exit(status)
+
+    def _ask_again(self, number: int) -> None:
+        if self._retrying:
+            return
+        self._retrying = True
+
+        def later() -> None:
+            time.sleep(RETRY_S)
+            self._retrying = False
+            send_to_main_thread(number)
+
+        # Not threading.Thread: it takes locks that the code under this handler may hold.
+        _thread.start_new_thread(later, ())
+
+    def _unraisable(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
+        def hook(told: Any) -> None:
+            if isinstance(told.exc_value, KeyboardInterrupt) and self._status is None:
+                # It fell into a destructor, which swallows it.
+                self._since = None
+                self._ask_again(_number(told.exc_value))
+            elif self._since is None:
+                before(told)
+
+        return hook
+
+    def _in_thread(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
+        def hook(told: Any) -> None:
+            # What a thread misses once its work is being taken down is no news.
+            if self._since is None:
+                before(told)
+
+        return hook
+
+
+def say(number: int) -> None:
+    """The one line, or the answer in JSON to those who asked for one; past all buffers."""
+    kind, line = SAID[signal.Signals(number)]
+    text, descriptor = line, 2
+    if "--json" in sys.argv[1:]:
+        text, descriptor = f'{{\n  "error": "{kind}",\n  "message": "{line}"\n}}', 1
+    with contextlib.suppress(OSError):
+        os.write(descriptor, f"{text}\n".encode())
+
+
+def send_to_main_thread(number: int) -> None:
+    """Have the handler of a signal run; a wait of the main thread ends for it where it can."""
+    thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and thread is not None:
+        signal.pthread_kill(thread, number)
+    else:
+        _thread.interrupt_main(signal.Signals(number))
+
+
+def asked_to_end(error: BaseException | None) -> int | None:
+    """The signal behind an error: its own, or that of what it was raised from or amidst."""
+    seen: set[int] = set()
+    todo = [error]
+    while todo:
+        error = todo.pop()
+        if error is None or id(error) in seen:
+            continue
+        seen.add(id(error))
+        if isinstance(error, KeyboardInterrupt):
+            return _number(error)
+        todo += [error.__cause__, error.__context__]
+    return None
+
+
+def _number(error: BaseException) -> int:
+    return signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename in _IMPORTS:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _deafen() -> None:
+    """The interpreter, as it ends, would hand the signals back to the system, which kills."""
+    for number in SAID:
+        signal.signal(number, signal.SIG_IGN)
