@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -57,6 +60,52 @@ def test_make_targets_scripts_and_extras_exist(page: Path) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     for extras in re.findall(r"pip install '(?:\.|gelslim-cad)\[([a-z,]+)\]'", text):
         assert set(extras.split(",")) <= set(project["optional-dependencies"])
+
+
+SCRIPT = re.compile(r"python ((?:bench|tools)/\w+\.py(?: --?[a-z][^`\n#]*)?)")
+SCRIPTS = sorted({s.strip() for page in PAGES for s in SCRIPT.findall(text_of(page))})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_scripts_know_the_options_that_pages_give_them(script: str) -> None:
+    """Each reads its options, then prints its help: what it does itself takes minutes."""
+    run = subprocess.run(
+        [sys.executable, *shlex.split(script), "--help"], cwd=ROOT, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith("usage:")
+
+
+MADE = sorted(
+    {line for page in PAGES for line in shell_lines(page) if re.match(r"make [a-z]", line)}
+    | {call for page in PAGES for call in re.findall(r"`(make [^`\n]+)`", text_of(page))}
+)
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+@pytest.mark.parametrize("line", MADE)
+def test_make_knows_what_to_do(line: str) -> None:
+    """A dry run: every file that a target needs is there, and its commands are printed."""
+    words = shlex.split(line, comments=True)
+    run = subprocess.run([*words, "--dry-run"], cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_commands_named_in_sentences_are_known(page: Path) -> None:
+    from typer.main import get_command
+
+    from gelslim_cad.cli.app import app
+
+    known = get_command(app).commands  # type: ignore[attr-defined]
+    for call in re.findall(r"`gelslim ([a-z][^`\n]*)`", text_of(page)):
+        name, *rest = shlex.split(call)
+        assert name in known, f"{named(page)}: {call}"
+        options = {o for p in known[name].params for o in (*p.opts, *p.secondary_opts)}
+        told = [o for word in rest for o in word.split("/") if o.startswith("-")]
+        assert set(told) <= options, f"{named(page)}: {call}"
 
 
 @pytest.mark.parametrize(("page", "line"), CALLS, ids=[f"{named(p)}-{c}" for p, c in CALLS])

@@ -22,6 +22,7 @@ from gelslim_cad.spec.reader import read_spec
 
 SMALLER = (
     ("--count 1000 -j 8", "--count 2"),
+    ("--rays 1048576", "--rays 16384"),
     ("--count 100 -j 2", "--count 2"),
     ("gel.length_mm=16:50:1", "gel.length_mm=16:50:17"),
     ("gel.length_mm=16:30:1", "gel.length_mm=16:30:7"),
