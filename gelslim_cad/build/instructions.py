@@ -50,9 +50,9 @@ def _print(d: Dimensions, bom: tuple[BomLine, ...]) -> str:
     fit = d["design.housing.fit_clearance_mm"]
     return (
         "## 2. Print\n\n"
-        f"Print `print/fit_coupon` first on the machine you will use: the gap that slides without "
-        f"play must be {fit:g} mm, else set `design.housing.fit_clearance_mm` to what slides and "
-        "build again.\n\n"
+        "Print `print/fit_coupon.stl` first on the machine you will use: the gap that slides "
+        f"without play must be {fit:g} mm, else set `design.housing.fit_clearance_mm` to what "
+        "slides and build again.\n\n"
         + "\n".join(f"- `print/{n}.stl` (or `.3mf`), in the orientation of the file" for n in names)
         + "\n\nUse black material or paint the inside matt black: stray light lowers the contrast. "
         "Holes for countersunk screws are tapped by the screws themselves."
@@ -90,7 +90,7 @@ def _cast(d: Dimensions, batch: Casting) -> str:
         "- Degas in vacuum until no bubble rises. Pour at the gate until every vent shows gel.\n"
         "- Platinum silicone does not cure against sulphur, amines, tin or uncured resin: wear "
         "nitrile gloves; coat a printed mould, or use the acrylic one.\n"
-        "- Cure, open, trim the edge with `mould/cutting_template`.\n"
+        "- Cure, open, trim the edge along `laser/cutting_template.dxf`.\n"
         "- Bond the flat face to the acrylic window (primer, no bubbles); the gel sits "
         f"{d['design.light_guide.side_margin_mm']:g} mm inside the window on each side."
     )
@@ -130,7 +130,7 @@ def _assemble(d: Dimensions) -> str:
 def _focus(d: Dimensions) -> str:
     return (
         "## 7. Focus\n\n"
-        f"Set the camera in `print/focus_jig` and turn the lens until the target, "
+        f"Set the camera in `print/focus_jig.stl` and turn the lens until the target, "
         f"{d['view.focus_mm']:.2f} mm from the front of the lens, is sharp: about "
         f"{d['view.lens_extension_mm']:.2f} mm out from infinity focus. Expect a blur of "
         f"{d['view.near_blur_mm']:.3f} mm at the near and {d['view.far_blur_mm']:.3f} mm at the "

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -50,6 +52,31 @@ def test_all_kinds_of_files_are_there_and_listed_with_their_hash(
     ):
         assert path in found, path
     assert any(p.startswith("mould/") for p in found)
+
+
+def test_documents_name_files_that_are_there(built: Path) -> None:
+    """BUILD.md's own, and those of docs/file_formats.md, which names every file."""
+    found = [p.relative_to(built).as_posix() for p in built.rglob("*") if p.is_file()]
+    told = re.findall(r"`([a-z]+/[\w.-]+)`", (built / "BUILD.md").read_text("utf-8"))
+    assert len(told) > 5
+    assert set(told) <= set(found)
+    page = (SPEC.parents[1] / "docs" / "file_formats.md").read_text("utf-8")
+    part = page.partition("`gelslim build`\n")[2].partition("\n## ")[0].replace("NAME", "mini20")
+    cells = re.findall(r"^\| ([^|]*) \|", part, re.MULTILINE)
+    listed = [name for cell in cells for name in re.findall(r"`([\w./*-]+)`", cell)]
+    for pattern in listed:
+        assert any(fnmatch(path, pattern) for path in found), f"not written: {pattern}"
+    for path in found:
+        assert any(fnmatch(path, pattern) for pattern in listed), f"not in the page: {path}"
+    manifest = json.loads((built / "manifest.json").read_text())
+    rules = json.loads((built / "checks.json").read_text())
+    dimensions = json.loads((built / "dimensions.json").read_text())
+    named = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", part))))
+    for held in (manifest, rules[0], dimensions, *manifest["proofs"], *manifest["files"].values()):
+        assert set(held) <= named
+    assert set(next(iter(dimensions["dimensions"].values()))) <= named
+    assert set((built / "BOM.csv").read_text("utf-8").splitlines()[0].split(",")) <= named
+    assert set((built / "markers/markers.csv").read_text().splitlines()[0].split(",")) <= named
 
 
 def test_every_proof_holds_and_all_file_kinds_are_proved(built: Path) -> None:
