@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +13,11 @@ from gelslim_cad.cli.options import AsJson, Force, SpecFile
 
 if TYPE_CHECKING:
     from accuracy_budget.budget import Budget
+    from gelslim_cad.dimensions import Dimensions
+    from gelslim_cad.spec import Spec
+    from ifem_export.bundle import Bundle
     from ifem_export.operator_ladder import OperatorLadder
+    from ifem_export.pad_mesh import PadMesh
 
 
 def bundle(
@@ -43,56 +47,58 @@ def bundle(
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.budget import budget_of
     from gelslim_cad.cli.output import require_pad_rules, written
-    from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.pad import gel_material, make_bundle, marker_grid, pad_mesh, reference_mesh
+    from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh
     from gelslim_cad.spec.reader import read_spec
     from ifem_export.bundle_io import write_bundle
-    from ifem_export.ladder import measure_ladder
 
     budget = budget_of(error, within)
-    loaded = read_spec(spec)
-    d = derive(loaded.spec)
+    loaded = read_spec(spec).spec
+    d = derive(loaded)
     require_pad_rules(d, "gelslim bundle", force)
     grid = marker_grid(d)
     mesh, _ = pad_mesh(d, grid)
     measured, label = None, ""
     if ladder or not budget.unlimited:
-        gel, element = gel_material(loaded.spec), loaded.spec.mesh.element
-        with progress_bar(quiet=as_json) as tell:
-            measured = measure_ladder(
-                mesh,
-                gel,
-                element,
-                dense=dense,
-                progress=tell,
-                reference=reference_mesh(d, mesh),
-            )
+        measured = _measured(loaded, d, mesh, dense, quiet=as_json)
         label = chosen_label(measured, budget)
-    folder = out or Path("out") / f"{loaded.spec.name}-bundle"
+    folder = out or Path("out") / f"{loaded.name}-bundle"
     made = make_bundle(
-        loaded.spec, d, mesh, grid, with_stiffness=with_k, ladder=measured, operator=label
+        loaded, d, mesh, grid, with_stiffness=with_k, ladder=measured, operator=label
     )
     write_bundle(folder, made)
     files = sorted(p.name for p in folder.iterdir())
-    elements, nodes = mesh.n_elements, mesh.n_nodes
     if as_json:
-        print_json(
-            {
-                "folder": str(folder),
-                "files": files,
-                "elements": elements,
-                "nodes": nodes,
-                "markers": len(grid),
-                "operator": label,
-                "ladder": measured.to_record() if measured is not None else None,
-            }
-        )
+        print_json({"folder": str(folder), "files": files, **_record(made, len(grid))})
         return 0
     if measured is not None:
         print_ladder(measured, label)
-    print(f"{written(folder, files)}: {elements} elements, {nodes} nodes, {len(grid)} markers.")
+    counts = f"{mesh.n_elements} elements, {mesh.n_nodes} nodes, {len(grid)} markers"
+    print(f"{written(folder, files)}: {counts}.")
     return 0
+
+
+def _measured(
+    spec: Spec, d: Dimensions, mesh: PadMesh, dense: bool, *, quiet: bool
+) -> OperatorLadder:
+    """Error and time of every operator on this pad, with or without the dense one."""
+    from gelslim_cad.cli.progress import progress_bar
+    from gelslim_cad.pad import gel_material, reference_mesh
+    from ifem_export.ladder import measure_ladder
+
+    gel, element, fine = gel_material(spec), spec.mesh.element, reference_mesh(d, mesh)
+    with progress_bar(quiet=quiet) as tell:
+        return measure_ladder(mesh, gel, element, dense=dense, progress=tell, reference=fine)
+
+
+def _record(made: Bundle, markers: int) -> dict[str, Any]:
+    return {
+        "elements": made.mesh.n_elements,
+        "nodes": made.mesh.n_nodes,
+        "markers": markers,
+        "operator": made.operator,
+        "ladder": made.ladder.to_record() if made.ladder is not None else None,
+    }
 
 
 def chosen_label(ladder: OperatorLadder, budget: Budget) -> str:
@@ -114,11 +120,13 @@ def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
 
     from gelslim_cad.cli.answer import console
 
-    table = Table("operator", "field error", "resultant", "per frame", "memory", "", box=None)
+    columns = ("operator", "field error", "at the edge", "resultant", "per frame", "memory", "")
+    table = Table(*columns, box=None)
     for rung in ladder.rungs:
         table.add_row(
             rung.label,
             f"{rung.error_field:.2%}",
+            "" if rung.error_edge is None else f"{rung.error_edge:.2%}",
             f"{rung.error_resultant:.2%}",
             f"{rung.milliseconds:.3f} ms",
             f"{rung.n_bytes / 1e6:.1f} MB",

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim_cad.cli.options import AsJson
+from gelslim_cad.cli.options import AsJson, SensorBundle
 
 if TYPE_CHECKING:
     from gelslim_force.sensor_calibration import SensorCalibration
 
 
 def calibrate(
-    bundle: Annotated[Path, typer.Argument(metavar="BUNDLE", help="The sensor's bundle.")],
+    bundle: SensorBundle,
     reference: Annotated[
         Path,
         typer.Argument(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from gelslim_cad.cli.options import AsJson
 
 if TYPE_CHECKING:
     from gelslim_cad.family.member import Member
+    from gelslim_cad.spec import Spec
 
 
 def family(
@@ -31,51 +33,69 @@ def family(
     Each goes to a folder of its own, where what has not changed is taken over. Exit status 1 when
     a finger breaks a design rule; the others are built and drawn all the same.
     """
-    from gelslim_cad.build import build_variant
-    from gelslim_cad.build.variant import BuildRefusedError
     from gelslim_cad.cli.answer import print_json
-    from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.status import OK, RULE_FAILED
-    from gelslim_cad.dimensions import derive
     from gelslim_cad.extras import require
-    from gelslim_cad.family.member import member
     from gelslim_cad.spec.reader import read_spec
 
     started = time.monotonic()
     require("cadquery", "trimesh")
     loaded = [read_spec(s) for s in specs]
     _distinct([x.spec.name for x in loaded])
-    members, refused, rebuilt = [], {}, {}
-    with progress_bar(quiet=as_json) as tell:
-        for path, one in zip(specs, loaded, strict=True):
-            name = one.spec.name
-            try:
-                result = build_variant(path, out / name, jobs=jobs, progress=_named(tell, name))
-            except BuildRefusedError as error:
-                refused[name] = str(error)
-                continue
-            rebuilt[name] = len(result.rebuilt)
-            members.append(member(name, derive(one.spec), out / name))
-    files, note = _draw(out, members)
+    built = _built([(s, x.spec) for s, x in zip(specs, loaded, strict=True)], out, jobs, as_json)
+    files, note = _draw(out, built.members)
     if as_json:
         print_json(
             {
                 "format": "gelslim-family/1",
                 "folder": str(out),
                 "files": files,
-                "members": [_record(m, rebuilt[m.name]) for m in members],
-                "refused": refused,
+                "members": [_record(m, built.units[m.name]) for m in built.members],
+                "refused": built.refused,
                 "note": note,
             }
         )
     else:
-        _report(members, rebuilt, refused)
+        _report(built)
         if note:
             print(note)
-        if members:
+        if built.members:
             done = time.monotonic() - started
-            print(f"{len(members)} fingers in {out}/, {', '.join(files)} ({done:.1f} s)")
-    return RULE_FAILED if refused else OK
+            print(f"{len(built.members)} fingers in {out}/, {', '.join(files)} ({done:.1f} s)")
+    return RULE_FAILED if built.refused else OK
+
+
+@dataclass(frozen=True)
+class _Built:
+    """What came of each finger, by name."""
+
+    members: list[Member]
+    units: dict[str, int]
+    """Units of work that were not taken over from an earlier build."""
+    refused: dict[str, str]
+    """Why a finger is not built."""
+
+
+def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: bool) -> _Built:
+    """Every finger built into a folder of its own, those that break a design rule apart."""
+    from gelslim_cad.build import build_variant
+    from gelslim_cad.build.variant import BuildRefusedError
+    from gelslim_cad.cli.progress import progress_bar
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.family.member import member
+
+    built = _Built([], {}, {})
+    with progress_bar(quiet=quiet) as tell:
+        for path, spec in specs:
+            folder = out / spec.name
+            try:
+                result = build_variant(path, folder, jobs=jobs, progress=_named(tell, spec.name))
+            except BuildRefusedError as error:
+                built.refused[spec.name] = str(error)
+                continue
+            built.units[spec.name] = len(result.rebuilt)
+            built.members.append(member(spec.name, derive(spec), folder))
+    return built
 
 
 def _distinct(names: list[str]) -> None:
@@ -128,7 +148,7 @@ def _record(m: Member, rebuilt: int) -> dict[str, Any]:
     }
 
 
-def _report(members: list[Member], rebuilt: dict[str, int], refused: dict[str, str]) -> None:
+def _report(built: _Built) -> None:
     from rich.table import Table
 
     from gelslim_cad.cli.answer import console, number, say
@@ -136,15 +156,15 @@ def _report(members: list[Member], rebuilt: dict[str, int], refused: dict[str, s
     table = Table("finger", box=None, pad_edge=False)
     for column in ("gel", "thickness", "width", "length", "units built"):
         table.add_column(column, justify="right")
-    for m in members:
+    for m in built.members:
         length, width, thickness = m.size_mm
         table.add_row(
             m.name,
             f"{m.gel_mm[0]:g} × {m.gel_mm[1]:g} × {m.gel_mm[2]:g} mm",
             *(number(v, "mm") for v in (thickness, width, length)),
-            str(rebuilt[m.name]) if rebuilt[m.name] else "up to date",
+            str(built.units[m.name]) if built.units[m.name] else "up to date",
         )
-    if members:
+    if built.members:
         console().print(table)
-    for name, message in refused.items():
+    for name, message in built.refused.items():
         say(f"{name} is not built: {message}", style="bold red")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +14,7 @@ from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
     from gelslim_cad.explore.optimum import Optimum
+    from gelslim_cad.spec import Spec
 
 
 class Aim(StrEnum):
@@ -52,35 +53,19 @@ def optimise(
     design is feasible.
     """
     from gelslim_cad.cli.answer import print_json
-    from gelslim_cad.cli.failure import CommandError
-    from gelslim_cad.cli.output import spare_strangers
-    from gelslim_cad.cli.progress import progress_bar
-    from gelslim_cad.explore.axis import parse_axis
-    from gelslim_cad.explore.engine import Engine, processors
-    from gelslim_cad.explore.error import ExploreError
-    from gelslim_cad.explore.optimum import optimise as run
-    from gelslim_cad.explore.space import Space, changed
-    from gelslim_cad.explore.study import Request
+    from gelslim_cad.cli.output import replace_file, spare_strangers
+    from gelslim_cad.explore.saved import spec_text
+    from gelslim_cad.explore.space import changed
     from gelslim_cad.spec.reader import read_spec
 
     if save is not None:
         spare_strangers(save, b"gelslim-spec/", "spec")
     loaded = read_spec(spec)
     folder = out or Path("out") / f"{loaded.spec.name}-optimise"
-    try:
-        space = Space.of(loaded.spec, [parse_axis(v) for v in vary])
-        request = Request(space, rays=rays, noise_px=marker_noise_px)
-        engine = Engine(jobs or processors(), scheduler)
-        with progress_bar(quiet=as_json) as tell:
-            best = run(request, aim.value, folder, engine, rounds=rounds, progress=tell)
-    except ExploreError as error:
-        raise CommandError(f"gelslim optimise: {error}", _status(error)) from error
-    chosen = changed(loaded.spec, best.values)
-    words = _binding(chosen)
+    effort = _Effort(jobs, scheduler, rays, marker_noise_px, rounds)
+    best = _best(loaded.spec, vary, aim, folder, effort, quiet=as_json)
+    words = _binding(changed(loaded.spec, best.values))
     if save is not None:
-        from gelslim_cad.cli.output import replace_file
-        from gelslim_cad.explore.saved import spec_text
-
         replace_file(save, spec_text(loaded.text, best.values).encode())
     if as_json:
         print_json(_record(best, words))
@@ -89,6 +74,40 @@ def optimise(
     if save is not None:
         print(f"Wrote {save}. Next: gelslim check {save}")
     return 0
+
+
+@dataclass(frozen=True)
+class _Effort:
+    """What the search may use, and how closely it looks."""
+
+    jobs: int | None
+    scheduler: str
+    rays: int
+    noise_px: float
+    rounds: int
+
+
+def _best(
+    spec: Spec, vary: list[str], aim: Aim, folder: Path, effort: _Effort, *, quiet: bool
+) -> Optimum:
+    """The best feasible design. Raises CommandError where the axes are no good or none is."""
+    from gelslim_cad.cli.failure import CommandError
+    from gelslim_cad.cli.progress import progress_bar
+    from gelslim_cad.explore.axis import parse_axis
+    from gelslim_cad.explore.engine import Engine, processors
+    from gelslim_cad.explore.error import ExploreError
+    from gelslim_cad.explore.optimum import optimise as run
+    from gelslim_cad.explore.space import Space
+    from gelslim_cad.explore.study import Request
+
+    try:
+        space = Space.of(spec, [parse_axis(v) for v in vary])
+        request = Request(space, rays=effort.rays, noise_px=effort.noise_px)
+        engine = Engine(effort.jobs or processors(), effort.scheduler)
+        with progress_bar(quiet=quiet) as tell:
+            return run(request, aim.value, folder, engine, rounds=effort.rounds, progress=tell)
+    except ExploreError as error:
+        raise CommandError(f"gelslim optimise: {error}", _status(error)) from error
 
 
 def _status(error: Exception) -> int:
