@@ -10,8 +10,10 @@ from gelslim_force.force_estimator import ForceSettings
 from gelslim_force.marker_motion import COMPENSATIONS, Compensation
 from ifem_export.bundle import Bundle
 from ifem_export.errors import IfemError
+from ifem_export.operator_ladder import OperatorLadder, operator_label
 from ifem_export.surface_operator import RUNGS, Rung, SurfaceOperator
 
+QUICK = operator_label("fft", {"lumped": 1})
 Interpolation = Literal["sparse", "thin_plate"]
 Gel = Literal["linear", "neo_hookean"]
 
@@ -64,8 +66,20 @@ class PipelineSettings:
         return bundle.surface_operator(self.rung, budget=self.budget)
 
     def compliance(self, bundle: Bundle) -> SurfaceOperator:
-        """The quick operator that a masked fit asks many times per frame."""
+        """The operator that a masked fit asks many times per frame.
+
+        A quick one, unless a budget asks for less error than that has: then the one chosen, at
+        many times the time. Raises as `operator`.
+        """
+        if self._too_coarse(bundle.ladder):
+            return self.operator(bundle)
         try:
-            return bundle.surface_operator("fft", lumped=True)
+            return bundle.surface_operator("fft", lumped=1)
         except IfemError:
             return self.operator(bundle)
+
+    def _too_coarse(self, ladder: OperatorLadder | None) -> bool:
+        if ladder is None or self.budget is None:
+            return False
+        quick = ladder.named(QUICK)
+        return quick is not None and not self.budget.allows_error(quick.error_field)

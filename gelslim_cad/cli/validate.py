@@ -13,6 +13,7 @@ from gelslim_cad.cli.budget import FieldError, FrameTime
 from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
+    from accuracy_budget.budget import Budget
     from gelslim_twin.simulation.twin_sensor import TwinSensor
     from gelslim_twin.validation.validation import Validation
     from ifem_export.bundle import Bundle
@@ -44,7 +45,6 @@ def validate(
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.budget import budget_of
-    from gelslim_cad.cli.bundle import chosen_label
     from gelslim_cad.cli.output import replace_file, spare_strangers_in
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_cad.cli.twin_sensor import spec_sensor
@@ -52,7 +52,6 @@ def validate(
     from gelslim_cad.spec.reader import read_spec
     from gelslim_force.outputs.atomic_file import json_bytes
     from gelslim_force.outputs.packed_frame import plain
-    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
     from gelslim_twin.validation.validate import validate as validated
 
     started = time.monotonic()
@@ -60,22 +59,13 @@ def validate(
     name = read_spec(spec).spec.name
     folder = out or Path("out") / f"{name}-validation"
     with progress_bar(quiet=as_json) as tell:
-        kept = folder / "sensor"
         made = spec_sensor(spec)
         names = [RECORD, *(picture_names(made) if pictures else [])]
         spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
-        ladder = None if budget.unlimited else _ladder(spec, made.bundle, tell)
-        label = "" if ladder is None else chosen_label(ladder, budget)
-        store_sensor(made, kept, True)
-        sensor = stored_sensor(kept)
-        if label:
-            # The pipeline starts with its bundle's choice wherever a chain names no other.
-            chosen = replace(sensor.bundle, ladder=ladder, operator=label)
-            sensor = replace(sensor, bundle=chosen)
+        kept = folder / "sensor"
+        sensor, operator = _stored(spec, made, budget, kept, tell)
         found = validated(sensor, kept, seed, tell)
-    record = plain(found.to_record())
-    if label:
-        record["operator"] = label
+    record = plain(found.to_record()) | operator
     replace_file(folder / RECORD, json_bytes(record))
     written = [RECORD, *(_draw(found, folder) if pictures else [])]
     if as_json:
@@ -84,6 +74,25 @@ def validate(
     print_validation(found)
     print(f"\nIn {folder}/: {', '.join(written)} ({time.monotonic() - started:.0f} s).")
     return 0
+
+
+def _stored(
+    spec: Path, made: TwinSensor, budget: Budget, kept: Path, tell: Progress | None
+) -> tuple[TwinSensor, dict[str, str]]:
+    """The sensor by way of the folder `kept`; and, where a budget picked one, its operator."""
+    from gelslim_cad.cli.bundle import chosen_label
+    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
+
+    # A budget that no operator keeps is refused before anything is written.
+    ladder = None if budget.unlimited else _ladder(spec, made.bundle, tell)
+    label = "" if ladder is None else chosen_label(ladder, budget)
+    store_sensor(made, kept, True)
+    sensor = stored_sensor(kept)
+    if not label:
+        return sensor, {}
+    # The pipeline starts with its bundle's choice wherever a chain names no other.
+    chosen = replace(sensor.bundle, ladder=ladder, operator=label)
+    return replace(sensor, bundle=chosen), {"operator": label}
 
 
 def _ladder(spec: Path, bundle: Bundle, tell: Progress | None) -> OperatorLadder:

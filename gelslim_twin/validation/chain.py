@@ -6,9 +6,10 @@ stiffness, and for a known shape the cap of the indenter below the rim of the pa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from accuracy_budget.budget import Budget
 from gelslim_force.force_estimator import ForceSettings
 from gelslim_force.pipeline_settings import PipelineSettings
 from ifem_export.bundle import Bundle
@@ -43,8 +44,14 @@ CHAINS: tuple[Chain, ...] = (
 )
 
 
-def chains_for(bundle: Bundle) -> tuple[Chain, ...]:
-    """The chains that a bundle's pad can take."""
+def chains_for(bundle: Bundle, budget: Budget | None = None) -> tuple[Chain, ...]:
+    """The chains that a bundle's pad can take, those that name no operator with the budget."""
     mesh = bundle.mesh
     even = mesh.fill is None and mesh.surface_shift is None
-    return tuple(c for c in CHAINS if even or not c.needs_even_layers)
+    return tuple(_budgeted(c, budget) for c in CHAINS if even or not c.needs_even_layers)
+
+
+def _budgeted(chain: Chain, budget: Budget | None) -> Chain:
+    if chain.settings.rung is not None:
+        return chain
+    return replace(chain, settings=replace(chain.settings, budget=budget))

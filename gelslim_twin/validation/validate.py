@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from accuracy_budget.budget import Budget
 from gelslim_force.calibration import calibrate
 from gelslim_force.force_pipeline import ForcePipeline
 from gelslim_force.frame_result import FrameResult
@@ -44,12 +45,12 @@ FRAMES_APART = 100
 class Bench:
     """A sensor with its renderer, its reference frame and the chains to compare."""
 
-    def __init__(self, sensor: TwinSensor, seed: int) -> None:
+    def __init__(self, sensor: TwinSensor, seed: int, budget: Budget | None = None) -> None:
         self.sensor = sensor
         self.renderer = sensor_renderer(sensor, seed)
         self.reference: Image = self.renderer.frame(number=0).image
         self.calibration: SensorCalibration = calibrate(sensor.bundle, self.reference)
-        self.chains = chains_for(sensor.bundle)
+        self.chains = chains_for(sensor.bundle, budget)
         self._pipelines = {c.name: self._pipeline(c) for c in self.chains}
         places = sensor.grid.positions_mm[self.calibration.reference.markers]
         self._to_markers: Any = marker_to_node(sensor.points_mm, places)
@@ -114,12 +115,17 @@ class Bench:
 
 
 def validate(
-    sensor: TwinSensor, folder: Path | None = None, seed: int = 0, progress: Progress | None = None
+    sensor: TwinSensor,
+    folder: Path | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+    budget: Budget | None = None,
 ) -> Validation:
     """Validate a sensor; `folder` keeps the compliance of the pad.
 
-    Raises ContactError where a contact is not found, CalibrationError where the sensor's own
-    reference frame is refused.
+    `budget` picks the operator of our chains from the bundle's ladder.
+    Raises BudgetError where no operator keeps it, ContactError where a contact is not found,
+    CalibrationError where the sensor's own reference frame is refused.
     """
     tell = progress or (lambda text, done, total: None)
     bundle = sensor.bundle
@@ -127,7 +133,7 @@ def validate(
     experiment = sphere_experiment(thickness, *sensor.size_mm)
     cases = other_contacts(thickness, *sensor.size_mm)
     steps = len(experiment.tests) + len(cases) + 1
-    gel, bench = TruthGel(bundle, FRICTION, folder), Bench(sensor, seed)
+    gel, bench = TruthGel(bundle, FRICTION, folder), Bench(sensor, seed, budget)
     scores: list[Score] = []
     strained: list[GelState] = []
     linear: list[GelState] = []
@@ -161,12 +167,12 @@ def validate(
         )
         samples.append(Sample(case.name, images[-1], states[-1], last))
     tell("error budget", steps - 1, steps)
-    budget = error_budget(bundle, strained, linear) if gel.law == "neo_hookean" else ()
+    spreads = error_budget(bundle, strained, linear) if gel.law == "neo_hookean" else ()
     gel.compliance.store()
     tell("done", steps, steps)
     chains = tuple(summary(c.name, [s for s in scores if s.chain == c.name]) for c in bench.chains)
     return Validation(
-        _statement(gel, bundle.mesh.layers), experiment, tuple(scores), chains, budget, others,
+        _statement(gel, bundle.mesh.layers), experiment, tuple(scores), chains, spreads, others,
         tuple(samples), sensor.points_mm, bench.calibration,
     )  # fmt: skip
 

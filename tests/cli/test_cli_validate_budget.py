@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from cli_samples import ROOT
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
+from sensor_samples import sensor_bundle
+
 from accuracy_budget.budget import Budget
 from gelslim_cad.cli.main import main
 from gelslim_force.pipeline_settings import PipelineSettings
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.validation import validate as validation
+from gelslim_twin.validation.chain import chains_for
 
 SPEC = str(ROOT / "designs" / "mini20.yaml")
 
@@ -24,9 +29,11 @@ def test_the_operator_of_the_budget_is_what_our_chains_start_with(
 ) -> None:
     """The experiment takes minutes: here it only answers which sensor it was given."""
     given: list[TwinSensor] = []
+    budgets: list[object] = []
 
-    def caught(sensor: TwinSensor, *_: object) -> SimpleNamespace:
+    def caught(sensor: TwinSensor, *more: object) -> SimpleNamespace:
         given.append(sensor)
+        budgets.append(more[-1])
         return SimpleNamespace(to_record=lambda: {"markers": len(sensor.grid)})
 
     monkeypatch.setattr(validation, "validate", caught)
@@ -36,6 +43,7 @@ def test_the_operator_of_the_budget_is_what_our_chains_start_with(
     assert main(["validate", SPEC, *out, "--error", "15%"]) == 0
     said = capsys.readouterr()
     label = json.loads(said.out)["operator"]
+    assert budgets == [Budget(), Budget(0.15)]
     bare, chosen = (sensor.bundle for sensor in given)
     assert bare.ladder is None
     assert chosen.ladder is not None
@@ -52,6 +60,15 @@ def test_the_operator_of_the_budget_is_what_our_chains_start_with(
     assert "on the side of time" in told
     assert "on the side of error" in told
     assert len(given) == 2
+
+
+def test_our_chains_take_the_budget_and_the_papers_its_operator() -> None:
+    bundle, asked = sensor_bundle(), Budget(0.02, 3.0)
+    for chain in chains_for(bundle, asked):
+        paper = chain.name.startswith("paper")
+        assert chain.settings.budget == (None if paper else asked)
+        assert chain.settings.rung == ("paper" if paper else None)
+    assert all(c.settings.budget is None for c in chains_for(bundle))
 
 
 def test_words_that_are_no_budget_are_refused_at_once(
