@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
+from numbers import Real
 
 from accuracy_budget.errors import BudgetError
 
@@ -19,19 +20,25 @@ class Budget:
     """Limits on error and time; None is no limit.
 
     `error` is relative, 0.03 for 3 %; `time_ms` is in milliseconds, of what the ladder times.
+    `Budget(error=0.03, time="2s")` reads the time from words, `parse` both.
     Raises BudgetError for a limit that is not a finite number above 0 or an error above 10.
     """
 
     error: float | None = None
     time_ms: float | None = None
+    time: InitVar[str | None] = None
 
-    def __post_init__(self) -> None:
-        if self.error is not None and not 0 < self.error <= MOST_ERROR:
+    def __post_init__(self, time: str | None) -> None:
+        if time is not None:
+            if self.time_ms is not None:
+                raise BudgetError("give time or time_ms, not both")
+            object.__setattr__(self, "time_ms", parse_time_ms(time))
+        if self.error is not None and not 0 < _number("error", self.error) <= MOST_ERROR:
             raise BudgetError(
                 f"error {self.error:g}: must be a share above 0 and at most {MOST_ERROR:g}, "
                 "as 3% or 0.03"
             )
-        if self.time_ms is not None and not 0 < self.time_ms < math.inf:
+        if self.time_ms is not None and not 0 < _number("time_ms", self.time_ms) < math.inf:
             raise BudgetError(f"time {self.time_ms:g} ms: must be above 0, as 5ms or 2s")
 
     @classmethod
@@ -82,6 +89,8 @@ def parse_share(text: str) -> float:
 
 def parse_time_ms(text: str) -> float:
     """`5ms`, `2s`, `1min` or a bare number of milliseconds, in ms. Raises BudgetError."""
+    if not isinstance(text, str):
+        raise BudgetError(f"time {text!r}: give its unit, as '5ms' or '2s', or use time_ms")
     found = _TIME.fullmatch(text.strip())
     unit = found.group(2) if found else "?"
     try:
@@ -103,3 +112,10 @@ def shown_time(time_ms: float) -> str:
     if time_ms >= 1000:
         return f"{time_ms / 1000:.3g} s"
     return f"{time_ms:.3g} ms"
+
+
+def _number(name: str, value: object) -> float:
+    """The value if it is a number; words and yes or no are refused with BudgetError."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise BudgetError(f"{name} {value!r}: must be a number; Budget.parse reads words")
+    return float(value)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from accuracy_budget.budget import Budget, parse_share, parse_time_ms, shown_share, shown_time
@@ -57,6 +59,31 @@ def test_limits_must_be_positive_and_finite(value: float) -> None:
         Budget(error=value)
     with pytest.raises(BudgetError, match="must be"):
         Budget(time_ms=value)
+
+
+def test_a_researchers_budget() -> None:
+    import accuracy_budget
+
+    assert accuracy_budget.Budget is Budget
+    assert accuracy_budget.BudgetError is BudgetError
+    assert Budget(error=0.03, time="2s") == Budget(0.03, 2000.0)
+    assert Budget(error=np.float32(0.5), time_ms=np.int64(3)).allows(0.5, 3.0)
+    assert replace(Budget(time="2s"), error=0.1) == Budget(0.1, 2000.0)
+
+
+def test_words_and_numbers_in_the_wrong_place_are_told() -> None:
+    with pytest.raises(BudgetError, match=r"error '3%': must be a number; Budget\.parse reads"):
+        Budget(error="3%")  # type: ignore[arg-type]
+    with pytest.raises(BudgetError, match="time_ms '5ms': must be a number"):
+        Budget(time_ms="5ms")  # type: ignore[arg-type]
+    with pytest.raises(
+        BudgetError, match="time 2: give its unit, as '5ms' or '2s', or use time_ms"
+    ):
+        Budget(time=2)  # type: ignore[arg-type]
+    with pytest.raises(BudgetError, match="error True: must be a number"):
+        Budget(error=True)
+    with pytest.raises(BudgetError, match="time or time_ms, not both"):
+        Budget(time_ms=5.0, time="5ms")
 
 
 def test_limits_are_kept_exactly() -> None:
