@@ -64,7 +64,7 @@ def validate(
         spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
         kept = folder / "sensor"
         sensor, operator = _stored(spec, made, budget, kept, tell)
-        found = validated(sensor, kept, seed, tell)
+        found = validated(sensor, kept, seed, tell, budget)
     record = plain(found.to_record()) | operator
     replace_file(folder / RECORD, json_bytes(record))
     written = [RECORD, *(_draw(found, folder) if pictures else [])]
