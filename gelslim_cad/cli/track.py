@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gelslim_cad.cli.options import AsJson
+from gelslim_cad.cli.options import AsJson, MostFrames, OverlayPictures
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,38 +23,39 @@ FILES = ("tracks.npz", "frames.csv", "summary.json")
 """What a run writes, in this order."""
 
 
+Frames = Annotated[
+    str,
+    typer.Argument(
+        metavar="FRAMES",
+        help="Folder of pictures, picture, video, .npy or .npz array, or camera:0 for live.",
+    ),
+]
+Reference = Annotated[
+    Path | None,
+    typer.Option("-r", "--reference", help="Picture without contact; the first frame if left out."),
+]
+TrackFolder = Annotated[
+    Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-track if left out.")
+]
+Diameters = Annotated[
+    str | None,
+    typer.Option(
+        "--diameters", help="Smallest and largest dot in px, as 4:12; estimated if left out."
+    ),
+]
+FrameRate = Annotated[
+    float | None, typer.Option("--rate", help="Frames per second, where the source has none.")
+]
+
+
 def track(
-    frames: Annotated[
-        str,
-        typer.Argument(
-            metavar="FRAMES",
-            help="Folder of pictures, picture, video, .npy or .npz array, or camera:0 for live.",
-        ),
-    ],
-    reference: Annotated[
-        Path | None,
-        typer.Option(
-            "-r", "--reference", help="Picture without contact; the first frame if left out."
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-track if left out.")
-    ] = None,
-    diameters_px: Annotated[
-        str | None,
-        typer.Option(
-            "--diameters", help="Smallest and largest dot in px, as 4:12; estimated if left out."
-        ),
-    ] = None,
-    frames_per_s: Annotated[
-        float | None, typer.Option("--rate", help="Frames per second, where the source has none.")
-    ] = None,
-    most_frames: Annotated[
-        int | None, typer.Option("--frames", min=1, help="Stop after so many frames.")
-    ] = None,
-    pictures: Annotated[
-        int, typer.Option(min=0, help="Overlay pictures to write, spread over the run.")
-    ] = 4,
+    frames: Frames,
+    reference: Reference = None,
+    out: TrackFolder = None,
+    diameters_px: Diameters = None,
+    frames_per_s: FrameRate = None,
+    most_frames: MostFrames = None,
+    pictures: OverlayPictures = 4,
     as_json: AsJson = False,
 ) -> int:
     """Follow the dots of any marker sensor, in pixels.
@@ -64,10 +65,9 @@ def track(
     per frame, summary.json, and overlay pictures. Ctrl-C ends a live camera and keeps the run.
     """
     from gelslim_cad.cli.answer import print_json
-    from gelslim_cad.cli.output import replace_file, spare_strangers_in
+    from gelslim_cad.cli.output import spare_strangers_in
     from gelslim_cad.cli.progress import progress_bar
     from gelslim_force.frame_source import open_frames
-    from gelslim_force.outputs.atomic_file import json_bytes
     from gelslim_force.track_record import TrackRecord
 
     settings = _settings(diameters_px)
@@ -82,16 +82,24 @@ def track(
         record = TrackRecord(rest)
         kept = _picture_sink(rest, folder, pictures)
         _follow(rest, first, record, kept)
-    record.write(folder / "tracks.npz")
-    replace_file(folder / "frames.csv", record.table())
     summary = {"source": frames, **record.summary()}
-    replace_file(folder / "summary.json", json_bytes(summary))
+    _write(folder, record, summary)
     drawn = [] if kept is None else [str(f) for f in kept.write()]
     if as_json:
         print_json({"folder": str(folder), **summary, "pictures": drawn})
     else:
         _report(folder, summary, rest, len(drawn))
     return 0
+
+
+def _write(folder: Path, record: TrackRecord, summary: dict[str, Any]) -> None:
+    from gelslim_cad.cli.output import replace_file
+    from gelslim_force.outputs.atomic_file import json_bytes
+
+    tracks, table, told = FILES
+    record.write(folder / tracks)
+    replace_file(folder / table, record.table())
+    replace_file(folder / told, json_bytes(summary))
 
 
 class _Frames:
