@@ -9,6 +9,7 @@ from typing import Any, Literal
 from gelslim_cad.checks import RULES, check
 from gelslim_cad.checks.rule import Rule
 from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.dimensions.bend import chosen_here
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension, unit_of
 from gelslim_cad.spec import Spec
@@ -16,6 +17,7 @@ from gelslim_cad.spec.reader import LoadedSpec
 from yaml_model.fields import field_at
 
 Kind = Literal["dimension", "field", "solver", "rule"]
+BEND, BEND_FIELD = "guide.bend_ratio", "design.light_guide.bend_radius_ratio"
 AT_WORK = 0.004
 """A limit closer than this part of its scale is said to be at work."""
 
@@ -89,8 +91,14 @@ class _Tracer:
             source=entry.source,
             note=_limits_at_work(self.d.fold) if entry.internal else "",
             repeated=not first,
-            inputs=self._inputs(entry.inputs) if first else (),
+            inputs=self._inputs(self._heeded(entry)) if first else (),
         )
+
+    def _heeded(self, entry: Dimension) -> tuple[str, ...]:
+        """The inputs that the value depends on: a given bend asks nothing of the light."""
+        if entry.name == BEND and not chosen_here(self.d.given[BEND_FIELD]):
+            return tuple(p for p in entry.inputs if self.d.argument(p)[0] == BEND_FIELD)
+        return entry.inputs
 
     def rule(self, name: str) -> Node:
         entry = RULES[name]

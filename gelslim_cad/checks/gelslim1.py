@@ -37,7 +37,7 @@ def gelslim1_closed_form(
     """The fold that shows `length_mm` of gel over a mirror at `mirror_deg` to the gel.
 
     `pitch_deg` is ψ, how far the camera looks down; β = 90° - ψ, and γ = β - 2α tilts the virtual
-    axis from the gel's normal. From PHYSICS §2: the mirror's slant length
+    axis from the gel's normal. From docs/physics.md#camera-and-fold: the mirror's slant length
     h = L cos(β - Φ/2 - 2α) / cos(Φ/2 - β + α), its true height h sin α. The marginal rays follow
     from the sine rule in the triangle of virtual pinhole and gel; their difference is the
     published L = (a - b) sin Φ / (2 sin(Φ/2) sin(β - 2α)).

@@ -54,6 +54,15 @@ def number(value: Any, unit: str = "") -> str:
     return f"{text}{gap}{unit}"
 
 
+def given(value: Any, unit: str = "") -> str:
+    """A value of the spec as it stands there, up to six digits, then its unit."""
+    if isinstance(value, tuple | list) and not value:
+        return "none"
+    if isinstance(value, float) and math.isfinite(value) and 1e-4 <= abs(value) < 1e6:
+        return f"{value:.6g}{number(0, unit)[1:]}"
+    return number(value, unit)
+
+
 def console() -> Console:
     """A console on standard output: colours only on a terminal, at most `WIDEST` wide."""
     from rich.console import Console

@@ -12,7 +12,7 @@ from gelslim_cad.cli.options import AsJson, SpecFile
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from gelslim_cad.compare.comparison import Change, Comparison
+    from gelslim_cad.compare.comparison import Change, Comparison, RuleChange
     from gelslim_cad.compare.part_change import PartChanges
 
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
@@ -93,18 +93,19 @@ def _report(first: str, second: str, found: Comparison) -> None:
     if found.same:
         say(f"{first} and {second} give the same finger.")
         return
-    _changes("fields of the spec", found.fields)
+    _changes("fields of the spec", found.fields, every=True)
     _changes("dimensions that follow", found.dimensions)
     if found.rules:
         table = Table("design rules", box=None, pad_edge=False)
         for column in ("before", "after", "limit", "margin", ""):
             table.add_column(column, justify="right" if column else "left", no_wrap=True)
         order = list(STYLE)
-        for c in sorted(found.rules, key=lambda c: order.index(c.verdict)):
+        shown = [c for c in found.rules if _shows(c)]
+        for c in sorted(shown, key=lambda c: order.index(c.verdict)):
             b, a = c.before, c.after
             table.add_row(
                 c.id,
-                number(b.value),
+                number(b.value, b.unit),
                 number(a.value, a.unit),
                 _limit(b.limit, a.limit),
                 "" if a.margin is None else number(a.margin),
@@ -113,10 +114,25 @@ def _report(first: str, second: str, found: Comparison) -> None:
                 else Text(f"{b.status} → {a.status}, {c.verdict}", style=STYLE[c.verdict]),
             )
         console().print(table)
+        _note_unshown(len(found.rules) - len(shown))
         print()
     for block in found.bundle:
         words = f"{block.before} → {block.after}" if block.before != block.after else block.after
         say(f"bundle, {block.block}: {words}")
+
+
+def _shows(change: RuleChange) -> bool:
+    """Whether the change is to be seen in the digits that are written."""
+    from gelslim_cad.cli.answer import number
+
+    b, a = change.before, change.after
+    pairs = ((b.value, a.value), (b.limit, a.limit))
+    return b.status != a.status or any(number(x) != number(y) for x, y in pairs)
+
+
+def _note_unshown(count: int) -> None:
+    if count:
+        print(f"{count} more differ{'s' if count == 1 else ''} in digits not shown.")
 
 
 def _limit(before: float | None, after: float | None) -> str:
@@ -128,11 +144,13 @@ def _limit(before: float | None, after: float | None) -> str:
     return number(after)
 
 
-def _changes(title: str, changes: Sequence[Change]) -> None:
+def _changes(title: str, changes: Sequence[Change], every: bool = False) -> None:
+    """A table of the changes: of `every` one, or of those that the digits show."""
     from rich.table import Table
 
-    from gelslim_cad.cli.answer import console, number
+    from gelslim_cad.cli.answer import console, given, number
 
+    spelt = given if every else number
     if not changes:
         return
     screen = console()
@@ -143,17 +161,19 @@ def _changes(title: str, changes: Sequence[Change]) -> None:
     told = screen.width >= WIDE
     if told:
         table.add_column("", style="dim", overflow="fold")
-    for c in sorted(changes, key=lambda c: c.name not in FIRST):
+    shown = [c for c in changes if every or number(c.before) != number(c.after)]
+    for c in sorted(shown, key=lambda c: c.name not in FIRST):
         step = c.difference
         cells = (
             c.name,
-            number(c.before, c.unit),
-            number(c.after, c.unit),
+            spelt(c.before, c.unit),
+            spelt(c.after, c.unit),
             "" if step is None else f"{'+' if step > 0 else ''}{number(step, c.unit)}",
             c.meaning,
         )
         table.add_row(*cells[: 5 if told else 4])
     screen.print(table)
+    _note_unshown(len(changes) - len(shown))
     print()
 
 

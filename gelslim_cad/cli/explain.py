@@ -76,11 +76,12 @@ def _grow(tree: Tree, node: Node) -> None:
 def _label(node: Node) -> Text:
     from rich.text import Text
 
-    from gelslim_cad.cli.answer import number
+    from gelslim_cad.cli.answer import given, number
 
+    shown = given if node.kind == "field" else number
     text = Text(node.name, style="bold")
     if node.value is not None or node.kind == "field":
-        text.append(f" = {number(node.value, node.unit)}", style="not bold")
+        text.append(f" = {shown(node.value, node.unit)}", style="not bold")
     if node.repeated:
         text.append("  (see above)", style="not bold dim")
         return text

@@ -12,13 +12,19 @@ import typer
 from gelslim_cad.cli.options import AsJson, DrawPictures, SpecFile
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from accuracy_budget.budget import Budget
     from gelslim_cad.dimensions import Dimensions
-    from gelslim_cad.light.study import LightStudy, Progress
+    from gelslim_cad.light.study import Comparison, LightStudy, Progress
     from gelslim_cad.spec import Spec
     from gelslim_optics.light_result import Estimate, LightResult
 
 PICTURES = ("light_paths.png", "irradiance.png", "light_ratio.png")
+FIRST = "delivered"
+"""Entry of the ledger that is told first; the others follow by size."""
+LEAST_SHARE = 5e-4
+"""Of all light: less is not told."""
 MARK = "gelslim light"
 """In the first picture's text: it is one of an earlier run."""
 
@@ -145,15 +151,36 @@ def _report(name: str, study: LightStudy) -> None:
 
     for sentence in study.certificate.sentences():
         say(sentence)
-    for comparison in study.comparisons:
-        say(f"{name} is {comparison.sentence()}.")
     print()
-    print(f"{study.light.rays} rays per guide")
+    _comparisons(name, study.comparisons)
+    print()
     _ledger(study.light)
+    print()
     for colour in ("red", "green"):
         _evenness(study.light, colour)
     for ours, glued in zip(study.exposures, study.glued_exposures, strict=True):
-        say(f"{ours.sentence()}; with glued mirrors {glued.frame_rate_hz:.0f}.")
+        say(f"{ours.sentence()} (with glued mirrors: {glued.frame_rate_hz:.0f}).")
+
+
+def _comparisons(name: str, found: Sequence[Comparison]) -> None:
+    """How many times the light of each other guide, with what its interval allows to say."""
+    from rich.table import Table
+
+    from gelslim_cad.cli.answer import console, say
+    from gelslim_cad.light.study import QUANTITIES
+
+    table = Table(
+        "straight guide with", "light", "times", "95 % interval", "", box=None, pad_edge=False
+    )
+    alike = ""
+    for c in found:
+        other, _, alike = c.other.partition(" (")
+        interval = f"{c.ratio.low:.3f} to {c.ratio.high:.3f}"
+        kind = other.removeprefix("a straight guide with ")
+        place = QUANTITIES[c.quantity].removeprefix("light ")
+        table.add_row(kind, place, f"{c.ratio.value:.3f}", interval, c.verdict)
+    say(f"Light of {name} over that of others ({alike}:" if alike else f"Light of {name}:")
+    console().print(table)
 
 
 def _ledger(result: LightResult) -> None:
@@ -162,9 +189,10 @@ def _ledger(result: LightResult) -> None:
 
     from gelslim_cad.cli.answer import console
 
-    table = Table("where the light goes", "share", "95 % interval", box=None)
-    for name, found in result.ledger().items():
-        if found.value >= 5e-4 or name in ("lost", "truncated"):
+    title = f"where the light goes ({result.rays} rays)"
+    table = Table(title, "share", "95 % interval", box=None, pad_edge=False)
+    for name, found in sorted(result.ledger().items(), key=lambda e: (e[0] != FIRST, -e[1].value)):
+        if found.value >= LEAST_SHARE:
             table.add_row(_named(name), f"{found.value:.2%}", _interval(found))
     console().print(table)
 

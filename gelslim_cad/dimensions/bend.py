@@ -13,7 +13,7 @@ from gelslim_cad.dimensions.registry import dimension
 @dimension(
     "guide.bend_ratio",
     formula="given; auto: least R/t within 1 % of the most light that max_width_mm has room for",
-    source="PHYSICS: light guide",
+    source="docs/physics.md#light",
 )
 def guide_bend_ratio(
     light_guide_bend_radius_ratio: Any,
@@ -45,7 +45,7 @@ def guide_bend_ratio(
     material_acrylic_absorption_per_m: Any,
 ) -> Any:
     """Inner bend radius over guide thickness, R/t."""
-    if light_guide_bend_radius_ratio is None or not _is_auto(light_guide_bend_radius_ratio):
+    if not chosen_here(light_guide_bend_radius_ratio):
         return light_guide_bend_radius_ratio
     from gelslim_cad.light.bend_choice import brightest_ratio
 
@@ -84,7 +84,8 @@ def guide_bend_ratio(
     return rows[0] if len(rows) == 1 else np.array(rows)
 
 
-def _is_auto(value: Any) -> bool:
+def chosen_here(value: Any) -> bool:
+    """Whether the ratio is left to be found from the light: `auto`."""
     return isinstance(value, str) and value == "auto"
 
 

@@ -2,7 +2,7 @@
 
 Coordinates x (towards the tip) and z (out of the gel) of the sensor frame. A candidate is given
 by the air angles of the two marginal rays that end on the gel's edges and by the mirror angle;
-everything else follows in closed form, exact refraction included (PHYSICS: camera, fold mirror).
+everything else follows in closed form, exact refraction included (docs/physics.md).
 Every field is an array; candidates broadcast against designs.
 """
 

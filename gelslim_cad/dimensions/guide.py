@@ -8,7 +8,7 @@ import numpy as np
 
 from gelslim_cad.dimensions.registry import dimension
 
-GUIDE = "PHYSICS: light guide"
+GUIDE = "docs/physics.md#light"
 
 
 @dimension("stack.gel_total_mm", formula="edge thickness + crown")

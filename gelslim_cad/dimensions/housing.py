@@ -132,7 +132,7 @@ def finger_camera_depth_mm(fold_layout: Fold) -> Any:
 @dimension(
     "finger.thickness_mm",
     formula="T = back wall + depth + guide thickness + gel total",
-    source="PHYSICS: camera, fold mirror, thickness",
+    source="docs/physics.md#camera-and-fold",
 )
 def finger_thickness_mm(
     housing_back_wall_mm: Any,

@@ -9,7 +9,7 @@ import numpy as np
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import dimension
 
-FOLD = "PHYSICS: camera, fold mirror, thickness"
+FOLD = "docs/physics.md#camera-and-fold"
 
 
 @dimension("camera_pose.x_mm", formula="mirror image of the virtual camera", source=FOLD)

@@ -11,7 +11,7 @@ from gelslim_cad.dimensions.fold_problem import FoldProblem
 from gelslim_cad.dimensions.registry import dimension
 from gelslim_cad.dimensions.solver import solve_fold
 
-FOLD = "PHYSICS: camera, fold mirror, thickness"
+FOLD = "docs/physics.md#camera-and-fold"
 
 
 @dimension("view.pixel_pitch_mm", formula="sensor width / image width")

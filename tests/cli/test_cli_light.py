@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -21,15 +22,22 @@ def test_words_say_certificate_ledger_and_verdict(
     said = " ".join(capsys.readouterr().out.split())
     for words in (
         "Not fully guided",
-        "a straight guide with glued 45° mirrors",
+        "glued 45° mirrors",
         "95 % interval",
-        "lost at corners 0.00%",
+        "where the light goes (4096 rays)",
+        "coat of the gel",
         "frames per second",
         "Pictures in",
     ):
         assert words in said, words
     names = {p.name for p in (tmp_path / "light").iterdir()}
     assert names == {"light_paths.png", "irradiance.png", "light_ratio.png"}
+    assert said.count("same LEDs and legs") == 1
+    assert "0.00%" not in said
+    ledger = said.partition("where the light goes")[2].partition("red on the coat")[0]
+    shares = [float(s) for s in re.findall(r"([\d.]+)% [\d.]+% to", ledger)]
+    assert len(shares) > 5
+    assert shares[1:] == sorted(shares[1:], reverse=True)
 
 
 def test_json_without_pictures_writes_nothing(

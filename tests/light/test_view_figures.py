@@ -22,7 +22,7 @@ def test_better_models_leave_less(name: str) -> None:
     )
     assert apparent < straight < printed
     assert float(errors.off_mm("exact").max()) == 0.0
-    # PHYSICS: the straight ray is 3 to 8 % low, the apparent height within 4 %.
+    # docs/physics.md: the straight ray is 3 to 8 % low, the apparent height within 4 %.
     low = np.nanmean(errors.relative("arctan"))
     assert -0.09 < low < -0.02
 
