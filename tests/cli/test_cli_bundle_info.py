@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from gelslim_cad.cli import main
+from ifem_export.bundle_io import load_bundle
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")
 
@@ -68,7 +69,16 @@ def test_a_matrix_is_exported(
     assert "names no format" in capsys.readouterr().err
 
 
-def test_a_budget_chooses_the_operator(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_budget_chooses_the_operator(
+    bundle: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Measured once, in the fixture: it is the choice that is tried here.
+    ladder = load_bundle(bundle).ladder
+    monkeypatch.setattr("ifem_export.ladder.measure_ladder", lambda *a, **k: ladder)
+    capsys.readouterr()
     folder = tmp_path / "bundle"
     assert main(["bundle", SPEC, "-o", str(folder), "--error", "5%"]) == 0
     said = capsys.readouterr().out

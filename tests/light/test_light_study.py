@@ -55,9 +55,9 @@ def study(finger: Dimensions) -> Any:
     return study_light(finger, rays=RAYS)
 
 
-def test_light_needs_no_more_than_its_inputs(finger: Dimensions, study: Any) -> None:
-    again = study_light(light_inputs(finger), rays=RAYS)
-    assert study_record(again) == study_record(study)
+def test_light_needs_no_more_than_its_inputs(finger: Dimensions) -> None:
+    again = study_light(light_inputs(finger), rays=RAYS >> 4)
+    assert study_record(again) == study_record(study_light(finger, rays=RAYS >> 4))
 
 
 def test_every_ledger_closes_and_nothing_is_lost(study: Any) -> None:

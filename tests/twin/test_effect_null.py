@@ -14,9 +14,11 @@ import pytest
 from scene_samples import ROOT
 from sim_rig import small_sensor
 
+from gelslim_twin.plan import Plan
 from gelslim_twin.scene.question import plan_scene
-from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.sensor_figures import bundle_figures
+from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.twin_sensor import TwinSensor
@@ -68,13 +70,27 @@ def _sensor(place: Path) -> TwinSensor:
     return TwinSensor(load_bundle(place))
 
 
+MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation")
+_solved: dict[tuple[Any, ...], list[GelState]] = {}
+
+
+def _states(folder: Path, plan: Plan, loaded: LoadedScene) -> list[GelState]:
+    """States of all poses; plans whose mechanics are the same share them."""
+    chosen = [plan.choice(name) for name in plan.order if name in MECHANICS]
+    key = (folder, *((c.effect, c.rung, *c.rung_parameters) for c in chosen))
+    if key not in _solved:
+        sensor = _sensor(folder / "bundle")
+        _solved[key] = list(mechanics_of(loaded, plan, sensor).states(loaded.poses))
+    return _solved[key]
+
+
 def outcome(folder: Path, effects: dict[str, Any]) -> tuple[tuple[str, ...], bytes]:
     """The plan's order, and every array that comes of the last pose."""
     path = folder / "scene.yaml"
     path.write_text(json.dumps(scene(effects)))
     loaded, sensor = read_scene(path), _sensor(folder / "bundle")
     plan = plan_scene(loaded, bundle_figures(folder / "bundle"))
-    states = list(mechanics_of(loaded, plan, sensor).states(loaded.poses))
+    states = _states(folder, plan, loaded)
     viewer = Viewer(sensor, plan, loaded.scene, 0.05)
     frame = viewer.frame(states[-1], states[-2], 3, 0.3)
     arrays = (*(a for s in states for a in (s.displacement_mm, s.force_n)), frame.image)
