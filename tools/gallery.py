@@ -19,8 +19,6 @@ IMAGES = ROOT / "docs" / "images"
 PAGE = ROOT / "docs" / "gallery.md"
 FOLDER = "out/gallery"
 SHEAR = f"{FOLDER}/shear_sphere"
-WIDTH_PX = 900
-COLOURS = 160
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,9 @@ class Picture:
     commands: tuple[str, ...]
     made: str
     """File under the repository; of several that match, the last."""
+    width_px: int = 900
+    colours: int = 160
+    """0: all of them."""
 
     @property
     def file(self) -> Path:
@@ -105,20 +106,23 @@ PICTURES = (
     Picture(
         "pareto",
         "Thickness against everything else",
-        "Every dot a design; the best trades marked.",
+        "Every dot a design: length of the gel, f-number and allowed blur varied, light traced and"
+        " force error computed; the best trades marked.",
         (
-            "explore designs/mini20.yaml --vary gel.length_mm=10:30:0.5"
-            f" --vary gel.thickness_mm=0.5:5:0.25 -o {FOLDER}/explore",
+            "explore designs/mini20.yaml --vary gel.length_mm=16:24:2"
+            " --vary camera.f_number=2,2.9,4 --vary optics.blur_per_diameter=0.25,0.333,0.5"
+            f" --light --force-error -o {FOLDER}/trades",
         ),
-        f"{FOLDER}/explore/pareto.png",
+        f"{FOLDER}/trades/pareto.png",
     ),
     _scene("press_ring", "A ring, as the camera sees it", "Simulated; forces known at every node."),
     _scene("textured_plane", "A knurled plane", "Simulated, with the same camera and light."),
     Picture(
         "forces",
         "Forces of a ball pressed and pushed aside",
-        "Estimated from simulated frames: motion yellow, shear red, pressure shaded. True at"
-        " this frame: Fx +0.54, Fy +0.27, Fz −1.08 N (the simulation's `truth.csv`).",
+        "Estimated from simulated frames, given the ball's radius: motion yellow, shear red,"
+        " pressure shaded, the wrench at the side. True at this frame: Fx +0.54, Fy +0.27,"
+        " Fz −1.08 N (the simulation's `truth.csv`).",
         (
             f"bundle designs/gelslim2.yaml -o {FOLDER}/bundle",
             f"simulate designs/scenes/shear_sphere.yaml -o {SHEAR}",
@@ -129,6 +133,25 @@ PICTURES = (
         ),
         f"{FOLDER}/forces/pictures/*.png",
     ),
+    Picture(
+        "fields",
+        "Force fields, true and found",
+        "The deepest push of a validation: the true nodal forces, two of our chains, and the"
+        " paper's choices. With the depth given, these find the resultant as well as ours do, and"
+        " put forces where nothing touches.",
+        (f"validate designs/mini20.yaml -o {FOLDER}/validation",),
+        f"{FOLDER}/validation/fields.png",
+        width_px=1300,
+        colours=0,
+    ),
+    Picture(
+        "resultants",
+        "The paper's experiment, repeated",
+        "Resultants of 56 contacts against the truth; the dotted lines are 15 %, what the paper"
+        " reports for its sensor.",
+        (f"validate designs/mini20.yaml -o {FOLDER}/validation",),
+        f"{FOLDER}/validation/resultants.png",
+    ),
 )
 _HEAD = """\
 # Gallery
@@ -137,6 +160,18 @@ _HEAD = """\
 
 Every picture is what the command under it leaves behind, made smaller. `python tools/gallery.py`
 makes them all anew, in a few minutes.
+"""
+_TAIL = """\
+## What accuracy costs
+
+![Error of the force field against time per frame](images/accuracy_stiffness_0p3223.png)
+
+![Contact: field error against time by tolerance, steps and layers](images/twin_contact.png)
+
+Stiffness operators for one gel, and contact in the twin. There is a figure for every step that offers
+a choice in [accuracy against time](accuracy_vs_time.md).
+
+    make bench
 """
 
 
@@ -162,7 +197,7 @@ def main() -> int:
         found = sorted(ROOT.glob(picture.made))
         if not found:
             raise SystemExit(f"{picture.name}: the command left no {picture.made}")
-        _replace(picture.file, small(found[-1].read_bytes()))
+        _replace(picture.file, small(found[-1].read_bytes(), picture))
     _replace(PAGE, page().encode())
     return 0
 
@@ -174,20 +209,22 @@ def page() -> str:
         commands = "".join(f"    gelslim {c}\n" for c in p.commands)
         picture = f"![{p.title}](images/{p.file.name})"
         parts.append(f"## {p.title}\n\n{picture}\n\n{p.caption}\n\n{commands}")
-    return "\n".join(parts)
+    return "\n".join([*parts, _TAIL])
 
 
-def small(data: bytes) -> bytes:
-    """A PNG no wider than WIDTH_PX, with few colours: the same bytes for the same picture."""
+def small(data: bytes, wanted: Picture) -> bytes:
+    """A PNG of limited width and colours: the same bytes for the same picture."""
     from PIL import Image
 
     picture = Image.open(io.BytesIO(data)).convert("RGB")
-    if picture.width > WIDTH_PX:
-        height = round(picture.height * WIDTH_PX / picture.width)
-        picture = picture.resize((WIDTH_PX, height), Image.Resampling.LANCZOS)
+    if picture.width > wanted.width_px:
+        height = round(picture.height * wanted.width_px / picture.width)
+        picture = picture.resize((wanted.width_px, height), Image.Resampling.LANCZOS)
+    if wanted.colours:
+        method, none = Image.Quantize.MEDIANCUT, Image.Dither.NONE
+        picture = picture.quantize(wanted.colours, method, dither=none)
     kept = io.BytesIO()
-    few = picture.quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    few.save(kept, "PNG", optimize=True)
+    picture.save(kept, "PNG", optimize=True)
     return kept.getvalue()
 
 
