@@ -19,7 +19,8 @@ from gelslim_twin.effects.effect import unit_of
 from gelslim_twin.plan import Plan
 from gelslim_twin.planner import Question, make_plan
 
-LEVELS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
+LEVELS = (1e-9, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
+"""The first asks every effect for its finest rung."""
 FITTED_RADII = (0.7, 3.0)
 """Radius of the contact over the gel's thickness for which the force of a contact was fitted."""
 GEL, LARGE_STRAIN, PICTURE = "gel", "large strain", "picture"

@@ -90,6 +90,22 @@ def test_an_effect_switched_off_is_not_held_against_the_plan() -> None:
     assert choice.rung.error <= 0.01
 
 
+@pytest.mark.parametrize("path", GALLERY, ids=lambda p: p.stem)
+def test_no_error_is_refused_that_some_tolerance_keeps(path: Path) -> None:
+    """The sum at a tolerance of 0.1 % may be 0.103 %, and 0.098 % at a tolerance below."""
+    asked = question(read_scene(path), SENSOR)
+
+    def error_at(level: float) -> float:
+        allowed = tolerance_at(asked, level)
+        plan = make_plan(replace(asked, force_n=allowed.force_n, image_px=allowed.image_px))
+        return plan_error(asked, plan)
+
+    finest = error_at(1e-9)
+    assert choose_tolerance(asked, Budget(1.0001 * finest))[0].rung.error <= 1.0001 * finest
+    with pytest.raises(BudgetError, match="no effect has a finer rung"):
+        choose_tolerance(asked, Budget(0.99 * finest))
+
+
 def test_a_scene_without_contact_has_nothing_to_err_by(tmp_path: Path) -> None:
     apart = load(tmp_path, MINIMAL.replace("depth_mm: 0.5", "depth_mm: -1.0"))
     with pytest.raises(BudgetError, match="nothing touches the gel"):
