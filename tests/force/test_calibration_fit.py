@@ -20,17 +20,14 @@ FLAT = np.column_stack([GRID.positions_mm, np.zeros(len(GRID))])
 SIGMA = CameraTolerance().sigma(DESIGN)
 
 
-def _seen(camera, noise=0.0, seed=0, every=1):
-    """Centres of every so manieth dot."""
+def _seen(camera, noise=0.0, seed=0):
     rng = np.random.default_rng(seed)
-    offset = centroid_offset_px(camera, GRID.positions_mm[::every], GRID.diameter_mm[::every])
-    centre = camera.project(FLAT[::every]) + offset
+    centre = camera.project(FLAT) + centroid_offset_px(camera, GRID.positions_mm, GRID.diameter_mm)
     return centre + rng.normal(size=centre.shape) * noise
 
 
-def _fit(seen, design=DESIGN, tolerance=None, every=1):
-    positions, diameter = GRID.positions_mm[::every], GRID.diameter_mm[::every]
-    return fit_camera(design, positions, diameter, seen, tolerance)
+def _fit(seen, design=DESIGN, tolerance=None):
+    return fit_camera(design, GRID.positions_mm, GRID.diameter_mm, seen, tolerance)
 
 
 def test_centroid_offset_is_that_of_a_finely_drawn_rim():
@@ -64,8 +61,7 @@ def test_covariance_agrees_with_the_scatter():
     distance, pulls, noise = [], [], []
     for k in range(30):
         truth = rng.normal(size=len(SIGMA)) * SIGMA
-        seen = _seen(deviated_camera(DESIGN, truth), noise=0.15, seed=k, every=5)
-        fit = _fit(seen, every=5)
+        fit = _fit(_seen(deviated_camera(DESIGN, truth), noise=0.15, seed=k))
         error = fit.values - truth
         distance.append(error @ np.linalg.solve(fit.covariance, error))
         pulls.append(error / fit.sigma)
