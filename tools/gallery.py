@@ -168,8 +168,8 @@ _TAIL = """\
 
 ![Contact: field error against time by tolerance, steps and layers](images/twin_contact.png)
 
-Stiffness operators for one gel, and contact in the twin. There is a figure for every step that offers
-a choice in [accuracy against time](accuracy_vs_time.md).
+Stiffness operators for one gel, and contact in the twin. There is a figure for every step that
+offers a choice in [accuracy against time](accuracy_vs_time.md).
 
     make bench
 """
