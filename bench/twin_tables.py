@@ -46,6 +46,13 @@ def where(data: dict[str, Any], part: str) -> str:
     )
 
 
+PARTS = {
+    "gel": ("normal_contact", "friction", "relaxation", "nonlinearity"),
+    "light": ("refraction", "shading", "marker_print", "dirt"),
+}
+"""One table each, and one for the other effects: all in one would be too wide to read."""
+
+
 def scenes_text(data: dict[str, Any]) -> str:
     """Effects by scene, and the planner's choice by scene."""
     rows = data["effects"]
@@ -57,14 +64,20 @@ def scenes_text(data: dict[str, Any]) -> str:
         f"{data['poses_at_most']} poses of a scene, each with the way to it from the last; "
         f"{where(data, 'scenes')}.",
         "",
-        "| scene | " + " | ".join(f"`{e}`" for e in effects) + " |",
-        "|---|" + "---|" * len(effects),
     ]
     by = {(r["scene"], r["effect"]): r for r in rows}
-    for scene in scenes:
-        cells = [effect_cell(by[scene, e]) if (scene, e) in by else "" for e in effects]
-        lines.append(f"| `{scene}` | " + " | ".join(cells) + " |")
-    lines += ["", *choice_lines(data["drops"])]
+    shown = {e for group in PARTS.values() for e in group}
+    last = [e for e in effects if e not in shown]
+    for part, group in {**PARTS, "camera": last}.items():
+        here = [e for e in group if e in effects]
+        lines += [f"| {part} | " + " | ".join(f"`{e}`" for e in here) + " |"]
+        lines += ["|---|" + "---|" * len(here)]
+        for scene in scenes:
+            cells = [effect_cell(by[scene, e]) if (scene, e) in by else "" for e in here]
+            if any(cells):
+                lines.append(f"| `{scene}` | " + " | ".join(cells) + " |")
+        lines.append("")
+    lines += choice_lines(data["drops"])
     return "\n".join(lines)
 
 

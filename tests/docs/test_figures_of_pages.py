@@ -8,7 +8,11 @@ from functools import cache
 from typing import Any
 
 import pytest
-from page_text import DOCS, text_of
+from page_text import DOCS, ROOT, text_of
+
+from gelslim_cad.binding import binding_sentences
+from gelslim_cad.dimensions import derive
+from gelslim_cad.spec.reader import read_spec
 
 
 @cache
@@ -187,3 +191,17 @@ def test_settings_of_the_light_page(row: str) -> None:
         for at in ("1", "2.05", "3")
     )
     assert f"| {row} | {cells} |" in text_of(DOCS / "light_guide.md")
+
+
+def test_what_check_says_of_the_smallest_finger() -> None:
+    """README quotes its last lines, the design guide tells them."""
+    spec = read_spec(ROOT / "designs" / "mini20.yaml").spec
+    told = binding_sentences(spec, derive(spec))
+    quoted = re.findall(r"^    (\S.* saves .*)$", text_of(ROOT / "README.md"), re.MULTILINE)
+    assert quoted
+    assert set(quoted) <= set(told)
+    saved = dict(re.findall(r"^(.*) saves ([\d.]+) mm", "\n".join(told), re.MULTILINE))
+    guide = flat("design_guide.md")
+    assert f"0.1 mm more blur would save {saved['Allowing 0.1 mm more blur']} mm" in guide
+    assert f"a gel 2 mm shorter {saved['A gel 2 mm shorter']} mm" in guide
+    assert f"one stop less aperture {saved['One stop less aperture']} mm" in guide
