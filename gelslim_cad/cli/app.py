@@ -29,6 +29,7 @@ from gelslim_cad.cli.optimise import optimise
 from gelslim_cad.cli.plan import plan
 from gelslim_cad.cli.schema import schema
 from gelslim_cad.cli.simulate import simulate
+from gelslim_cad.cli.thinner import thinner
 from gelslim_cad.cli.track import track
 from gelslim_cad.cli.validate import validate
 
@@ -71,6 +72,7 @@ for _command in (
     diff,
     explore,
     optimise,
+    thinner,
     build,
     family,
     bundle,

@@ -32,6 +32,7 @@ PAD_NAMES = (
     "design.markers.diameter_mm",
     "design.markers.pitch_mm",
     "material.gel.poissons_ratio",
+    "material.gel.youngs_modulus_mpa",
     "mesh.element",
     "mesh.layers",
     "pad_mesh.cell_x_mm",
@@ -77,16 +78,29 @@ class Patch:
 
 @dataclass(frozen=True)
 class PatchError:
-    """Errors of a patch: of its mesh, and of position noise as large as the bump is deep."""
+    """Errors of a patch: of its mesh, and of position noise as large as the bump is deep.
+
+    `press_mm` times Young's modulus is its stiffness: the work of pressing the bump in, u·f, over
+    the square of its depth.
+    """
 
     mesh: float
     noise_gain: float
+    press_mm: float
 
     def noise(self, d: Lookup, noise_px: float) -> float:
         """Relative force error by marker positions known to `noise_px`, at the far edge."""
         px = min(d["view.marker_along_px"], d["view.marker_across_px"])
         sigma_mm = noise_px * d["design.markers.diameter_mm"] / px
         return float(self.noise_gain * sigma_mm / DEPTH_MM)
+
+    def total(self, d: Lookup, noise_px: float) -> float:
+        """Mesh and noise together, as errors that do not know of each other."""
+        return math.hypot(self.mesh, self.noise(d, noise_px))
+
+    def stiffness(self, d: Lookup) -> float:
+        """Of the gel against the bump, N/mm: u·f over the square of the depth."""
+        return rounded(self.press_mm * d["material.gel.youngs_modulus_mpa"])
 
 
 def patch_error(patch: Patch) -> PatchError:
@@ -101,7 +115,7 @@ def patch_error(patch: Patch) -> PatchError:
     element: Any = patch.element
     operator = surface_operator(mesh, gel, element, rung, rtol=1e-6)
     points = np.asarray(mesh.nodes_mm)[mesh.surface]
-    errors, sizes = [], []
+    errors, sizes, work = [], [], 0.0
     for way in ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0)):
 
         def bump(p: Array, way: tuple[float, float, float] = way) -> Array:
@@ -112,10 +126,11 @@ def patch_error(patch: Patch) -> PatchError:
         found = operator.force(bump(points))
         errors.append(float(np.linalg.norm(found - expected) / np.linalg.norm(expected)))
         sizes.append(float(np.linalg.norm(expected)))
+        work = float((bump(points) * expected).sum())  # the last way, the press, stays
     contact = (points[:, :2] ** 2).sum(axis=1) <= (2 * WIDTH_MM) ** 2
     noise = [operator.force(u)[contact] for u in _noise(points, patch.pitch_mm)]
     gain = math.sqrt(float(np.mean([(f**2).sum() for f in noise]))) / min(sizes)
-    return PatchError(rounded(max(errors)), rounded(gain))
+    return PatchError(rounded(max(errors)), rounded(gain), rounded(work))
 
 
 def _mesh(patch: Patch) -> Any:

@@ -29,7 +29,12 @@ LIGHT_COLUMNS = (
     "light.exposure_ms",
     "light.frame_rate_hz",
 )
-FORCE_COLUMNS = ("force.mesh_error", "force.noise_error", "force.error")
+FORCE_COLUMNS = (
+    "force.mesh_error",
+    "force.noise_error",
+    "force.error",
+    "gel.stiffness_n_mm",
+)
 
 
 @dataclass(frozen=True)
@@ -191,9 +196,13 @@ def _force(
     errors = {p: PatchError(**r) for p, r in zip(distinct, results, strict=True)}
     found = {}
     for k in rows:
-        error = errors[patches[k]]
-        noise = error.noise(_Row(columns, k), request.noise_px)
-        values = (error.mesh, noise, (error.mesh**2 + noise**2) ** 0.5)
+        error, row = errors[patches[k]], _Row(columns, k)
+        values = (
+            error.mesh,
+            error.noise(row, request.noise_px),
+            error.total(row, request.noise_px),
+            error.stiffness(row),
+        )
         found[k] = dict(zip(FORCE_COLUMNS, values, strict=True))
     return _spread(FORCE_COLUMNS, columns, found)
 

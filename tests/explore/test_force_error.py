@@ -58,7 +58,7 @@ def test_designs_that_differ_elsewhere_share_a_patch() -> None:
 
 
 def test_noise_falls_with_the_pixels_per_marker() -> None:
-    error = PatchError(0.01, 7.0)
+    error = PatchError(0.01, 7.0, 30.0)
     near = {"view.marker_along_px": 10.0, "view.marker_across_px": 12.0}
     far = {"view.marker_along_px": 5.0, "view.marker_across_px": 12.0}
     dot = {"design.markers.diameter_mm": 0.5}

@@ -1,0 +1,127 @@
+"""What a changed finger costs: its figures beside those of another, in the unit and in per cent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+
+from gelslim_cad.checks import check
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns, trace
+from gelslim_cad.explore.force_error import MARKER_NOISE_PX, Patch, PatchError, patch_error
+from gelslim_cad.spec import Spec
+
+SAME = 5e-4
+"""Relative change below which a figure is the same: the solver stops near its limits."""
+KEPT = 64
+"""Guides and patches kept: fingers that differ elsewhere share them."""
+Wanted = Literal["less", "more", ""]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number by which fingers are compared, and which way it is better."""
+
+    name: str
+    words: str
+    unit: str
+    better: Wanted
+
+
+FIGURES = (
+    Figure("finger.thickness_mm", "finger thickness", "mm", "less"),
+    Figure("finger.length_mm", "finger length", "mm", "less"),
+    Figure("finger.width_mm", "finger width", "mm", "less"),
+    Figure("gel.area_mm2", "gel length × width", "mm²", "more"),
+    Figure("view.keystone", "keystone", "", "less"),
+    Figure("view.far_blur_mm", "blur at the far edge", "mm", "less"),
+    Figure("marker.px", "marker at the far edge, shorter side", "px", "more"),
+    Figure("light.irradiance_uw_mm2", "brightness on the coat", "µW/mm²", "more"),
+    Figure("light.exposure_ms", "exposure", "ms", "less"),
+    Figure("light.frame_rate_hz", "frame rate", "Hz", "more"),
+    Figure("force.error", "expected force error", "", "less"),
+    Figure("gel.stiffness_n_mm", "gel stiffness against a bump", "N/mm", ""),
+)
+"""Brightness is of the darker colour, exposure and frame rate of the slower."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A finger's figures by name, None where a broken rule leaves none, and the rules it breaks."""
+
+    figures: Mapping[str, float | None]
+    failed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Price:
+    """One figure of two fingers."""
+
+    figure: Figure
+    before: float | None
+    after: float | None
+
+    @property
+    def change(self) -> float | None:
+        """(after - before) / before; None where one is missing or the first is zero."""
+        if self.before is None or self.after is None or self.before == 0:
+            return None
+        return (self.after - self.before) / self.before
+
+    @property
+    def verdict(self) -> str:
+        """Whether the second finger is better or worse; empty where neither is, or unknown."""
+        change = self.change
+        if change is None or abs(change) < SAME or not self.figure.better:
+            return ""
+        return "better" if (change < 0) == (self.figure.better == "less") else "worse"
+
+
+def measured(spec: Spec, rays: int = RAYS, noise_px: float = MARKER_NOISE_PX) -> Measured:
+    """The figures of one finger, its light traced and its force error measured: a second or two.
+
+    Light and forces are left out where a rule fails, as `explore` does.
+    """
+    d = derive(spec)
+    failed = tuple(c.id for c in check(d) if c.status == "fail")
+    found: dict[str, float | None] = dict.fromkeys(f.name for f in FIGURES)
+    found |= {n: float(d[n]) for n in found if n in d.values}
+    found["gel.area_mm2"] = d["design.gel.length_mm"] * d["design.gel.width_mm"]
+    found["marker.px"] = float(min(d["view.marker_along_px"], d["view.marker_across_px"]))
+    if not bool(np.all(d.feasible())):
+        found |= dict.fromkeys(n for n in found if n.startswith(("view.", "marker.")))
+    if not failed:
+        found |= _traced_and_pressed(d, rays, noise_px)
+    return Measured(found, failed)
+
+
+def _traced_and_pressed(d: Dimensions, rays: int, noise_px: float) -> dict[str, float]:
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):  # as the tasks of an exploration, so that both say the same
+        light = light_columns(d, _lit(tuple(d[n] for n in TRACED), rays))
+        error = _pressed(Patch.of(d))
+    return {
+        **{n: v for n, v in light.items() if n in {f.name for f in FIGURES}},
+        "force.error": error.total(d, noise_px),
+        "gel.stiffness_n_mm": error.stiffness(d),
+    }
+
+
+@lru_cache(maxsize=KEPT)
+def _lit(values: tuple[Any, ...], rays: int) -> Traced:
+    return trace(dict(zip(TRACED, values, strict=True)), rays)
+
+
+@lru_cache(maxsize=KEPT)
+def _pressed(patch: Patch) -> PatchError:
+    return patch_error(patch)
+
+
+def prices(before: Measured, after: Measured) -> tuple[Price, ...]:
+    """Every figure of two fingers, in the order of `FIGURES`."""
+    return tuple(Price(f, before.figures[f.name], after.figures[f.name]) for f in FIGURES)
