@@ -4,10 +4,10 @@ Its first lines see to Ctrl-C, before anything else is imported. Worker processe
 too and leave Ctrl-C to their parent. Import `gelslim_cad.cli` to run commands from Python.
 """
 
-import sys
-from collections.abc import Callable
-
 try:
+    import sys
+    from collections.abc import Callable
+
     from gelslim_cad.ending import Ending
 
     _ending = Ending()
@@ -15,8 +15,10 @@ try:
         _ending.arm()
 except KeyboardInterrupt:
     # In the middle of the lines that are to see to it.
-    sys.stderr.write("Interrupted; every file that is there is whole.\n")
-    raise SystemExit(130) from None
+    import os
+
+    os.write(2, b"Interrupted; every file that is there is whole.\n")
+    os._exit(130)
 
 
 def main() -> int:

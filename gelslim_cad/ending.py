@@ -47,6 +47,7 @@ class Ending:
         self._status: int | None = None
         self._since: float | None = None
         self._retrying = False
+        self._leaving = False
 
     def arm(self) -> None:
         """Take both signals over where nobody has them ignored, as `nohup` and shells do."""
@@ -82,6 +83,9 @@ class Ending:
 
     def _leave(self, number: int) -> None:
         """End here and now; buffered streams may be in use, and are left alone."""
+        if self._leaving:
+            return
+        self._leaving = True
         status = self._status
         if status is None:
             status = 128 + number

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -20,7 +19,6 @@ from sweep_commands import (
     digests,
     environment,
     finished,
-    heeds_interrupts,
 )
 
 pytest.importorskip("cadquery", reason="building needs the [cad] extra")
@@ -126,22 +124,3 @@ def test_two_at_once_into_one_folder_end_whole_or_say_why(
             assert "another process" in err or "another gelslim" in err
     assert 0 in [process.returncode for process in both], told
     assert digests(out.parent, command.ignored) == clean_runs(command).whole
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.name)
-def test_an_interrupt_is_one_line(command: Command, place: Path, tmp_path: Path) -> None:
-    """Ctrl-C at a terminal reaches every process of the group."""
-    moments, scratch = random.Random(f"interrupt {command.name}"), tmp_path / "tmp"
-    for k in range(3):
-        process = subprocess.Popen(
-            command.argv(place, tmp_path / f"out_{k}" / "out"), env=environment(scratch),
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-            preexec_fn=heeds_interrupts,
-        )  # fmt: skip
-        time.sleep(moments.uniform(0.6, 3.0))
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-        assert "Traceback" not in out + err, err
-        assert process.returncode in (0, 130), err

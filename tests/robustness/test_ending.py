@@ -1,0 +1,225 @@
+"""The program from its first line to its last: what signals do, at moments set by events."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from interrupted_run import LINES, interrupted, leaves_nothing
+from sweep_commands import ROOT, environment, heeds_interrupts
+
+from gelslim_cad.cli.failure import _as_json
+from gelslim_cad.ending import SAID, Terminated, asked_to_end, say
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals process groups")
+BOTH = (signal.SIGINT, signal.SIGTERM)
+
+PROGRAM = """
+import os, signal, sys, time
+from gelslim_cad.__main__ import run
+
+def interrupt(times=1):
+    for _ in range(times):
+        os.kill(os.getpid(), signal.{signal})
+
+def work():
+    {work}
+
+def command(loaded):
+    from gelslim_cad.cli.failure import explain_failure
+    loaded()
+    try:
+        work()
+    except BaseException as error:
+        return explain_failure(error, "--json" in sys.argv)
+    print("done")
+    return 0
+
+if __name__ == "__main__":
+    sys.exit(run(command))
+"""
+
+
+def program(tmp_path: Path, work: str, number: signal.Signals = signal.SIGINT, *words: str):  # type: ignore[no-untyped-def]
+    """Run lines of work under the program's guard."""
+    indented = work.strip().replace("\n", "\n    ")
+    place = tmp_path / "program.py"
+    place.write_text(PROGRAM.format(signal=number.name, work=indented))
+    return subprocess.run(
+        [sys.executable, str(place), *words], env=environment(tmp_path / "tmp"), text=True,
+        capture_output=True, timeout=120, check=False, preexec_fn=heeds_interrupts,
+    )  # fmt: skip
+
+
+# SIGTERM is nobody's for the first few imports, and the system ends the process without a word.
+@pytest.mark.parametrize(
+    ("number", "at"),
+    [(signal.SIGINT, 1), (signal.SIGINT, 5), (signal.SIGINT, 60), (signal.SIGTERM, 60)],
+)
+def test_a_signal_during_imports_is_one_line(
+    number: signal.Signals, at: int, tmp_path: Path
+) -> None:
+    argv = [sys.executable, "-m", "gelslim_cad", "schema", "-o", str(tmp_path / "schema.json")]
+    run = interrupted(argv, tmp_path / "tmp", number=number, at=f"import:{at}")
+    assert run.was_one_line()
+    leaves_nothing(run, tmp_path / "tmp", tmp_path)
+    assert not (tmp_path / "schema.json").exists()
+
+
+def test_the_installed_command_is_guarded_as_the_module_is() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert 'gelslim = "gelslim_cad.__main__:main"' in text
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_a_second_one_meanwhile_changes_nothing(number: signal.Signals, tmp_path: Path) -> None:
+    work = """
+from whole_files.scratch import scratch_folder
+with scratch_folder() as folder:
+    try:
+        (folder / "file").write_bytes(b"x")
+        interrupt()
+    finally:
+        interrupt(3)
+        (folder / "more").write_bytes(b"x")
+"""
+    done = program(tmp_path, work, number)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", LINES[number])
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_one_that_falls_into_a_destructor_is_not_lost(tmp_path: Path) -> None:
+    work = """
+class Deaf:
+    def __del__(self):
+        interrupt()
+Deaf()
+time.sleep(60)
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+
+
+def test_one_within_an_import_waits_for_its_end(tmp_path: Path) -> None:
+    (tmp_path / "library.py").write_text(
+        "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    for _ in range(1000): pass\n"
+        "except BaseException as e:\n    raise ImportError('broken')\nloaded = True\n"
+        "print('loaded', flush=True)\n"
+    )
+    done = program(tmp_path, "import library\ntime.sleep(60)")
+    assert (done.returncode, done.stdout) == (130, "loaded\n")
+    assert done.stderr == LINES[signal.SIGINT]
+
+
+def test_one_at_the_interpreters_own_end_changes_nothing(tmp_path: Path) -> None:
+    work = """
+import atexit, threading
+atexit.register(interrupt)
+class Late:
+    def __del__(self):
+        os.kill(os.getpid(), 2)
+sys.late = Late()
+threading.Thread(target=lambda: (time.sleep(0.2), interrupt())).start()
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+
+
+def test_the_impatient_are_let_go(tmp_path: Path) -> None:
+    work = """
+from gelslim_cad import ending
+ending.PATIENCE_S = -1.0
+try:
+    interrupt()
+finally:
+    interrupt()
+    time.sleep(60)
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+
+
+def test_an_ignored_signal_stays_ignored(tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["sh", "-c", f"trap '' INT; exec {sys.executable} -c 'import gelslim_cad.__main__, signal;"
+         "print(signal.getsignal(2) is signal.SIG_IGN)'"],
+        env=environment(tmp_path / "tmp"), text=True, capture_output=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == "True\n"
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_early_and_late_answers_in_json_are_the_same(
+    number: signal.Signals, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["gelslim", "derive", "--json"])
+    say(number)
+    error = KeyboardInterrupt() if number == signal.SIGINT else Terminated()
+    late = _as_json(error, SAID[number][1], 128 + number)
+    assert capfd.readouterr() == (late + "\n", "")
+    assert json.loads(late)["error"] == SAID[number][0]
+
+
+def test_the_signal_behind_an_error_is_found() -> None:
+    assert asked_to_end(ValueError()) is None
+    assert asked_to_end(Terminated()) == signal.SIGTERM
+    error, amidst = ImportError("initialization failed"), RuntimeError("closed")
+    amidst.__context__ = KeyboardInterrupt()
+    error.__cause__ = amidst
+    amidst.__cause__ = error
+    assert asked_to_end(error) == signal.SIGINT
+
+
+POOL = """
+from pool_task import task
+from work_pool.workers import worker_pool
+with worker_pool(2, "{method}") as pool:
+    futures = [pool.submit(task, k) for k in range(6)]
+    futures[0].result()
+    interrupt()
+    futures[-1].result()
+"""
+TASK = """
+import pathlib, sys, time
+from whole_files.replaced_file import replacement
+from whole_files.scratch import scratch_folder
+HERE = pathlib.Path(__file__).parent
+def task(k):
+    with scratch_folder(), replacement(HERE / f"made_{k}") as stream:
+        stream.write(b"x")
+        (HERE / f"begun_{k}").touch()
+        if k == 0:
+            while not (HERE / "begun_1").exists():
+                time.sleep(0.01)
+        else:
+            time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("number", BOTH)
+def test_workers_close_what_they_have_open(
+    method: str, number: signal.Signals, tmp_path: Path
+) -> None:
+    (tmp_path / "pool_task.py").write_text(TASK)
+    done = program(tmp_path, POOL.format(method=method), number)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", LINES[number])
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert (tmp_path / "made_0").read_bytes() == b"x"
+    assert not (tmp_path / "made_1").exists()
+
+
+def test_a_worker_that_just_starts_says_nothing(tmp_path: Path) -> None:
+    """At a terminal the whole group gets the signal, new interpreters too."""
+    (tmp_path / "pool_task.py").write_text(TASK)
+    work = POOL.format(method="spawn").replace(
+        "    futures[0].result()\n", "    time.sleep(0.05)\n"
+    )
+    done = program(tmp_path, "os.setsid()" + work.replace("interrupt()", "os.killpg(0, 2)"))
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
