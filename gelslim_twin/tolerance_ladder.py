@@ -38,14 +38,19 @@ class Tolerance:
 
 
 def scale(circumstances: Circumstances) -> Tolerance:
-    """What relative errors are relative to. Raises BudgetError where nothing touches the gel."""
+    """What relative errors are relative to. Raises BudgetError where nothing touches the gel.
+
+    The force is the estimate itself, not the effects' upper one, so that a share is of no more
+    force than there is, near enough.
+    """
+    force_n = circumstances.touch.normal_n
     depth_px = circumstances.touch.depth_mm * circumstances.sensor.px_per_mm
-    if not (circumstances.force_n > 0 and depth_px > 0):
+    if not (force_n > 0 and depth_px > 0):
         raise BudgetError(
             "error as a share: nothing touches the gel in this scene, so there is nothing to err "
             "by; give a tolerance in N and px in the scene"
         )
-    return Tolerance(circumstances.force_n, depth_px)
+    return Tolerance(force_n, depth_px)
 
 
 def tolerance_at(question: Question, error: float) -> Tolerance:

@@ -27,6 +27,7 @@ from gelslim_twin.tolerance_ladder import (
     choose_tolerance,
     plan_error,
     plan_ms,
+    scale,
     tolerance_at,
     tolerance_ladder,
 )
@@ -88,6 +89,15 @@ def test_an_effect_switched_off_is_not_held_against_the_plan() -> None:
     plan = make_plan(replace(asked, force_n=allowed.force_n, image_px=allowed.image_px))
     assert plan.over_tolerance
     assert choice.rung.error <= 0.01
+
+
+@pytest.mark.parametrize(("depth_mm", "true_n"), [(0.15, 0.078), (0.4, 0.539)])
+def test_a_share_is_of_the_force_there_is(tmp_path: Path, depth_mm: float, true_n: float) -> None:
+    """The upper estimate of the effects was 1.8 and 1.5 times the force solved for."""
+    text = MINIMAL.replace("radius_mm: 8", "radius_mm: 10")
+    scene = load(tmp_path, text.replace("depth_mm: 0.5", f"depth_mm: {depth_mm}"))
+    whole = scale(question(scene, SENSOR).circumstances).force_n
+    assert true_n <= whole <= 1.4 * true_n
 
 
 @pytest.mark.parametrize("path", GALLERY, ids=lambda p: p.stem)
