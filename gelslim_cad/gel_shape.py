@@ -66,11 +66,6 @@ class GelShape:
         return math.hypot(self.length_mm / 2 - r, self.width_mm / 2 - r) + r
 
     @property
-    def apex_radius_mm(self) -> float:
-        """Radius of curvature at the apex, rim² / (2 crown); inf where the gel is flat."""
-        return self.rim_mm**2 / (2 * self.crown_mm) if self.crown_mm else math.inf
-
-    @property
     def outline(self) -> Outline:
         """The outline in the x-y plane."""
         return Outline.rounded_rectangle(self.length_mm, self.width_mm, self.corner_radius_mm)

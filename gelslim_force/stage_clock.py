@@ -112,17 +112,3 @@ class StageClock:
         if names:
             names.append(TOTAL)
         return tuple(self._rings[name].times(name) for name in names)
-
-
-def latency_table(times: tuple[StageTimes, ...]) -> str:
-    """Return a Markdown table: a line per stage, in ms."""
-    lines = [
-        "| stage | median ms | 95 % ms | 99 % ms | largest ms | frames |",
-        "|---|---:|---:|---:|---:|---:|",
-    ]
-    lines += [
-        f"| {t.stage} | {t.median_ms:.2f} | {t.p95_ms:.2f} | {t.p99_ms:.2f} "
-        f"| {t.largest_ms:.2f} | {t.frames} |"
-        for t in times
-    ]
-    return "\n".join(lines) + "\n"

@@ -51,11 +51,6 @@ class CropReport:
     alignment_error_mm: float = 0.0
 
     @property
-    def n_cells_dropped(self) -> int:
-        """Cells inside the outline that were left out."""
-        return self.n_cells_inside - self.n_cells_kept
-
-    @property
     def area_error(self) -> float:
         """Relative error of the meshed area, (mesh - outline) / outline."""
         return (self.mesh_area_mm2 - self.outline_area_mm2) / self.outline_area_mm2

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from ifem_export.alignment import misaligned, points_xy, shift_to
 from ifem_export.cell_fill import DEFAULT_FLOOR, Weighting, filled_cells
@@ -251,26 +250,6 @@ def build_pad_mesh(
     on_steps = weighting == "cell_centre"
     levels = crown_levels(crown, mesh.occupancy.shape, mesh.origin_mm, mesh.cell_size_mm)
     return mesh.crowned(None if on_steps else levels), report
-
-
-def surface_nodes_at(
-    mesh: PadMesh, points_mm: ArrayLike, tolerance_mm: float = 1e-6
-) -> NDArray[np.int32]:
-    """Surface node under each point (marker), seen along z.
-
-    Args:
-        mesh: the pad.
-        points_mm: (k, 2) or (k, 3).
-        tolerance_mm: how far in the x-y plane a node may be.
-
-    Returns:
-        (k,) int32 node numbers, -1 where no surface node is that near.
-
-    Raises:
-        MeshError: wrong shape or a value that is not finite.
-    """
-    distance, nearest = cKDTree(mesh.nodes_mm[mesh.surface, :2]).query(points_xy(points_mm))
-    return np.where(distance <= tolerance_mm, mesh.surface[nearest], -1).astype(np.int32)
 
 
 def _lattice_pitch(

@@ -71,11 +71,6 @@ def _without_folds(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return faces[counts[same] == 1] if (counts > 1).any() else faces
 
 
-def is_closed(mesh: TriangleMesh) -> bool:
-    """Whether every edge is used exactly once each way: watertight and oriented alike."""
-    return len(mesh.faces) > 0 and len(bad_edges(mesh)) == 0
-
-
 def bad_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
     """Edges `(k,2)`, as vertex numbers, that are not used exactly once each way.
 

@@ -10,7 +10,6 @@ import csv
 import io
 import math
 import os
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,16 +100,6 @@ def line(result: FrameResult) -> str:
     problems = "; ".join(" ".join(problem.split()) for problem in result.problems)
     csv.writer(out, lineterminator="\n").writerow([*numbers, problems])
     return out.getvalue()
-
-
-def write_wrenches(path: str | os.PathLike[str], results: Iterable[FrameResult]) -> None:
-    """Write a file in one go. Raises OutputError."""
-    try:
-        with open(path, "w", encoding="utf-8", errors=ESCAPE, newline="") as out:
-            out.write(header())
-            out.writelines(line(result) for result in results)
-    except OSError as error:
-        raise disk_error(path, "writing wrenches", error) from error
 
 
 def read_wrenches(path: str | os.PathLike[str]) -> WrenchTable:

@@ -107,14 +107,6 @@ class LightMap:
         found: Array = low * (1 - v) + high * v
         return found
 
-    def steepest_per_mm(self) -> float:
-        """Largest relative change of a source's irradiance per mm."""
-        steps = (np.diff(self.x_mm)[None, :, None], np.diff(self.y_mm)[:, None, None])
-        usual = max(float(self.irradiance.mean()), 1e-12)
-        along = np.abs(np.diff(self.irradiance, axis=1)) / steps[0]
-        across = np.abs(np.diff(self.irradiance, axis=0)) / steps[1]
-        return float(np.hypot(along.max(), across.max())) / usual
-
 
 def red_green_sides(
     length_mm: float,

@@ -62,12 +62,6 @@ class StateStore:
         """All states."""
         return (self[k] for k in range(self.count))
 
-    def forget(self) -> None:
-        """Delete all chunks."""
-        for path in self.folder.glob("states_*.npz"):
-            path.unlink()
-        self._stored, self._waiting, self._last = 0, [], None
-
     def _path(self, number: int) -> Path:
         return self.folder / f"states_{number:05d}.npz"
 

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gelslim_force.stage_clock import TOTAL, StageClock, latency_table
+from gelslim_force.stage_clock import TOTAL, StageClock, StageTimes
 
 
 class HandClock:
@@ -93,15 +93,15 @@ def test_memory_does_not_grow() -> None:
     assert clock.summary()[-1].frames == 20_300
 
 
-def test_table_and_refusals() -> None:
+def test_times_given_and_refusals() -> None:
     clock = StageClock()
     assert clock.summary() == ()
     clock.add({})
     assert clock.summary() == ()
     clock.add({"detect": 1.25, "match": 0.5})
-    table = latency_table(clock.summary()).splitlines()
-    assert table[2] == "| detect | 1.25 | 1.25 | 1.25 | 1.25 | 1 |"
-    assert table[-1].startswith("| total | 1.75 ")
+    detect, _, total = clock.summary()
+    assert detect == StageTimes("detect", 1, 1.25, 1.25, 1.25, 1.25, 1.25)
+    assert (total.stage, total.median_ms) == (TOTAL, 1.75)
     with pytest.raises(ValueError, match="window = 0"):
         StageClock(window=0)
 

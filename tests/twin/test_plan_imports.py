@@ -45,34 +45,6 @@ def test_planning_imports_no_implementation_and_nothing_heavy():
     assert fresh(code) == "[]"
 
 
-def test_an_absent_effect_is_not_in_memory_after_a_run(tmp_path):
-    """A stub pipeline of modules that note when they are imported and run."""
-    names = ("ink", "base", "kept", "dropped", "forbidden")
-    for name in names:
-        (tmp_path / f"stub_{name}.py").write_text(
-            f"def apply(x, **knobs):\n    return x + ['{name}' + str(sorted(knobs.items()))]\n"
-        )
-    code = f"""
-sys.path.insert(0, {str(tmp_path)!r})
-from test_planner import _ask, _effect
-from gelslim_twin.planner import make_plan
-from gelslim_twin.stages import load_stages
-effects = (
-    _effect("ink", 9.0, ((0.0, 1.0),), provides=("ink",)),
-    _effect("base", 9.0, ((0.0, 1.0),), needs=("ink",), provides=("image",)),
-    _effect("kept", 5.0, ((0.0, 1.0),), refines=("image",)),
-    _effect("dropped", 0.01, ((0.0, 1.0),), refines=("image",)),
-    _effect("forbidden", 5.0, ((0.0, 1.0),), refines=("image",)),
-)
-plan = make_plan(_ask(effects, 1.0, forbidden="off"), effects)
-data = []
-for stage in load_stages(plan):
-    data = stage.module.apply(data, **stage.rung_parameters)
-print(data, sorted(m for m in sys.modules if m.startswith("stub_")))
-"""
-    assert fresh(code) == "['ink[]', 'base[]', 'kept[]'] ['stub_base', 'stub_ink', 'stub_kept']"
-
-
 def test_a_picture_loads_the_modules_of_its_effects_only():
     code = f"""
 from scene_samples import SENSOR
