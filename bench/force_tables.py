@@ -1,4 +1,4 @@
-"""Put the measured tables into the guide and the README, between their comment marks.
+"""Put the measured tables into the guide, between their comment marks.
 
 python bench/force_tables.py    # from docs/data/force_latency.json and force_ladders.json
 """
@@ -11,7 +11,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
-GUIDE, README = ROOT / "docs" / "force_pipeline.md", ROOT / "README.md"
+GUIDE = ROOT / "docs" / "force_pipeline.md"
 STAGES = {
     "track": "find and match markers",
     "look": "find the contact patch",
@@ -21,7 +21,6 @@ STAGES = {
     "force": "forces",
     "wrench": "wrench with σ",
 }
-SHOWN = ("tangential, 5%", "depth given, 5%", "depth given", "sphere seen, 5%", "paper's choices")
 
 
 def main() -> None:
@@ -30,7 +29,6 @@ def main() -> None:
     if latency.exists():
         data = json.loads(latency.read_text(encoding="utf-8"))
         replace_between(GUIDE, "latency", full_latency(data))
-        replace_between(README, "latency", short_latency(data))
     ladders = DATA / "force_ladders.json"
     if ladders.exists():
         replace_between(
@@ -49,21 +47,6 @@ def replace_between(path: Path, mark: str, text: str) -> None:
     path.write_text(
         f"{before}{first}\n{text.strip()}\n{last}{rest.split(last, 1)[1]}", encoding="utf-8"
     )
-
-
-def short_latency(data: dict[str, Any]) -> str:
-    """Median and tail of the whole chain."""
-    lines = [
-        "| 640 x 480 frame, one core | markers | median, ms | 95 % | 99 % |",
-        "|---|---:|---:|---:|---:|",
-    ]
-    lines += [
-        f"| {row['chain']} | {row['markers']} | {ms(row['total']['median'])} "
-        f"| {ms(row['total']['p95'])} | {ms(row['total']['p99'])} |"
-        for row in data["chains"]
-        if row["chain"] in SHOWN
-    ]
-    return "\n".join(lines)
 
 
 def full_latency(data: dict[str, Any]) -> str:
