@@ -29,6 +29,8 @@ SAID = {
     signal.SIGTERM: ("terminated", "Terminated; every file that is there is whole."),
 }
 """Kind, as in answers in JSON, and line for people."""
+SHOWN_AGAIN = b"\r\x1b[2K\x1b[?25h"
+"""Clears a progress bar's line on a terminal and shows the cursor that it has hidden."""
 _IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
 
 
@@ -56,6 +58,7 @@ class Ending:
                 signal.signal(number, self._asked)
         # The first to be registered is the last to run: only the interpreter's own end follows.
         atexit.register(_deafen)
+        sys.excepthook = _but_for_interrupts(sys.excepthook)
         sys.unraisablehook = self._unraisable(sys.unraisablehook)
         threading.excepthook = self._in_thread(threading.excepthook)
 
@@ -89,16 +92,19 @@ class Ending:
         status = self._status
         if status is None:
             status = 128 + number
+            if self._begun and os.isatty(2):
+                os.write(2, SHOWN_AGAIN)
             say(number)
         os._exit(status)
 
-    def _ask_again(self, number: int) -> None:
+    def _ask_again(self, number: int, at_once: bool = False) -> None:
         if self._retrying:
             return
         self._retrying = True
 
         def later() -> None:
-            time.sleep(RETRY_S)
+            if not at_once:
+                time.sleep(RETRY_S)
             self._retrying = False
             send_to_main_thread(number)
 
@@ -108,9 +114,9 @@ class Ending:
     def _unraisable(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
         def hook(told: Any) -> None:
             if isinstance(told.exc_value, KeyboardInterrupt) and self._status is None:
-                # It fell into a destructor, which swallows it.
+                # It fell into a destructor or compiled code, which swallow it.
                 self._since = None
-                self._ask_again(_number(told.exc_value))
+                self._ask_again(_number(told.exc_value), at_once=True)
             elif self._since is None:
                 before(told)
 
@@ -157,6 +163,16 @@ def asked_to_end(error: BaseException | None) -> int | None:
             return _number(error)
         todo += [error.__cause__, error.__context__]
     return None
+
+
+def _but_for_interrupts(before: Callable[..., Any]) -> Callable[..., None]:
+    """Cython prints what it swallows as if it had reached the top."""
+
+    def hook(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        if not isinstance(error, KeyboardInterrupt):
+            before(kind, error, trace)
+
+    return hook
 
 
 def _number(error: BaseException) -> int:

@@ -6,7 +6,6 @@ time of each part of the simulation is set against the times its effects declare
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from gelslim_twin.simulation.simulate import Ledger, simulate
 from gelslim_twin.simulation.stored_sensor import BUNDLE, store_sensor, stored_sensor
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE, pace_group
+from whole_files.scratch import scratch_folder
 
 Progress = Callable[[str, int, int], None]
 DEPTH, RADIUS = 0.1, 2.0
@@ -52,8 +52,7 @@ def measure_paces(
     With them the figures of the sensor as planning sees it. Raises what `simulate` raises.
     """
     tell = progress or (lambda text, done, total: None)
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
+    with scratch_folder() as folder:
         store_sensor(sensor, folder / "sensor", True)
         runs = {}
         # The first run computes the compliance of the pad and compiles what is not compiled yet.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -104,6 +105,21 @@ time.sleep(60)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
 
 
+def test_one_that_compiled_code_swallows_is_not_lost(tmp_path: Path) -> None:
+    """Cython has functions that raise nothing: they print, by the hook for what is uncaught."""
+    pytest.importorskip("scipy")
+    work = """
+import numpy as np
+from scipy.stats import qmc
+real, np.load = np.load, lambda *a, **k: (interrupt(), real(*a, **k))[1]
+qmc.Sobol(3)
+np.load = real
+time.sleep(60)
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+
+
 def test_one_within_an_import_waits_for_its_end(tmp_path: Path) -> None:
     (tmp_path / "library.py").write_text(
         "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n"
@@ -142,6 +158,37 @@ finally:
 """
     done = program(tmp_path, work)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+
+
+def test_the_impatient_get_their_cursor_back() -> None:
+    """A progress bar hides it; the terminal's end of the program is a pseudo-terminal."""
+    import pty
+
+    work = """
+from gelslim_cad import ending
+from gelslim_cad.cli.progress import progress_bar
+ending.PATIENCE_S = -1.0
+with progress_bar(False) as tell:
+    tell("work", 0, 1)
+    try:
+        interrupt()
+    finally:
+        interrupt()
+        time.sleep(60)
+"""
+    ours, theirs = pty.openpty()
+    text = PROGRAM.format(signal="SIGINT", work=work.strip().replace("\n", "\n    "))
+    done = subprocess.run(
+        [sys.executable, "-c", text], stderr=theirs, timeout=120, check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}, preexec_fn=heeds_interrupts,
+    )  # fmt: skip
+    told = os.read(ours, 100_000)
+    os.close(ours)
+    os.close(theirs)
+    assert done.returncode == 130
+    assert b"\x1b[?25l" in told
+    assert b"\x1b[?25h" in told.rpartition(b"\x1b[?25l")[2]
+    assert told.endswith(LINES[signal.SIGINT].strip().encode() + b"\r\n")
 
 
 def test_an_ignored_signal_stays_ignored(tmp_path: Path) -> None:
