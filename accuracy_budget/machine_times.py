@@ -15,7 +15,7 @@ import platform
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -74,14 +74,29 @@ def times_path(ladder_key: str) -> Path:
     return cache_folder() / "times" / this_machine().key / f"{ladder_key}.json"
 
 
+def require_keeping() -> None:
+    """Raises OSError where times cannot be kept: to be asked before measuring them."""
+    folder = times_path("any").parent
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
 def read_times(ladder_key: str) -> dict[str, float]:
-    """Times in ms by rung, measured on this machine; empty where there are none."""
+    """Times in ms by rung, measured on this machine; empty where there are none.
+
+    A file that was carried here from another machine or another sensor is as good as none.
+    """
     try:
         found = json.loads(times_path(ladder_key).read_bytes())
         times = {str(name): float(ms) for name, ms in found["times_ms"].items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
-    if found.get("format") != FORMAT:
+    if (found.get("format"), found.get("ladder"), found.get("machine")) != (
+        FORMAT,
+        ladder_key,
+        asdict(this_machine()),
+    ):
         return {}
     return {name: ms for name, ms in times.items() if 0 < ms < math.inf}
 
@@ -89,16 +104,10 @@ def read_times(ladder_key: str) -> dict[str, float]:
 def write_times(ladder_key: str, times_ms: Mapping[str, float]) -> Path:
     """Keep the times of a ladder, in one step; returns the file. Raises OSError."""
     path = times_path(ladder_key)
-    machine = this_machine()
     record: dict[str, Any] = {
         "format": FORMAT,
         "ladder": ladder_key,
-        "machine": {
-            "name": machine.name,
-            "processor": machine.processor,
-            "cores": machine.cores,
-            "system": machine.system,
-        },
+        "machine": asdict(this_machine()),
         "times_ms": dict(times_ms),
     }
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -31,10 +31,11 @@ def bench(
     on. No bundle and no result is changed by them. Other programs running meanwhile count as
     slowness.
     """
-    from accuracy_budget.machine_times import cache_folder, this_machine
+    from accuracy_budget.machine_times import cache_folder, require_keeping, this_machine
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.progress import progress_bar
 
+    require_keeping()
     with progress_bar(quiet=as_json) as tell:
         found = list(_parts(sensor, simulation, tell))
     if as_json:

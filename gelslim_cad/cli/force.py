@@ -155,7 +155,8 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
         if gel != "linear":
             told = f"the ladder was measured on a linear gel; its errors say little of {gel}"
             choice = replace(choice, remarks=(*choice.remarks, told))
-        note_choice(choice, budget, bool(read_times(sensor.times_key)), f"gelslim bench {path}")
+        here = choice.rung.name in read_times(sensor.times_key)
+        note_choice(choice, budget, here, f"gelslim bench {path}")
     return timed
 
 

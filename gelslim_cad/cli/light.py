@@ -117,13 +117,20 @@ def _budgeted(
     """Rays per guide for a budget; without times of this machine, one of time measures them."""
     from accuracy_budget.machine_times import read_times
     from gelslim_cad.cli.budget import keep_times, note_choice
-    from gelslim_cad.light.ray_ladder import measure_errors, measure_times, rays_of, times_key
+    from gelslim_cad.light.ray_ladder import (
+        TRACED,
+        measure_errors,
+        measure_times,
+        rays_of,
+        rung_name,
+        times_key,
+    )
     from gelslim_cad.pad import spec_hash
 
     key = times_key(spec_hash(spec))
     times = read_times(key)
     errors = measure_errors(d, seed, tell)
-    if not times and budget.time_ms is not None:
+    if budget.time_ms is not None and not {rung_name(r) for r in TRACED} <= set(times):
         times = measure_times(d, tell)
         keep_times(key, times)
     choice = errors.ladder(times).choose(budget)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from accuracy_budget import machine_times
 from accuracy_budget.machine_times import (
     cache_folder,
     read_times,
+    require_keeping,
     this_machine,
     times_path,
     write_times,
@@ -55,6 +57,39 @@ def test_another_machine_has_times_of_its_own(monkeypatch: pytest.MonkeyPatch) -
     write_times("abc", {"a": 7.0})
     monkeypatch.setattr(machine_times, "this_machine", lambda: here)
     assert read_times("abc") == {"a": 1.0}
+
+
+def test_a_file_carried_from_elsewhere_is_as_good_as_none() -> None:
+    path = write_times("abc", {"a": 1.0})
+    for_another = times_path("other")
+    for_another.write_bytes(path.read_bytes())
+    assert read_times("other") == {}
+    record = json.loads(path.read_text())
+    for change in ({"format": "gelslim-machine-times/2"}, {"machine": {"name": "elsewhere"}}):
+        path.write_text(json.dumps({**record, **change}))
+        assert read_times("abc") == {}
+    path.write_text(json.dumps(record))
+    assert read_times("abc") == {"a": 1.0}
+
+
+def test_whether_times_can_be_kept_is_known_beforehand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    require_keeping()
+    assert list(times_path("abc").parent.iterdir()) == []
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("GELSLIM_CACHE_DIR", str(tmp_path / "file"))
+    with pytest.raises(OSError, match="file"):
+        require_keeping()
+
+
+def test_two_writers_at_once_leave_one_whole_file() -> None:
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda k: write_times("abc", {f"r{i}": k for i in range(300)}), range(1, 65)))
+    found = read_times("abc")
+    assert len(found) == 300
+    assert len(set(found.values())) == 1
+    assert [p.name for p in times_path("abc").parent.iterdir()] == ["abc.json"]
 
 
 def test_a_write_that_fails_leaves_the_old_times(monkeypatch: pytest.MonkeyPatch) -> None:

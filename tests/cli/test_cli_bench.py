@@ -184,6 +184,34 @@ def test_a_full_disk_and_a_damaged_bundle_are_told(
     assert main(["bench", str(sensor / "gone.yaml")]) == 2
 
 
+def test_a_place_that_keeps_nothing_is_told_before_measuring(
+    sensor: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from ifem_export import ladder
+
+    def measured(*_: object) -> None:
+        raise AssertionError("measured in vain")
+
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("GELSLIM_CACHE_DIR", str(tmp_path / "file"))
+    monkeypatch.setattr(ladder, "time_operators", measured)
+    assert main(["bench", str(sensor / "bundle"), "--no-simulation"]) == 2
+    said = capsys.readouterr().err
+    assert str(tmp_path / "file") in said
+    assert "check the path" in said
+
+
+def test_times_of_other_rungs_do_not_calibrate_the_one_chosen(
+    sensor: Path, laddered: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_times(laddered.times_key, {"factor": 900.0})
+    assert forces(sensor, tmp_path / "a", "--time", "1.5ms") == 0
+    assert "times are not this machine's" in capsys.readouterr().err
+
+
 def test_the_label_of_an_error_is_the_same_in_every_bundle_made(laddered: Bundle) -> None:
     """Two builds on machines of other speed give bundles with the same operator."""
     rng = np.random.default_rng(13)
