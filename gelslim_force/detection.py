@@ -24,6 +24,7 @@ from gelslim_force.detections import (
     Detections,
 )
 from gelslim_force.detector_settings import DetectorSettings
+from gelslim_force.read_only import read_only
 
 _NOISE_SHARE = 1.5
 _MOST_ASPECT = 3.0
@@ -108,7 +109,7 @@ def as_planes(image: Any) -> NDArray[np.uint8]:
         )
     if min(image.shape[:2]) < 16:
         raise ValueError(f"a frame of {image.shape[1]} x {image.shape[0]} px is too small; min. 16")
-    return np.ascontiguousarray(image)
+    return read_only(image)
 
 
 def _candidates(

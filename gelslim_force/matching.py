@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.read_only import read_only
 from gelslim_force.reference_lattice import ReferenceLattice
 from gelslim_force.tracks import MarkerStatus, Tracks
 
@@ -46,12 +47,13 @@ def match(
     `expected_px` (n, 2) are predicted places, by default those of the reference; NaN where there
     is none. Raises ValueError for arrays of other shapes or an unknown mode.
     """
-    points = np.ascontiguousarray(points_px, dtype=float)
+    points = read_only(np.asarray(points_px, dtype=float))
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
         raise ValueError(f"dots {points.shape} must be finite places (m, 2)")
     expected = reference.places_px if expected_px is None else np.asarray(expected_px, dtype=float)
     if expected.shape != (len(reference), 2):
         raise ValueError(f"expected places {expected.shape} must be ({len(reference)}, 2)")
+    expected = read_only(expected)
     if mode == "nearest":
         return _nearest(reference, points, expected)
     if mode == "robust":

@@ -47,7 +47,9 @@ class Window:
         """About `count` of the bins, for a first look."""
         skip = max(1, len(self.x_mm) // count)
         none = np.zeros(0, dtype=np.intp)
-        x, y, lean, change = (a[::skip] for a in (self.x_mm, self.y_mm, self.lean, self.change))
+        whole = self.x_mm, self.y_mm, self.lean, self.change
+        # Contiguous, as the whole window is: kernels are compiled anew for strided arrays.
+        x, y, lean, change = (np.ascontiguousarray(a[::skip]) for a in whole)
         return Window(x, y, lean, change, self.bin_mm, (none, none))
 
 

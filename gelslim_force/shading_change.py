@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.read_only import read_only
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LEAST_LEVEL = 8.0
@@ -141,7 +143,7 @@ def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         )
     if min(picture.shape[:2]) < 32:
         raise ValueError(f"image of {picture.shape[1]} x {picture.shape[0]} px: 32 x 32 at least")
-    return np.ascontiguousarray(picture if picture.ndim == 3 else picture[:, :, None])
+    return read_only(picture if picture.ndim == 3 else picture[:, :, None])
 
 
 def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
