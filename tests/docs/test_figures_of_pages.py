@@ -7,6 +7,7 @@ import re
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 from page_text import DOCS, ROOT, text_of
 
@@ -77,10 +78,16 @@ def ray_row(power: int, sampling: str, split: float) -> Any:
     return row
 
 
-def brighter(setting: str) -> dict[float, float]:
-    """Light on the coat over that of glued mirrors, by R/t."""
+def brighter(setting: str, light: str = "arrived") -> dict[float, float]:
+    """Light on the coat (or net into the gel) over that of glued mirrors, by R/t."""
     rows = data("light_rays")["ratios"]["rows"]
-    return {r["bend_ratio"]: r["arrived"] for r in rows if r["setting"] == setting}
+    return {r["bend_ratio"]: r[light] for r in rows if r["setting"] == setting}
+
+
+def turning(light: str) -> float:
+    """R/t at which the plain setting's curved guide gets the brighter one."""
+    found = {r: v for r, v in brighter("plain, short legs", light).items() if 1 <= r <= 3}
+    return float(np.interp(1.0, [found[r] for r in (2, 2.5)], [2, 2.5]))
 
 
 def leak(chord_deg: float) -> float:
@@ -114,6 +121,7 @@ def light_claims() -> list[str]:
     sobol, random = ray_row(18, "sobol", 0.05), ray_row(18, "random", 0.05)
     assert random["error_delivered"] / sobol["error_delivered"] > 1.8
     bend = ray_row(16, "sobol", 0.05)["error_leaked.outer_bend_right"]
+    assert min(brighter("gelslim2, own legs").values()) > 1
     own, short = brighter("gelslim2, own legs"), brighter("gelslim2, short legs")
     assert max(abs(own[r] - short[r]) for r in own) < 0.06
     best = max(own, key=lambda r: own[r])
@@ -126,6 +134,8 @@ def light_claims() -> list[str]:
         f"Chords leak {1e6 * leak(1):.0f}·10⁻⁶ at 1°, {100 * leak(5):.2f} % at 5°, "
         f"{100 * leak(15):.1f} % at 15°",
         f"from R/t = 0.6 ({own[0.6]:.2f}) on",
+        f"at R/t = {turning('entered_gel'):.1f} for the net light into the gel and at "
+        f"{turning('arrived'):.1f} for the light on the coat",
         f"best near 3 to 3.5 ({own[best]:.2f})",
         f"nor below: {brighter('plain, short legs')[0.6]:.2f} at 0.6",
     ]
