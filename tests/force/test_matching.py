@@ -175,3 +175,18 @@ def test_what_cannot_be_matched_is_refused():
         match(REFERENCE, REST_PX, REST_PX[:5])
     with pytest.raises(ValueError, match="'robust' or 'nearest'"):
         match(REFERENCE, REST_PX, mode="best")
+
+
+def test_kernels_are_compiled_once_whoever_made_the_arrays():
+    from gelslim_force import matching_kernel, steep_kernel
+
+    kernels = [matching_kernel.mutual, matching_kernel.verify, matching_kernel.grow]
+    kernels += [matching_kernel.patches, steep_kernel.settle]
+    seen = shot(np.random.default_rng(3), motion(np.random.default_rng(3), KINDS[0], 0.8))
+    frozen, strided = seen.dots_px.copy(), np.repeat(seen.dots_px, 2, axis=0)[::2]
+    frozen.setflags(write=False)
+    found = [match(REFERENCE, points) for points in (seen.dots_px.copy(), frozen, strided)]
+    found.append(match(REFERENCE, frozen, REST_PX.copy()))
+    assert all(np.array_equal(found[0].dots, other.dots) for other in found)
+    for kernel in kernels:
+        assert len(kernel.signatures) == 1, kernel.py_func.__qualname__

@@ -14,6 +14,7 @@ from gelslim_force.patch_finder import PatchFinder
 from gelslim_force.patch_follow import AFRESH
 from gelslim_force.patch_outline import circle_start, fit_circle, fit_strip
 from gelslim_force.patch_settings import PatchSettings
+from gelslim_force.read_only import read_only
 
 BALL_MM = 10.0
 
@@ -266,6 +267,7 @@ def test_light_ratios_are_those_of_numpy():
     for channels in (1, 3):
         pair = rng.integers(0, 256, (2, 50, 70, channels)).astype(np.uint8)
         pair[:, 30:40, 20:40] = 255
+        pair = read_only(pair)
         blocked, touched = np.zeros((50, 70), np.uint8), np.zeros((12, 17), np.uint8)
         discs = np.array([[20.3, 10.0], [-2.0, 60.0], [np.nan, 1.0]])
         block_discs(blocked, discs, np.full(3, 5.5), 4, touched)
