@@ -8,7 +8,7 @@ try:
     import sys
     from collections.abc import Callable
 
-    from gelslim_cad.ending import Ending
+    from gelslim_cad.ending import Ending, number_of, say
 
     _ending = Ending()
     if "__mp_main__" not in sys.modules:
@@ -30,9 +30,15 @@ def main() -> int:
 
 def run(command: Callable[..., int]) -> int:
     """Run a command line, which is to call what it is given as `loaded` before its work begins."""
-    status = command(loaded=_ending.begin)
-    if status > 128:
-        _tidy()
+    try:
+        status = command(loaded=_ending.begin)
+        if status <= 128:
+            return _ending.end(status)
+    except KeyboardInterrupt as error:
+        # In the middle of the command's last words.
+        status = 128 + number_of(error)
+        say(status - 128)
+    _tidy()
     return _ending.end(status)
 
 

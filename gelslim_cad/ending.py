@@ -68,8 +68,9 @@ class Ending:
 
     def end(self, status: int) -> int:
         """The work is done and said; a signal changes nothing any more. Returns `status`."""
-        self._status = status
+        # In this order: a signal between the two must raise nothing any more.
         self._since = time.monotonic()
+        self._status = status
         return status
 
     def _asked(self, number: int, frame: FrameType | None) -> None:
@@ -92,8 +93,9 @@ class Ending:
         status = self._status
         if status is None:
             status = 128 + number
-            if self._begun and os.isatty(2):
-                os.write(2, SHOWN_AGAIN)
+            with contextlib.suppress(OSError):
+                if self._begun and os.isatty(2):
+                    os.write(2, SHOWN_AGAIN)
             say(number)
         os._exit(status)
 
@@ -116,7 +118,7 @@ class Ending:
             if isinstance(told.exc_value, KeyboardInterrupt) and self._status is None:
                 # It fell into a destructor or compiled code, which swallow it.
                 self._since = None
-                self._ask_again(_number(told.exc_value), at_once=True)
+                self._ask_again(number_of(told.exc_value), at_once=True)
             elif self._since is None:
                 before(told)
 
@@ -160,7 +162,7 @@ def asked_to_end(error: BaseException | None) -> int | None:
             continue
         seen.add(id(error))
         if isinstance(error, KeyboardInterrupt):
-            return _number(error)
+            return number_of(error)
         todo += [error.__cause__, error.__context__]
     return None
 
@@ -175,7 +177,8 @@ def _but_for_interrupts(before: Callable[..., Any]) -> Callable[..., None]:
     return hook
 
 
-def _number(error: BaseException) -> int:
+def number_of(error: BaseException) -> int:
+    """The signal that a KeyboardInterrupt stands for."""
     return signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT
 
 

@@ -132,6 +132,12 @@ def test_one_within_an_import_waits_for_its_end(tmp_path: Path) -> None:
     assert done.stderr == LINES[signal.SIGINT]
 
 
+def test_one_amidst_the_last_words_is_one_line(tmp_path: Path) -> None:
+    """Outside of what turns errors into messages."""
+    done = program(tmp_path, "import builtins\nbuiltins.print = lambda *words: interrupt()")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+
+
 def test_one_at_the_interpreters_own_end_changes_nothing(tmp_path: Path) -> None:
     work = """
 import atexit, threading
