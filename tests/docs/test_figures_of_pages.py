@@ -12,6 +12,7 @@ import pytest
 from page_text import DOCS, ROOT, text_of
 
 from gelslim_cad.binding import binding_sentences
+from gelslim_cad.cli import main
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
 
@@ -215,3 +216,20 @@ def test_what_check_says_of_the_smallest_finger() -> None:
     assert f"0.1 mm more blur would save {saved['Allowing 0.1 mm more blur']} mm" in guide
     assert f"a gel 2 mm shorter {saved['A gel 2 mm shorter']} mm" in guide
     assert f"one stop less aperture {saved['One stop less aperture']} mm" in guide
+
+
+def test_the_refusal_that_the_budget_page_quotes(capsys: pytest.CaptureFixture[str]) -> None:
+    """Word for word, but for the times of a machine."""
+    page = flat("budget.md")
+    line = re.search(r"\(`gelslim (plan [^`]*)`\)", page)
+    quoted = re.search(r"> (no tolerance .*? on the side of error)", page)
+    assert line is not None
+    assert quoted is not None
+    words = line.group(1).replace("designs/", f"{ROOT}/designs/").split()
+    assert main(words) == 2
+    said = re.sub(r"\s+", " ", capsys.readouterr().err)
+
+    def timeless(text: str) -> str:
+        return re.sub(r", [\d.]+ m?s\)", ", TIME)", text.replace(" > ", " "))
+
+    assert timeless(quoted.group(1)) in timeless(said)
