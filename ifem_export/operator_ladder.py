@@ -119,10 +119,12 @@ class OperatorLadder:
             f"where the motion reaches the gel's edge the field error of {rung.name} is "
             f"{shown_share(found.error_edge)}, outside the calibrated range"
         )
-        able = [r for r in self._by_work() if r.error_edge is not None]
-        able = [r for r in able if budget.allows_error(max(r.error_edge or 0, r.error_field))]
-        within = [r for r in able if budget.allows_time(r.milliseconds)]
-        return (f"{told}; {within[0].label} keeps the budget there too" if within else told,)
+        edges = [(r.error_edge, r) for r in self._by_work() if r.error_edge is not None]
+        for error, other in edges:
+            if budget.allows(max(error, other.error_field), other.milliseconds):
+                return (f"{told}; {other.label} keeps the budget there too",)
+        least, best = min(edges, key=lambda pair: pair[0])
+        return (f"{told}; least there has {best.label}, {shown_share(least)}",)
 
     def _by_work(self) -> list[MeasuredRung]:
         return sorted(self.rungs, key=lambda r: r.n_bytes)

@@ -46,6 +46,7 @@ def bundle(
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.budget import budget_of
+    from gelslim_cad.cli.failure import CommandError
     from gelslim_cad.cli.output import require_pad_rules, written
     from gelslim_cad.dimensions import derive
     from gelslim_cad.pad import make_bundle, marker_grid, pad_mesh
@@ -53,13 +54,15 @@ def bundle(
     from ifem_export.bundle_io import write_bundle
 
     budget = budget_of(error, within)
+    if not (ladder or budget.unlimited):
+        raise CommandError("--no-ladder leaves a budget nothing to choose from: give one of them")
     loaded = read_spec(spec).spec
     d = derive(loaded)
     require_pad_rules(d, "gelslim bundle", force)
     grid = marker_grid(d)
     mesh, _ = pad_mesh(d, grid)
     measured, label = None, ""
-    if ladder or not budget.unlimited:
+    if ladder:
         measured = _measured(loaded, d, mesh, dense, quiet=as_json)
         label = chosen_label(measured, budget)
     folder = out or Path("out") / f"{loaded.name}-bundle"

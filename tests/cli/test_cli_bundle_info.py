@@ -99,3 +99,10 @@ def test_the_matrix_is_stored_on_request(tmp_path: Path) -> None:
     assert main(["bundle", SPEC, "-o", str(tmp_path / "k"), "--with-k", "--no-ladder"]) == 0
     assert (tmp_path / "k" / "stiffness_data_n_per_mm.npy").is_file()
     assert not (tmp_path / "k" / "ladder.json").exists()
+
+
+def test_a_budget_needs_the_ladder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "k"
+    assert main(["bundle", SPEC, "-o", str(out), "--no-ladder", "--error", "3%"]) == 2
+    assert "--no-ladder leaves a budget nothing to choose from" in capsys.readouterr().err
+    assert not out.exists()
