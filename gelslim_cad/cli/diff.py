@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from gelslim_cad.compare.comparison import Change, Comparison, RuleChange
     from gelslim_cad.compare.part_change import PartChanges
+    from gelslim_cad.explore.price import Measured
+    from gelslim_cad.spec import Spec
 
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
 FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
@@ -27,12 +29,15 @@ def diff(
     parts: Annotated[
         bool, typer.Option(help="Compare the solids too (some seconds; needs the cad extra).")
     ] = True,
+    price: Annotated[
+        bool, typer.Option(help="Trace the light and measure the force error of both.")
+    ] = True,
     as_json: AsJson = False,
 ) -> int:
     """Compare two specs.
 
-    Fields, dimensions, rules, parts and bundle that change. Nothing is built. Exit status 0
-    whether or not they differ.
+    Fields, dimensions, rules, parts and bundle that change, and what the second finger costs
+    against the first. Nothing is built. Exit status 0 whether or not they differ.
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.compare.comparison import compare
@@ -41,12 +46,39 @@ def diff(
     one, two = read_spec(first), read_spec(second)
     found = compare(one.spec, two.spec)
     made, note = _parts(one, two) if parts and not found.same else (None, "")
+    costs = _measured(one.spec, two.spec) if price and not found.same else ()
     if as_json:
-        print_json(_record(str(first), str(second), found, made, note))
+        record = _record(str(first), str(second), found, made, note)
+        print_json({**record, "price": _price_record(costs)})
         return 0
     _report(str(first), str(second), found)
     _report_parts(made, note)
+    _report_price(str(first), str(second), costs)
     return 0
+
+
+def _measured(one: Spec, two: Spec) -> tuple[Measured, ...]:
+    from gelslim_cad.explore.price import measured
+
+    return measured(one), measured(two)
+
+
+def _price_record(costs: Sequence[Measured]) -> list[dict[str, Any]] | None:
+    from gelslim_cad.cli.price_table import price_record
+    from gelslim_cad.explore.price import prices
+
+    return price_record(prices(*costs)) if costs else None
+
+
+def _report_price(first: str, second: str, costs: Sequence[Measured]) -> None:
+    from gelslim_cad.cli.price_table import print_broken, print_prices
+    from gelslim_cad.explore.price import prices
+
+    if not costs:
+        return
+    print_prices("what it costs", prices(*costs), "before", "after")
+    for name, found in zip((first, second), costs, strict=True):
+        print_broken(name, found)
 
 
 def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:

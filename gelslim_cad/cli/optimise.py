@@ -13,7 +13,8 @@ from gelslim_cad.cli.explore import Jobs, NoisePx, Rays, Scheduler, Vary
 from gelslim_cad.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
-    from gelslim_cad.explore.optimum import Optimum
+    from gelslim_cad.explore.optimum import Neighbour, Optimum
+    from gelslim_cad.explore.price import Measured
     from gelslim_cad.spec import Spec
 
 
@@ -47,10 +48,10 @@ def optimise(
     marker_noise_px: NoisePx = 0.05,
     as_json: AsJson = False,
 ) -> int:
-    """Find the best feasible design and what binds it.
+    """Find the best feasible design, what binds it, and what it costs.
 
-    Every combination of the values, then finer steps around the best. Exit status 1 when no
-    design is feasible.
+    Every combination of the values, then finer steps around the best; its price is against the
+    spec as it is. Exit status 1 when no design is feasible.
     """
     from gelslim_cad.cli.answer import print_json
     from gelslim_cad.cli.output import replace_file, spare_strangers
@@ -64,13 +65,15 @@ def optimise(
     folder = out or Path("out") / f"{loaded.spec.name}-optimise"
     effort = _Effort(jobs, scheduler, rays, marker_noise_px, rounds)
     best = _best(loaded.spec, vary, aim, folder, effort, quiet=as_json)
-    words = _binding(changed(loaded.spec, best.values))
+    chosen = changed(loaded.spec, best.values)
+    words, price = _binding(chosen), _Price.of(loaded.spec, chosen, effort)
     if save is not None:
         replace_file(save, spec_text(loaded.text, best.values).encode())
     if as_json:
-        print_json(_record(best, words))
+        print_json({**_record(best, words), "price": price.record()})
         return 0
     _report(loaded.spec.name, best, words)
+    price.print()
     if save is not None:
         print(f"Wrote {save}. Next: gelslim check {save}")
     return 0
@@ -85,6 +88,34 @@ class _Effort:
     rays: int
     noise_px: float
     rounds: int
+
+
+@dataclass(frozen=True)
+class _Price:
+    """The best design against the spec as it is."""
+
+    before: Measured
+    after: Measured
+
+    @classmethod
+    def of(cls, spec: Spec, chosen: Spec, effort: _Effort) -> _Price:
+        from gelslim_cad.explore.price import measured
+
+        before, after = (measured(s, effort.rays, effort.noise_px) for s in (spec, chosen))
+        return cls(before, after)
+
+    def record(self) -> list[dict[str, Any]]:
+        from gelslim_cad.cli.price_table import price_record
+        from gelslim_cad.explore.price import prices
+
+        return price_record(prices(self.before, self.after))
+
+    def print(self) -> None:
+        from gelslim_cad.cli.price_table import print_broken, print_prices
+        from gelslim_cad.explore.price import prices
+
+        print_prices("what it costs", prices(self.before, self.after), "as it is", "best")
+        print_broken("The spec as it is", self.before)
 
 
 def _best(
@@ -164,6 +195,15 @@ def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
             f"{n.path.removeprefix('design.')} {shown(n.value)}",
             "" if here is None else number(here, best.goal.unit),
             "" if here is None else f"{'+' if here > value else ''}{number(here - value)}",
-            "" if n.status == "feasible" else n.binding,
+            _stop(n),
         )
     console().print(table)
+
+
+def _stop(n: Neighbour) -> str:
+    """What stops a step further, and from where on."""
+    from gelslim_cad.explore.axis import shown
+
+    if n.status == "feasible":
+        return ""
+    return n.binding if n.holds_to is None else f"{n.stops} beyond {shown(n.holds_to)}"

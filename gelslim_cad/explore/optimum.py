@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gelslim_cad.explore.axis import Axis, Value
+from gelslim_cad.explore.border import border
 from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.pareto import Goal
@@ -30,13 +31,19 @@ BETWEEN = 2
 
 @dataclass(frozen=True)
 class Neighbour:
-    """The optimum with one field a step further: its verdict and its goal."""
+    """The optimum with one field a step further: its verdict and its goal.
+
+    Where it is not feasible, `holds_to` is how far the field can go until `stops` ends it: another
+    rule perhaps than `binding`, which the neighbour misses most.
+    """
 
     path: str
     value: Value
     status: str
     binding: str
     goal: float | None
+    holds_to: float | None = None
+    stops: str = ""
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,8 @@ def optimise(
     """Explore the space, then `rounds` times the surroundings of the best design.
 
     A round puts `BETWEEN` values between the best value and its neighbours, of fields that are
-    real numbers; it never leaves the range given. The grid finds the basin, so steps should be
+    real numbers; it never leaves the range given. At last the best goes up to the border of what is
+    feasible where that is better. The grid finds the basin, so steps should be
     fine enough for the design space's folds. Raises ExploreError where no design is feasible, as
     `explore` does else.
     """
@@ -82,12 +90,12 @@ def optimise(
         if k == rounds or finer == found.space:
             break
         asked = replace(asked, space=finer)
-    place = found.space.rows(0, found.space.count).index(best)
+    best, row = _at_borders(asked, best, _row(found, best), goal, folder, engine, request.space)
     given = request.space.axes
     return Optimum(
         goal,
         {a.path: v for a, v in zip(given, best, strict=True)},
-        {n: column[place] for n, column in found.columns.items()},
+        row,
         _neighbours(asked, best, goal, folder, engine, request.space),
         tuple(a.path for a, v in zip(given, best, strict=True) if _ended(a, v)),
         designs,
@@ -106,6 +114,42 @@ def _best(found: Exploration, goal: Goal) -> tuple[Value, ...]:
         )
     column = found.columns[goal.column]
     return found.space.row(min(rows, key=lambda k: (column[k], k)))
+
+
+def _row(found: Exploration, design: tuple[Value, ...]) -> dict[str, Any]:
+    place = found.space.rows(0, found.space.count).index(design)
+    return {n: column[place] for n, column in found.columns.items()}
+
+
+def _at_borders(
+    request: Request,
+    best: tuple[Value, ...],
+    row: dict[str, Any],
+    goal: Goal,
+    folder: Path,
+    engine: Engine,
+    given: Space,
+) -> tuple[tuple[Value, ...], dict[str, Any]]:
+    """The best design moved along each field up to the rule that ends it, where that is better.
+
+    Finer steps only come near a border: the thinnest gel allowed lies between two of them.
+    """
+    for k, axis in enumerate(given.axes):
+        if not _real(given.spec, axis):
+            continue
+        for j, beyond in enumerate(_beside(axis, best[k])):
+            values = {a.path: v for a, v in zip(given.axes, best, strict=True)}
+            last = border(given.spec, values, axis.path, beyond)
+            if last is None or last.value == best[k]:
+                continue
+            moved = (*best[:k], last.value, *best[k + 1 :])
+            axes = tuple(Axis(a.path, (v,)) for a, v in zip(given.axes, moved, strict=True))
+            asked = replace(request, space=Space(given.spec, axes))
+            tried = explore(asked, folder / f"border-{k}-{j}", engine)
+            here = tried.columns[goal.column][0]
+            if tried.rows_where("feasible") and here < row[goal.column]:
+                best, row = moved, _row(tried, moved)
+    return best, row
 
 
 def _real(spec: Spec, axis: Axis) -> bool:
@@ -158,7 +202,13 @@ def _neighbours(
         tried = explore(asked, folder / f"beside-{k}", engine)
         for i, value in enumerate(others):
             cells = (tried.columns[n][i] for n in ("status", "binding", goal.column))
-            found.append(Neighbour(axis.path, value, *cells))
+            beside = Neighbour(axis.path, value, *cells)
+            values = {a.path: v for a, v in zip(given.axes, best, strict=True)}
+            if _real(given.spec, axis):
+                last = border(given.spec, values, axis.path, value)
+                if last is not None:
+                    beside = replace(beside, holds_to=last.value, stops=last.stops)
+            found.append(beside)
     return tuple(found)
 
 

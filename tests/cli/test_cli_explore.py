@@ -90,6 +90,9 @@ def test_optimise_saves_a_spec_that_checks(
     assert "least finger thickness" in shown
     assert "design.gel.length_mm: 16, an end of its range" in shown
     assert "Thickness" in shown
+    price = shown.split("what it costs")[1]
+    assert "finger thickness 17.79 mm" in price
+    assert "gel length × width 400 mm² 320 mm² -20.0 % worse" in price
     assert main(["check", str(best)]) == 0
     capsys.readouterr()
     assert main(["optimise", str(MINI20), "--vary", "gel.length_mm=60", "-o", "y"]) == 1

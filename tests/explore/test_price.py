@@ -124,3 +124,13 @@ def test_the_answer_in_words_and_for_programs(capsys: pytest.CaptureFixture[str]
     assert "No field alone makes it 9 mm thick" in capsys.readouterr().out
     assert main(["thinner", str(MINI20), "--to", "20"]) == 2
     assert "no more than 20 mm" in capsys.readouterr().err
+
+
+def test_diff_tells_the_price(capsys: pytest.CaptureFixture[str]) -> None:
+    thin = str(ROOT / "designs" / "thin.yaml")
+    assert main(["diff", str(MINI20), thin, "--no-parts"]) == 0
+    table = capsys.readouterr().out.split("what it costs")[1]
+    line = next(x for x in table.splitlines() if x.startswith("keystone"))
+    assert line.split() == ["keystone", "1.27", "1.59", "+25.2", "%", "worse"]
+    assert main(["diff", str(MINI20), thin, "--no-parts", "--no-price"]) == 0
+    assert "what it costs" not in capsys.readouterr().out
