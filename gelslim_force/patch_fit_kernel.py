@@ -50,26 +50,18 @@ def settle(
     scale = np.array([1.0, 0.2 if strip else 1.0, 1.0, 2.0])
     basis = np.empty((len(x), GAINS))
     tried, trial = np.empty_like(residual), theta.copy()
-    cost = _residual(x, y, lean, change, theta, strip, curvature, blur, basis, residual)
+    bins, shape = (x, y, lean, change), (strip, curvature, blur)
+    cost = _residual(bins, shape, theta, basis, residual)
     damping, far, fresh, settled = 1e-3, True, False, False
     for _ in range(steps):
         if far:
-            _differences(x, y, lean, change, theta, strip, curvature, blur, scale, basis,
-                         residual, tried, jacobian)  # fmt: skip
+            _differences(bins, shape, theta, scale, basis, residual, tried, jacobian)
             fresh = True
         normal, gradient = _normal(jacobian, residual)
         improved = False
         for _ in range(TRIES):
-            move = _damped(normal, gradient, damping, False)
-            # At a bound of the decay the others move without it, or its cut step spoils theirs.
-            if (theta[3] >= MOST_DECAY and move[3] > 0) or (theta[3] <= 0 and move[3] < 0):
-                move = _damped(normal, gradient, damping, True)
-            for k in range(4):
-                most = 0.4 * theta[2] * scale[k]
-                trial[k] = theta[k] + min(max(move[k], -most), most)
-            trial[2] = max(trial[2], 0.3 * theta[2])
-            trial[3] = min(max(trial[3], 0.0), MOST_DECAY)
-            new = _residual(x, y, lean, change, trial, strip, curvature, blur, basis, tried)
+            move = _bounded_step(normal, gradient, damping, theta, scale, trial)
+            new = _residual(bins, shape, trial, basis, tried)
             if new <= cost:
                 improved = True
                 break
@@ -79,8 +71,7 @@ def settle(
         if not improved:
             if fresh:
                 break
-            _differences(x, y, lean, change, theta, strip, curvature, blur, scale, basis,
-                         residual, tried, jacobian)  # fmt: skip
+            _differences(bins, shape, theta, scale, basis, residual, tried, jacobian)
             fresh = True
             continue
         gained, largest = cost - new, 0.0
@@ -115,23 +106,33 @@ def squares_left(
 ) -> Any:
     """Squares that a trial of `theta` (4,) leaves; arguments as for `settle`."""
     basis = np.empty((len(x), GAINS))
-    return _residual(x, y, lean, change, theta, strip, curvature, blur, basis, residual)
+    return _residual((x, y, lean, change), (strip, curvature, blur), theta, basis, residual)
 
 
 @njit(**COMPILED)
-def _residual(
-    x: Any,
-    y: Any,
-    lean: Any,
-    change: Any,
-    theta: Any,
-    strip: Any,
-    curvature: Any,
-    blur: Any,
-    basis: Any,
-    out: Any,
+def _bounded_step(
+    normal: Any, gradient: Any, damping: Any, theta: Any, scale: Any, trial: Any
 ) -> Any:
-    """Write what the best gains leave of the change to `out` (n, c); returns its squares."""
+    """Write `theta` moved within bounds to `trial`; returns the move before they cut it."""
+    move = _damped(normal, gradient, damping, False)
+    # At a bound of the decay the others move without it, or its cut step spoils theirs.
+    if (theta[3] >= MOST_DECAY and move[3] > 0) or (theta[3] <= 0 and move[3] < 0):
+        move = _damped(normal, gradient, damping, True)
+    for k in range(4):
+        most = 0.4 * theta[2] * scale[k]
+        trial[k] = theta[k] + min(max(move[k], -most), most)
+    trial[2] = max(trial[2], 0.3 * theta[2])
+    trial[3] = min(max(trial[3], 0.0), MOST_DECAY)
+    return move
+
+
+@njit(**COMPILED)
+def _residual(bins: Any, shape: Any, theta: Any, basis: Any, out: Any) -> Any:
+    """Write what the best gains leave of the change to `out` (n, c); returns its squares.
+
+    `bins` are x, y, lean and change, `shape` strip, curvature and blur, as for `settle`.
+    """
+    (x, y, lean, change), (strip, curvature, blur) = bins, shape
     count, layers = change.shape
     at = theta.copy()
     at[2] = max(at[2], 1e-3)
@@ -162,28 +163,24 @@ def _residual(
 
 @njit(**COMPILED)
 def _differences(
-    x: Any,
-    y: Any,
-    lean: Any,
-    change: Any,
+    bins: Any,
+    shape: Any,
     theta: Any,
-    strip: Any,
-    curvature: Any,
-    blur: Any,
     scale: Any,
     basis: Any,
     residual: Any,
     ahead: Any,
     jacobian: Any,
 ) -> None:
+    """Write the derivative of `residual` by each value to `jacobian`; `ahead` is scratch."""
     moved = theta.copy()
-    layers = change.shape[1]
+    count, layers = residual.shape
     for k in range(4):
         small = 1e-3 * scale[k] * max(theta[2], 0.1)
         moved[k] = theta[k] + small
-        _residual(x, y, lean, change, moved, strip, curvature, blur, basis, ahead)
+        _residual(bins, shape, moved, basis, ahead)
         moved[k] = theta[k]
-        for n in range(len(x)):
+        for n in range(count):
             for c in range(layers):
                 jacobian[n * layers + c, k] = (ahead[n, c] - residual[n, c]) / small
 
