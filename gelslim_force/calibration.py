@@ -24,6 +24,7 @@ from gelslim_force.residual_bump import ResidualField, split_residuals
 from gelslim_force.sensor_calibration import SensorCalibration, expected_dots
 from gelslim_optics.back_projection import pixel_slopes
 from gelslim_optics.camera_rays import points_along
+from ifem_export.single_thread import single_threaded
 
 if TYPE_CHECKING:
     from gelslim_optics.virtual_camera import VirtualCamera
@@ -35,6 +36,7 @@ _TOUCHED_PITCHES = 4.5
 """Around a contact, dots within this are not fitted by."""
 
 
+@single_threaded
 def calibrate(
     bundle: Bundle,
     image: NDArray[np.uint8],

@@ -24,7 +24,6 @@ from gelslim_force.marker_noise import noise_px
 from gelslim_force.normal_source import NormalSource
 from gelslim_force.pipeline_settings import PipelineSettings
 from gelslim_force.sensor_calibration import SensorCalibration
-from gelslim_force.single_thread import single_threaded
 from gelslim_force.surface_motion import SurfaceMotion
 from gelslim_force.tracker import TrackedFrame
 from gelslim_force.tracks import MarkerStatus
@@ -32,6 +31,7 @@ from gelslim_force.wrench_noise import WrenchNoise
 from ifem_export.bundle import Bundle
 from ifem_export.errors import IfemError
 from ifem_export.marker_interpolation import FilledInterpolation
+from ifem_export.single_thread import single_threaded
 
 Array = NDArray[np.float64]
 _SHIFT_MM = 0.03
@@ -60,6 +60,7 @@ class ForcePipeline:
         ValueError: the calibration belongs to another bundle.
     """
 
+    @single_threaded
     def __init__(
         self,
         bundle: Bundle,
@@ -80,7 +81,7 @@ class ForcePipeline:
         operator = self.settings.operator(bundle)
         law = FiniteStrainForce(bundle) if self.settings.gel == "neo_hookean" else None
         self._fitter = ForceEstimator(
-            bundle.mesh, self.settings.compliance(bundle), self.settings.force
+            bundle.mesh, self.settings.compliance(bundle), self.settings.force, law
         )
         self._wrench = WrenchNoise.of(operator, points_mm)
         self._motion = SurfaceMotion(

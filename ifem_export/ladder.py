@@ -20,6 +20,7 @@ from ifem_export.errors import MeshError
 from ifem_export.material import Material
 from ifem_export.operator_ladder import MeasuredRung, OperatorLadder, operator_label
 from ifem_export.pad_mesh import PadMesh
+from ifem_export.single_thread import single_threaded
 from ifem_export.surface_operator import CROWNED_RUNGS, Rung, SurfaceOperator, surface_operator
 
 Array = NDArray[np.float64]
@@ -47,6 +48,7 @@ CHOICES: tuple[Choice, ...] = (
 DENSE: tuple[Choice, ...] = (("dense32", {}),)
 
 
+@single_threaded
 def measure_ladder(
     mesh: PadMesh,
     material: Material,

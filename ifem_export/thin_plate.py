@@ -19,6 +19,7 @@ from scipy import linalg, special
 from scipy.spatial.distance import cdist
 
 from ifem_export.errors import InterpolationError
+from ifem_export.single_thread import single_threaded
 
 Array = NDArray[np.float64]
 MOST_MARKERS = 4000
@@ -40,6 +41,7 @@ class ThinPlate:
     bending: Array
 
 
+@single_threaded
 def thin_plate(markers_mm: Array, nodes_mm: Array, smoothing_mm2: float = 0.0) -> ThinPlate:
     """Thin-plate spline operator.
 

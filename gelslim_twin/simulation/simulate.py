@@ -35,6 +35,7 @@ from gelslim_twin.simulation.run_folder import (
 from gelslim_twin.simulation.state_store import StateStore
 from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
 from gelslim_twin.simulation.twin_sensor import TwinSensor
+from ifem_export.single_thread import single_threaded
 from whole_files.beside import beside
 from whole_files.file_lock import locked
 
@@ -102,6 +103,7 @@ class Ledger:
         }
 
 
+@single_threaded
 def simulate(
     job: SimulationJob,
     folder: Path,

@@ -34,6 +34,7 @@ from gelslim_twin.validation.score import Score, score, summary
 from gelslim_twin.validation.truth_gel import TruthGel
 from gelslim_twin.validation.validation import Sample, Validation
 from ifem_export.interpolation import marker_to_node
+from ifem_export.single_thread import single_threaded
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -114,6 +115,7 @@ class Bench:
         return replace(source, cap_only=True) if cap_only else source
 
 
+@single_threaded
 def validate(
     sensor: TwinSensor,
     folder: Path | None = None,

@@ -1,17 +1,26 @@
-"""What is solved does not depend on what was asked before, to the last bit."""
+"""What is solved depends neither on what was asked before nor on the threads, to the last bit."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "twin"))
+sys.path.extend([str(Path(__file__).parents[1] / area) for area in ("twin", "force")])
+from camera_rig import finger_view
+from sensor_samples import sensor_bundle, sensor_grid
 from sim_rig import small_sensor
+from synthetic import Look, render
 
+from gelslim_force.calibration import calibrate
+from gelslim_force.force_pipeline import ForcePipeline
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from ifem_export.bundle_io import load_bundle
+from ifem_export.thin_plate import thin_plate
 
 
 def test_columns_of_the_compliance_are_the_same_in_whatever_order(tmp_path: Path) -> None:
@@ -29,3 +38,44 @@ def test_columns_of_the_compliance_are_the_same_in_whatever_order(tmp_path: Path
         some.require(np.array([0, 57]))
         found = [[some.displacement(np.array([k]), e[None]) for e in np.eye(3)] for k in (0, 57)]
         assert np.array_equal(np.array(found), full)
+
+
+def of_threads(made: Callable[[], list[NDArray[np.float64]]]) -> list[list[bytes]]:
+    """The bytes of what is made with one BLAS thread and with two."""
+    found = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            found.append([np.asarray(array).tobytes() for array in made()])
+    return found
+
+
+def test_a_spline_is_the_same_whatever_the_threads() -> None:
+    """Two threads gave other bits: the bundle's files depended on the processors."""
+    random = np.random.default_rng(3)
+    markers, nodes = random.uniform(0, 20, (300, 2)), random.uniform(0, 20, (900, 2))
+
+    def spline() -> list[NDArray[np.float64]]:
+        made = thin_plate(markers, nodes)
+        return [made.to_nodes, made.bending]
+
+    one, two = of_threads(spline)
+    assert one == two
+
+
+def test_calibration_and_forces_are_the_same_whatever_the_threads() -> None:
+    """The fit of the camera made 1e-6 px of the last bits."""
+    bundle, dots = sensor_bundle(), np.asarray(sensor_grid().positions_mm)
+    rest = render(sensor_grid(), finger_view(), Look(noise=2.0))
+    push = 0.1 * np.exp(-np.sum(dots**2, axis=1) / 18)[:, None] * [1.0, -0.5, 0.0]
+    pushed = render(sensor_grid(), finger_view(), Look(noise=2.0), push)
+
+    def found() -> list[NDArray[np.float64]]:
+        calibration = calibrate(bundle, rest.image)
+        result = ForcePipeline(bundle, calibration).process(pushed.image)
+        assert result.field is not None
+        assert np.abs(result.field.force_n[:, :2]).max() > 0
+        camera = calibration.camera
+        return [camera.position_mm, camera.forward, result.field.force_n, result.wrench.covariance]
+
+    one, two = of_threads(found)
+    assert one == two

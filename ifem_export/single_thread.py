@@ -1,4 +1,9 @@
-"""One thread for linear algebra within a frame: waking others costs more than it saves."""
+"""One thread for linear algebra: sums do not depend on how many there are, nor wait for each other.
+
+BLAS splits sums by its threads, so their last bits differ with the number of processors; where a
+fit or a covariance is made of them, more than the last bits. Within a frame, waking other threads
+costs more than it saves.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ from collections.abc import Callable
 from functools import cache, wraps
 from typing import Any, TypeVar
 
+import scipy.linalg  # noqa: F401  (brings its own BLAS, which has to be there to be held)
 from threadpoolctl import ThreadpoolController
 
 Wrapped = TypeVar("Wrapped", bound=Callable[..., Any])
