@@ -116,8 +116,8 @@ def light_notes(record: bytes) -> tuple[Note, ...]:
     """Certificate, comparison and exposure from a build's light.json."""
     light = json.loads(record)
     certificate = " ".join(light["certificate"]["sentences"])
-    compared = " ".join(f"The guide is {c['sentence']}." for c in light["comparisons"])
-    exposed = " ".join(f"{e['sentence']}." for e in light["exposures"])
+    compared = "\n".join(f"The guide is {c['sentence']}." for c in light["comparisons"])
+    exposed = "\n".join(f"{e['sentence']}." for e in light["exposures"])
     return (
         Note("Total internal reflection", certificate),
         Note("Brightness", compared),

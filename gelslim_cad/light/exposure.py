@@ -27,10 +27,10 @@ class Exposure:
 
     def sentence(self) -> str:
         """In words."""
-        why = "readout sets it" if self.limit == "readout" else "light sets it"
+        what = "the camera's readout" if self.limit == "readout" else "the light"
         return (
-            f"{self.colour}: {self.exposure_ms:.2f} ms of exposure fill half the well, "
-            f"{self.frame_rate_hz:.0f} frames per second, {why}"
+            f"{self.colour.capitalize()}: an exposure of {self.exposure_ms:.2f} ms fills half of a "
+            f"pixel's well; {what} limits the rate to {self.frame_rate_hz:.0f} frames per second"
         )
 
 

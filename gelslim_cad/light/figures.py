@@ -56,7 +56,8 @@ def irradiance_png(d: Lookup, study: LightStudy) -> bytes:
         figure.colorbar(shown, ax=panel, shrink=0.8, label="over its mean")
         panel.set_title(f"{colour} on the coat", fontsize=10)
         panel.set_xlabel("y, mm")
-        panel.set_ylabel("x, mm")
+        if panel is axes[0]:
+            panel.set_ylabel("x, mm")
         across = bins.mean(axis=0) / bins.mean()
         places = (np.arange(len(across)) + 0.5) / len(across) * 2 * half_y - half_y
         axes[2].plot(places, across, color=RAY_COLOURS[colour], label=colour)
