@@ -103,14 +103,19 @@ def _campaign(tmp_path: Path, *arguments: str) -> dict[str, Any]:
     return counted
 
 
-def test_small_campaign(tmp_path: Path) -> None:
-    counted = _campaign(tmp_path, "--count", "10")
-    assert counted["specs"] == 10
+@pytest.mark.parametrize(
+    ("first", "count", "built"), [(3, 3, 1), pytest.param(0, 10, 3, marks=pytest.mark.slow)]
+)
+def test_small_campaign(tmp_path: Path, first: int, count: int, built: int) -> None:
+    """The three of the short one hold one that is built and two that are refused."""
+    counted = _campaign(tmp_path, "--first", str(first), "--count", str(count))
+    assert counted["specs"] == count
     assert counted["failed"] == counted["refused_on_the_solids"] == 0, campaign.shown(counted)
-    assert counted["built_and_proved"] >= 3
-    assert counted["built_and_proved"] + counted["refused_with_a_reason"] == 10
+    assert counted["built_and_proved"] >= built
+    assert counted["built_and_proved"] + counted["refused_with_a_reason"] == count
 
 
-def test_many_specs_meet_the_rules(tmp_path: Path) -> None:
-    counted = _campaign(tmp_path, "--count", "60", "--first", "100", "--stage", "rules")
+@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
+def test_many_specs_meet_the_rules(tmp_path: Path, count: int) -> None:
+    counted = _campaign(tmp_path, "--count", str(count), "--first", "100", "--stage", "rules")
     assert counted["failed"] == 0, campaign.shown(counted)
