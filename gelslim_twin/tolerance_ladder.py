@@ -19,8 +19,9 @@ from gelslim_twin.effects.effect import unit_of
 from gelslim_twin.plan import Plan
 from gelslim_twin.planner import Question, make_plan
 
-LEVELS = (1e-9, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
-"""The first asks every effect for its finest rung."""
+LEVELS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
+FINER = (1e-9, 1e-4, 2e-4, 5e-4)
+"""Only where an error is asked for; the first asks every effect for its finest rung."""
 FITTED_RADII = (0.7, 3.0)
 """Radius of the contact over the gel's thickness for which the force of a contact was fitted."""
 GEL, LARGE_STRAIN, PICTURE = "gel", "large strain", "picture"
@@ -68,7 +69,7 @@ def tolerance_ladder(
     Raises BudgetError where nothing touches the gel, PlanError as `make_plan`.
     """
     tolerances, rungs = dict[str, Tolerance](), []
-    for level in sorted({*LEVELS, *([error] if error is not None else [])}):
+    for level in sorted({*LEVELS, *((*FINER, error) if error is not None else ())}):
         allowed = tolerance_at(question, level)
         plan = make_plan(replace(question, force_n=allowed.force_n, image_px=allowed.image_px))
         name = f"tolerance of {shown_share(level)}"

@@ -20,6 +20,7 @@ from gelslim_cad.light.ray_ladder import (
     SEEDS,
     TRACED,
     RayErrors,
+    _rising,
     half_widths,
     measure_errors,
     rays_of,
@@ -93,6 +94,10 @@ def test_times_go_on_with_the_rays(errors: RayErrors) -> None:
     times = {rung_name(r): 1e-2 * r for r in TRACED}
     for rung in errors.ladder(times).rungs:
         assert rung.time_ms == pytest.approx(1e-2 * rung.work)
+
+
+def test_fewer_rays_never_count_as_slower() -> None:
+    assert _rising({"a": 9.0, "b": 2.0, "c": 3.0}) == {"a": 2.0, "b": 2.0, "c": 3.0}
 
 
 def light(capsys: pytest.CaptureFixture[str], *more: str) -> tuple[dict, str]:

@@ -83,6 +83,13 @@ def test_a_time_takes_the_most_exact_within_it() -> None:
         choose_tolerance(asked, Budget(1e-4, 1.0))
 
 
+def test_a_long_time_asks_for_no_tolerance_that_nothing_keeps() -> None:
+    asked = question(next(read_scene(p) for p in GALLERY if p.stem == "press_sphere"), SENSOR)
+    _, allowed = choose_tolerance(asked, Budget(time="1min"))
+    plan = make_plan(replace(asked, force_n=allowed.force_n, image_px=allowed.image_px))
+    assert plan.over_tolerance == ()
+
+
 def test_an_effect_switched_off_is_not_held_against_the_plan() -> None:
     asked = question(next(read_scene(p) for p in GALLERY if p.stem == "shear_sphere"), SENSOR)
     choice, allowed = choose_tolerance(asked, Budget(0.01))
