@@ -270,7 +270,7 @@ def test_scratch_of_killed_processes_goes(tmp_path: Path, monkeypatch: pytest.Mo
     with scratch_folder() as folder:
         assert {p.name for p in tmp_path.glob("*/big")} == {"big"}
         assert len(list(tmp_path.glob("*/big"))) == 1
-        assert folder.is_dir()
+        assert folder.stat().st_mode & 0o777 == 0o700  # nobody else's to look at
     living.communicate("go\n")
     assert [p.name for p in tmp_path.iterdir()] == ["gelslim-notours"]
 

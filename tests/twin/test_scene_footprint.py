@@ -16,6 +16,7 @@ from scipy.sparse.linalg import spsolve
 from gelslim_twin.effects.touch import Footprint, nonlinear_excess, touch
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.indenter import Indenter
+from gelslim_twin.scene.reach import shape_reach_mm, tool_reach_mm
 from gelslim_twin.scene.stl_extent import footprint_mm, stl_corners
 from ifem_export.material import Material
 from ifem_export.outline import RoundedRectangle
@@ -85,6 +86,16 @@ def test_area_and_volume_are_those_of_the_shape(indenter, height, depth):
     area, volume = overlap(height, depth)
     assert footprint.area_mm2(depth) == pytest.approx(area, rel=0.03)
     assert footprint.volume_mm3(depth) == pytest.approx(volume, rel=0.01)
+
+
+@pytest.mark.parametrize(("indenter", "height"), CASES, ids=lambda v: getattr(v, "shape", ""))
+@pytest.mark.parametrize("depth", [0.05, 0.3, 1.0])
+def test_reach_is_the_farthest_place_below_the_surface(indenter, height, depth):
+    farthest = R[height < depth].max()
+    assert shape_reach_mm(indenter, HERE, depth) == pytest.approx(farthest, abs=3 * STEP)
+    high = indenter.model_copy(update={"raised_mm": 0.2, "x_mm": 3.0, "y_mm": 4.0})
+    assert tool_reach_mm([high], HERE, 0.2) == 0.0
+    assert tool_reach_mm([high], HERE, depth + 0.2) == pytest.approx(5.0 + farthest, abs=3 * STEP)
 
 
 @pytest.mark.parametrize(("indenter", "height"), CASES, ids=lambda v: getattr(v, "shape", ""))
