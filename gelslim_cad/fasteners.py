@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+SCREW_EDGE_MM = 2.6
+"""From a side wall's inside to the axis of the screws beside it."""
+
 
 @dataclass(frozen=True)
 class ScrewSize:

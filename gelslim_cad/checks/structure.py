@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
-from gelslim_cad.fasteners import LENGTHS_MM, SCREWS
+from gelslim_cad.fasteners import LENGTHS_MM, SCREW_EDGE_MM, SCREWS
 
 THINNEST_WALL_MM = {
     "sla": (0.6, "thinner cured resin warps on its supports and cracks when a screw is driven"),
@@ -16,7 +16,6 @@ THINNEST_WALL_MM = {
 }
 """Thinnest wall per process, and why. Starting values for a careful shop."""
 SMALLEST_GAP_MM = {"sla": 0.1, "fdm": 0.15, "sls": 0.15}
-SCREW_EDGE_MM = 2.6
 
 
 @rule(

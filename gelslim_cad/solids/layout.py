@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.housing import BEAM_MM
-from gelslim_cad.fasteners import SCREWS, ScrewSize, stock_length_mm
+from gelslim_cad.fasteners import SCREW_EDGE_MM, SCREWS, ScrewSize, stock_length_mm
 
-SCREW_EDGE_MM = 2.6
 SEAT_RECESS_SHARE = 0.4
 SEAT_RECESS_MM = 0.5
 
