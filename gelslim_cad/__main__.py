@@ -29,9 +29,9 @@ def main() -> int:
 
 
 def run(command: Callable[..., int]) -> int:
-    """Run a command line, which is to call what it is given as `loaded` before its work begins."""
+    """Run a command line, which is to call what it is given as `begun` as its work begins."""
     try:
-        status = command(loaded=_ending.begin)
+        status = command(begun=_ending.begin)
         if status <= 128:
             return _ending.end(status)
     except KeyboardInterrupt as error:

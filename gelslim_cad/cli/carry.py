@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from contextvars import ContextVar
 from typing import ParamSpec
 
 P = ParamSpec("P")
+beginning: ContextVar[Callable[[], None]] = ContextVar("beginning")
+"""Called as a command begins: typer, which has read the words by then, ends without a word at
+Ctrl-C."""
 
 
 class CarriedError(Exception):
@@ -23,8 +27,13 @@ def carried(command: Callable[P, int]) -> Callable[P, int]:
     @functools.wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> int:
         try:
+            beginning.get(_nothing)()
             return command(*args, **kwargs)
         except BaseException as error:
             raise CarriedError(error) from error
 
     return run
+
+
+def _nothing() -> None:
+    """Nobody asked."""

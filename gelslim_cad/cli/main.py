@@ -9,16 +9,16 @@ from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 
 
-def main(argv: Sequence[str] | None = None, loaded: Callable[[], None] = lambda: None) -> int:
+def main(argv: Sequence[str] | None = None, begun: Callable[[], None] = lambda: None) -> int:
     """Run `gelslim` with `argv` (default: the process's) and return its exit status.
 
     0: done. 1: a design rule fails. 2: bad input. 3: a fault of gelslim itself. As shells have it,
     130 after an interrupt, 141 when the reader of a pipe has gone and 143 after SIGTERM.
-    `loaded` is called once the command line is imported and before a command begins.
+    `begun` is called as a command begins; until then there is nothing to clear away.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        return _run(arguments, loaded)
+        return _run(arguments, begun)
     except SystemExit as ended:
         # Only shell completion ends this way: it has printed its answer.
         return ended.code if isinstance(ended.code, int) else 0
@@ -26,14 +26,18 @@ def main(argv: Sequence[str] | None = None, loaded: Callable[[], None] = lambda:
         return _failed(raised, as_json="--json" in arguments)
 
 
-def _run(arguments: list[str], loaded: Callable[[], None]) -> int:
+def _run(arguments: list[str], begun: Callable[[], None]) -> int:
     _open_streams()
     # Loaded here, so that an interrupt meanwhile is caught too.
     from gelslim_cad.cli.app import app
+    from gelslim_cad.cli.carry import beginning
+    from gelslim_cad.cli.status import INTERRUPTED
 
-    loaded()
-
+    beginning.set(begun)
     status = app(args=arguments, prog_name="gelslim", standalone_mode=False)
+    if status == INTERRUPTED:
+        # It fell into typer, which turns it into a status.
+        raise KeyboardInterrupt
     sys.stdout.flush()
     return int(status or 0)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from gelslim_cad.__main__ import run
 
 
-def main(loaded: Callable[[], None]) -> int:
+def main(begun: Callable[[], None]) -> int:
     """The command line, its experiment cut short before it begins."""
     from gelslim_cad.cli import main as command
     from gelslim_twin.validation import experiment, truth_gel
@@ -18,7 +18,7 @@ def main(loaded: Callable[[], None]) -> int:
     validation.other_contacts = lambda *size: ()  # type: ignore[assignment]
     truth_gel.truth_pad = lambda bundle: bundle  # type: ignore[assignment]
     validation.error_budget = lambda *states: ()  # type: ignore[assignment]
-    return command(loaded=loaded)
+    return command(begun=begun)
 
 
 if __name__ == "__main__":

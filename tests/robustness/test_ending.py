@@ -30,9 +30,9 @@ def interrupt(times=1):
 def work():
     {work}
 
-def command(loaded):
+def command(begun):
     from gelslim_cad.cli.failure import explain_failure
-    loaded()
+    begun()
     try:
         work()
     except BaseException as error:
@@ -69,6 +69,20 @@ def test_a_signal_during_imports_is_one_line(
     assert run.was_one_line()
     leaves_nothing(run, tmp_path / "tmp", tmp_path)
     assert not (tmp_path / "schema.json").exists()
+
+
+@pytest.mark.parametrize("words", ["check nowhere.yaml", "--help", "schema"])
+def test_one_amidst_the_reading_of_words_is_one_line(words: str, tmp_path: Path) -> None:
+    """typer ends at Ctrl-C without a word."""
+    work = f"""
+import typer
+from gelslim_cad.cli.main import main
+real = typer.main.TyperGroup.parse_args
+typer.main.TyperGroup.parse_args = lambda *a: (interrupt(), real(*a))[1]
+os._exit(main({words.split()!r}))
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
 
 
 def test_the_installed_command_is_guarded_as_the_module_is() -> None:
