@@ -23,6 +23,8 @@ PALETTE = (
     "#a6761d", "#666666", "#e7969c", "#17becf",
 )  # fmt: skip
 """Colours of what binds; green is kept for feasible cells."""
+LEAST_ROOM = 0.05
+"""Room above and below in a Pareto plot, as a part of the value."""
 MOST_TICKS = 9
 MOST_PANELS = 9
 
@@ -79,10 +81,13 @@ def _trade(panel: Axes, found: Exploration, goal: Goal) -> None:
 
 
 def _focus(panel: Axes, x: list[float], y: list[float]) -> None:
-    """Show the feasible designs large: infeasible ones may lie anywhere."""
-    for values, limit in ((x, panel.set_xlim), (y, panel.set_ylim)):
+    """Show the feasible designs large: infeasible ones may lie anywhere.
+
+    Values that differ less than the limit they all lie at stay a line: its scatter is the solver's.
+    """
+    for values, limit, least in ((x, panel.set_xlim, 0.0), (y, panel.set_ylim, LEAST_ROOM)):
         low, high = min(values), max(values)
-        room = 0.25 * (high - low) or 0.1 * abs(high) or 1.0
+        room = max(0.25 * (high - low), least * abs(high)) or 0.1 * abs(high) or 1.0
         limit(low - room, high + room)
 
 
@@ -114,7 +119,10 @@ def feasibility_png(found: Exploration) -> bytes:
         if panels_over is not None:
             label = panels_over.path.removeprefix("design.")
             panel.set_title(f"{label} = {shown(panels_over.values[k])}", fontsize=9)
-    marks = [Patch(color="#2e9e5b", label="feasible")]
+    if len(axes) > len(cells.shape):
+        others = ", ".join(a.path.removeprefix("design.") for a in axes[cells.ndim :])
+        figure.suptitle(f"feasible for at least one value of {others}", fontsize=10)
+    marks: list[Any] = [Patch(color="#2e9e5b", label="feasible, within the black line")]
     marks += [Patch(color=colours[n], label=_told(n)) for n in names]
     legend_below(figure, marks, "feasible, or what binds")
     return as_png(figure)
@@ -169,6 +177,8 @@ def _map(panel: Axes, cells: Any, axes: tuple[Axis, ...], colours: dict[str, str
         [[to_rgb(colours[n] if n else "#2e9e5b") for n in column] for column in cells.T]
     )
     panel.imshow(image, origin="lower", aspect="auto", interpolation="nearest")
+    for ends in borders(cells == ""):
+        panel.plot(*ends, color="black", lw=1.6, solid_capstyle="projecting")
     first, second = axes[0], axes[1] if len(axes) > 1 else None
     _ticks(panel.set_xticks, first)
     panel.set_xlabel(first.path.removeprefix("design."))
@@ -177,6 +187,17 @@ def _map(panel: Axes, cells: Any, axes: tuple[Axis, ...], colours: dict[str, str
     else:
         _ticks(panel.set_yticks, second)
         panel.set_ylabel(second.path.removeprefix("design."))
+
+
+def borders(feasible: Any) -> list[tuple[list[float], list[float]]]:
+    """Edges between feasible cells (columns, rows) and others, as ends in x and in y: for eyes that
+    do not tell the colours apart."""
+    found = [
+        ([k + 0.5, k + 0.5], [j - 0.5, j + 0.5])
+        for k, j in np.argwhere(feasible[1:] != feasible[:-1])
+    ]
+    across = np.argwhere(feasible[:, 1:] != feasible[:, :-1])
+    return found + [([k - 0.5, k + 0.5], [j + 0.5, j + 0.5]) for k, j in across]
 
 
 def _ticks(put: Any, axis: Axis) -> None:
