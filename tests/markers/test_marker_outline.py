@@ -68,3 +68,13 @@ def test_bad_outlines_are_refused(points, message):
 def test_too_large_a_radius_is_refused():
     with pytest.raises(ValueError, match="half the shorter side, 3 mm"):
         Outline.rounded_rectangle(10, 6, 3.1)
+
+
+@pytest.mark.parametrize("tolerance_mm", [0.2, 0.02, 0.002])
+def test_chords_keep_within_the_tolerance_and_are_no_finer_than_it_asks(tolerance_mm):
+    flat = Outline.rounded_rectangle(20, 16, 3).flattened(tolerance_mm)
+    middle = (flat + np.roll(flat, -1, axis=0)) / 2
+    from_centre = np.abs(middle) - [7, 5]
+    rounded = (from_centre > 1e-9).all(axis=1)
+    sagitta = 3 - np.hypot(*from_centre[rounded].T)
+    assert 0.4 * tolerance_mm < sagitta.max() <= tolerance_mm * (1 + 1e-9)
