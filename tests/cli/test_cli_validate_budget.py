@@ -34,7 +34,8 @@ def test_the_operator_of_the_budget_is_what_our_chains_start_with(
     def caught(sensor: TwinSensor, *more: object) -> SimpleNamespace:
         given.append(sensor)
         budgets.append(more[-1])
-        return SimpleNamespace(to_record=lambda: {"markers": len(sensor.grid)})
+        record = {"format": "gelslim-validation/1", "markers": len(sensor.grid)}
+        return SimpleNamespace(to_record=lambda: record)
 
     monkeypatch.setattr(validation, "validate", caught)
     out = ("-o", str(tmp_path / "v"), "--no-pictures", "--json")
