@@ -122,7 +122,7 @@ def _record(found: Exploration) -> dict[str, object]:
     fronts = {}
     for goal in (g for g in TRADES if g.column in found.columns):
         x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
-        fronts[goal.column] = [rows[k] for k in front(x, y, larger=goal.larger)]
+        fronts[goal.column] = [rows[k] for k in front(x, goal.costs(y))]
     return {
         "format": "gelslim-explore/1",
         "name": found.space.spec.name,
@@ -176,7 +176,7 @@ def _report(found: Exploration) -> None:
     table.add_column("with")
     for goal in (THICKNESS, *(g for g in TRADES if g.column in found.columns)):
         x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
-        best = rows[front(y, x)[0]] if not goal.larger else rows[front([-v for v in y], x)[0]]
+        best = rows[front(goal.costs(y), x)[0]]
         chosen = (
             f"{a.path.removeprefix('design.')} {shown(found.columns[a.path][best])}"
             for a in found.space.axes

@@ -64,7 +64,7 @@ def _trade(panel: Axes, found: Exploration, goal: Goal) -> None:
             bar.set_label(axis.path.removeprefix("design."), fontsize=8)
     rows = [k for k in found.rows_where("feasible") if y[k] is not None]
     if rows:
-        best = front([x[k] for k in rows], [y[k] for k in rows], larger=goal.larger)
+        best = front([x[k] for k in rows], goal.costs([y[k] for k in rows]))
         line = [rows[k] for k in best]
         panel.plot(
             [x[k] for k in line], [y[k] for k in line], "o-", color=FRONT, ms=4, mfc="none",
@@ -76,7 +76,7 @@ def _trade(panel: Axes, found: Exploration, goal: Goal) -> None:
         panel.set_title("no feasible design", fontsize=9)
     unit = f" in {goal.unit}" if goal.unit else ""
     panel.set_xlabel("finger thickness in mm")
-    panel.set_ylabel(f"{goal.words}{unit}, {'more' if goal.larger else 'less'} is better")
+    panel.set_ylabel(f"{goal.words}{unit}, {goal.better} is better")
     panel.grid(alpha=0.3)
 
 

@@ -13,17 +13,29 @@ DIGITS = 4
 
 @dataclass(frozen=True)
 class Goal:
-    """A column to make small, or large where `larger`."""
+    """A column to make small, large where `larger`, or near one where it is a `ratio`."""
 
     column: str
     words: str
     unit: str = ""
     larger: bool = False
+    ratio: bool = False
+
+    @property
+    def better(self) -> str:
+        """Which way it is better, in words."""
+        return "nearer to 1" if self.ratio else "more" if self.larger else "less"
+
+    def costs(self, values: Sequence[float]) -> list[float]:
+        """The column as numbers to make small: of a ratio 0.8 is as far off as 1.25."""
+        if self.ratio:
+            return [max(v, 1 / v) for v in values]
+        return [-v if self.larger else v for v in values]
 
 
 THICKNESS = Goal("finger.thickness_mm", "thickness", "mm")
 TRADES = (
-    Goal("view.keystone", "keystone"),
+    Goal("view.keystone", "keystone", ratio=True),
     Goal("view.far_blur_mm", "blur at the far edge", "mm"),
     Goal("light.irradiance_uw_mm2", "brightness on the coat", "µW/mm²", larger=True),
     Goal("force.error", "expected force error"),

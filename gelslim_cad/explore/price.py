@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +20,7 @@ SAME = 5e-4
 """Relative change below which a figure is the same: the solver stops near its limits."""
 KEPT = 64
 """Guides and patches kept: fingers that differ elsewhere share them."""
-Wanted = Literal["less", "more", ""]
+Wanted = Literal["less", "more", "one", ""]
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ FIGURES = (
     Figure("finger.length_mm", "finger length", "mm", "less"),
     Figure("finger.width_mm", "finger width", "mm", "less"),
     Figure("gel.area_mm2", "gel length × width", "mm²", "more"),
-    Figure("view.keystone", "keystone", "", "less"),
+    Figure("view.keystone", "keystone", "", "one"),
     Figure("view.far_blur_mm", "blur at the far edge", "mm", "less"),
     Figure("marker.px", "marker at the far edge, shorter side", "px", "more"),
     Figure("light.irradiance_uw_mm2", "brightness on the coat", "µW/mm²", "more"),
@@ -78,7 +79,10 @@ class Price:
         change = self.change
         if change is None or abs(change) < SAME or not self.figure.better:
             return ""
-        return "better" if (change < 0) == (self.figure.better == "less") else "worse"
+        less = change < 0
+        if self.figure.better == "one":
+            less = abs(math.log(self.after)) < abs(math.log(self.before))  # type: ignore[arg-type]
+        return "worse" if less == (self.figure.better == "more") else "better"
 
 
 def measured(spec: Spec, rays: int = RAYS, noise_px: float = MARKER_NOISE_PX) -> Measured:

@@ -13,7 +13,8 @@ from gelslim_cad.dimensions import derive, derive_batch
 from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.optimum import optimise
-from gelslim_cad.explore.pareto import front
+from gelslim_cad.explore.pareto import TRADES, front
+from gelslim_cad.explore.price import FIGURES, Price
 from gelslim_cad.explore.saved import spec_text
 from gelslim_cad.explore.study import Request
 from gelslim_cad.spec.reader import read_spec
@@ -94,3 +95,16 @@ def test_the_front_is_that_of_brute_force(larger: bool) -> None:
 def test_differences_below_the_solvers_accuracy_make_no_front() -> None:
     assert front([1.0, 1.00001, 2.0], [3.0, 2.99999, 1.0]) == [0, 1, 2]
     assert front([1.0, 1.5, 2.0], [3.0, 2.99999, 1.0]) == [0, 2]
+
+
+def test_a_keystone_below_one_is_a_keystone_too() -> None:
+    """Far markers larger than near ones once counted as better than a view square on."""
+    goal = next(g for g in TRADES if g.column == "view.keystone")
+    assert goal.costs([0.8, 1.0, 1.25]) == pytest.approx([1.25, 1.0, 1.25])
+    assert front([15.0, 16.0, 17.0], goal.costs([1.0, 0.96, 0.95])) == [0]
+    bright = next(g for g in TRADES if g.larger)
+    assert front([1.0, 2.0, 3.0], bright.costs([5.0, 4.0, 6.0])) == [0, 2]
+    keystone = next(f for f in FIGURES if f.name == "view.keystone")
+    assert Price(keystone, 1.02, 0.9).verdict == "worse"
+    assert Price(keystone, 0.9, 1.02).verdict == "better"
+    assert Price(keystone, 1.2, 1.3).verdict == "worse"
