@@ -37,7 +37,8 @@ def _difference(given: str, supported: tuple[str, ...], start: str) -> tuple[str
     name, version = newest.rsplit("/", 1)
     found = _FORMAT.match(given)
     if not found or found.group(1) != name:
-        return f"not a format of this kind of file, {reads}", f"write `format: {newest}`"
+        message = f"not a format of this kind of file, {reads}"
+        return message, f"give a file that has `format: {newest}`, or correct this line to it"
     if int(found.group(2)) > int(version):
         return f"newer than this program, {reads}", "update gelslim-cad"
     return (

@@ -15,6 +15,7 @@ from gelslim_cad.cli.bundle_info import bundle_info
 from gelslim_cad.cli.calibrate import calibrate
 from gelslim_cad.cli.carry import carried
 from gelslim_cad.cli.check import check
+from gelslim_cad.cli.command_list import CommandList
 from gelslim_cad.cli.derive import derive
 from gelslim_cad.cli.diff import diff
 from gelslim_cad.cli.doctor import doctor
@@ -37,8 +38,9 @@ EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of 
 
 app = typer.Typer(
     name="gelslim",
+    cls=CommandList,
     help="From one YAML spec to a GelSlim-type tactile finger: CAD, marker print, stiffness, "
-    "report.",
+    "report.\n\nNew here? `gelslim new my_finger`, then `gelslim check my_finger.yaml`.",
     epilog=EPILOG,
     no_args_is_help=True,
     add_completion=True,

@@ -35,7 +35,7 @@ def validate(
     pictures: Annotated[bool, typer.Option(help="Write plots and overlay pictures.")] = True,
     as_json: AsJson = False,
 ) -> int:
-    """Try a sensor on frames with known forces, before it is printed.
+    """Try a sensor on contacts of known force.
 
     The experiment of the GelSlim 2.0 paper: a ball pressed into the gel and slid in many
     directions, simulated on a finer gel at large strain, drawn as this sensor's camera would see

@@ -50,17 +50,6 @@ def test_commands_without_cad_load_no_cad_and_no_compiled_code(arguments: list[s
     assert loaded_by(arguments, CAD) == set()
 
 
-def test_help_names_every_command_in_whole_words(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--help"]) == 0
-    shown = capsys.readouterr().out
-    listed = {
-        line.split()[0]: line for line in shown.partition("Commands:")[2].splitlines() if line
-    }
-    for command in COMMANDS:
-        assert listed[command].rstrip().endswith(".")
-        assert "..." not in listed[command]
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--help"]) == 0
@@ -127,3 +116,34 @@ def test_a_closed_pipe_ends_quietly(arguments: tuple[str, ...]) -> None:
     os.close(writer)
     assert done.returncode == 141
     assert done.stderr == ""
+
+
+def test_help_lists_every_command_once_under_a_heading_in_whole_words(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from typer.main import get_command
+
+    from gelslim_cad.cli.app import app
+    from gelslim_cad.cli.command_list import GROUPS
+
+    named = [name for names in GROUPS.values() for name in names]
+    known = set(get_command(app).commands)  # type: ignore[attr-defined]
+    assert len(named) == len(set(named))
+    assert set(named) == known
+    assert main(["--help"]) == 0
+    told = capsys.readouterr().out
+    assert "..." not in told.partition("Design a finger:")[2]
+    assert "Other:" not in told
+    listed = [
+        line.split()[0] for line in told.partition("Design a finger:")[2].splitlines() if line
+    ]
+    for name in named:
+        assert listed.count(name) == 1, name
+
+
+def test_a_scene_in_the_place_of_a_spec_is_not_to_be_relabelled(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    scene = ROOT / "designs" / "scenes" / "press_sphere.yaml"
+    assert main(["check", str(scene)]) == 2
+    assert "give a file that has `format: gelslim-spec/1`" in capsys.readouterr().err
