@@ -157,71 +157,82 @@ def rendering(data: Data, header: Data) -> list[LadderRecord]:
         "source": "rendering",
         "header": header,
     }
+    return [drawing(data, about), shading(data, about), frame_effects(data, about)]
+
+
+def drawing(data: Data, about: Data) -> LadderRecord:
+    """Dots filled by samples or by exact areas, under even light."""
     even = [r for r in data["sampling"] if r["light"] == "even" and "ink_rms_px" in r]
+    return LadderRecord(
+        name="drawing",
+        title="Drawing of dots",
+        question=f"{data['dots']} dots of a pressed gel, by samples per pixel or exact areas.",
+        reference="Centroids of the dots' outlines",
+        error_label="shift of the ink, RMS",
+        error_unit="px",
+        rungs=tuple(
+            RungRecord(
+                r["rung"],
+                r["ink_rms_px"],
+                r["ms"],
+                is_ours=r["samples"] == 0,
+                count=1000 * r["detector_rms_px"],
+            )
+            for r in even
+        ),
+        count_label="1/1000 px, as detected",
+        **about,
+    )
+
+
+def shading(data: Data, about: Data) -> LadderRecord:
+    """Light computed on fewer pixels than there are."""
     own_step = Shading().pixel_step
-    return [
-        LadderRecord(
-            name="drawing",
-            title="Drawing of dots",
-            question=f"{data['dots']} dots of a pressed gel, by samples per pixel or exact areas.",
-            reference="Centroids of the dots' outlines",
-            error_label="shift of the ink, RMS",
-            error_unit="px",
-            rungs=tuple(
-                RungRecord(
-                    r["rung"],
-                    r["ink_rms_px"],
-                    r["ms"],
-                    is_ours=r["samples"] == 0,
-                    count=1000 * r["detector_rms_px"],
-                )
-                for r in even
-            ),
-            count_label="1/1000 px, as detected",
-            **about,
+    return LadderRecord(
+        name="shading",
+        title="Shading of the gel",
+        question="Light on a dented surface, computed on every n-th pixel.",
+        reference="Every pixel, to full convergence",
+        error_label="largest error of a pixel",
+        error_unit="grey values",
+        rungs=tuple(
+            RungRecord(
+                r["pixel_step"] if isinstance(r["pixel_step"], str) else step(r["pixel_step"]),
+                r["largest_dn"],
+                r["ms"],
+                is_ours=r["pixel_step"] == own_step,
+            )
+            for r in data["shading"]
         ),
-        LadderRecord(
-            name="shading",
-            title="Shading of the gel",
-            question="Light on a dented surface, computed on every n-th pixel.",
-            reference="Every pixel, to full convergence",
-            error_label="largest error of a pixel",
-            error_unit="grey values",
-            rungs=tuple(
-                RungRecord(
-                    r["pixel_step"] if isinstance(r["pixel_step"], str) else step(r["pixel_step"]),
-                    r["largest_dn"],
-                    r["ms"],
-                    is_ours=r["pixel_step"] == own_step,
-                )
-                for r in data["shading"]
-            ),
-            **about,
+        **about,
+    )
+
+
+def frame_effects(data: Data, about: Data) -> LadderRecord:
+    """Effects of the camera, each left out of one frame."""
+    return LadderRecord(
+        name="frame-effects",
+        title="Effects of the camera on one frame",
+        question="A pressed frame with everything on; one effect left out at a time. A cost "
+        "lost in the noise of the clock counts as 0.",
+        reference="The detector on the whole frame",
+        error_label="shift of detected centres, RMS",
+        error_unit="px",
+        rungs=tuple(
+            RungRecord(
+                r["effect"].replace("_", " "),
+                r["change_rms_px"],
+                max(0.0, r["ms_saved"]),
+                r["effect"].replace("_", " "),
+                count=r["change_mean_dn"],
+            )
+            for r in data["effects"]
+            if "change_rms_px" in r
         ),
-        LadderRecord(
-            name="frame-effects",
-            title="Effects of the camera on one frame",
-            question="A pressed frame with everything on; one effect left out at a time. A cost "
-            "lost in the noise of the clock counts as 0.",
-            reference="The detector on the whole frame",
-            error_label="shift of detected centres, RMS",
-            error_unit="px",
-            rungs=tuple(
-                RungRecord(
-                    r["effect"].replace("_", " "),
-                    r["change_rms_px"],
-                    max(0.0, r["ms_saved"]),
-                    r["effect"].replace("_", " "),
-                    count=r["change_mean_dn"],
-                )
-                for r in data["effects"]
-                if "change_rms_px" in r
-            ),
-            count_label="mean change, grey values",
-            kind="omissions",
-            **(about | {"time_label": "CPU time it costs per frame"}),
-        ),
-    ]
+        count_label="mean change, grey values",
+        kind="omissions",
+        **(about | {"time_label": "CPU time it costs per frame"}),
+    )
 
 
 def step(pixels: int) -> str:
