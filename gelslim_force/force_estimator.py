@@ -22,11 +22,11 @@ from scipy import sparse
 from gelslim_force.force_noise import (
     ForceNoise,
     MotionNoise,
-    lattice_curvature,
     normal_noise_mm,
 )
 from gelslim_force.frame_result import ForceField
 from gelslim_force.low_pass import LowPass, SmoothedForce, widths_mm
+from gelslim_force.surface_lattice import curvature, neighbours, with_rim
 from gelslim_force.surface_motion import SurfaceMotion
 from gelslim_force.surface_share import surface_share_mm2
 from ifem_export.contact_inverse import masked_force
@@ -84,7 +84,8 @@ class ForceEstimator:
     """Linear operator of the masked fit, and of the others unless `law` is given."""
     settings: ForceSettings
     law: SurfaceForce | None = None
-    """Another law for `direct` and `low_pass`, such as a neo-Hookean pad."""
+    """Another law of the gel, such as a neo-Hookean one. A masked fit then fits the motion that
+    its forces would make of a linear gel."""
     motion: SurfaceMotion | None = None
     """The sensor's markers, whose noise the low-pass and the contact are judged by; without them
     the motion is taken to be free of noise."""
@@ -111,8 +112,12 @@ class ForceEstimator:
         return LowPass.of(self.points_mm, widths_mm(cell_mm, fixed_mm), noise)
 
     @cached_property
+    def _beside(self) -> sparse.csr_array:
+        return neighbours(self.points_mm, self.mesh.cell_size_mm[:2])
+
+    @cached_property
     def _curvature(self) -> sparse.csr_array:
-        return lattice_curvature(self.points_mm, np.asarray(self.mesh.cell_size_mm[:2]))
+        return curvature(self._beside)
 
     def estimate(
         self,
@@ -166,10 +171,12 @@ class ForceEstimator:
         return touched is not None and self.settings.method in ("auto", "masked")
 
     def _fitted(self, u: Array, touched: Mask, start_n: Array | None) -> tuple[Array, float]:
+        if self.law is not None:
+            u = self.operator.displacement(self.law.force(u))
         fit = masked_force(
             self.operator,
             u,
-            touched,
+            with_rim(touched, self._beside),
             friction=self.settings.friction,
             start_n=start_n,
             most_steps=self.settings.most_steps,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from gelslim_force.marker_noise import quiet_sigma
 from gelslim_force.surface_motion import SurfaceMotion
@@ -60,23 +59,8 @@ class ForceNoise:
 
 
 def normal_noise_mm(curvature: sparse.csr_array, w_mm: Array) -> float:
-    """Standard deviation of one node's normal motion (c,), for `lattice_curvature`.
+    """Standard deviation of one node's normal motion (c,), for `surface_lattice.curvature`.
 
     The lower quartile does not see the nodes that curve around a contact.
     """
     return quiet_sigma(curvature @ w_mm) / np.sqrt(1.25)
-
-
-def lattice_curvature(points_mm: Array, cell_mm: Array) -> sparse.csr_array:
-    """(i, c): each inner node of a surface lattice less the mean of its four neighbours.
-
-    White noise has 1.25 times the variance there. `points_mm` is (c, 2 or 3), `cell_mm` (2,).
-    """
-    places = points_mm[:, :2] / cell_mm
-    first, second = cKDTree(places).query_pairs(1.2, output_type="ndarray").T
-    rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
-    count = len(places)
-    beside = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    inner = np.flatnonzero(beside.sum(axis=1) == 4)
-    each = sparse.eye_array(count, format="csr")
-    return sparse.csr_array((each - beside / 4)[inner])

@@ -38,6 +38,7 @@ CHAINS: tuple[Chain, ...] = (
     Chain("ours, depth known", PipelineSettings(), "depth"),
     Chain("ours, depth, neo-Hookean", PipelineSettings(gel="neo_hookean"), "depth", True),
     Chain("ours, shape known", PipelineSettings(), "shape"),
+    Chain("ours, shape, neo-Hookean", PipelineSettings(gel="neo_hookean"), "shape", True),
     Chain("ours, tangential", PipelineSettings(), "nothing"),
     Chain("paper, depth known", _PAPER, "depth", True),
     Chain("paper, shape known", _PAPER, "cap", True),

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pad_samples import hertz_like, small_bundle
+from scipy.spatial import cKDTree
 
 from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_force.force_estimator import ForceEstimator, ForceSettings
 from gelslim_force.surface_share import surface_share_mm2
 from gelslim_force.wrench import resultant
 from gelslim_force.wrench_noise import WrenchNoise, rigid_motions
+from ifem_export.contact_inverse import masked_force
+from ifem_export.ladder import lumped, refined
+from ifem_export.surface_operator import surface_operator
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +64,9 @@ def test_masked_fit_keeps_forces_on_the_contact(case) -> None:
     noisy = moved + np.random.default_rng(5).normal(0, 0.005, moved.shape)
     touched = force[:, 2] < 0
     masked = estimator(case, "auto", most_steps=200).estimate(noisy, touched)
-    assert not masked.force_n[~touched].any()
+    pitch_mm = 0.5
+    away = np.hypot(masked.points_mm[:, 0] - 0.4, masked.points_mm[:, 1] + 0.3)
+    assert not masked.force_n[away > 2.2 + pitch_mm].any()
     assert (masked.contact == touched).all()
     raw = operator.force(noisy)
     size = np.linalg.norm(force)
@@ -171,6 +177,36 @@ def test_neo_hookean_inner_nodes_are_in_balance(case) -> None:
     assert np.abs(law.pad.force(whole).reshape(-1)[inside]).max() < 1e-10
     exact = law.pad.force(whole)[-columns:]
     assert np.linalg.norm(law.force(u) - exact) < 2e-3 * np.linalg.norm(exact)
+
+
+def test_masked_fit_holds_pressure_between_the_nodes(case) -> None:
+    """Truth from half the pitch and eight layers: its rim loads nodes outside the contact."""
+    bundle, operator, _, _ = case
+    fine = refined(bundle.mesh)
+    points = np.asarray(fine.surface_mm)
+    pressed = hertz_like(points, 1.0, (0.3, -0.2))
+    every = [int(k) for k in cKDTree(points[:, :2]).query(bundle.mesh.surface_mm[:, :2])[1]]
+    u = surface_operator(fine, bundle.material, "bbar", "pcg").displacement(pressed)[every]
+    touched = np.hypot(points[every, 0] - 0.4, points[every, 1] + 0.3) < 2.2
+    found = estimator(case, "auto", most_steps=400, tolerance=1e-4).estimate(u, touched).force_n
+    bare = masked_force(operator, u, touched, most_steps=400, tolerance=1e-4).force_n
+    true = lumped(pressed, fine, bundle.mesh)
+    assert found.sum(axis=0) == pytest.approx([0.3, -0.2, -1.0], abs=0.02)
+    assert np.linalg.norm(found - true) < 0.8 * np.linalg.norm(bare - true)
+
+
+def test_masked_fit_of_a_neo_hookean_gel(case) -> None:
+    bundle, operator, force, moved = case
+    law = FiniteStrainForce(bundle, tolerance=1e-4)
+    u = 0.5 * moved
+    true = law.force(u).sum(axis=0)
+    touched = force[:, 2] < 0
+    settings = ForceSettings(most_steps=400, tolerance=1e-4)
+    linear = ForceEstimator(bundle.mesh, operator, settings).estimate(u, touched)
+    found = ForceEstimator(bundle.mesh, operator, settings, law).estimate(u, touched)
+    off = np.linalg.norm(found.force_n.sum(axis=0) - true)
+    assert off < 0.03 * np.linalg.norm(true)
+    assert off < 0.5 * np.linalg.norm(linear.force_n.sum(axis=0) - true)
 
 
 def test_impossible_settings_are_named() -> None:

@@ -11,12 +11,12 @@ from gelslim_force.force_estimator import ForceEstimator, ForceSettings
 from gelslim_force.force_noise import (
     ForceNoise,
     MotionNoise,
-    lattice_curvature,
     normal_noise_mm,
 )
 from gelslim_force.low_pass import NORMAL, TANGENTIAL, WIDTHS_IN_CELLS, LowPass, widths_mm
 from gelslim_force.marker_motion import MarkerView
 from gelslim_force.marker_noise import quiet_sigma
+from gelslim_force.surface_lattice import curvature, neighbours
 from gelslim_force.surface_motion import SurfaceMotion
 from ifem_export.bundle import Bundle
 
@@ -129,12 +129,12 @@ def test_sigma_is_the_scatter_behind_the_low_pass(case) -> None:
 
 def test_noise_of_the_normal_motion_is_told_from_a_contact(case) -> None:
     _, motion, _, moved, _ = case
-    curvature = lattice_curvature(motion.points_mm, CELL_MM)
+    bend = curvature(neighbours(motion.points_mm, CELL_MM))
     smooth = moved[:, 2] * 0.3 / np.abs(moved[:, 2]).max()
-    assert normal_noise_mm(curvature, smooth) < 3e-4
+    assert normal_noise_mm(bend, smooth) < 3e-4
     rng = np.random.default_rng(10)
     for sigma in (0.002, 0.01, 0.05):
-        found = [normal_noise_mm(curvature, smooth + rng.normal(0, sigma, len(smooth)))
+        found = [normal_noise_mm(bend, smooth + rng.normal(0, sigma, len(smooth)))
                  for _ in range(5)]  # fmt: skip
         # A contact that covers a fifth of so small a pad leaves few quiet nodes.
         assert 0.85 * sigma < np.mean(found) < 1.4 * sigma

@@ -104,12 +104,17 @@ def test_ours_beats_the_papers_field_and_finite_strain_finds_the_force(found: Va
     by = {c.name: c for c in found.chains}
     ours, papers = by["ours, contact known"], by["paper, depth known"]
     assert ours.field_error < 0.6 * papers.field_error
-    assert ours.outside_share == 0.0
+    # The pipeline allows for pressure between the nodes; the truth here has none.
+    assert ours.outside_share < 0.12
     assert papers.outside_share > 0.3
     # The linear gel under-reads a strained one, and the strained pipeline does not.
     assert ours.relative > 0.05
     assert by["ours, depth, neo-Hookean"].relative < 0.04
     assert by["ours, depth, neo-Hookean"].direction_error_deg < 3
+    # Where the contact is seen in the picture too, but for the depth, which a linear law tells.
+    strained, linear = by["ours, shape, neo-Hookean"], by["ours, shape known"]
+    assert strained.field_error < 0.8 * linear.field_error
+    assert (np.array(strained.deviation_n[:2]) < 0.8 * np.array(linear.deviation_n[:2])).all()
 
 
 def test_what_is_not_known_is_not_invented(found: Validation) -> None:
