@@ -136,4 +136,4 @@ def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
             "chosen" if rung.label == chosen else "",
         )
     console().print(table)
-    print(f"Against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")
+    print(f"Errors against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")

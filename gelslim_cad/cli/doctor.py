@@ -116,7 +116,8 @@ def _tell_machine(cores: Threads, cache: Kernels) -> None:
     from gelslim_cad.cli.answer import say
 
     limits = "".join(f", {name}={value}" for name, value in cores.limits.items())
-    pools = ", ".join(f"{name} {count}" for name, count in cores.pools) or "none found"
+    told = dict.fromkeys(f"{name} {count}" for name, count in cores.pools)
+    pools = ", ".join(told) or "none found"
     say(f"processors: {cores.usable} of {cores.processors} usable; thread pools: {pools}{limits}")
     if cache.warm:
         say(f"compiled kernels: {cache.cached} kept {cache.folder}")
@@ -143,7 +144,7 @@ def _tell_speed(speed: RealTime | None, problem: str) -> None:
     say(f"real time: forces of a {CELLS} × {CELLS} × {LAYERS} pad take {times}")
     verdict = "ready" if speed.ready else "not ready"
     say(
-        f"real time: {verdict}: {PASSES} calls of {speed.quickest.operator} "
+        f"real time: {verdict}, {PASSES} calls of {speed.quickest.operator} "
         f"{'fit' if speed.ready else 'do not fit'} into a frame at {FRAME_RATE_HZ:g} Hz",
         style="green" if speed.ready else "yellow",
     )
