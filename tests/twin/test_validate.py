@@ -29,11 +29,16 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> TwinSensor:
     return TwinSensor(load_bundle(place))
 
 
+def shorten(patch: pytest.MonkeyPatch) -> None:
+    """Two slides of few steps, at the least and the largest depth."""
+    for name, value in (("DIRECTIONS", 2), ("PRESS_STEPS", 2), ("SLIDE_STEPS", 3), ("_STRIDE", 1)):
+        patch.setattr(experiments, name, value)
+
+
 @pytest.fixture(scope="module")
 def found(sensor: TwinSensor) -> Validation:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(experiments, "DIRECTIONS", 3)
-        patch.setattr(experiments, "_STRIDE", 1)
+        shorten(patch)
         return validate(sensor)
 
 
@@ -79,7 +84,10 @@ def test_field_errors_of_a_field_known_by_hand() -> None:
     assert turned == pytest.approx(45.0)
 
 
-def test_no_inverse_crime_and_it_is_said(found: Validation, sensor: TwinSensor) -> None:
+def test_no_inverse_crime_and_it_is_said(
+    found: Validation, sensor: TwinSensor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shorten(monkeypatch)
     assert "neo-Hookean gel of 8 layers" in found.truth
     assert "No inverse crime" in found.truth
     gel, test = TruthGel(sensor.bundle, FRICTION), found.experiment.tests[-1]
@@ -92,7 +100,7 @@ def test_no_inverse_crime_and_it_is_said(found: Validation, sensor: TwinSensor) 
 
 
 def test_every_frame_of_every_chain_is_scored(found: Validation) -> None:
-    frames = len(found.experiment.tests) * (experiments.PRESS_STEPS + experiments.SLIDE_STEPS)
+    frames = len(found.experiment.tests) * (2 + 3)
     assert {c.frames for c in found.chains} == {frames}
     assert len(found.scores) == frames * len(found.chains)
     record = found.to_record()
