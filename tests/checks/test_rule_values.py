@@ -180,3 +180,10 @@ def test_ten_thousand_designs_are_checked_at_once() -> None:
     envelope = failed["finger.thickness_mm"]
     np.testing.assert_array_equal(envelope, batch["finger.thickness_mm"] > 18 + 1e-9)
     assert 0 < envelope.sum() < 10_000
+
+
+def test_half_the_cable_and_its_room_lie_between_the_tongues():
+    from gelslim_cad.checks.mount import TONGUE_ROOM_MM, cable_slot
+
+    found = cable_slot(8.0, 6.0)
+    assert (found.value, found.limit) == (4.0 + TONGUE_ROOM_MM, 6.0)
