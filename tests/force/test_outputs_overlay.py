@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import output_samples as samples
@@ -222,3 +223,24 @@ def test_without_libraries_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -
     for bad in ({"zoom": 9}, {"cell_mm": 0.0}, {"brightness": 2.0}):
         with pytest.raises(ValueError, match="must be"):
             OverlaySettings(**bad)  # type: ignore[arg-type]
+
+
+def test_words_of_the_scales_are_of_what_is_drawn() -> None:
+    """Arrows as long as their words say, and the pressure of the full shade, in kPa."""
+    from gelslim_force.outputs.legend import _scales
+
+    class Told:
+        words: ClassVar[list[str]] = []
+
+        def text(self, place: object, text: str, *_: object) -> None:
+            self.words.append(text)
+
+        def line(self, *_: object) -> None: ...
+
+        def polygon(self, *_: object) -> None: ...
+
+    _scales(Told(), SCALE, 1.0, 10.0, 50.0)  # type: ignore[arg-type]
+    assert "0 to 200 kPa pressure" in Told.words
+    # 20 mm per MPa at 10 px/mm: an arrow of 90 px is 450 kPa, and a round value is below it.
+    (shear,) = (w for w in Told.words if w.endswith("kPa shear"))
+    assert 0.3 * 450 < float(shear.split()[0]) <= 450
