@@ -18,12 +18,12 @@ CX, CY, AREA, CONTRAST, MXX, MXY, MYY, STEPS, INSIDE, SKEW = range(10)
 """Columns of a weighed dot; INSIDE is the share of the window within the picture, SKEW the last
 move of the window in px."""
 
-# Sums may be reordered for the vector unit, nothing else is relaxed.
+# No reordering of sums: compiled here or taken from the cache, their order was not the same one.
 COMPILED: dict[str, Any] = {
     "cache": True,
     "nogil": True,
     "error_model": "numpy",
-    "fastmath": {"reassoc", "contract", "nsz"},
+    "fastmath": {"contract", "nsz"},
 }
 _FITS = 2
 """Windows for which the light is fitted anew; later ones have hardly moved."""

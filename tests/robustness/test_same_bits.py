@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
@@ -63,7 +66,6 @@ def test_a_spline_is_the_same_whatever_the_threads() -> None:
 
 
 def test_calibration_and_forces_are_the_same_whatever_the_threads() -> None:
-    """The fit of the camera made 1e-6 px of the last bits."""
     bundle, dots = sensor_bundle(), np.asarray(sensor_grid().positions_mm)
     rest = render(sensor_grid(), finger_view(), Look(noise=2.0))
     push = 0.1 * np.exp(-np.sum(dots**2, axis=1) / 18)[:, None] * [1.0, -0.5, 0.0]
@@ -79,3 +81,27 @@ def test_calibration_and_forces_are_the_same_whatever_the_threads() -> None:
 
     one, two = of_threads(found)
     assert one == two
+
+
+CENTRES = (
+    "import hashlib, sensor_samples as s, synthetic, camera_rig;"
+    "from gelslim_force.calibration import calibrate;"
+    "look = synthetic.Look(noise=2.0);"
+    "seen = synthetic.render(s.sensor_grid(), camera_rig.finger_view(), look);"
+    "found = calibrate(s.sensor_bundle(), seen.image);"
+    "print(hashlib.sha256(found.reference.places_px.tobytes()).hexdigest())"
+)
+
+
+@pytest.mark.slow
+def test_dots_are_the_same_compiled_and_from_the_cache(tmp_path: Path) -> None:
+    """Sums that may be reordered were, in one of the two: dots moved by 1e-8 px."""
+    tests = Path(__file__).parents[1]
+    paths = os.pathsep.join([str(tests.parent), str(tests / "force")])
+    own = {**os.environ, "PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(tmp_path)}
+    argv = [sys.executable, "-c", CENTRES]
+    compiled, cached = (
+        subprocess.run(argv, env=own, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert compiled == cached
