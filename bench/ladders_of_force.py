@@ -151,8 +151,8 @@ def operators(rows: list[Data], balanced: str | None, about: dict[str, Any]) -> 
         name="operators",
         title="Operator and force method on noisy markers",
         question="Forces from markers that are off by 0.04 px and a depth off by 2 %, on a push "
-        "with shear. “Direct” takes them as they come; the low-pass, as wide as the noise calls for "
-        "unless it is given, trades detail for noise.",
+        "with shear. “Direct” takes them as they come; the low-pass, as wide as the noise calls "
+        "for unless it is given, trades detail for noise.",
         paper="one layer, direct.",
         reference="The forces applied on a pad of half the pitch with eight layers",
         error_label="error of the force field",
