@@ -32,7 +32,8 @@ def gather_block(rows: Any, nodes: Any, block: Any, kept: int) -> None:
                             block[3 * j + b, 3 * i + a] = value
 
 
-@njit(cache=True, fastmath=True)
+# No reordering of sums: a kernel compiled here and one from the cache need not agree on it.
+@njit(cache=True, fastmath={"contract", "nsz"})
 def add_motion(rows: Any, nodes: Any, force: Any, starts: Any, ends: Any, motion: Any) -> None:
     """motion (3c,) += C force (n, 3) on `nodes`, between `starts` and `ends` (r,) only.
 
