@@ -14,6 +14,14 @@ from whole_files import file_lock, replaced_file, replaced_folder, scratch
 from whole_files.held_interrupt import interrupts_held
 
 
+@pytest.fixture(autouse=True)
+def heeded() -> Iterator[None]:
+    """A shell's background jobs start with Ctrl-C ignored, and so would these tests."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def test_an_interrupt_waits_for_the_end_of_the_stretch() -> None:
     done = []
 

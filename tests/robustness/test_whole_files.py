@@ -169,7 +169,7 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path: Path) -> None:
 def test_a_forked_child_does_not_keep_the_lock(tmp_path: Path) -> None:
     lock = tmp_path / ".lock"
     code = LOCKS.replace(
-        "    print(", "    import os, time\n    if not os.fork(): time.sleep(60)\n    print("
+        "    print(", "    import os, time\n    if os.fork(): time.sleep(60)\n    print("
     )
     holder = subprocess.Popen(
         [sys.executable, "-c", code, str(lock)],
