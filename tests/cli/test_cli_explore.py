@@ -95,7 +95,10 @@ def test_optimise_saves_a_spec_that_checks(
     assert "gel length × width 400 mm² 320 mm² -20.0 % worse" in price
     assert main(["check", str(best)]) == 0
     capsys.readouterr()
-    assert main(["optimise", str(MINI20), "--vary", "gel.length_mm=60", "-o", "y"]) == 1
+    assert (
+        main(["optimise", str(MINI20), "--vary", "gel.length_mm=60", "-o", str(tmp_path / "y")])
+        == 1
+    )
     assert "is feasible" in capsys.readouterr().err
 
 
