@@ -1,4 +1,4 @@
-"""Put the measured tables into the guide, between their comment marks.
+"""Put the measured tables into guide and README, between their comment marks.
 
 python bench/force_tables.py    # from docs/data/force_latency.json and force_ladders.json
 """
@@ -12,6 +12,13 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
 GUIDE = ROOT / "docs" / "force_pipeline.md"
+README = ROOT / "README.md"
+SHORT = {
+    "depth given, 5%": "depth given",
+    "tangential, 5%": "nothing given: normal force unknown",
+    "sphere seen, 5%": "only the ball's size given, contact sought in the picture",
+    "paper's choices": "the paper's choices, with our detector",
+}
 STAGES = {
     "track": "find and match markers",
     "look": "find the contact patch",
@@ -29,6 +36,7 @@ def main() -> None:
     if latency.exists():
         data = json.loads(latency.read_text(encoding="utf-8"))
         replace_between(GUIDE, "latency", full_latency(data))
+        replace_between(README, "latency", short_latency(data))
     ladders = DATA / "force_ladders.json"
     if ladders.exists():
         replace_between(
@@ -85,6 +93,23 @@ def full_latency(data: dict[str, Any]) -> str:
             "the first tenth."
         )
     return "\n\n".join(parts)
+
+
+def short_latency(data: dict[str, Any]) -> str:
+    """Medians and 95 % of a frame for the chains within 5 %, and the paper's."""
+    counts = list(dict.fromkeys(row["markers"] for row in data["chains"]))
+    lines = [
+        "| camera frame to wrench and force field, ms, median (95 %) | "
+        + " | ".join(f"{count} markers" for count in counts)
+        + " |",
+        "|---|" + "---:|" * len(counts),
+    ]
+    totals = {(row["chain"], row["markers"]): row["total"] for row in data["chains"]}
+    for chain, told in SHORT.items():
+        of = [totals[chain, count] for count in counts]
+        cells = [f"{ms(t['median'])} ({ms(t['p95'])})" for t in of]
+        lines.append(f"| {told} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def ladder_tables(data: dict[str, Any]) -> str:
