@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_force.contact_forces import ContactForces
 from gelslim_force.finite_strain_force import FiniteStrainForce
 from gelslim_force.force_estimator import ForceEstimator
 from gelslim_force.frame_clock import FrameClock
@@ -80,9 +81,6 @@ class ForcePipeline:
         markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
         operator = self.settings.operator(bundle)
         law = FiniteStrainForce(bundle) if self.settings.gel == "neo_hookean" else None
-        self._fitter = ForceEstimator(
-            bundle.mesh, self.settings.compliance(bundle), self.settings.force, law
-        )
         self._wrench = WrenchNoise.of(operator, points_mm)
         self._motion = SurfaceMotion(
             MarkerView(
@@ -95,8 +93,10 @@ class ForcePipeline:
             points_mm,
             self.settings.compensation,
         )
-        self._estimator = ForceEstimator(
-            bundle.mesh, operator, self.settings.force, law, self._motion
+        mesh, chosen = bundle.mesh, self.settings.force
+        self._forces = ContactForces(
+            ForceEstimator(mesh, operator, chosen, law, self._motion),
+            ForceEstimator(mesh, self.settings.compliance(bundle), chosen, law),
         )
         self._index = 0
         self._last_force: Array | None = None
@@ -106,12 +106,12 @@ class ForcePipeline:
     @property
     def points_mm(self) -> Array:
         """(c, 3) surface nodes at rest."""
-        return self._estimator.points_mm
+        return self._forces.straight.points_mm
 
     @property
     def operator_name(self) -> str:
         """Rung in use."""
-        return self._estimator.operator.name
+        return self._forces.straight.operator.name
 
     def reset(self) -> None:
         """Forget all motion and count frames from 0."""
@@ -167,7 +167,8 @@ class ForcePipeline:
             interpolation, displacement = self._motion.of_nodes(motion, reading)
             clock.stage("interpolate")
             noise = self._noise_px(tracks.displacement_px)
-            field = self._forces(displacement, reading, noise)
+            touched = reading.touched if reading is not None and known else None
+            field = self._forces.estimate(displacement, touched, self._last_force, noise)
             clock.stage("force")
             if field.misfit > _MISFIT and self._motion.moved(motion):
                 problems = (*problems, _UNEXPLAINED.format(field.misfit))
@@ -244,14 +245,6 @@ class ForcePipeline:
         if w.shape != (count,) or not np.isfinite(w).all():
             raise ValueError(f"normal motion of shape {w.shape}: must be ({count},) and finite")
         return NormalReading(w, np.zeros(count), None)
-
-    def _forces(
-        self, displacement: Array, reading: NormalReading | None, noise: float
-    ) -> ForceField:
-        touched = reading.touched if reading is not None and reading.known else None
-        masked = touched is not None and self.settings.force.method in ("auto", "masked")
-        estimator = self._fitter if masked else self._estimator
-        return estimator.estimate(displacement, touched, self._last_force, noise)
 
     def _noise_px(self, displacement_px: Array) -> float:
         if self.settings.noise_px is not None:

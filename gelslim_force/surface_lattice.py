@@ -32,6 +32,12 @@ def curvature(beside: sparse.csr_array) -> sparse.csr_array:
     return sparse.csr_array((each - beside / 4)[inner])
 
 
+def edge_distance_mm(points_mm: Array, cell_mm: ArrayLike) -> Array:
+    """(c,) distance of each node to the nearest one on the edge of the surface."""
+    edge = neighbours(points_mm, cell_mm).sum(axis=1) < 4
+    return np.asarray(cKDTree(points_mm[edge, :2]).query(points_mm[:, :2])[0])
+
+
 def with_rim(touched: NDArray[np.bool_], beside: sparse.csr_array) -> NDArray[np.bool_]:
     """(c,) the nodes touched and their neighbours.
 
