@@ -80,6 +80,16 @@ def _rule(canvas: Canvas, y: float) -> None:
     canvas.line((_LEFT, y), (_RIGHT, y), _RULE, 1)
 
 
+def value_text(value: float, sigma: float, full: float) -> str:
+    """A value and its standard deviation to a hundredth of the full bar, or one digit of σ."""
+    decimals = max(0, min(3, 2 - int(np.floor(np.log10(full)))))
+    if not np.isfinite(sigma):
+        return f"{value:+.{decimals}f}"
+    if 1e-4 <= sigma < 0.5 * 10.0**-decimals:
+        decimals = -int(np.floor(np.log10(sigma)))
+    return f"{value:+.{decimals}f} ± {sigma:.{decimals}f}"
+
+
 def _wrench(canvas: Canvas, result: FrameResult, scale: ArrowScale, y: float) -> float:
     _rule(canvas, y - 12)
     wrench = result.wrench
@@ -93,10 +103,7 @@ def _wrench(canvas: Canvas, result: FrameResult, scale: ArrowScale, y: float) ->
         if not np.isfinite(values[k]):
             canvas.text((_LEFT + 34, row), "unknown", GREY, 16)
         else:
-            decimals = max(0, min(3, 2 - int(np.floor(np.log10(full)))))
-            text = f"{values[k]:+.{decimals}f}"
-            if np.isfinite(sigma[k]):
-                text += f" ± {sigma[k]:.{decimals}f}"
+            text = value_text(float(values[k]), float(sigma[k]), full)
             canvas.text((_LEFT + 34, row), f"{text} {unit}", WHITE, 16)
         _bar(canvas, values[k], sigma[k], full, row + 9)
     canvas.text((_LEFT, y + 214), _range(scale), GREY, 13)
