@@ -27,7 +27,7 @@ lint: $(VENV)/.installed-dev
 stability: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.stability.run --count 300
 
-bench: $(VENV)/.installed-dev
+bench: $(VENV)/.installed-peers
 	$(BIN)/python bench/run_all.py
 
 bench-quick: $(VENV)/.installed-dev
@@ -52,6 +52,10 @@ $(VENV)/.installed: pyproject.toml $(PINS)
 $(VENV)/.installed-dev: pyproject.toml $(PINS)
 	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev"
 	touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-peers: pyproject.toml $(PINS)
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev,peers"
+	touch $@ $(VENV)/.installed-dev $(VENV)/.installed
 
 pins: $(VENV)/.installed-dev
 	( echo "# Pinned versions for make variant, make test and CI. Renew with: make pins"; \
