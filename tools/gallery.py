@@ -136,8 +136,8 @@ PICTURES = (
     Picture(
         "fields",
         "Force fields, true and found",
-        "The deepest push of a validation: the true nodal forces, two of our chains, and the"
-        " paper's choices. With the depth given, these find the resultant as well as ours do, and"
+        "The deepest push of a validation: the true nodal forces; ours, found from the picture and"
+        " the ball's size alone, for a linear and a neo-Hookean gel; and the paper's choices, which"
         " put forces where nothing touches.",
         (f"validate designs/mini20.yaml -o {FOLDER}/validation",),
         f"{FOLDER}/validation/fields.png",

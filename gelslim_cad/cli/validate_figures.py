@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from gelslim_twin.validation.validation import Sample, Validation
 
 SHOWN = {
-    "ours, contact known": ("#1b6ca8", "o"),
     "ours, shape known": ("#5fb14b", "^"),
+    "ours, shape, neo-Hookean": ("#1b6ca8", "o"),
     "paper, depth known": ("#e09d3c", "s"),
     "paper, shape known": ("#c23b3b", "x"),
 }
