@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -59,6 +60,8 @@ def simulate(
         sensor = twin_sensor(loaded)
         mesh = sensor.bundle.mesh
         require_within_gel(loaded, mesh.layers * mesh.cell_size_mm[2])
+        with contextlib.suppress(FileNotFoundError):
+            folder.stat()  # a name too long is told before anything is written beside it
         store_sensor(sensor, _beside(folder), "image" in loaded.scene.observe)
         if count is None:
             answer = _one(loaded, folder, overwrite, tell)
