@@ -43,6 +43,10 @@ class ContactForces:
             return replace(found, contact=touched)
         return self.fitter.estimate(displacement_mm, touched, start_n, noise_px)
 
+    def prepare(self) -> None:
+        """Make now what a first contact would have to wait for, at the edge or elsewhere."""
+        _ = self.straight.low_pass, self.straight.curvature, self.fitter.beside, self.beyond_fit
+
     @cached_property
     def beyond_fit(self) -> Mask:
         """(c,) nodes too near the edge for the fitter's operator."""

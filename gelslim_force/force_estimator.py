@@ -19,11 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from gelslim_force.force_noise import (
-    ForceNoise,
-    MotionNoise,
-    normal_noise_mm,
-)
+from gelslim_force.force_noise import ForceNoise, MotionNoise, normal_noise_mm
 from gelslim_force.frame_result import ForceField
 from gelslim_force.low_pass import LowPass, SmoothedForce, widths_mm
 from gelslim_force.surface_lattice import curvature, neighbours, with_rim
@@ -112,12 +108,14 @@ class ForceEstimator:
         return LowPass.of(self.points_mm, widths_mm(cell_mm, fixed_mm), noise)
 
     @cached_property
-    def _beside(self) -> sparse.csr_array:
+    def beside(self) -> sparse.csr_array:
+        """(c, c) neighbours on the surface, see `surface_lattice`."""
         return neighbours(self.points_mm, self.mesh.cell_size_mm[:2])
 
     @cached_property
-    def _curvature(self) -> sparse.csr_array:
-        return curvature(self._beside)
+    def curvature(self) -> sparse.csr_array:
+        """(i, c) by which noise of the normal motion is told, see `surface_lattice`."""
+        return curvature(self.beside)
 
     def estimate(
         self,
@@ -147,7 +145,7 @@ class ForceEstimator:
             assert touched is not None
             force, misfit = self._fitted(u, touched, start_n)
         else:
-            noise = MotionNoise(noise_px, normal_noise_mm(self._curvature, u[:, 2]))
+            noise = MotionNoise(noise_px, normal_noise_mm(self.curvature, u[:, 2]))
             smoothed = self.low_pass.applied((self.law or self.operator).force(u), noise)
             force = smoothed.force_n
         if touched is None:
@@ -176,7 +174,7 @@ class ForceEstimator:
         fit = masked_force(
             self.operator,
             u,
-            with_rim(touched, self._beside),
+            with_rim(touched, self.beside),
             friction=self.settings.friction,
             start_n=start_n,
             most_steps=self.settings.most_steps,

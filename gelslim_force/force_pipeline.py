@@ -98,6 +98,7 @@ class ForcePipeline:
             ForceEstimator(mesh, operator, chosen, law, self._motion),
             ForceEstimator(mesh, self.settings.compliance(bundle), chosen, law),
         )
+        self._forces.prepare()
         self._index = 0
         self._last_force: Array | None = None
         self._last_lateral: Array | None = None

@@ -65,6 +65,21 @@ def test_a_fit_that_is_asked_for_is_made(pad) -> None:
     assert asked.estimate(exact.displacement(force), force[:, 2] < 0, None, 0.0).misfit > 0
 
 
+def test_nothing_is_left_to_make_at_the_first_contact(pad) -> None:
+    """A first contact by the edge made thirty forces before its own, in the middle of a stream."""
+    both, exact = pad
+    fresh = ContactForces(ForceEstimator(both.fitter.mesh, exact, ForceSettings()), both.fitter)
+    fresh.prepare()
+    made = dict(vars(fresh.straight)), dict(vars(fresh.fitter)), dict(vars(fresh))
+    points = both.fitter.points_mm
+    for x_mm in (0.0, points[:, 0].max() - RADIUS_MM):
+        force = pressed(points, x_mm)
+        fresh.estimate(exact.displacement(force), force[:, 2] < 0, None, 0.0)
+    after = dict(vars(fresh.straight)), dict(vars(fresh.fitter)), dict(vars(fresh))
+    assert [sorted(a) for a in after] == [sorted(m | {"area_mm2": 0}) if k < 2 else sorted(m)
+                                          for k, m in enumerate(made)]  # fmt: skip
+
+
 def test_an_operator_that_knows_the_edge_fits_there_too(pad) -> None:
     both, _ = pad
     assert both.beyond_fit.any()
