@@ -29,9 +29,9 @@ YOUNGS_MPA, POISSON = 0.147, 0.3223
 
 def ours(cells: tuple[int, int, int]) -> Callable[[], Any]:
     """This project, CSR, element matrix and numbering included."""
-    from ifem_export.assembly import assemble_csr
-    from ifem_export.element import hex8_stiffness
-    from ifem_export.material import Material
+    from ifem_export.assembly.assembly import assemble_csr
+    from ifem_export.elements.hex8 import hex8_stiffness
+    from ifem_export.elements.material import Material
 
     occupancy = np.ones(cells, dtype=bool)
     gel = Material(YOUNGS_MPA, POISSON, 1000.0)

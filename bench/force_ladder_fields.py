@@ -18,13 +18,13 @@ from scipy.interpolate import (
 )
 from scipy.spatial import Delaunay
 
-from gelslim_force.finite_strain_force import FiniteStrainForce
-from gelslim_force.force_estimator import ForceEstimator, ForceSettings
-from gelslim_force.marker_motion import COMPENSATIONS, MarkerView
-from gelslim_force.surface_motion import SurfaceMotion
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.ladder import lumped, refined
-from ifem_export.surface_operator import SurfaceOperator
+from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
+from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.motion.marker_motion import COMPENSATIONS, MarkerView
+from gelslim_force.motion.surface_motion import SurfaceMotion
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.operators.ladder import lumped, refined
+from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 Interpolate = Callable[[Array], Array]

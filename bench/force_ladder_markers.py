@@ -11,10 +11,10 @@ from force_rig import SEED, Rig
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
-from gelslim_force.matching import MatchMode, match
-from gelslim_force.reference_lattice import ReferenceLattice
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
+from gelslim_force.tracking.matching import MatchMode, match
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.rendered_frame import RenderedFrame

@@ -81,7 +81,7 @@ def print_rows(name: str, rows: Rows) -> None:
 
 def draw(data: dict[str, Any], path: Path) -> None:
     """Four panels, one per ladder from picture to force."""
-    from gelslim_cad.figure import as_png, new_figure
+    from gelslim_core.figure import as_png, new_figure
 
     figure, axes = new_figure(12.5, 9.0, columns=2, rows=2)
     draw_detection(axes[0][0], data["detection"])

@@ -28,12 +28,12 @@ from force_rig import SEED, Rig, large_rig, shares, small_rig
 from machine import machine
 from numpy.typing import NDArray
 
-from accuracy_budget.budget import Budget
-from gelslim_force.calibration import calibrate
-from gelslim_force.force_pipeline import ForcePipeline
-from gelslim_force.indenter_source import indenter_source
-from gelslim_force.pipeline_settings import PipelineSettings
-from gelslim_force.sensor_calibration import SensorCalibration
+from gelslim_core.budget.budget import Budget
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.contact.indenter_source import indenter_source
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.settings import PipelineSettings
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).parents[1]
@@ -142,11 +142,11 @@ def paper_chain(
     """The paper's choices with our detector: no verification, no low-pass, no covariance."""
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-    from gelslim_force.detection import Detector
-    from gelslim_force.marker_motion import MarkerView
-    from gelslim_force.matching import match
-    from gelslim_force.wrench import resultant
-    from ifem_export.interpolation import marker_to_node
+    from gelslim_force.detection.detection import Detector
+    from gelslim_force.forces.wrench import resultant
+    from gelslim_force.motion.marker_motion import MarkerView
+    from gelslim_force.tracking.matching import match
+    from ifem_export.markers.interpolation import marker_to_node
 
     reference = calibration.reference
     view = MarkerView(calibration.camera, reference.places_px)
@@ -211,9 +211,9 @@ CHILD = """
 import time; begun = time.perf_counter()
 import sys
 import numpy as np
-from gelslim_force.calibration_file import read_calibration
-from gelslim_force.force_pipeline import ForcePipeline
-from ifem_export.bundle_io import load_bundle
+from gelslim_force.calibration.file import read_calibration
+from gelslim_force.pipeline import ForcePipeline
+from ifem_export.bundle.files import load_bundle
 marks = [time.perf_counter()]
 bundle = load_bundle(sys.argv[1] + "/bundle"); marks.append(time.perf_counter())
 built = read_calibration(sys.argv[1] + "/calibration.npz")
@@ -226,8 +226,8 @@ print(*np.diff([begun, *marks]))
 
 def first_frame(rig: Rig) -> dict[str, float]:
     """Seconds from the start of a process to the wrench of its first frame, compiled before."""
-    from gelslim_force.calibration_file import write_calibration
-    from ifem_export.bundle_io import write_bundle
+    from gelslim_force.calibration.file import write_calibration
+    from ifem_export.bundle.files import write_bundle
 
     frame = rig.stream(2)[1].image
     with tempfile.TemporaryDirectory() as folder:

@@ -11,10 +11,10 @@ import numpy as np
 from force_rig import NORMAL_N, SHEAR_N, large_rig
 from PIL import Image
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.force_pipeline import ForcePipeline
+from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.outputs.arrow_scale import scale_of_run
 from gelslim_force.outputs.overlay import Overlay
+from gelslim_force.pipeline import ForcePipeline
 
 TARGET = Path(__file__).parents[1] / "docs" / "images" / "force_overlay.png"
 STEPS = 8

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.indenter import Sphere
-from gelslim_optics.virtual_camera import Layer, VirtualCamera, reflect_point
+from gelslim_force.contact.indenter import Sphere
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.light_map import red_green_sides
@@ -24,13 +24,13 @@ from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.ladder import lumped, measure_ladder, refined
-from ifem_export.marker_grid import MarkerGrid, build_marker_grid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import MarkerGrid, build_marker_grid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.ladder import lumped, measure_ladder, refined
+from ifem_export.operators.surface_operator import surface_operator
 
 Array = NDArray[np.float64]
 LENGTH_MM, WIDTH_MM, CORNER_MM, THICKNESS_MM = 22.0, 20.5, 1.0, 2.0

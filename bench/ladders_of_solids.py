@@ -8,8 +8,8 @@ from typing import Any
 from ladder_record import LadderRecord, RungRecord
 
 from gelslim_cad.light.study import RAYS
-from ifem_export.material import Material
-from ifem_export.operator_ladder import BALANCE, ENOUGH
+from ifem_export.elements.material import Material
+from ifem_export.operators.operator_ladder import BALANCE, ENOUGH
 
 Data = Mapping[str, Any]
 OWN_CELLS, OWN_LAYERS, OWN_ELEMENT = 42, 4, "bbar"

@@ -9,21 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.guide_section import curved_guide, gel_section, straight_guide
+from gelslim_cad.geometry.guide_section import curved_guide, gel_section, straight_guide
+from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.scene import MIRROR_REFLECTANCE, dark_faces, light_scene
-from gelslim_cad.lookup import Lookup
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.guide_shapes import (
+from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
     MirrorGuide,
     curved_profile,
     mirror_profile,
 )
-from gelslim_optics.light_result import paired_ratio
-from gelslim_optics.light_scene import LightScene, Surface
-from gelslim_optics.light_source import LedRow
-from gelslim_optics.trace import trace_light
+from gelslim_optics.light.result import paired_ratio
+from gelslim_optics.light.scene import LightScene, Surface
+from gelslim_optics.light.source import LedRow
+from gelslim_optics.light.trace import trace_light
 
 SPEC = Path(__file__).parents[1] / "designs" / "gelslim2.yaml"
 RAYS = 1 << 16

@@ -22,14 +22,14 @@ from light_rays_figure import draw
 from machine import machine
 
 from gelslim_cad.light.study import RAYS
-from gelslim_optics.guide_facets import facetted_profile
-from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
-from gelslim_optics.guide_shapes import CurvedGuide, GelSection, curved_profile
-from gelslim_optics.light_points import Sampling
-from gelslim_optics.light_scene import LightScene
-from gelslim_optics.light_source import EdgeLaunch, LedRow
-from gelslim_optics.tir_certificate import certify_tir
-from gelslim_optics.trace import TraceOptions, trace_light
+from gelslim_optics.guide.facets import facetted_profile
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide.shapes import CurvedGuide, GelSection, curved_profile
+from gelslim_optics.guide.tir_certificate import certify_tir
+from gelslim_optics.light.points import Sampling
+from gelslim_optics.light.scene import LightScene
+from gelslim_optics.light.source import EdgeLaunch, LedRow
+from gelslim_optics.light.trace import TraceOptions, trace_light
 
 RUNS = 12
 REFERENCE_SEED = 10_001

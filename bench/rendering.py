@@ -25,8 +25,8 @@ from machine import machine
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.render.compression import Compression
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer
@@ -101,12 +101,12 @@ def shown(name: str, value: object) -> str:
 def design_sensor() -> Sensor:
     """Camera, print and traced light of the design."""
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.guide_section import guide_profile
+    from gelslim_cad.geometry.guide_section import guide_profile
+    from gelslim_cad.geometry.sight import camera_record, virtual_camera
     from gelslim_cad.light.scene import light_scene
-    from gelslim_cad.pad import marker_grid
-    from gelslim_cad.sight import camera_record, virtual_camera
+    from gelslim_cad.sensor.pad import marker_grid
     from gelslim_cad.spec.reader import read_spec
-    from gelslim_optics.trace import trace_light
+    from gelslim_optics.light.trace import trace_light
 
     d = derive(read_spec(SPEC).spec)
     traced = trace_light(light_scene(d, guide_profile(d)), 1 << 16, seed=LIGHT_SEED)

@@ -4,7 +4,7 @@
     python bench/stiffness_ladder.py --quick    # one Poisson's ratio, fewer layers, prints only
 
 The reference of every point is the same pad at half its pitch with eight B-bar layers (see
-ifem_export.ladder). One of layers, element and pitch is varied at a time.
+ifem_export.operators.ladder). One of layers, element and pitch is varied at a time.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 from bench_data import DOCS, write_data, write_whole
 from machine import machine
 
-from ifem_export.element import Formulation
-from ifem_export.ladder import FIELD_SEED, measure_ladder
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.elements.hex8 import Formulation
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
+from ifem_export.operators.ladder import FIELD_SEED, measure_ladder
 
 RATIOS = (0.3223, 0.45, 0.49)
 LAYERS = (1, 2, 3, 4, 6, 8)
@@ -100,7 +100,7 @@ def measured(
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
     """Above: layers and operators with the Pareto front; below: elements and pitches."""
-    from gelslim_cad.figure import as_png, new_figure
+    from gelslim_core.figure import as_png, new_figure
 
     ratios = sorted({r["poissons_ratio"] for r in rows})
     figure, axes = new_figure(12.0, 7.6, columns=max(2, len(ratios)), rows=2)

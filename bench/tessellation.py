@@ -32,7 +32,7 @@ from gelslim_cad.export.mesh import tessellate, volume_mm3, welded
 from gelslim_cad.export.patch import face_patches
 from gelslim_cad.export.stl import stl_bytes
 from gelslim_cad.export.tessellation import RUNGS, mesh_for
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.finger import finger_parts
 from gelslim_cad.spec.reader import read_spec
 

@@ -26,8 +26,8 @@ from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.stored_sensor import BUNDLE
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.mesh.pad_mesh import PadMesh
 
 Array = NDArray[np.float64]
 Rows = list[dict[str, Any]]

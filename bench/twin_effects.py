@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.effect import OBSERVABLES, Bound, Effect
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.plan import Plan
@@ -23,7 +24,6 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.stored_sensor import BUNDLE

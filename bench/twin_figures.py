@@ -16,7 +16,7 @@ DECADE = 3.0
 
 def draw_scenes(drops: Rows) -> bytes:
     """A panel per scene: effects dropped one by one, the front, the planner's choice."""
-    from gelslim_cad.figure import as_png, new_figure
+    from gelslim_core.figure import as_png, new_figure
 
     names = list(dict.fromkeys(r["scene"] for r in drops))
     rows = -(-len(names) // COLUMNS)
@@ -96,7 +96,7 @@ def shown(row: dict[str, Any]) -> float:
 
 def draw_contact(data: dict[str, Any]) -> bytes:
     """Three panels: tolerance, load steps, layers."""
-    from gelslim_cad.figure import as_png, new_figure
+    from gelslim_core.figure import as_png, new_figure
 
     figure, axes = new_figure(15.0, 4.6, columns=3)
     ladder(axes[0], data["contact"], "tolerance", "auto", "planner's choice")

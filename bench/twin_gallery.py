@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 from twin_effects import MATCH_PX, MECHANICS, measured
 from twin_rig import KeptBench, plan_key, turns_ms
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.plan import Plan
-from gelslim_twin.simulation.gel_state import GelState
 
 Array = NDArray[np.float64]
 Rows = list[dict[str, Any]]

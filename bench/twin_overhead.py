@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from twin_rig import SCENES, TwinSensor
 
-from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+from gelslim_core.files.atomic_file import json_bytes, replace_file
 from gelslim_force.outputs.picture_file import encoded
-from gelslim_optics.virtual_camera import VirtualCamera
+from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
@@ -36,7 +36,7 @@ from gelslim_twin.simulation.simulate import Ledger, simulate
 from gelslim_twin.simulation.state_store import StateStore
 from gelslim_twin.simulation.stored_sensor import BUNDLE
 from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
-from ifem_export.interpolation import marker_to_node
+from ifem_export.markers.interpolation import marker_to_node
 
 SCENE = "shear_sphere"
 """Thirty poses in a linear gel with pictures: quick stages, in which overhead shows most."""

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from twin_effects import MECHANICS, Bench
 
-from gelslim_cad.cli.twin_sensor import spec_sensor
+from gelslim.scene_sensor import spec_sensor
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.plan import Plan
 from gelslim_twin.planner import make_plan
 from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.stored_sensor import BUNDLE, store_sensor, stored_sensor

@@ -49,7 +49,7 @@ def main() -> None:
 def validated() -> dict[str, Any]:
     """The command's record, from a process of its own. Raises CalledProcessError."""
     with tempfile.TemporaryDirectory() as place:
-        command = [sys.executable, "-m", "gelslim_cad", "validate", SPEC, "-o", place]
+        command = [sys.executable, "-m", "gelslim", "validate", SPEC, "-o", place]
         done = subprocess.run(
             [*command, "--no-pictures", "--json"], cwd=ROOT, check=True, stdout=subprocess.PIPE
         )

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.detection import Detector
-from gelslim_force.detections import Detections
-from gelslim_force.detector_settings import DetectorSettings
-from gelslim_force.dot_size import DotEstimate, estimate_settings
-from gelslim_force.frame_result import FrameResult
-from gelslim_force.lattice_growth import LatticeError, grow_lattice
-from gelslim_force.reference_lattice import ReferenceLattice
-from gelslim_force.tracker import Tracker, TrackerSettings
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.detections import Detections
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.lattice.dot_size import DotEstimate, estimate_settings
+from gelslim_force.lattice.growth import LatticeError, grow_lattice
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
+from gelslim_force.tracking.tracker import Tracker, TrackerSettings
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from accuracy_budget.budget import Budget
-from accuracy_budget.ladder import Ladder
-from accuracy_budget.rung import Rung as BudgetRung
+from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.ladder import Ladder
+from gelslim_core.budget.rung import Rung as BudgetRung
+from gelslim_core.errors import GelslimError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.plan import Choice, Plan
 
 
-class PlanError(ValueError):
+class PlanError(GelslimError, ValueError):
     """A scene that cannot be planned; `effect` is the one whose override is to blame."""
 
     def __init__(self, effect: str, message: str, remedy: str) -> None:

@@ -22,7 +22,7 @@ def bundle_figures(path: str | os.PathLike[str]) -> SensorFigures:
     """
     import numpy as np
 
-    from ifem_export.bundle_manifest import read_manifest
+    from ifem_export.bundle.manifest import read_manifest
 
     manifest = read_manifest(Path(path))
     markers, mesh, material = manifest["markers"], manifest["mesh"], manifest["material"]

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from accuracy_budget.budget import Budget, shown_share
-from accuracy_budget.errors import BudgetError
-from accuracy_budget.ladder import Choice, Ladder, Wording
-from accuracy_budget.rung import Rung
+from gelslim_core.budget.budget import Budget, shown_share
+from gelslim_core.budget.errors import BudgetError
+from gelslim_core.budget.ladder import Choice, Ladder, Wording
+from gelslim_core.budget.rung import Rung
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import unit_of
 from gelslim_twin.plan import Plan

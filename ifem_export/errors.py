@@ -1,7 +1,11 @@
 """Errors of the stiffness side: every one says what is wrong, the limit and what to do."""
 
+from __future__ import annotations
 
-class IfemError(ValueError):
+from gelslim_core.errors import GelslimError
+
+
+class IfemError(GelslimError, ValueError):
     """Base of every refusal in this package; its message is fit to show to a user."""
 
 
@@ -36,6 +40,6 @@ class BundleError(IfemError):
         self.reason = reason
         self.remedy = remedy
 
-    def __reduce__(self) -> tuple[type["BundleError"], tuple[str, str, str]]:
+    def __reduce__(self) -> tuple[type[BundleError], tuple[str, str, str]]:
         """Pickle by its three parts, so that it crosses process boundaries."""
         return (type(self), (self.file, self.reason, self.remedy))

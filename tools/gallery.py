@@ -191,7 +191,7 @@ def main() -> int:
         for command in picture.commands:
             if command not in done:
                 print(f"gelslim {command}", file=sys.stderr)
-                run = [sys.executable, "-m", "gelslim_cad", *shlex.split(command)]
+                run = [sys.executable, "-m", "gelslim", *shlex.split(command)]
                 subprocess.run(run, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
                 done.add(command)
         found = sorted(ROOT.glob(picture.made))

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 DENSITY_G_CM3 = {
     "tough resin": 1.15,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.report import CameraView
-from gelslim_cad.sight import virtual_camera
-from ifem_export.marker_grid import MarkerGrid
+from ifem_export.markers.grid import MarkerGrid
 
 
 def view_of_markers(d: Dimensions, grid: MarkerGrid) -> CameraView:

@@ -11,9 +11,9 @@ from gelslim_cad.build.light_writer import LIGHT_JSON
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.build.page import pictures, report_data
 from gelslim_cad.build.plain_json import checks_json, json_bytes, plain
-from gelslim_cad.casting import cast_gel
 from gelslim_cad.dimensions import Dimensions, definition
 from gelslim_cad.report import render_report
+from gelslim_cad.solids.casting import cast_gel
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Plan, Stages

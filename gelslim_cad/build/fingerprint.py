@@ -7,7 +7,7 @@ import hashlib
 from importlib import metadata, resources
 from pathlib import Path
 
-PACKAGES = ("gelslim_cad", "gelslim_optics", "ifem_export", "yaml_model")
+PACKAGES = ("gelslim_cad", "gelslim_core", "gelslim_optics", "ifem_export")
 LIBRARIES = (
     "cadquery",
     "cadquery-ocp",
@@ -20,7 +20,7 @@ LIBRARIES = (
     "trimesh",
     "vtk",
 )
-NO_SHAPE = frozenset({"__pycache__", "cli"})
+NO_SHAPE = frozenset({"__pycache__"})
 """Folders that shape no file of a build."""
 SUFFIXES = frozenset({".py", ".js", ".css", ".html", ".json"})
 

@@ -12,9 +12,9 @@ import sys
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from whole_files.beside import beside
-from whole_files.file_lock import locked as lock_file
-from whole_files.replaced_folder import FolderError, replaced_folder
+from gelslim_core.files.beside import beside
+from gelslim_core.files.file_lock import locked as lock_file
+from gelslim_core.files.replaced_folder import FolderError, replaced_folder
 
 MANIFEST = "manifest.json"
 FAMILY = "gelslim-build/"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gelslim_cad.build.bom import BomLine
-from gelslim_cad.casting import Casting
 from gelslim_cad.dimensions import Dimensions
-from ifem_export.marker_grid import MarkerGrid
+from gelslim_cad.solids.casting import Casting
+from ifem_export.markers.grid import MarkerGrid
 
 
 def build_guide(

@@ -7,7 +7,7 @@ from typing import Any
 
 from gelslim_cad.build.plain_json import json_bytes
 from gelslim_cad.build.work import Written
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 LIGHT_JSON = "light.json"
 BALANCE = 1e-9

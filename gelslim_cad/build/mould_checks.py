@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.solids.prism import Hole
 
 UNDERCUT_MM2 = 1e-3

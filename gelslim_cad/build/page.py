@@ -21,8 +21,8 @@ from gelslim_cad.report import (
     ReportData,
     RuleRow,
 )
-from gelslim_cad.view_figures import projection_sentence
-from ifem_export.marker_grid import MarkerGrid
+from gelslim_cad.report.view_figures import projection_sentence
+from ifem_export.markers.grid import MarkerGrid
 
 PICTURES = {
     "pictures/whole.png": ("The finger", "Assembled, seen from the tip."),

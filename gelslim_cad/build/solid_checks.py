@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 INTERFERENCE_MM3 = 1e-3
 

@@ -6,20 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from gelslim_cad.binding import binding_sentences
 from gelslim_cad.build.bom import bill_of_materials, bom_csv
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.build.work import PackedPart, Unit
 from gelslim_cad.checks import Check, check
+from gelslim_cad.checks.binding import binding_sentences
 from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.light.inputs import light_inputs
-from gelslim_cad.pad import make_bundle, marker_grid, marker_print, pad_mesh, spec_hash
-from gelslim_cad.part import Part
+from gelslim_cad.report.view_figures import view_inputs
+from gelslim_cad.sensor.pad import make_bundle, marker_grid, marker_print, pad_mesh, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
-from gelslim_cad.view_figures import view_inputs
-from ifem_export.marker_grid import MarkerGrid
-from whole_files.held_interrupt import interrupts_held
-from whole_files.scratch import scratch_folder
+from gelslim_core.files.held_interrupt import interrupts_held
+from gelslim_core.files.scratch import scratch_folder
+from ifem_export.markers.grid import MarkerGrid
 
 
 @dataclass(frozen=True)
@@ -136,8 +136,8 @@ class Stages:
         return {f"markers/{n}": (data, "marker print, 1:1") for n, data in rendered.items()}
 
     def _bundle_files(self) -> dict[str, tuple[bytes, str]]:
-        from ifem_export.bundle_io import load_bundle, write_bundle
-        from ifem_export.vtu import write_vtu
+        from ifem_export.bundle.files import load_bundle, write_bundle
+        from ifem_export.mesh.vtu import write_vtu
 
         mesh, _ = pad_mesh(self.dimensions, self.grid)
         with scratch_folder() as scratch:

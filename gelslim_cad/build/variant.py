@@ -14,8 +14,9 @@ from gelslim_cad.build.folder import locked, require_ours, staged
 from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
 from gelslim_cad.build.work import Unit, Written, run
 from gelslim_cad.checks import Check
-from whole_files.replaced_folder import recover
-from work_pool.workers import worker_pool
+from gelslim_core.errors import GelslimError
+from gelslim_core.files.replaced_folder import recover
+from gelslim_core.jobs.workers import worker_pool
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Stages
@@ -24,8 +25,15 @@ Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
 
 
-class BuildRefusedError(Exception):
-    """A design rule fails, or a written file does not stand up to its proof."""
+class BuildRefusedError(GelslimError):
+    """A design rule fails, or a written file fails its check.
+
+    Attributes:
+        checks: All design rules with their findings.
+    """
+
+    exit_status = 1
+    kind = "design rule failed"
 
     def __init__(self, checks: tuple[Check, ...], message: str) -> None:
         super().__init__(message)

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from gelslim_cad.build.work import Written
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 PICTURE = "pictures/projection_error.png"
 
 
 def write_view(parts: Sequence[Part], **values: Any) -> Written:
     """Map of the projection errors; `values` are `view_inputs`."""
-    from gelslim_cad.view_figures import projection_png
+    from gelslim_cad.report.view_figures import projection_png
 
     return Written({PICTURE: projection_png(values)}, {PICTURE: "picture of the projection error"})

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gelslim_cad.build.fingerprint import code_hash, combined
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 Files = dict[str, bytes]
 VOLUME_TOLERANCE = 2e-4

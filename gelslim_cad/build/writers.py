@@ -10,8 +10,8 @@ from typing import Any
 from gelslim_cad.build.light_writer import write_light  # noqa: F401
 from gelslim_cad.build.view_writer import write_view  # noqa: F401
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
-from gelslim_cad.part import Part
-from whole_files.scratch import scratch_folder
+from gelslim_cad.geometry.part import Part
+from gelslim_core.files.scratch import scratch_folder
 
 SECTION_MM = 0.013
 """Off the mid-plane, so that no section runs along a face."""

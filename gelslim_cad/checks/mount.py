@@ -6,7 +6,7 @@ from typing import Any
 
 from gelslim_cad.checks.rule import Finding, rule
 from gelslim_cad.dimensions.housing import TONGUE_ROOM_MM
-from gelslim_cad.fasteners import SCREWS
+from gelslim_cad.geometry.fasteners import SCREWS
 
 
 @rule(

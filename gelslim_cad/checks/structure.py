@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
-from gelslim_cad.fasteners import LENGTHS_MM, SCREW_EDGE_MM, SCREWS
+from gelslim_cad.geometry.fasteners import LENGTHS_MM, SCREW_EDGE_MM, SCREWS
 
 THINNEST_WALL_MM = {
     "sla": (0.6, "thinner cured resin warps on its supports and cracks when a screw is driven"),

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.pad import marker_grid, pad_mesh
-from gelslim_cad.sight import camera_record
+from gelslim_cad.geometry.sight import camera_record
+from gelslim_cad.sensor.pad import marker_grid, pad_mesh
 from ifem_export.errors import IfemError
 
 

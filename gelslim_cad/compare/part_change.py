@@ -9,7 +9,7 @@ from gelslim_cad.build.fingerprint import combined
 from gelslim_cad.build.stages import Stages
 from gelslim_cad.build.work import Unit
 from gelslim_cad.export.brep import shape_digest
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.spec.reader import LoadedSpec
 
 How = Literal["added", "removed", "reshaped", "moved", "detail"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import dimension
-from gelslim_cad.fasteners import SCREWS
+from gelslim_cad.geometry.fasteners import SCREWS
 
 CLAMP_CHEEK_MM = 3.5
 CLAMP_BAR_MM = 1.5

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.spec import Spec
-from yaml_model.fields import Field, field_table
+from gelslim_core.yaml.fields import Field, field_table
 
 Value = float | int | str | None
 MOST_VALUES = 100_000

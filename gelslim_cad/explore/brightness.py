@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.exposure import exposure_at
 from gelslim_cad.light.inputs import NAMES
-from gelslim_cad.lookup import Lookup
 
 EXPOSED = (
     "camera.f_number",
@@ -35,9 +35,9 @@ class Traced:
 
 def trace(values: Mapping[str, Any], rays: int) -> Traced:
     """Trace the guide of a design given by `TRACED`; a fixed seed, so the same rays for all."""
-    from gelslim_cad.guide_section import guide_profile
+    from gelslim_cad.geometry.guide_section import guide_profile
     from gelslim_cad.light.scene import light_scene
-    from gelslim_optics.trace import trace_light
+    from gelslim_optics.light.trace import trace_light
 
     light = trace_light(light_scene(values, guide_profile(values)), rays, threads=1)
     red, green = (float(light.irradiance(c).mean()) for c in COLOURS)

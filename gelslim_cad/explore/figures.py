@@ -12,7 +12,7 @@ from gelslim_cad.explore.axis import Axis, shown
 from gelslim_cad.explore.judge import REFUSED
 from gelslim_cad.explore.pareto import THICKNESS, TRADES, Goal, front
 from gelslim_cad.explore.study import Exploration
-from gelslim_cad.figure import as_png, new_figure
+from gelslim_core.figure import as_png, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

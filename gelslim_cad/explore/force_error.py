@@ -5,7 +5,8 @@ and shears a patch of the design's own thickness, cells, layers and element. Two
 measured there:
 
 - mesh: forces against the same patch at half the pitch with eight B-bar layers, the reference of
-  the bundle's ladder (`ifem_export.ladder`), relative in L2, the worse of press and shear;
+  the bundle's ladder (`ifem_export.operators.ladder`), relative in L2, the worse of press and
+  shear;
 - noise: forces that errors of the marker positions make, the markers as far apart as the design's
   and bilinear in between, root mean square over the contact (two widths around its middle),
   relative to the same force field.
@@ -25,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.lookup import Lookup
+from gelslim_cad.geometry.lookup import Lookup
 
 PAD_NAMES = (
     "design.gel.thickness_mm",
@@ -105,9 +106,9 @@ class PatchError:
 
 def patch_error(patch: Patch) -> PatchError:
     """Measure a patch: about a second. Raises IfemError where its mesh has no operator."""
-    from ifem_export.ladder import reference_force
-    from ifem_export.material import Material
-    from ifem_export.surface_operator import surface_operator
+    from ifem_export.elements.material import Material
+    from ifem_export.operators.ladder import reference_force
+    from ifem_export.operators.surface_operator import surface_operator
 
     mesh = _mesh(patch)
     gel = Material(1.0, patch.poissons_ratio, 1000.0)
@@ -134,7 +135,7 @@ def patch_error(patch: Patch) -> PatchError:
 
 
 def _mesh(patch: Patch) -> Any:
-    from ifem_export.pad_mesh import PadMesh
+    from ifem_export.mesh.pad_mesh import PadMesh
 
     hx, hy, t = patch.cell_x_mm, patch.cell_y_mm, patch.thickness_mm
     nx, ny = (min(MOST_CELLS, 2 * math.ceil(SIDE_MM / h / 2)) for h in (hx, hy))

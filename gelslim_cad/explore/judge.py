@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.binding import LIMITS, SETTERS
 from gelslim_cad.checks import margins_batch
+from gelslim_cad.checks.binding import LIMITS, SETTERS
 from gelslim_cad.dimensions import Dimensions, derive_batch
 from gelslim_cad.explore.axis import Axis, Value
 from gelslim_cad.explore.force_error import PAD_NAMES

@@ -16,7 +16,7 @@ from gelslim_cad.explore.pareto import Goal
 from gelslim_cad.explore.space import Space
 from gelslim_cad.explore.study import Exploration, Progress, Request, explore
 from gelslim_cad.spec import Spec
-from yaml_model.fields import field_at
+from gelslim_core.yaml.fields import field_at
 
 Aim = Literal["thin", "bright", "accurate"]
 GOALS: dict[Aim, Goal] = {

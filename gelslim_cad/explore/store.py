@@ -13,7 +13,7 @@ from typing import Any
 from gelslim_cad.build.folder import locked
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.task import Task
-from whole_files.replaced_file import is_part, replace_file, sweep
+from gelslim_core.files.replaced_file import is_part, replace_file, sweep
 
 MARK, MARKED = "explore.json", b"{}\n"
 CHUNKS = "chunks"

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.checks import margins_batch
+from gelslim_cad.checks.relaxation import given, relaxations
 from gelslim_cad.dimensions import derive_batch
 from gelslim_cad.explore.brightness import RAYS
 from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX
 from gelslim_cad.explore.price import Measured, Price, measured, prices
 from gelslim_cad.explore.space import changed, illegal
-from gelslim_cad.relaxation import given, relaxations
 from gelslim_cad.spec import Spec
 
 LIMIT_FIELD, LIMIT_RULE = "design.envelope.max_thickness_mm", "finger.thickness_mm"
@@ -66,8 +66,9 @@ def thinner(
 ) -> Offer:
     """What each field alone buys in thickness, and its price against the finger as it is.
 
-    Without `to_mm` every field gives way by its usual step (`gelslim_cad.relaxation`); with it, by
-    as little as makes the finger so thin while every rule holds, or else by what makes it thinnest.
+    Without `to_mm` every field gives way by its usual step (`gelslim_cad.checks.relaxation`). With
+    it, a field gives way by as little as makes the finger so thin while every rule holds, or else
+    by what makes it thinnest.
     The spec's own limit on thickness is left aside. Raises ExploreError where the finger is as thin
     already, or breaks a rule, so that there is nothing to compare with.
     """

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gelslim_cad.export.error import ExportError
 from gelslim_cad.export.patch import Patch, face_patches
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963

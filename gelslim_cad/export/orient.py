@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.export.mesh import TriangleMesh, stored
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 
 def rotation(angles_deg: tuple[float, float, float]) -> NDArray[np.float64]:

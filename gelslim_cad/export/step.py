@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from gelslim_cad.export.brep import bare_copy, only_solid
 from gelslim_cad.export.error import ExportError
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 Schema = Literal["AP242DIS", "AP214IS", "AP203"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
-from gelslim_cad.pad import marker_grid
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.sensor.pad import marker_grid
 
 MM = 1000.0
 """Per metre: GLB is in metres."""

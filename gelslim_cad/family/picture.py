@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.family.member import Member
-from gelslim_cad.figure import as_png
 from gelslim_cad.report.pictures import render_window
 from gelslim_cad.report.stage import Stage, View
+from gelslim_core.figure import as_png
 
 FRONT, EDGE = View(-62.0, 16.0), View(0.0, 0.0)
 WIDTH_PX, OVERSAMPLING, DPI = 2000, 2, 150

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.guide_section import curved_guide, gel_section
+from gelslim_cad.geometry.guide_section import curved_guide, gel_section
 from gelslim_cad.light.scene import light_scene
-from gelslim_optics.guide_shapes import curved_profile
-from gelslim_optics.trace import trace_light
+from gelslim_optics.guide.shapes import curved_profile
+from gelslim_optics.light.trace import trace_light
 
 LEAST, MOST, STEP = 0.5, 6.0, 0.25
 GOOD_ENOUGH = 0.99

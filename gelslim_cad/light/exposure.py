@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from gelslim_cad.lookup import Lookup
-from gelslim_optics.light_result import LightResult
+from gelslim_cad.geometry.lookup import Lookup
+from gelslim_optics.light.result import LightResult
 
 PLANCK_J_S = 6.62607015e-34
 LIGHT_M_S = 2.99792458e8

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.figure import as_png, new_figure
-from gelslim_cad.guide_section import guide_profile
+from gelslim_cad.geometry.guide_section import guide_profile
+from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import LightStudy
-from gelslim_cad.lookup import Lookup
-from gelslim_optics.guide_profile import GuideProfile, Segment
-from gelslim_optics.trace import trace_paths
+from gelslim_core.figure import as_png, new_figure
+from gelslim_optics.guide.profile import GuideProfile, Segment
+from gelslim_optics.light.trace import trace_paths
 
 PATHS = 70
 ACRYLIC, GEL, INK = "#cfe6f5", "#f4efe2", "#333a44"

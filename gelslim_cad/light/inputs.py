@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gelslim_cad.lookup import Lookup
+from gelslim_cad.geometry.lookup import Lookup
 
 NAMES = (
     "camera.f_number",

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from accuracy_budget.ladder import Ladder, Wording
-from accuracy_budget.rung import Rung
-from gelslim_cad.guide_section import guide_profile
+from gelslim_cad.geometry.guide_section import guide_profile
+from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import COLOURS, RATIOS, study_light
-from gelslim_cad.lookup import Lookup
-from gelslim_optics.light_result import LightResult
-from gelslim_optics.trace import trace_light
+from gelslim_core.budget.ladder import Ladder, Wording
+from gelslim_core.budget.rung import Rung
+from gelslim_optics.light.result import LightResult
+from gelslim_optics.light.trace import trace_light
 
 TRACED = tuple(1 << k for k in range(11, 18))
 """Rays whose errors and times are measured."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from gelslim_cad.light.exposure import Exposure
 from gelslim_cad.light.study import COLOURS, LightStudy
-from gelslim_optics.light_result import Estimate, LightResult
+from gelslim_optics.light.result import Estimate, LightResult
 
 
 def study_record(study: LightStudy) -> dict[str, Any]:

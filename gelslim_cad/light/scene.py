@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from gelslim_cad.lookup import Lookup
-from gelslim_optics.guide_profile import GuideProfile
-from gelslim_optics.light_law import AngularLaw, Dome, Lambertian, MeasuredLaw
-from gelslim_optics.light_scene import PMMA_SELLMEIER, LightScene, Medium, Surface
-from gelslim_optics.light_source import LedRow
+from gelslim_cad.geometry.lookup import Lookup
+from gelslim_optics.guide.profile import GuideProfile
+from gelslim_optics.light.law import AngularLaw, Dome, Lambertian, MeasuredLaw
+from gelslim_optics.light.scene import PMMA_SELLMEIER, LightScene, Medium, Surface
+from gelslim_optics.light.source import LedRow
 
 MIRROR_REFLECTANCE = 0.9
 """Aluminium on acrylic, unprotected; silver reaches 0.95."""

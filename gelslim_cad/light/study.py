@@ -6,14 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gelslim_cad.guide_section import curved_guide, gel_section, guide_profile, straight_guide
+from gelslim_cad.geometry.guide_section import (
+    curved_guide,
+    gel_section,
+    guide_profile,
+    straight_guide,
+)
+from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.exposure import Exposure, exposure
 from gelslim_cad.light.scene import MIRROR_REFLECTANCE, launched_na, light_scene
-from gelslim_cad.lookup import Lookup
-from gelslim_optics.guide_shapes import curved_profile, mirror_profile
-from gelslim_optics.light_result import Estimate, LightResult, paired_ratio
-from gelslim_optics.tir_certificate import TirCertificate, certify_tir
-from gelslim_optics.trace import trace_light
+from gelslim_optics.guide.shapes import curved_profile, mirror_profile
+from gelslim_optics.guide.tir_certificate import TirCertificate, certify_tir
+from gelslim_optics.light.result import Estimate, LightResult, paired_ratio
+from gelslim_optics.light.trace import trace_light
 
 RATIOS = (0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0)
 RAYS = 1 << 17

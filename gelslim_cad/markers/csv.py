@@ -7,7 +7,7 @@ import io
 
 from gelslim_cad.markers.nodes import NearestNodes
 from gelslim_cad.markers.number import decimal
-from ifem_export.marker_grid import ANCHOR_LARGE, MarkerGrid
+from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 COLUMNS = (
     "marker_id",

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from gelslim_cad.markers.drawing import Drawing
 from gelslim_cad.markers.layout import CROSS_ARM_MM, lay_out, notes
 from gelslim_cad.markers.outline import Outline, as_outline
-from ifem_export.marker_grid import MarkerGrid
+from ifem_export.markers.grid import MarkerGrid
 
 _TEXT_MM = 2.0
 

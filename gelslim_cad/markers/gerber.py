@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_cad import __version__
 from gelslim_cad.markers.layout import check_inside
 from gelslim_cad.markers.number import decimal
 from gelslim_cad.markers.outline import Outline, arc_centre, as_outline
 from gelslim_cad.markers.stencil import StencilSheet
-from ifem_export.marker_grid import MarkerGrid
+from gelslim_core import __version__
+from ifem_export.markers.grid import MarkerGrid
 
 _PROFILE_MM = 0.05
 _GREATEST_MM = 9999.0

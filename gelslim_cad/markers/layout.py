@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gelslim_cad.markers.number import decimal
 from gelslim_cad.markers.outline import Outline, as_outline
-from ifem_export.marker_grid import ANCHOR_LARGE, MarkerGrid
+from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 CROSS_ARM_MM = 2.0
 """Half the length of a registration cross."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from gelslim_cad.markers.layout import CROSS_ARM_MM, SheetLayout, lay_out, notes
 from gelslim_cad.markers.number import decimal
 from gelslim_cad.markers.outline import Outline, as_outline
-from ifem_export.marker_grid import MarkerGrid
+from ifem_export.markers.grid import MarkerGrid
 
 Paper = Literal["a4", "letter"]
 SCALE_BAR_MM = 50.0

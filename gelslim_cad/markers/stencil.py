@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from gelslim_cad.markers.drawing import Drawing
 from gelslim_cad.markers.layout import check_inside, tip_arrow
 from gelslim_cad.markers.outline import Outline, as_outline
-from ifem_export.marker_grid import MarkerGrid
+from ifem_export.markers.grid import MarkerGrid
 
 _CORNER_MM = 2.0
 _WALL_MM = 2.0

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from gelslim_cad.markers.layout import CROSS_ARM_MM, SCALE_BAR_MM, SheetLayout, lay_out, notes
 from gelslim_cad.markers.number import decimal
 from gelslim_cad.markers.outline import Outline, as_outline
-from ifem_export.marker_grid import ANCHOR_LARGE, MarkerGrid
+from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 _LINE_MM = 0.1
 _TEXT_MM = 2.0

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from gelslim_cad.markers.csv import render_csv
 from gelslim_cad.markers.nodes import NearestNodes
 from gelslim_cad.markers.outline import Outline, as_outline
-from ifem_export.marker_grid import MarkerGrid
-from whole_files.replaced_file import replace_file
+from gelslim_core.files.replaced_file import replace_file
+from ifem_export.markers.grid import MarkerGrid
 
 FIRST_FILE = "markers-Alignment.gbr"
 """Written first; it names its generator."""

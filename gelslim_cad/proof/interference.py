@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof.result import ProofResult, at_most, equal
 
 TOLERANCE_MM3 = 1e-3

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof.result import ProofResult, at_most, equal
 
 VOLUME_LIMIT = 1e-3

@@ -5,8 +5,8 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.fasteners import SCREWS
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.fasteners import SCREWS
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import ADAPTER, PRINTED
 from gelslim_cad.solids.shapes import box, pair, rod, single, subtract, union

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import BEZEL, PRINTED
 from gelslim_cad.solids.shapes import countersink, eased, rounded_box, single, subtract

@@ -11,7 +11,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Hole, Layout
 from gelslim_cad.solids.materials import BODY, PRINTED
 from gelslim_cad.solids.shapes import box, eased, pair, rod, rounded_box, single, subtract, union

@@ -6,7 +6,7 @@ import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.housing import CLAMP_BAR_MM, CLAMP_CHEEK_MM, CLAMP_LIP_MM
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import CAMERA, CLAMP, PRINTED
 from gelslim_cad.solids.shapes import Point2, box, pair, rod, single, subtract, union

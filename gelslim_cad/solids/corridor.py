@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
-from gelslim_cad.sight import virtual_camera
+from gelslim_cad.geometry.part import Part
+from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.solids.shapes import single
 
 SEEN_PARTS = frozenset({"light_guide", "gel_pad", "mirror", "camera"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.camera import clamp_screw_places
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import COVER, PRINTED

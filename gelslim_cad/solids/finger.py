@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.adapter import adapter
 from gelslim_cad.solids.bezel import bezel
 from gelslim_cad.solids.body import body

@@ -10,8 +10,8 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.prism import prism
 from gelslim_cad.solids.shapes import single
 

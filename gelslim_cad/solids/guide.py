@@ -11,12 +11,12 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.guide_section import guide_profile
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.guide_section import guide_profile
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.closed_wire import Piece, closed_wire
 from gelslim_cad.solids.materials import ACRYLIC
 from gelslim_cad.solids.shapes import single
-from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Point, Segment
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Point, Segment
 
 
 def profile_wire(profile: GuideProfile, x_mm: float) -> cq.Wire:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.housing import BEAM_MM
-from gelslim_cad.fasteners import SCREW_EDGE_MM, SCREWS, ScrewSize, stock_length_mm
+from gelslim_cad.geometry.fasteners import SCREW_EDGE_MM, SCREWS, ScrewSize, stock_length_mm
 
 SEAT_RECESS_SHARE = 0.4
 SEAT_RECESS_MM = 0.5

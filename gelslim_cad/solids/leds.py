@@ -5,7 +5,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.materials import GREEN_BOARD, RED_BOARD
 from gelslim_cad.solids.shapes import box, single, union
 

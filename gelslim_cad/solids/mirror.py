@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import MIRROR, PRINTED, SEAT
 from gelslim_cad.solids.shapes import Point2, prism_across, rod, single, subtract

@@ -7,8 +7,8 @@ import math
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.fasteners import ScrewSize, stock_length_mm
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.fasteners import ScrewSize, stock_length_mm
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.camera import clamp_screw_places
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import STEEL

@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
+from gelslim_core.yaml.base import Block
 
 FOV_TOLERANCE = 0.05
 

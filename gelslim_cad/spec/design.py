@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
+from gelslim_core.yaml.base import Block
 
 
 class Gel(Block):

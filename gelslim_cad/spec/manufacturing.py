@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from yaml_model.base import Block
+from gelslim_core.yaml.base import Block
 
 PrintProcess = Literal["sla", "fdm", "sls"]
 MarkingProcess = Literal["laser_opened_paint", "laser_etch", "uv_print", "stencil"]

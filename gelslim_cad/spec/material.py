@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
+from gelslim_core.yaml.base import Block
 
 STIFF_GEL_MPA = 5.0
 

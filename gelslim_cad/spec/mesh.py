@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
+from gelslim_core.yaml.base import Block
 
 Count = Annotated[int, Field(ge=1, le=400)]
 

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 
 from gelslim_cad.spec.spec import Spec
-from yaml_model.reader import Loaded, read_model
+from gelslim_core.yaml.reader import Loaded, read_model
 
 
 @dataclass(frozen=True)

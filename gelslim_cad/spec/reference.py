@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from gelslim_cad.spec.schema import schema_text
-from yaml_model.reference import reference_markdown
+from gelslim_core.yaml.reference import reference_markdown
 
 RULES = (
     (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import yaml_model.schema
+import gelslim_core.yaml.schema
 from gelslim_cad.spec.spec import Spec
 
 FORMAT = "gelslim-spec/1"
@@ -10,4 +10,4 @@ FORMAT = "gelslim-spec/1"
 
 def schema_text() -> str:
     """The JSON Schema (draft 2020-12) of the spec as text, the same for the same program."""
-    return yaml_model.schema.schema_text(Spec, FORMAT)
+    return gelslim_core.yaml.schema.schema_text(Spec, FORMAT)

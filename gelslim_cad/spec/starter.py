@@ -11,12 +11,12 @@ from typing import Any
 from pydantic import BaseModel
 
 from gelslim_cad.spec.spec import Spec
-from yaml_model.errors import InputError
-from yaml_model.fields import Field, children
-from yaml_model.phrases import range_phrase
-from yaml_model.reader import load_bytes
-from yaml_model.scalars import RefusedScalarError, resolve
-from yaml_model.suggest import one_of
+from gelslim_core.yaml.errors import InputError
+from gelslim_core.yaml.fields import Field, children
+from gelslim_core.yaml.phrases import range_phrase
+from gelslim_core.yaml.reader import load_bytes
+from gelslim_core.yaml.scalars import RefusedScalarError, resolve
+from gelslim_core.yaml.suggest import one_of
 
 SPY_CAMERA: dict[str, Any] = {
     "camera.name": "Raspberry Pi spy camera (OV5647)",

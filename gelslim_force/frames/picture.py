@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_core.errors import GelslimError
 from gelslim_force.frames.frame import FrameSourceError, Picture, with_vision
 
 PICTURE_ENDINGS = (
@@ -16,7 +17,7 @@ PICTURE_ENDINGS = (
 _MOST_PX = 100_000_000
 
 
-class PictureError(ValueError):
+class PictureError(GelslimError, ValueError):
     """A file that holds no whole picture; the message leaves out the file's name."""
 
 

@@ -9,7 +9,7 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_force.forces.frame_result import FrameResult
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 

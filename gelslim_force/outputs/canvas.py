@@ -10,8 +10,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.files.output_error import OutputError
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.output_error import OutputError
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]

@@ -7,8 +7,8 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_force.outputs.field_chunk import stack, write_chunk
-from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.packed_frame import PackedFrame
 
 _WAITING = 2

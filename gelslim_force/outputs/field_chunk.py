@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.atomic_file import replace_file
+from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.atomic_file import replace_file
-from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.packed_frame import PER_MARKER, PER_NODE, PackedFrame, unpack
 
 Format = Literal["npz", "parquet"]

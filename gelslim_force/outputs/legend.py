@@ -6,10 +6,10 @@ import textwrap
 
 import numpy as np
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale, round_step
 from gelslim_force.outputs.canvas import Backend, Canvas, Colour, Image, arrow, canvas_on
-from gelslim_force.tracks import MarkerStatus
+from gelslim_force.tracking.tracks import MarkerStatus
 
 WIDTH_PX, LEAST_HEIGHT_PX = 300, 640
 YELLOW: Colour = (255, 221, 40)

@@ -15,8 +15,8 @@ from importlib import resources
 from types import TracebackType
 from typing import Any
 
-from gelslim_force.frame_result import FrameResult
-from gelslim_force.outputs.output_error import OutputError, disk_error
+from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.packed_frame import plain
 from gelslim_force.outputs.picture_file import Image, encoded
 from gelslim_force.outputs.wrench_csv import row

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_core.files.output_error import OutputError
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.output_error import OutputError
 from gelslim_force.outputs.picture_file import Image
 
 _STOP_KEYS = (27, ord("q"))

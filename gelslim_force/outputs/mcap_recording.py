@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.ros_messages import (
     FORCE_FIELD,
     WRENCH_STAMPED,

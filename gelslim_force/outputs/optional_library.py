@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from gelslim_force.outputs.output_error import OutputError
+from gelslim_core.files.output_error import OutputError
 
 
 def load(module: str, extra: str, purpose: str) -> Any:

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import ForceField, FrameResult
+from gelslim_core.files.atomic_file import replace_file
+from gelslim_core.files.output_error import disk_error
+from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale
-from gelslim_force.outputs.atomic_file import replace_file
 from gelslim_force.outputs.canvas import Backend, Canvas, Image, arrow, canvas_on
 from gelslim_force.outputs.legend import (
     LEAST_HEIGHT_PX,
@@ -28,10 +29,9 @@ from gelslim_force.outputs.legend import (
     shade_share,
     status_mark,
 )
-from gelslim_force.outputs.output_error import disk_error
 from gelslim_force.outputs.picture_file import encoded, enlarged
 from gelslim_force.outputs.surface_view import Projection, SurfaceView
-from gelslim_force.tracks import MarkerStatus, Tracks
+from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 _DARK = (18, 20, 22)
 _SHADES = np.array([shade_share(k / 255.0) for k in range(256)])

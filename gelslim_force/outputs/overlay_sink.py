@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale, LiveScale, extent, scale_for
 from gelslim_force.outputs.overlay import Overlay, write_overlay
 from gelslim_force.outputs.overlay_video import OverlayVideo

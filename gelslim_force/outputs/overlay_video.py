@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_core.files.beside import beside
+from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.picture_file import Image
-from whole_files.beside import beside
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
 

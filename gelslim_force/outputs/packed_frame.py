@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import ForceField, FrameResult
-from gelslim_force.tracks import Tracks
-from gelslim_force.wrench import Wrench
+from gelslim_force.forces.frame_result import ForceField, FrameResult
+from gelslim_force.forces.wrench import Wrench
+from gelslim_force.tracking.tracks import Tracks
 
 Precision = Literal["float32", "float64"]
 """Of places, motions and forces; times and wrenches are float64 always."""

@@ -7,8 +7,8 @@ import io
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.files.output_error import OutputError
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.output_error import OutputError
 
 Image = NDArray[np.uint8]
 _PURPOSE = "writing pictures"

@@ -12,15 +12,15 @@ from typing import Any, get_args
 
 import numpy as np
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.stage_clock import StageClock, StageTimes
 from gelslim_force.outputs.field_chunk import FieldChunk, Format, read_chunk, stack
 from gelslim_force.outputs.frame_journal import read_journal
-from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.packed_frame import PackedFrame
 from gelslim_force.outputs.run_manifest import read_manifest
 from gelslim_force.outputs.run_recorder import FIELD_FILE, STAGES, WRENCHES
 from gelslim_force.outputs.wrench_csv import NUMBERS, WrenchTable, read_wrenches
-from gelslim_force.stage_clock import StageClock, StageTimes
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_force.forces.frame_result import FrameResult
 
 
 class Recorder(Protocol):

@@ -8,9 +8,9 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.wrench import Wrench
 from gelslim_force.outputs.cdr import CdrMessage
-from gelslim_force.wrench import Wrench
 
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 FORCE_FIELD = "gelslim_msgs/msg/ForceField"

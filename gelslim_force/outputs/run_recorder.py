@@ -22,13 +22,15 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.file_lock import locked
+from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.files.replaced_file import sweep
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs import optional_library, wrench_csv
 from gelslim_force.outputs.append_file import AppendFile
 from gelslim_force.outputs.chunk_writer import ChunkWriter
 from gelslim_force.outputs.field_chunk import Format, fits
 from gelslim_force.outputs.frame_journal import record
-from gelslim_force.outputs.output_error import OutputError, disk_error
 from gelslim_force.outputs.packed_frame import PackedFrame, Precision, pack, plain
 from gelslim_force.outputs.run_manifest import (
     FORMAT_NAME,
@@ -40,8 +42,6 @@ from gelslim_force.outputs.run_manifest import (
     versions,
     write_manifest,
 )
-from whole_files.file_lock import locked
-from whole_files.replaced_file import sweep
 
 LOCK = ".lock"
 WRENCHES, STAGES = "wrenches.csv", "stages.jsonl"

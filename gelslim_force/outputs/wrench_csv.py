@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
-from gelslim_force.outputs.output_error import OutputError, disk_error
-from gelslim_force.tracks import MarkerStatus
+from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.tracking.tracks import MarkerStatus
 
 _AXES = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
 _STATUS = {

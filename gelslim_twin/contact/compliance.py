@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.files.replaced_file import replacement
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.pad_symmetry import Symmetry, symmetries
 from gelslim_twin.contact.row_factor import RowFactor
-from ifem_export.bundle import Bundle
-from ifem_export.pad_system import PadSystem
-from ifem_export.sparse_factor import Factor, factored
-from ifem_export.surface_operator import SurfaceOperator
-from whole_files.replaced_file import replacement
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.sparse_factor import Factor, factored
+from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

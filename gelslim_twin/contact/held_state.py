@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.simulation.gel_state import GelState
+from gelslim_twin.contact.gel_state import GelState
 
 
 @dataclass(frozen=True, eq=False)

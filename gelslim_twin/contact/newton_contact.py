@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.anderson import Anderson
+from gelslim_force.contact.anderson import Anderson
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_balance import STICK, Balance, balanced
 from gelslim_twin.contact.gel_body import GelBody, Tangent
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.held_state import HeldState
 from gelslim_twin.contact.settling import room_to_tool, slack_mm
 from gelslim_twin.contact.solver import REACH, ContactSolver
 from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState
-from ifem_export.finite_strain import FiniteStrainError
+from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

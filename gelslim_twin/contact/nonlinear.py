@@ -18,19 +18,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.anderson import Anderson
-from gelslim_force.finite_strain_force import FiniteStrainForce
+from gelslim_force.contact.anderson import Anderson
+from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.gel_body import GelBody
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.halved_path import reached, rests
 from gelslim_twin.contact.held_state import held_mm
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState
-from ifem_export.bundle import Bundle
-from ifem_export.finite_strain import FiniteStrainError
-from ifem_export.solver import ConvergenceError
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.finite_strain.neo_hookean import FiniteStrainError
+from ifem_export.operators.solver import ConvergenceError
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.mesh.pad_mesh import PadMesh
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_balance import STICK
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.halved_path import between, reached, rests
 from gelslim_twin.contact.held_state import HeldState, held_mm
 from gelslim_twin.contact.reach import Reach, reach_of
@@ -29,7 +30,6 @@ from gelslim_twin.contact.settling import Settled, Settling, room_to_tool, slack
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState
 
 __all__ = ["ContactError", "ContactSettings", "ContactSolver"]
 

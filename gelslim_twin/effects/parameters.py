@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from yaml_model.base import Block
+from gelslim_core.yaml.base import Block
 
 Use = Literal["auto", "on", "off"]
 

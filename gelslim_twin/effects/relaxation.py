@@ -7,11 +7,11 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import Bound, Effect, Rung
 from gelslim_twin.effects.parameters import EffectParameters
-from yaml_model.base import Block
-from yaml_model.errors import FieldError
 
 
 class PronyTerm(Block):

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_optics.height_field import HeightGrid
+from gelslim_optics.camera.height_field import HeightGrid
 
 if TYPE_CHECKING:
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_twin.render.sight import Sight
 
 Array = NDArray[np.float64]

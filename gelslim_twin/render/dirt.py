@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelslim_twin.render.random_stream import stream
 
 if TYPE_CHECKING:
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
 _CORNERS = 24

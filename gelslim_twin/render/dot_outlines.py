@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_twin.render.marker_motion import MarkerMotion
     from gelslim_twin.render.printed_dots import PrintedDots
     from gelslim_twin.render.surface_state import SurfaceState

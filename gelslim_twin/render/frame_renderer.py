@@ -19,12 +19,12 @@ from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad, still_irradiance
 
 if TYPE_CHECKING:
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_twin.render.defocus import BlurField
     from gelslim_twin.render.domed_top import DomedTop
     from gelslim_twin.render.light_map import LightMap
     from gelslim_twin.render.marker_motion import MarkerMotion
-    from ifem_export.marker_grid import MarkerGrid
+    from ifem_export.markers.grid import MarkerGrid
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ifem_export.marker_grid import MarkerGrid
+    from ifem_export.markers.grid import MarkerGrid
 
 Array = NDArray[np.float64]
 

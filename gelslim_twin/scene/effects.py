@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from gelslim_core.yaml.base import Block
 from gelslim_twin.effects.compression import CompressionParameters
 from gelslim_twin.effects.defocus import DefocusParameters
 from gelslim_twin.effects.dirt import DirtParameters
@@ -22,7 +23,6 @@ from gelslim_twin.effects.relaxation import RelaxationParameters
 from gelslim_twin.effects.sensor_noise import SensorNoiseParameters
 from gelslim_twin.effects.shading import ShadingParameters
 from gelslim_twin.effects.specular import SpecularParameters
-from yaml_model.base import Block
 
 
 class Effects(Block):

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
-from yaml_model.errors import FieldError
+from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 Size = Annotated[float, Field(gt=0, le=200)]
 Offset = Annotated[float, Field(ge=-100, le=100)]

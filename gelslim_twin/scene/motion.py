@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
-from yaml_model.errors import FieldError
+from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 MAX_POSES = 20_000
 

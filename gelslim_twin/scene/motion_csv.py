@@ -7,11 +7,11 @@ import math
 import os
 from dataclasses import fields
 
+from gelslim_core.yaml.errors import InputError, Problem, listed, shown
+from gelslim_core.yaml.source import MAX_BYTES, read_source
+from gelslim_core.yaml.suggest import closest
 from gelslim_twin.scene.motion import MAX_POSES
 from gelslim_twin.scene.pose import Pose
-from yaml_model.errors import InputError, Problem, listed, shown
-from yaml_model.source import MAX_BYTES, read_source
-from yaml_model.suggest import closest
 
 COLUMNS = tuple(field.name for field in fields(Pose))
 REQUIRED = ("time_s", "depth_mm")

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from gelslim_core.yaml.errors import InputError, Problem, shown
+from gelslim_core.yaml.reader import Loaded, read_model
+from gelslim_core.yaml.schema import schema_text
 from gelslim_twin.scene.motion_csv import read_motion_csv
 from gelslim_twin.scene.pose import Pose, poses
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
 from gelslim_twin.scene.stl_extent import footprint_mm
 from gelslim_twin.scene.varied import varied
-from yaml_model.errors import InputError, Problem, shown
-from yaml_model.reader import Loaded, read_model
-from yaml_model.schema import schema_text
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
+from gelslim_core.yaml.reference import reference_markdown
 from gelslim_twin.scene.reader import scene_schema_text
-from yaml_model.reference import reference_markdown
 
 RULES = (
     ("sensor", "names `spec` or `bundle`, not both"),

@@ -6,14 +6,14 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
+from gelslim_core.yaml.folder_name import require_folder_name
 from gelslim_twin.scene.effects import Effects
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.motion import Motion
 from gelslim_twin.scene.sensor import Sensor
 from gelslim_twin.scene.variation import Variation
-from yaml_model.base import Block
-from yaml_model.errors import FieldError
-from yaml_model.folder_name import require_folder_name
 
 FORMAT = "gelslim-scene/1"
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
-from yaml_model.errors import FieldError
+from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 
 class Sensor(Block):

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from yaml_model.base import Block
-from yaml_model.errors import FieldError
+from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 Range = Annotated[tuple[float, float], Field(description="Lowest and highest value")]
 _TWO_53 = 2.0**53

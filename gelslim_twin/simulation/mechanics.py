@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.simulate import Mechanics
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 

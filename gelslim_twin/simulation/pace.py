@@ -11,6 +11,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from gelslim_core.files.scratch import scratch_folder
 from gelslim_twin.effects.circumstances import SensorFigures
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.reader import read_scene
@@ -20,7 +21,6 @@ from gelslim_twin.simulation.simulate import Ledger, simulate
 from gelslim_twin.simulation.stored_sensor import BUNDLE, store_sensor, stored_sensor
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE, pace_group
-from whole_files.scratch import scratch_folder
 
 Progress = Callable[[str, int, int], None]
 DEPTH, RADIUS = 0.1, 2.0

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.scene import Scene
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.view.camera import plan_camera
-from ifem_export.interpolation import marker_to_node
+from ifem_export.markers.interpolation import marker_to_node
 
 if TYPE_CHECKING:
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_twin.render.frame_renderer import FrameRenderer
     from gelslim_twin.render.rendered_frame import RenderedFrame
     from gelslim_twin.render.surface_state import SurfaceState

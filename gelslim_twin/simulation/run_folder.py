@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gelslim_force.outputs.atomic_file import json_bytes, replace_file
-from whole_files.replaced_file import is_part, sweep
+from gelslim_core.errors import GelslimError
+from gelslim_core.files.atomic_file import json_bytes, replace_file
+from gelslim_core.files.replaced_file import is_part, sweep
 
 FORMAT = "gelslim-simulation/1"
 RUN, PLAN, LEDGER = "run.json", "plan.json", "ledger.json"
@@ -17,7 +18,7 @@ TRUTH, FIELDS = "truth.csv", "truth.npz"
 FRAMES, STATES = "frames", "states"
 
 
-class SimulationError(ValueError):
+class SimulationError(GelslimError, ValueError):
     """A simulation that cannot start or go on; the message says why and what to do."""
 
 

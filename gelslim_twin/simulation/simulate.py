@@ -15,13 +15,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+from gelslim_core.files.atomic_file import json_bytes, replace_file
+from gelslim_core.files.beside import beside
+from gelslim_core.files.file_lock import locked
 from gelslim_force.outputs.picture_file import encoded
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.frame_times import FrameTime, frame_times
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.scene import Scene
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.run_folder import (
     FIELDS,
     LEDGER,
@@ -35,9 +37,7 @@ from gelslim_twin.simulation.run_folder import (
 from gelslim_twin.simulation.state_store import StateStore
 from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.single_thread import single_threaded
-from whole_files.beside import beside
-from whole_files.file_lock import locked
+from ifem_export.operators.single_thread import single_threaded
 
 Progress = Callable[[str, int, int], None]
 COORDINATES = ("x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gelslim_force.outputs.atomic_file import replace_file
-from gelslim_twin.simulation.gel_state import GelState
+from gelslim_core.files.atomic_file import replace_file
+from gelslim_twin.contact.gel_state import GelState
 
 CHUNK = 32
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gelslim_force.outputs.atomic_file import json_bytes, replace_file
+from gelslim_core.files.atomic_file import json_bytes, replace_file
+from gelslim_core.files.file_lock import locked
+from gelslim_core.files.shared_use import use, used_elsewhere
 from gelslim_twin.simulation.run_folder import SimulationError
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle_io import load_bundle, write_bundle
-from whole_files.file_lock import locked
-from whole_files.shared_use import use, used_elsewhere
+from ifem_export.bundle.files import load_bundle, write_bundle
 
 BUNDLE, LIGHT, OUTLINE = "bundle", "light.npz", "sensor.json"
 USE = ".in_use"

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.wrench import resultant
+from gelslim_force.forces.wrench import resultant
+from gelslim_twin.contact.gel_state import GelState, Touch
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState, Touch
 
 Array = NDArray[np.float64]
 COLUMNS = (

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ifem_export.bundle import Bundle
+from ifem_export.bundle.bundle import Bundle
 
 if TYPE_CHECKING:
     from gelslim_twin.render.light_map import LightMap
-    from ifem_export.marker_grid import MarkerGrid
+    from ifem_export.markers.grid import MarkerGrid
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class TwinSensor:
     @cached_property
     def grid(self) -> MarkerGrid:
         """The print. Raises IfemError for a bundle without markers."""
-        from gelslim_force.bundle_grid import bundle_grid
+        from gelslim_force.lattice.bundle_grid import bundle_grid
 
         return bundle_grid(self.bundle)
 

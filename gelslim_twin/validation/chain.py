@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from accuracy_budget.budget import Budget
-from gelslim_force.force_estimator import ForceSettings
-from gelslim_force.pipeline_settings import PipelineSettings
-from ifem_export.bundle import Bundle
+from gelslim_core.budget.budget import Budget
+from gelslim_force.forces.estimator import ForceSettings
+from gelslim_force.settings import PipelineSettings
+from ifem_export.bundle.bundle import Bundle
 
 Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
 """The surface's true height, with or without the nodes touched, or the indenter's shape (`cap`:

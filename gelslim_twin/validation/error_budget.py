@@ -14,16 +14,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.bundle_camera import bundle_camera
-from gelslim_force.marker_heights import marker_heights_mm
-from gelslim_force.marker_motion import Compensation, MarkerView
-from gelslim_twin.simulation.gel_state import GelState
+from gelslim_force.calibration.bundle_camera import bundle_camera
+from gelslim_force.motion.marker_heights import marker_heights_mm
+from gelslim_force.motion.marker_motion import Compensation, MarkerView
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.validation.score import Spread, spread
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.interpolation import marker_to_node
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
-from ifem_export.surface_operator import SurfaceOperator
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.interpolation import marker_to_node
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 THICKNESS_OFF = 0.05

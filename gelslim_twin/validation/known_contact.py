@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.indenter_source import NormalReading
-from gelslim_twin.simulation.gel_state import GelState
+from gelslim_force.contact.indenter_source import NormalReading
+from gelslim_twin.contact.gel_state import GelState
 
 Array = NDArray[np.float64]
 

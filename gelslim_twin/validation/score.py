@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_force.frame_result import FrameResult
-from gelslim_twin.simulation.gel_state import GelState
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_twin.contact.gel_state import GelState
 
 Array = NDArray[np.float64]
 NEAR = 0.15

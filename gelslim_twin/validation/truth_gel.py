@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.validation.truth_pad import truth_pad
-from ifem_export.bundle import Bundle
+from ifem_export.bundle.bundle import Bundle
 
 Law = Literal["neo_hookean", "linear"]
 

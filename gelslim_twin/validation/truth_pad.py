@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.mesh.pad_mesh import PadMesh
 
 LAYERS = 8
 

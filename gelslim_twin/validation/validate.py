@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from accuracy_budget.budget import Budget
-from gelslim_force.calibration import calibrate
-from gelslim_force.force_pipeline import ForcePipeline
-from gelslim_force.frame_result import FrameResult
-from gelslim_force.sensor_calibration import SensorCalibration
+from gelslim_core.budget.budget import Budget
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.render.domed_top import DomedTop
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.sensor_look import sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.validation.case import other_contacts
 from gelslim_twin.validation.chain import Chain, chains_for
@@ -33,8 +33,8 @@ from gelslim_twin.validation.known_contact import KnownContact
 from gelslim_twin.validation.score import Score, score, summary
 from gelslim_twin.validation.truth_gel import TruthGel
 from gelslim_twin.validation.validation import Sample, Validation
-from ifem_export.interpolation import marker_to_node
-from ifem_export.single_thread import single_threaded
+from ifem_export.markers.interpolation import marker_to_node
+from ifem_export.operators.single_thread import single_threaded
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -108,8 +108,8 @@ class Bench:
     def _source(self, pipeline: ForcePipeline, known: str, cap_only: bool) -> Any:
         from dataclasses import replace
 
-        from gelslim_force.indenter import parse_indenter
-        from gelslim_force.indenter_source import indenter_source
+        from gelslim_force.contact.indenter import parse_indenter
+        from gelslim_force.contact.indenter_source import indenter_source
 
         source = indenter_source(pipeline, self.reference, parse_indenter(known))
         return replace(source, cap_only=True) if cap_only else source
@@ -181,7 +181,7 @@ def validate(
 
 def sensor_renderer(sensor: TwinSensor, seed: int) -> FrameRenderer:
     """Draws what the sensor's camera sees, with all that a used sensor shows."""
-    from gelslim_force.bundle_camera import bundle_camera
+    from gelslim_force.calibration.bundle_camera import bundle_camera
 
     record = sensor.camera_record
     aperture = float(record.get("aperture_mm") or 0.0)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.frame_result import FrameResult
-from gelslim_force.sensor_calibration import SensorCalibration
-from gelslim_twin.simulation.gel_state import GelState
+from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.validation.experiment import FRICTION, Experiment
 from gelslim_twin.validation.score import Score, Spread
 

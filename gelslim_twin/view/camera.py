@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gelslim_twin.plan import Plan
 
 if TYPE_CHECKING:
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 
 def plan_camera(plan: Plan, record: Mapping[str, Any]) -> VirtualCamera:

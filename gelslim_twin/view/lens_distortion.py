@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gelslim_optics.virtual_camera import VirtualCamera
+from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 
 def apply(camera: VirtualCamera, record: Mapping[str, Any]) -> VirtualCamera:

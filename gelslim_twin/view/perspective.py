@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gelslim_optics.layer import Layer
-from gelslim_optics.virtual_camera import VirtualCamera
+from gelslim_optics.camera.layer import Layer
+from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 
 def apply(record: Mapping[str, Any]) -> VirtualCamera:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gelslim_optics.layer import Layer
-from gelslim_optics.virtual_camera import VirtualCamera
+from gelslim_optics.camera.layer import Layer
+from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 
 def apply(

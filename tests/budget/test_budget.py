@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from accuracy_budget.budget import Budget, parse_share, parse_time_ms, shown_share, shown_time
-from accuracy_budget.errors import BudgetError
+from gelslim_core.budget.budget import Budget, parse_share, parse_time_ms, shown_share, shown_time
+from gelslim_core.budget.errors import BudgetError
 
 
 @pytest.mark.parametrize(
@@ -62,10 +62,10 @@ def test_limits_must_be_positive_and_finite(value: float) -> None:
 
 
 def test_a_researchers_budget() -> None:
-    import accuracy_budget
+    import gelslim_core.budget
 
-    assert accuracy_budget.Budget is Budget
-    assert accuracy_budget.BudgetError is BudgetError
+    assert gelslim_core.budget.Budget is Budget
+    assert gelslim_core.budget.BudgetError is BudgetError
     assert Budget(error=0.03, time="2s") == Budget(0.03, 2000.0)
     assert Budget(error=np.float32(0.5), time_ms=np.int64(3)).allows(0.5, 3.0)
     assert replace(Budget(time="2s"), error=0.1) == Budget(0.1, 2000.0)

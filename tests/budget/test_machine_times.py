@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from accuracy_budget import machine_times
-from accuracy_budget.machine_times import (
+from gelslim_core.budget import machine_times
+from gelslim_core.budget.machine_times import (
     cache_folder,
     read_times,
     require_keeping,

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from accuracy_budget.budget import Budget
-from accuracy_budget.errors import BudgetError
-from accuracy_budget.ladder import Ladder, Wording
-from accuracy_budget.rung import Rung
+from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.errors import BudgetError
+from gelslim_core.budget.ladder import Ladder, Wording
+from gelslim_core.budget.rung import Rung
 
 WORDS = Wording("operator", "field error", "per frame", "use more layers")
 PAPER = Rung("paper", 0.4, 0.04, 1.0)

@@ -88,7 +88,7 @@ def test_every_proof_holds_and_all_file_kinds_are_proved(built: Path) -> None:
 
 
 def test_the_bundle_of_a_build_loads_and_knows_its_sensor(built: Path) -> None:
-    from ifem_export.bundle_io import load_bundle
+    from ifem_export.bundle.files import load_bundle
 
     bundle = load_bundle(built / "bundle", verify=True)
     assert bundle.spec_hash == json.loads((built / "manifest.json").read_text())["spec_hash"]

@@ -45,7 +45,7 @@ def test_a_killed_build_leaves_the_old_output(
 
 
 def start(spec: Path, out: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "gelslim_cad", "build", str(spec), "-o", str(out)]
+    command = [sys.executable, "-m", "gelslim", "build", str(spec), "-o", str(out)]
     root = Path(__file__).parents[2]
     return subprocess.Popen(
         command, cwd=root, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE

@@ -7,9 +7,9 @@ import re
 import pytest
 from rule_samples import shipped, varied
 
-from gelslim_cad.binding import binding_sentences
+from gelslim_cad.checks.binding import binding_sentences
+from gelslim_cad.checks.relaxation import ladders, relaxations
 from gelslim_cad.dimensions import derive
-from gelslim_cad.relaxation import ladders, relaxations
 from gelslim_cad.spec import Spec
 
 

@@ -12,9 +12,9 @@ from gelslim_cad.checks import RULES, check, check_batch
 from gelslim_cad.checks.apply import _check
 from gelslim_cad.checks.rule import Finding, Rule
 from gelslim_cad.dimensions import derive, derive_batch
-from gelslim_cad.gel_shape import GelShape
-from gelslim_cad.pad import marker_grid
-from ifem_export.marker_grid import build_marker_grid
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.sensor.pad import marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 
 def test_figures_worked_by_hand() -> None:

@@ -28,9 +28,9 @@ def too_long(folder: Path) -> Path:
 def fresh(
     *arguments: str, cwd: Path | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """`python -m gelslim_cad` in a process of its own."""
+    """`python -m gelslim` in a process of its own."""
     return subprocess.run(
-        [sys.executable, "-m", "gelslim_cad", *arguments],
+        [sys.executable, "-m", "gelslim", *arguments],
         capture_output=True,
         text=True,
         encoding="utf-8",

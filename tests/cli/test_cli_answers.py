@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from cli_samples import MINI20, altered, too_long
 
+from gelslim.cli import main
+from gelslim.cli.answer import number, plain
 from gelslim_cad.checks import RULES, check
-from gelslim_cad.cli import main
-from gelslim_cad.cli.answer import number, plain
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
 

@@ -13,15 +13,15 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import frame, sensor_bundle, stream
 
-from accuracy_budget.budget import Budget
-from accuracy_budget.machine_times import read_times, times_path, write_times
-from gelslim_cad.cli.main import main
+from gelslim.cli.main import main
+from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.machine_times import read_times, times_path, write_times
 from gelslim_force.outputs.picture_file import encoded
-from ifem_export.bundle import Bundle
-from ifem_export.bundle_io import load_bundle, write_bundle
-from ifem_export.ladder import operator_choices
-from ifem_export.operator_ladder import MeasuredRung, OperatorLadder
-from ifem_export.surface_operator import surface_operator
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.operators.ladder import operator_choices
+from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder
+from ifem_export.operators.surface_operator import surface_operator
 
 
 @pytest.fixture(autouse=True)
@@ -166,7 +166,7 @@ def test_what_is_outside_the_calibration_is_said(
 def test_a_full_disk_and_a_damaged_bundle_are_told(
     sensor: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from accuracy_budget import machine_times
+    from gelslim_core.budget import machine_times
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", "times.json")
@@ -190,7 +190,7 @@ def test_a_place_that_keeps_nothing_is_told_before_measuring(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from ifem_export import ladder
+    from ifem_export.operators import ladder
 
     def measured(*_: object) -> None:
         raise AssertionError("measured in vain")
@@ -234,7 +234,7 @@ def test_the_bundle_alone_is_loaded_as_it_was_written(sensor: Path, laddered: Bu
 
 @pytest.mark.slow
 def test_the_time_of_a_pose_is_measured_against_what_is_declared(tmp_path: Path) -> None:
-    from gelslim_cad.cli.scene_budget import machine_paces, twin_key
+    from gelslim.cli.scene_budget import machine_paces, twin_key
     from gelslim_twin.sensor_figures import bundle_figures
     from gelslim_twin.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE
 

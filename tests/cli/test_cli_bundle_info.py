@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gelslim_cad.cli import main
-from ifem_export.bundle_io import load_bundle
+from gelslim.cli import main
+from ifem_export.bundle.files import load_bundle
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")
 
@@ -77,7 +77,7 @@ def test_a_budget_chooses_the_operator(
 ) -> None:
     # Measured once, in the fixture: it is the choice that is tried here.
     ladder = load_bundle(bundle).ladder
-    monkeypatch.setattr("ifem_export.ladder.measure_ladder", lambda *a, **k: ladder)
+    monkeypatch.setattr("ifem_export.operators.ladder.measure_ladder", lambda *a, **k: ladder)
     capsys.readouterr()
     folder = tmp_path / "bundle"
     assert main(["bundle", SPEC, "-o", str(folder), "--error", "5%"]) == 0

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from gelslim_cad.cli import main
-from gelslim_force.bundle_camera import bundle_camera
-from gelslim_force.bundle_grid import bundle_grid
-from gelslim_force.calibration_file import read_calibration
-from gelslim_force.camera_deviation import PARAMETERS, deviated_camera
-from ifem_export.bundle_io import load_bundle
+from gelslim.cli import main
+from gelslim_force.calibration.bundle_camera import bundle_camera
+from gelslim_force.calibration.camera_deviation import PARAMETERS, deviated_camera
+from gelslim_force.calibration.file import read_calibration
+from gelslim_force.lattice.bundle_grid import bundle_grid
+from ifem_export.bundle.files import load_bundle
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")
 TURNED_DEG = 0.8

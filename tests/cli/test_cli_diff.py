@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from cli_samples import MINI20, ROOT, altered, too_long
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_cad.compare.comparison import compare, differ
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from cli_samples import ROOT, fresh
 
-from gelslim_cad import extras as extras_module
-from gelslim_cad.cli import main
-from gelslim_cad.doctor import libraries
-from gelslim_cad.doctor.realtime import RealTime, Timed
-from gelslim_cad.extras import EXTRAS, extra_of, installed
+from gelslim import extras as extras_module
+from gelslim.cli import main
+from gelslim.doctor import libraries
+from gelslim.doctor.realtime import RealTime, Timed
+from gelslim.extras import EXTRAS, extra_of, installed
 
 
 def answered(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:

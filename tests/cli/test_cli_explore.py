@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from cli_samples import MINI20, ROOT, fresh
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 
 VARY = ["--vary", "gel.length_mm=16:24:4", "--vary", "camera.f_number=2,4"]
 
@@ -68,7 +68,7 @@ def test_bad_requests(
 def test_without_parquet_and_pictures_the_table_is_still_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim_cad.extras.installed", lambda module: False)
+    monkeypatch.setattr("gelslim.extras.installed", lambda module: False)
     command = ["explore", str(MINI20), "--vary", "gel.length_mm=16", "-o", str(tmp_path / "x")]
     assert main(command) == 0
     captured = capsys.readouterr()
@@ -131,7 +131,7 @@ def test_a_full_disk_is_told_and_nothing_is_half_written(
 
 
 def test_two_runs_on_one_folder_wait_for_each_other(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "gelslim_cad", "explore", str(MINI20)]
+    command = [sys.executable, "-m", "gelslim", "explore", str(MINI20)]
     command += ["--vary", "gel.length_mm=16:24:0.01", "-o", str(tmp_path / "x"), "-j", "1"]
     runs = [
         subprocess.Popen([*command, "--no-pictures", "--json"], cwd=ROOT, stdout=subprocess.PIPE)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cli_samples import MINI20, altered, fresh, too_long
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_cad.spec import reader
 
 TAKES_SPEC = ("check", "derive", "build", "bundle", "markers", "light")

@@ -12,10 +12,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, stream
 
-from gelslim_cad.cli.main import main
+from gelslim.cli.main import main
 from gelslim_force.outputs.picture_file import encoded
 from gelslim_force.outputs.recorded_run import read_run
-from ifem_export.bundle_io import write_bundle
+from ifem_export.bundle.files import write_bundle
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_run_folder_and_answer(sensor: Path, tmp_path: Path, capsys) -> None:
 def test_depth_maps_give_the_normal_force(sensor: Path, tmp_path: Path, capsys) -> None:
     from scipy.interpolate import griddata
 
-    from gelslim_optics.virtual_camera import VirtualCamera
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
 
     bundle = sensor_bundle()
     camera = VirtualCamera.from_record(bundle.camera)

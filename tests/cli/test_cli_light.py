@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "gelslim2.yaml")
 FEW = ("--rays", "4096")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from cli_samples import ROOT
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_twin.effects.registry import EFFECTS
 
 SCENES = ROOT / "designs" / "scenes"

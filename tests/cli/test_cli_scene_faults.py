@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from cli_samples import ROOT
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 
 SCENE = ROOT / "designs" / "scenes" / "press_sphere.yaml"
 SENSOR = ROOT / "designs" / "gelslim2.yaml"

@@ -9,8 +9,8 @@ import sys
 import pytest
 from cli_samples import MINI20, ROOT, fresh
 
-from gelslim_cad import __version__
-from gelslim_cad.cli import main
+from gelslim.cli import main
+from gelslim_core import __version__
 
 HEAVY = (
     "numpy", "scipy", "numba", "cadquery", "OCP", "vtk", "vtkmodules", "pyvista", "matplotlib",
@@ -23,7 +23,7 @@ CAD = tuple(m for m in HEAVY if m not in ("numpy", "pydantic", "ruamel"))
 def loaded_by(arguments: list[str], watched: tuple[str, ...]) -> set[str]:
     """Which watched modules a fresh process has loaded after running a command."""
     code = (
-        "import sys\nfrom gelslim_cad.cli import main\n"
+        "import sys\nfrom gelslim.cli import main\n"
         f"status = main({arguments!r})\n"
         f"print('LOADED', *(m for m in {watched!r} if m in sys.modules))\nsys.exit(status)"
     )
@@ -106,7 +106,7 @@ def test_a_closed_pipe_ends_quietly(arguments: tuple[str, ...]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     done = subprocess.run(
-        [sys.executable, "-m", "gelslim_cad", *arguments],
+        [sys.executable, "-m", "gelslim", *arguments],
         stdout=writer,
         stderr=subprocess.PIPE,
         text=True,
@@ -123,8 +123,8 @@ def test_help_lists_every_command_once_under_a_heading_in_whole_words(
 ) -> None:
     from typer.main import get_command
 
-    from gelslim_cad.cli.app import app
-    from gelslim_cad.cli.command_list import GROUPS
+    from gelslim.cli.app import app
+    from gelslim.cli.command_list import GROUPS
 
     named = [name for names in GROUPS.values() for name in names]
     known = set(get_command(app).commands)  # type: ignore[attr-defined]

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from cli_samples import MINI20, altered
 
-from gelslim_cad.cli import main
-from gelslim_cad.cli.answer import given
+from gelslim.cli import main
+from gelslim.cli.answer import given
 
 
 def test_diff_shows_no_row_whose_two_sides_read_the_same(

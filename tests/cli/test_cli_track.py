@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from gelslim_cad.cli.main import main
+from gelslim.cli.main import main
 
 Image = pytest.importorskip("PIL.Image")
 

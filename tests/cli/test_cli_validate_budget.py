@@ -13,9 +13,9 @@ from cli_samples import ROOT
 sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import sensor_bundle
 
-from accuracy_budget.budget import Budget
-from gelslim_cad.cli.main import main
-from gelslim_force.pipeline_settings import PipelineSettings
+from gelslim.cli.main import main
+from gelslim_core.budget.budget import Budget
+from gelslim_force.settings import PipelineSettings
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.validation import validate as validation
 from gelslim_twin.validation.chain import chains_for

@@ -13,15 +13,15 @@ import pytest
 from cli_samples import MINI20, altered
 
 import gelslim_cad.build as build_package
+from gelslim.cli import main
+from gelslim.cli.output import replace_file
 from gelslim_cad.build import BuildResult
 from gelslim_cad.checks import check
-from gelslim_cad.cli import main
-from gelslim_cad.cli.output import replace_file
 from gelslim_cad.dimensions import derive
-from gelslim_cad.pad import marker_grid, spec_hash
+from gelslim_cad.sensor.pad import marker_grid, spec_hash
 from gelslim_cad.spec.reader import read_spec
-from ifem_export.bundle import force
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.bundle import force
+from ifem_export.bundle.files import load_bundle
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -9,8 +9,8 @@ import pytest
 from cli_samples import MINI20
 
 from gelslim_cad.checks import RULES
+from gelslim_cad.checks.explain import Node, UnknownNameError, explain
 from gelslim_cad.dimensions import definition, derive
-from gelslim_cad.explain import Node, UnknownNameError, explain
 from gelslim_cad.spec.reader import read_spec
 
 LOADED = read_spec(MINI20)

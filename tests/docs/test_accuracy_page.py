@@ -25,7 +25,7 @@ from accuracy_text import beating, conclusion, table  # noqa: E402
 from ladder_record import LadderRecord, RungRecord, records_of  # noqa: E402
 from light_rays import led_scene  # noqa: E402
 
-from gelslim_optics.trace import trace_light  # noqa: E402
+from gelslim_optics.light.trace import trace_light  # noqa: E402
 
 MACHINE = ("machine", "system", "processor", "cores", "threads", "python", "numpy", "scipy",
            "numba", "seed")  # fmt: skip
@@ -126,11 +126,11 @@ def test_counts_stay_within_limits(ladders: list[LadderRecord]) -> None:
 
 
 def test_stiffness_of_the_data_is_measured_again() -> None:
-    from ifem_export.ladder import bumps, reference_force, refined
-    from ifem_export.material import Material
-    from ifem_export.outline import RoundedRectangle
-    from ifem_export.pad_mesh import build_pad_mesh
-    from ifem_export.surface_operator import surface_operator
+    from ifem_export.elements.material import Material
+    from ifem_export.mesh.outline import RoundedRectangle
+    from ifem_export.mesh.pad_mesh import build_pad_mesh
+    from ifem_export.operators.ladder import bumps, reference_force, refined
+    from ifem_export.operators.surface_operator import surface_operator
 
     data = json.loads((DOCS / "data" / "stiffness_ladder.json").read_text(encoding="utf-8"))
     gel = Material(0.147, 0.3223, 1020.0)
@@ -174,7 +174,7 @@ def test_matching_of_the_data_is_tried_again() -> None:
     from force_ladder_markers import rest_lattice, shot
     from force_rig import SEED, small_rig
 
-    from gelslim_force.matching import match
+    from gelslim_force.tracking.matching import match
 
     rig = small_rig()
     reference, rng = rest_lattice(rig), np.random.default_rng(SEED)

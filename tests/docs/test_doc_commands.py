@@ -22,7 +22,7 @@ def test_the_pages_have_commands() -> None:
     told = {line.split()[1] for _, line in CALLS}
     from typer.main import get_command
 
-    from gelslim_cad.cli.app import app
+    from gelslim.cli.app import app
 
     known = set(get_command(app).commands)  # type: ignore[attr-defined]
     assert known <= told, "commands that no page shows"
@@ -32,7 +32,7 @@ def test_the_pages_have_commands() -> None:
 def test_command_parses(page: Path, line: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from typer.main import get_command
 
-    from gelslim_cad.cli.app import app
+    from gelslim.cli.app import app
 
     monkeypatch.chdir(ROOT)
     words = shlex.split(line.split(" > ")[0], comments=True)[1:]
@@ -97,7 +97,7 @@ def test_make_knows_what_to_do(line: str) -> None:
 def test_commands_named_in_sentences_are_known(page: Path) -> None:
     from typer.main import get_command
 
-    from gelslim_cad.cli.app import app
+    from gelslim.cli.app import app
 
     known = get_command(app).commands  # type: ignore[attr-defined]
     for call in re.findall(r"`gelslim ([a-z][^`\n]*)`", text_of(page)):

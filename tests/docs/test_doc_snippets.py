@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from page_text import DOCS, PAGES, ROOT, blocks, named
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_cad.spec.reader import read_spec
 from gelslim_twin.scene.reader import read_scene
 
@@ -105,6 +105,6 @@ def test_python_blocks_run(page: Path, bundle: Path, tmp_path: Path) -> None:
 
 
 def _surface_nodes(bundle: Path) -> int:
-    from ifem_export.bundle_io import load_bundle
+    from ifem_export.bundle.files import load_bundle
 
     return len(load_bundle(bundle).mesh.surface)

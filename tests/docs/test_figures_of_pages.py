@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from page_text import DOCS, ROOT, text_of
 
-from gelslim_cad.binding import binding_sentences
-from gelslim_cad.cli import main
+from gelslim.cli import main
+from gelslim_cad.checks.binding import binding_sentences
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from page_text import DOCS, ROOT, text_of
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 
 FORMATS = text_of(DOCS / "file_formats.md")
 FORCE = text_of(DOCS / "force_formats.md")

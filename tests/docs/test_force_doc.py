@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT / "tests" / "force"))
 from sensor_samples import frame, press, sensor_bundle, stream  # noqa: E402
 
 from gelslim_force.outputs.picture_file import encoded  # noqa: E402
-from ifem_export.bundle_io import write_bundle  # noqa: E402
+from ifem_export.bundle.files import write_bundle  # noqa: E402
 
 GUIDE = ROOT / "docs" / "force_pipeline.md"
 FRAMES = 5
@@ -62,7 +62,7 @@ def test_commands_of_the_guide_have_the_options_named() -> None:
     """Every `gelslim COMMAND --option` of the guide is one that the command line has."""
     from typer.main import get_command
 
-    from gelslim_cad.cli.app import app
+    from gelslim.cli.app import app
 
     commands = get_command(app).commands  # type: ignore[attr-defined]
     lines = re.findall(r"^    gelslim (.*?)(?:\s+#.*)?$", GUIDE.read_text("utf-8"), re.MULTILINE)

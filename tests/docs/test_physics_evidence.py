@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from page_text import DOCS, ROOT, text_of
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.sight import virtual_camera
+from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.pad_grid import pad_axes
-from gelslim_optics.projection_error import ErrorModel, error_map
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.surface_operator import Rung, surface_operator
+from gelslim_optics.camera.pad_grid import pad_axes
+from gelslim_optics.camera.projection_error import ErrorModel, error_map
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.surface_operator import Rung, surface_operator
 
 GEL = Material(0.147, 0.3223, 1020.0)
 THICKNESS_MM = 2.0

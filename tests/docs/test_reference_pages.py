@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reference import RULES as SPEC_RULES
 from gelslim_cad.spec.reference import reference_text as spec_page
+from gelslim_core.yaml.errors import InputError
+from gelslim_core.yaml.fields import Field, field_table
+from gelslim_core.yaml.reader import load_bytes
+from gelslim_core.yaml.reference import heading_anchor, reference_markdown
 from gelslim_twin.scene.reference import RULES as SCENE_RULES
 from gelslim_twin.scene.reference import reference_text as scene_page
 from gelslim_twin.scene.scene import Scene
-from yaml_model.errors import InputError
-from yaml_model.fields import Field, field_table
-from yaml_model.reader import load_bytes
-from yaml_model.reference import heading_anchor, reference_markdown
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = {"spec_reference.md": (spec_page, Spec), "scene_reference.md": (scene_page, Scene)}

@@ -9,14 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from page_text import DOCS, text_of
 
-from ifem_export.contact_inverse import masked_force, smoothed_force, smoothing
-from ifem_export.element import hex8_stiffness
-from ifem_export.material import Material
-from ifem_export.outline import Disc, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, Weighting, build_pad_mesh
-from ifem_export.pad_system import PadSystem
-from ifem_export.solver import pad_solver
-from ifem_export.surface_operator import surface_operator
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
+from ifem_export.inverse.contact_inverse import masked_force, smoothed_force, smoothing
+from ifem_export.mesh.outline import Disc, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, Weighting, build_pad_mesh
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.solver import pad_solver
+from ifem_export.operators.surface_operator import surface_operator
 
 PAGE = text_of(DOCS / "stiffness.md")
 DRAWS = 12

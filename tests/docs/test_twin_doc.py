@@ -11,9 +11,9 @@ import click
 import numpy as np
 import pytest
 
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.truth import COLUMNS, FrameTruth, fields_npz, wrench_csv
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +44,7 @@ def test_both_pages_have_the_commands_of_the_twin() -> None:
 def test_command_parses(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from typer.main import get_command
 
-    from gelslim_cad.cli.app import app
+    from gelslim.cli.app import app
 
     monkeypatch.chdir(ROOT)
     name, *rest = shlex.split(line.split(" > ")[0], comments=True)

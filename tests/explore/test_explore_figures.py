@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from gelslim_cad.checks import RULES
 from gelslim_cad.explore.figures import _focus, borders, legend_below
-from gelslim_cad.figure import new_figure
+from gelslim_core.figure import new_figure
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 12])

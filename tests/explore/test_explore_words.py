@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from explore_samples import MINI20, mini20, space
 
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_cad.dimensions import derive_batch, solver
 from gelslim_cad.explore.axis import parse_axis, shown
 from gelslim_cad.explore.engine import Engine

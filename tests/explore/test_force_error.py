@@ -11,10 +11,10 @@ from explore_samples import mini20
 from gelslim_cad.dimensions import derive
 from gelslim_cad.explore.force_error import Patch, PatchError, patch_error
 from gelslim_cad.explore.space import changed
-from ifem_export.ladder import reference_force
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.ladder import reference_force
+from ifem_export.operators.surface_operator import surface_operator
 
 COARSE = Patch(2.0, 1.2, 1.2, 4, "bbar", 0.3223, 1.2)
 

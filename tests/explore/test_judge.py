@@ -7,13 +7,13 @@ import pytest
 from explore_samples import mini20, space
 
 from gelslim_cad.checks import check, check_batch, margins_batch
+from gelslim_cad.checks.relaxation import given
 from gelslim_cad.dimensions import derive, derive_batch
 from gelslim_cad.explore.axis import Axis
 from gelslim_cad.explore.judge import SHOWN, judge
 from gelslim_cad.explore.space import changed, illegal
-from gelslim_cad.relaxation import given
 from gelslim_cad.spec import Spec
-from yaml_model.fields import field_at, field_table
+from gelslim_core.yaml.fields import field_at, field_table
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from explore_samples import MINI20, ROOT, mini20
 
+from gelslim.cli import main
 from gelslim_cad.checks import check
-from gelslim_cad.cli import main
 from gelslim_cad.dimensions import derive
 from gelslim_cad.explore.brightness import RAYS
 from gelslim_cad.explore.error import ExploreError
@@ -48,9 +48,9 @@ def test_prices_are_what_the_tools_say_of_each_finger() -> None:
     assert told["gel.area_mm2"].verdict == told["gel.stiffness_n_mm"].verdict == ""
     # Of a thinner gel of the same stuff: stiffer.
     assert told["gel.stiffness_n_mm"].change == pytest.approx(1 / 3, abs=0.05)
-    from gelslim_cad.guide_section import guide_profile
+    from gelslim_cad.geometry.guide_section import guide_profile
     from gelslim_cad.light.scene import light_scene
-    from gelslim_optics.trace import trace_light
+    from gelslim_optics.light.trace import trace_light
 
     light = trace_light(light_scene(d, guide_profile(d)), RAYS, threads=1)
     slowest = max(exposure(d, light, c).exposure_ms for c in ("red", "green"))

@@ -90,7 +90,7 @@ def _deadly(task: object) -> None:
 
 def test_no_cluster_is_said_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("work_pool.engine.CONNECT_S", 1)
+    monkeypatch.setattr("gelslim_core.jobs.engine.CONNECT_S", 1)
     with pytest.raises(ExploreError, match="no Dask scheduler answers"):
         explore(request(), tmp_path / "x", Engine(1, "tcp://127.0.0.1:1"))
 
@@ -131,7 +131,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
 
 def test_a_killed_run_goes_on(tmp_path: Path) -> None:
     vary = ("--vary", "gel.length_mm=16:24:0.02", "--vary", "camera.f_number=2:5:0.5")
-    command = [sys.executable, "-m", "gelslim_cad", "explore", str(MINI20), *vary]
+    command = [sys.executable, "-m", "gelslim", "explore", str(MINI20), *vary]
     command += ["-o", str(tmp_path / "x"), "--jobs", "1", "--no-pictures"]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     run = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL)

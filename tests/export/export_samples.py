@@ -7,7 +7,7 @@ from typing import Any
 
 import cadquery as cq
 
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 
 GREY = (0.5, 0.52, 0.55, 1.0)
 GLASS = (0.6, 0.8, 0.95, 0.35)

@@ -9,13 +9,13 @@ from camera_rig import finger_view
 from numpy.typing import NDArray
 from synthetic import Look, render
 
-from gelslim_force.camera_deviation import deviated_camera
-from gelslim_optics.virtual_camera import VirtualCamera
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.marker_grid import MarkerGrid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from gelslim_force.calibration.camera_deviation import deviated_camera
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import MarkerGrid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 
 def small_bundle(grid: MarkerGrid, camera: VirtualCamera | None = None) -> Bundle:

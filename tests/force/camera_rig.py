@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gelslim_optics.virtual_camera import Layer, VirtualCamera, reflect_point
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 
 
 def finger_view(tilt_deg: float = 30.0, height_mm: float = 22.0, focal_px: float = 640.0):

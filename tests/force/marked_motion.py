@@ -9,7 +9,7 @@ from camera_rig import finger_view
 from numpy.typing import NDArray
 from synthetic import grid_of_dots
 
-from gelslim_force.reference_lattice import ReferenceLattice
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
 
 KINDS = ("shear", "radial", "twist", "both")
 PITCH_MM = 1.1

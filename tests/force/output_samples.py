@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from camera_rig import finger_view
 
-from gelslim_force.frame_result import ForceField, FrameResult
-from gelslim_force.tracks import MarkerStatus, Tracks
-from gelslim_force.wrench import Wrench, resultant
+from gelslim_force.forces.frame_result import ForceField, FrameResult
+from gelslim_force.forces.wrench import Wrench, resultant
+from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 PITCH_MM, NODE_MM = 1.1, 0.6
 SHARE_MM2 = NODE_MM**2

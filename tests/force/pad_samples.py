@@ -6,11 +6,11 @@ from functools import cache
 
 import numpy as np
 
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.marker_grid import build_marker_grid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import build_marker_grid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 
 @cache

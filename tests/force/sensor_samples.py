@@ -12,14 +12,14 @@ import numpy as np
 from camera_rig import finger_view
 from synthetic import Frame, Look, grid_of_dots, render
 
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.interpolation import marker_to_node
-from ifem_export.ladder import lumped, refined
-from ifem_export.marker_grid import MarkerGrid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import MarkerGrid
+from ifem_export.markers.interpolation import marker_to_node
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
+from ifem_export.operators.ladder import lumped, refined
+from ifem_export.operators.surface_operator import surface_operator
 
 NORMAL_N, SHEAR_N = 1.0, (0.3, -0.2)
 PLACE_MM, RADIUS_MM = (1.0, -1.0), 3.0

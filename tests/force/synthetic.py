@@ -14,8 +14,8 @@ from camera_rig import finger_view
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from gelslim_optics.virtual_camera import VirtualCamera
-from ifem_export.marker_grid import MarkerGrid, build_marker_grid
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+from ifem_export.markers.grid import MarkerGrid, build_marker_grid
 
 Vector = NDArray[np.float64]
 _RIM = 48

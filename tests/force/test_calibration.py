@@ -10,14 +10,14 @@ from calibration_samples import BUILD, seen_by, small_bundle
 from camera_rig import finger_view
 from synthetic import Look, grid_of_dots, render
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.calibration_error import CalibrationError
-from gelslim_force.camera_deviation import PARAMETERS, deviated_camera
-from gelslim_force.detection import Detector
-from gelslim_force.lattice_registration import register
-from gelslim_force.sensor_calibration import SensorCalibration
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.camera_deviation import PARAMETERS, deviated_camera
+from gelslim_force.calibration.error import CalibrationError
+from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.detection.detection import Detector
+from gelslim_force.lattice.registration import register
 from ifem_export.errors import IfemError
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 GRID = grid_of_dots()
 BUNDLE = small_bundle(GRID)

@@ -10,15 +10,15 @@ from calibration_samples import small_bundle
 from camera_rig import finger_view
 from synthetic import grid_of_dots, render
 
-from gelslim_force import calibration_checks as checks
-from gelslim_force.calibration import calibrate
-from gelslim_force.calibration_error import CalibrationError
-from gelslim_force.calibration_fit import fit_camera
-from gelslim_force.camera_deviation import PARAMETERS, CameraTolerance
-from gelslim_force.detection import Detector
-from gelslim_force.detections import Detections
-from gelslim_force.lattice_registration import register
-from gelslim_force.residual_bump import ResidualBump, ResidualField
+from gelslim_force.calibration import checks
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.camera_deviation import PARAMETERS, CameraTolerance
+from gelslim_force.calibration.error import CalibrationError
+from gelslim_force.calibration.fit import fit_camera
+from gelslim_force.calibration.residual_bump import ResidualBump, ResidualField
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.detections import Detections
+from gelslim_force.lattice.registration import register
 
 GRID = grid_of_dots()
 CAMERA = finger_view()

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from calibration_samples import BUILD, seen_by, small_bundle
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.calibration_error import CalibrationError
-from gelslim_force.calibration_file import (
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.error import CalibrationError
+from gelslim_force.calibration.file import (
     calibration_of,
     calibration_record,
     read_calibration,
     write_calibration,
 )
-from gelslim_force.reference_picture import read_reference
-from ifem_export.marker_grid import build_marker_grid
+from gelslim_force.calibration.reference_picture import read_reference
+from ifem_export.markers.grid import build_marker_grid
 
 GRID = build_marker_grid(12, 11, 1.3, 0.5)
 

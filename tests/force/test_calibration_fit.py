@@ -9,10 +9,10 @@ import pytest
 from camera_rig import finger_view
 from synthetic import centroids, grid_of_dots, outlines
 
-from gelslim_force.calibration_fit import fit_camera
-from gelslim_force.camera_deviation import PARAMETERS, CameraTolerance, deviated_camera
-from gelslim_force.disc_centroid import centroid_offset_px
-from ifem_export.marker_grid import build_marker_grid
+from gelslim_force.calibration.camera_deviation import PARAMETERS, CameraTolerance, deviated_camera
+from gelslim_force.calibration.fit import fit_camera
+from gelslim_force.detection.disc_centroid import centroid_offset_px
+from ifem_export.markers.grid import build_marker_grid
 
 DESIGN = finger_view()
 GRID = grid_of_dots()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pad_samples import small_bundle
 
-from gelslim_force.contact_forces import ContactForces
-from gelslim_force.force_estimator import ForceEstimator, ForceSettings
-from gelslim_force.surface_lattice import edge_distance_mm
-from ifem_export.surface_operator import surface_operator
+from gelslim_force.forces.contact_forces import ContactForces
+from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
+from gelslim_force.motion.surface_lattice import edge_distance_mm
+from ifem_export.operators.surface_operator import surface_operator
 
 RADIUS_MM = 1.5
 

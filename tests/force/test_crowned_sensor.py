@@ -9,17 +9,17 @@ import pytest
 from camera_rig import finger_view
 from synthetic import Look, grid_of_dots, render
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.force_estimator import ForceSettings
-from gelslim_force.force_pipeline import ForcePipeline
-from gelslim_force.marker_heights import marker_heights_mm
-from gelslim_force.pipeline_settings import PipelineSettings
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.crown import Paraboloid
-from ifem_export.interpolation import marker_to_node
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.forces.estimator import ForceSettings
+from gelslim_force.motion.marker_heights import marker_heights_mm
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.settings import PipelineSettings
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.interpolation import marker_to_node
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 CROWN_MM, RIM_MM = 0.6, 15.0
 

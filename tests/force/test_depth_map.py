@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from shaded_frames import CAMERA, contact, pressed_heights
 
-from gelslim_force.depth_map import motion_from_grid, motion_from_image
-from gelslim_optics.height_field import HeightGrid
+from gelslim_force.contact.depth_map import motion_from_grid, motion_from_image
+from gelslim_optics.camera.height_field import HeightGrid
 
 X, Y = np.meshgrid(np.arange(-6, 6.1, 0.5), np.arange(-5, 5.1, 0.5))
 NODES = np.column_stack([X.ravel(), Y.ravel(), 0 * X.ravel()])

@@ -8,9 +8,9 @@ from camera_rig import finger_view
 from scipy.spatial import cKDTree
 from synthetic import Look, grid_of_dots, render
 
-from gelslim_force.detection import Detector
-from gelslim_force.detections import BORDER, FAINT, LARGE, SMALL
-from gelslim_force.detector_settings import DetectorSettings
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.detections import BORDER, FAINT, LARGE, SMALL
+from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.light_map import red_green_sides
@@ -19,7 +19,7 @@ from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 GRID = grid_of_dots()
 SEEDS = (1, 2, 3)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from synthetic import Look, grid_of_dots, render
 
-from gelslim_force.dot_size import estimate_settings
 from gelslim_force.dot_tracking import DotTracking, dots_at_rest
-from gelslim_force.lattice_growth import LatticeError
-from gelslim_force.track_record import COLUMNS, TrackRecord
-from ifem_export.marker_grid import build_marker_grid
+from gelslim_force.lattice.dot_size import estimate_settings
+from gelslim_force.lattice.growth import LatticeError
+from gelslim_force.outputs.track_record import COLUMNS, TrackRecord
+from ifem_export.markers.grid import build_marker_grid
 
 GRID = grid_of_dots()
 

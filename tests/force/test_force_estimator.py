@@ -7,14 +7,14 @@ import pytest
 from pad_samples import hertz_like, small_bundle
 from scipy.spatial import cKDTree
 
-from gelslim_force.finite_strain_force import FiniteStrainForce
-from gelslim_force.force_estimator import ForceEstimator, ForceSettings
-from gelslim_force.surface_share import surface_share_mm2
-from gelslim_force.wrench import resultant
-from gelslim_force.wrench_noise import WrenchNoise, rigid_motions
-from ifem_export.contact_inverse import masked_force
-from ifem_export.ladder import lumped, refined
-from ifem_export.surface_operator import surface_operator
+from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
+from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.forces.surface_share import surface_share_mm2
+from gelslim_force.forces.wrench import resultant
+from gelslim_force.forces.wrench_noise import WrenchNoise, rigid_motions
+from ifem_export.inverse.contact_inverse import masked_force
+from ifem_export.operators.ladder import lumped, refined
+from ifem_export.operators.surface_operator import surface_operator
 
 
 @pytest.fixture(scope="module")

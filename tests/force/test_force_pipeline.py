@@ -11,12 +11,12 @@ import pytest
 from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, stream
 from synthetic import Look
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.contact_patch import ContactPatch
-from gelslim_force.force_estimator import ForceSettings
-from gelslim_force.force_pipeline import ForcePipeline
-from gelslim_force.indenter_source import NormalReading
-from gelslim_force.pipeline_settings import PipelineSettings
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.contact.indenter_source import NormalReading
+from gelslim_force.contact.patch import ContactPatch
+from gelslim_force.forces.estimator import ForceSettings
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.settings import PipelineSettings
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +172,7 @@ def test_wrong_bundle_is_refused(calibration) -> None:
 
 def test_importing_the_pipeline_loads_no_cad_and_no_vtk() -> None:
     code = (
-        "import sys, gelslim_force.force_pipeline;"
+        "import sys, gelslim_force.pipeline;"
         "bad = {'OCP', 'cadquery', 'vtk', 'vtkmodules', 'pyvista', 'cv2', 'matplotlib',"
         " 'gelslim_cad'} & set(sys.modules); sys.exit(', '.join(bad) or None)"
     )

@@ -6,11 +6,11 @@ import zlib
 import numpy as np
 import pytest
 
-from gelslim_force.frame_source import FrameSourceError, open_frames
 from gelslim_force.frames.frame_array import FrameArray
 from gelslim_force.frames.natural_order import natural_key
 from gelslim_force.frames.picture import PictureError, read_picture
 from gelslim_force.frames.picture_folder import PictureFolder
+from gelslim_force.frames.source import FrameSourceError, open_frames
 from gelslim_force.frames.video_file import VideoFile
 
 cv2 = pytest.importorskip("cv2")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelslim_force.indenter import Cylinder, Flat, IndenterError, Sphere, parse_indenter
+from gelslim_force.contact.indenter import Cylinder, Flat, IndenterError, Sphere, parse_indenter
 
 
 def test_words_name_shapes():

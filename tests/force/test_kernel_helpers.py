@@ -58,4 +58,4 @@ def test_helpers_of_other_files_are_watched(name: str) -> None:
 
 
 def test_there_are_such_kernels() -> None:
-    assert "gelslim_force.patch_fit_kernel" in KERNELS
+    assert "gelslim_force.contact.patch_fit_kernel" in KERNELS

@@ -5,11 +5,11 @@ import pytest
 from camera_rig import finger_view
 from synthetic import Look, grid_of_dots, render
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
-from gelslim_force.lattice_growth import LatticeError, grow_lattice
-from gelslim_force.lattice_registration import register
-from ifem_export.marker_grid import build_marker_grid
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.lattice.growth import LatticeError, grow_lattice
+from gelslim_force.lattice.registration import register
+from ifem_export.markers.grid import build_marker_grid
 
 GRID = grid_of_dots()
 CAMERA = finger_view()

@@ -7,18 +7,18 @@ import pytest
 from camera_rig import finger_view
 from pad_samples import hertz_like, small_bundle
 
-from gelslim_force.force_estimator import ForceEstimator, ForceSettings
-from gelslim_force.force_noise import (
+from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
+from gelslim_force.forces.low_pass import NORMAL, TANGENTIAL, WIDTHS_IN_CELLS, LowPass, widths_mm
+from gelslim_force.forces.noise import (
     ForceNoise,
     MotionNoise,
     normal_noise_mm,
 )
-from gelslim_force.low_pass import NORMAL, TANGENTIAL, WIDTHS_IN_CELLS, LowPass, widths_mm
-from gelslim_force.marker_motion import MarkerView
-from gelslim_force.marker_noise import quiet_sigma
-from gelslim_force.surface_lattice import curvature, neighbours
-from gelslim_force.surface_motion import SurfaceMotion
-from ifem_export.bundle import Bundle
+from gelslim_force.motion.marker_motion import MarkerView
+from gelslim_force.motion.surface_lattice import curvature, neighbours
+from gelslim_force.motion.surface_motion import SurfaceMotion
+from gelslim_force.tracking.marker_noise import quiet_sigma
+from ifem_export.bundle.bundle import Bundle
 
 CELL_MM = np.array([0.5, 0.5])
 PARTS = (slice(0, 2), slice(2, 3))

@@ -7,7 +7,7 @@ import pytest
 from camera_rig import finger_view
 from synthetic import grid_of_dots
 
-from gelslim_force.marker_motion import COMPENSATIONS, MarkerView
+from gelslim_force.motion.marker_motion import COMPENSATIONS, MarkerView
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from sensor_samples import sensor_bundle
 
-from accuracy_budget.budget import Budget
-from gelslim_force.force_estimator import ForceEstimator, ForceSettings
-from gelslim_force.pipeline_settings import PipelineSettings
-from ifem_export.bundle import Bundle
-from ifem_export.ladder import operator_choices
-from ifem_export.operator_ladder import MeasuredRung, OperatorLadder
-from ifem_export.surface_operator import surface_operator
+from gelslim_core.budget.budget import Budget
+from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
+from gelslim_force.settings import PipelineSettings
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.operators.ladder import operator_choices
+from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder
+from ifem_export.operators.surface_operator import surface_operator
 
 ERRORS = {"fft": 0.03, "pcg": 0.012, "factor": 0.01}
 

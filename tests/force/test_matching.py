@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from marked_motion import GRID, KINDS, PITCH_MM, REFERENCE, REST_PX, motion, seen_at, shot
 
-from gelslim_force.matching import match
-from gelslim_force.tracks import MarkerStatus
+from gelslim_force.tracking.matching import match
+from gelslim_force.tracking.tracks import MarkerStatus
 
 SHOTS = 12
 
@@ -178,7 +178,7 @@ def test_what_cannot_be_matched_is_refused():
 
 
 def test_kernels_are_compiled_once_whoever_made_the_arrays():
-    from gelslim_force import matching_kernel, steep_kernel
+    from gelslim_force.tracking import matching_kernel, steep_kernel
 
     kernels = [matching_kernel.mutual, matching_kernel.verify, matching_kernel.grow]
     kernels += [matching_kernel.patches, steep_kernel.settle]

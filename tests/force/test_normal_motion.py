@@ -10,13 +10,13 @@ from bonded_layer import layer_contact, strip_contact
 from scipy.linalg import cholesky
 from scipy.optimize import nnls
 
-from gelslim_force.contact_patch import ContactPatch
-from gelslim_force.indenter import Cylinder, Flat, Sphere
-from gelslim_force.normal_compliance import NormalCompliance
-from gelslim_force.normal_motion import NormalModel
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
-from ifem_export.surface_operator import surface_operator
+from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
+from gelslim_force.contact.normal_compliance import NormalCompliance
+from gelslim_force.contact.normal_motion import NormalModel
+from gelslim_force.contact.patch import ContactPatch
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.surface_operator import surface_operator
 
 E_MPA, THICK_MM = 0.147, 2.0
 BALL = Sphere(10.0)

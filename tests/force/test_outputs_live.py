@@ -16,9 +16,9 @@ import numpy as np
 import output_samples as samples
 import pytest
 
+from gelslim_core.files.output_error import OutputError
 from gelslim_force.outputs.live_view import LiveView, live_state
 from gelslim_force.outputs.live_window import LiveWindow, windows_possible
-from gelslim_force.outputs.output_error import OutputError
 
 Image = pytest.importorskip("PIL.Image")
 

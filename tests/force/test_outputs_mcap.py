@@ -12,9 +12,9 @@ import numpy as np
 import output_samples as samples
 import pytest
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.output_error import OutputError
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.mcap_recording import McapRecording
-from gelslim_force.outputs.output_error import OutputError
 from gelslim_force.outputs.ros_messages import FORCE_FIELD, force_field, nanoseconds, schema
 
 pytest.importorskip("mcap_ros2")

@@ -13,7 +13,8 @@ import pytest
 from camera_rig import finger_view
 from scipy.interpolate import LinearNDInterpolator
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.output_error import OutputError
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import (
     ArrowScale,
     Extent,
@@ -24,10 +25,9 @@ from gelslim_force.outputs.arrow_scale import (
     scale_of_run,
 )
 from gelslim_force.outputs.legend import LEAST_HEIGHT_PX, ORANGE, RED, WIDTH_PX, YELLOW, value_text
-from gelslim_force.outputs.output_error import OutputError
 from gelslim_force.outputs.overlay import Overlay, OverlaySettings, write_overlay
 from gelslim_force.outputs.surface_view import SurfaceView
-from gelslim_force.tracks import MarkerStatus, Tracks
+from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 BLACK = np.zeros((480, 640, 3), dtype=np.uint8)
 SCALE = ArrowScale(2.0, 20.0, 0.2, 5.0, 5.0)

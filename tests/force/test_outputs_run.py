@@ -14,9 +14,9 @@ import numpy as np
 import output_samples as samples
 import pytest
 
-from gelslim_force.frame_result import FrameResult
+from gelslim_core.files.output_error import OutputError
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs import optional_library
-from gelslim_force.outputs.output_error import OutputError
 from gelslim_force.outputs.recorded_run import read_run
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
 
@@ -192,7 +192,7 @@ import resource, signal, sys
 sys.path[:0] = [{str(HERE)!r}]
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 import output_samples as samples
-from gelslim_force.outputs.output_error import OutputError
+from gelslim_core.files.output_error import OutputError
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
 frames = [samples.frame(k) for k in range(11)]
 resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded, sight
 
-from gelslim_force.indenter import Cylinder, Flat, Sphere
-from gelslim_force.patch_finder import PatchFinder
-from gelslim_force.patch_follow import AFRESH
-from gelslim_force.patch_outline import circle_start, fit_circle, fit_strip
-from gelslim_force.patch_settings import PatchSettings
-from gelslim_force.read_only import read_only
+from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
+from gelslim_force.contact.patch_finder import PatchFinder
+from gelslim_force.contact.patch_follow import AFRESH
+from gelslim_force.contact.patch_outline import circle_start, fit_circle, fit_strip
+from gelslim_force.contact.patch_settings import PatchSettings
+from gelslim_force.frames.read_only import read_only
 
 BALL_MM = 10.0
 
@@ -261,7 +261,7 @@ def test_circle_and_strip_fits_have_honest_errors():
 
 
 def test_light_ratios_are_those_of_numpy():
-    from gelslim_force.shading_kernel import block_discs, light_ratios, whole_sums
+    from gelslim_force.contact.shading_kernel import block_discs, light_ratios, whole_sums
 
     rng = np.random.default_rng(0)
     for channels in (1, 3):
@@ -292,8 +292,8 @@ def test_the_compiled_fit_ends_where_least_squares_does():
     cost less than the fit's own tolerance."""
     from scipy.optimize import least_squares
 
-    from gelslim_force.patch_fit_kernel import settle
-    from gelslim_force.slope_kernel import law
+    from gelslim_force.contact.patch_fit_kernel import settle
+    from gelslim_force.contact.slope_kernel import law
 
     rng = np.random.default_rng(5)
     x, y = rng.uniform(-4, 4, (2, 900))

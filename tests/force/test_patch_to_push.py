@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from shaded_frames import CAMERA, PAD_MM, contact, pressed_heights, shaded
 
-from gelslim_force.indenter import Sphere
-from gelslim_force.normal_motion import NormalModel
-from gelslim_force.patch_finder import PatchFinder
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
-from ifem_export.surface_operator import surface_operator
+from gelslim_force.contact.indenter import Sphere
+from gelslim_force.contact.normal_motion import NormalModel
+from gelslim_force.contact.patch_finder import PatchFinder
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.surface_operator import surface_operator
 
 BALL = Sphere(10.0)
 

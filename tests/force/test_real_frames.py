@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gelslim_force.detection import Detector
-from gelslim_force.dot_size import estimate_settings
+from gelslim_force.detection.detection import Detector
 from gelslim_force.dot_tracking import DotTracking, dots_at_rest
-from gelslim_force.matching import match
+from gelslim_force.lattice.dot_size import estimate_settings
+from gelslim_force.tracking.matching import match
 
 pytest.importorskip("PIL")
 from gelslim_force.frames.picture import read_picture

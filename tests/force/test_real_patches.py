@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
-from gelslim_force.patch_finder import PatchFinder
+from gelslim_force.contact.patch_finder import PatchFinder
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
 
 FRAMES = Path(
     os.environ.get("GELSLIM_REAL_FRAMES", Path(__file__).parents[3] / "shared" / "real_frames")

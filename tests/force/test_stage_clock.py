@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gelslim_force.stage_clock import TOTAL, StageClock, StageTimes
+from gelslim_force.forces.stage_clock import TOTAL, StageClock, StageTimes
 
 
 class HandClock:

@@ -5,12 +5,12 @@ import pytest
 from camera_rig import finger_view
 from synthetic import Look, grid_of_dots, render
 
-from gelslim_force.detection import Detector
-from gelslim_force.detections import Detections
-from gelslim_force.detector_settings import DetectorSettings
-from gelslim_force.lattice_registration import register
-from gelslim_force.tracker import Tracker, TrackerSettings
-from gelslim_force.tracks import MarkerStatus
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.detections import Detections
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.lattice.registration import register
+from gelslim_force.tracking.tracker import Tracker, TrackerSettings
+from gelslim_force.tracking.tracks import MarkerStatus
 
 GRID = grid_of_dots()
 CAMERA = finger_view()

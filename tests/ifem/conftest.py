@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from ifem_bundles import make_bundle
 
-from ifem_export.bundle_io import write_bundle
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.bundle.files import write_bundle
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 
 
 @pytest.fixture(scope="session")

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ifem_export.bundle import build_bundle
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 MARKERS = np.stack(np.meshgrid(np.arange(-3, 4) * 0.9, np.arange(-2, 3) * 0.9), -1).reshape(-1, 2)
 CAMERA = {"model": "OV5647", "matrix_px": [[600.0, 0, 320], [0, 600.0, 240], [0, 0, 1]]}

@@ -8,10 +8,10 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from ifem_export.assembly import assemble_csr
-from ifem_export.element import hex8_stiffness
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.assembly.assembly import assemble_csr
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
 
 
 def solve_held(K, held: np.ndarray, u: np.ndarray, load: np.ndarray | None = None) -> np.ndarray:

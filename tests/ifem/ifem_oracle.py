@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.mesh.pad_mesh import PadMesh
 
 
 def triplet_assembly(mesh: PadMesh, element_matrix: np.ndarray) -> sparse.csr_array:

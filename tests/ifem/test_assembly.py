@@ -9,13 +9,13 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import ifem_export
-from ifem_export.assembly import assemble_bsr, assemble_csr
-from ifem_export.element import FORMULATIONS, hex8_stiffness
+from ifem_export.assembly.assembly import assemble_bsr, assemble_csr
+from ifem_export.elements.hex8 import FORMULATIONS, hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError
-from ifem_export.lattice import number_nodes
-from ifem_export.material import Material
-from ifem_export.outline import Disc
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.mesh.lattice import number_nodes
+from ifem_export.mesh.outline import Disc
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 
 SIZE = (0.5, 0.7, 0.4)
 ROOT = Path(ifem_export.__file__).parents[1]
@@ -275,7 +275,7 @@ def test_bad_input_is_refused(gel):
 
 def test_importing_the_package_loads_neither_numba_nor_vtk_nor_cad():
     code = (
-        "import sys, ifem_export.bundle_io, ifem_export.bundle_summary, ifem_export.vtu;"
+        "import sys, ifem_export.bundle.files, ifem_export.bundle.summary, ifem_export.mesh.vtu;"
         "print([m for m in ('numba', 'vtk', 'vtkmodules', 'pyvista', 'OCP', 'cadquery',"
         " 'gelslim_cad', 'matplotlib') if m in sys.modules])"
     )

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from ifem_oracle import triplet_assembly
 
-from ifem_export.bundle import (
+from ifem_export.bundle.bundle import (
     build_bundle,
     force,
     geometry_hash,
     node_displacement,
 )
+from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 MARKERS = np.stack(np.meshgrid(np.arange(-3, 4) * 0.9, np.arange(-2, 3) * 0.9), -1).reshape(-1, 2)
 

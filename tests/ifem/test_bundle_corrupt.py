@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from ifem_bundles import edit, flip_byte, reseal
 
-from ifem_export.bundle_io import load_bundle
-from ifem_export.bundle_layout import bundle_arrays
+from ifem_export.bundle.files import load_bundle
+from ifem_export.bundle.layout import bundle_arrays
 from ifem_export.errors import BundleError
 
 ARRAYS = [

@@ -10,15 +10,15 @@ import pytest
 from ifem_bundles import CAMERA, flip_byte, make_bundle
 
 import ifem_export
-from ifem_export import bundle_io
-from ifem_export.bundle import build_bundle, force
-from ifem_export.bundle_io import load_bundle, write_bundle
-from ifem_export.bundle_layout import bundle_arrays
-from ifem_export.bundle_summary import summarise_bundle
+from gelslim_core.files import replaced_folder
+from ifem_export.bundle import files as bundle_io
+from ifem_export.bundle.bundle import build_bundle, force
+from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.bundle.layout import bundle_arrays
+from ifem_export.bundle.summary import summarise_bundle
 from ifem_export.errors import BundleError, IfemError
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
-from whole_files import replaced_folder
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 ROOT = Path(ifem_export.__file__).parents[1]
 
@@ -136,8 +136,8 @@ def test_the_same_pad_gives_the_same_bytes_in_a_fresh_process(pristine, tmp_path
     code = (
         "import sys; sys.path.insert(0, 'tests/ifem');"
         "from ifem_bundles import make_bundle;"
-        "from ifem_export.bundle_io import write_bundle;"
-        "from ifem_export.material import Material;"
+        "from ifem_export.bundle.files import write_bundle;"
+        "from ifem_export.elements.material import Material;"
         "write_bundle(sys.argv[1], make_bundle(Material(0.147, 0.3223, 1070.0)))"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path / "b")], check=True, cwd=ROOT)
@@ -188,7 +188,7 @@ def test_bundle_of_a_bare_pad(gel, tmp_path):
 
 
 def test_both_interpolations_come_back(bundle, pristine):
-    from ifem_export.marker_interpolation import thin_plate_interpolation
+    from ifem_export.markers.interpolation_matrix import thin_plate_interpolation
 
     back = load_bundle(pristine).markers
     motion = np.random.default_rng(5).normal(size=(35, 3))

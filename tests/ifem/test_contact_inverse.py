@@ -7,8 +7,10 @@ import pytest
 from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ifem_export.contact_fit_kernel import project
-from ifem_export.contact_inverse import (
+from ifem_export.elements.material import Material
+from ifem_export.errors import IfemError
+from ifem_export.inverse.contact_fit_kernel import project
+from ifem_export.inverse.contact_inverse import (
     MARGIN,
     _by_operator,
     _largest,
@@ -17,11 +19,9 @@ from ifem_export.contact_inverse import (
     smoothed_force,
     smoothing,
 )
-from ifem_export.errors import IfemError
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
+from ifem_export.operators.surface_operator import surface_operator
 
 NOISE_MM = 0.02
 

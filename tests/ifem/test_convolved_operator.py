@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ifem_export.bundle import build_bundle
-from ifem_export.ladder import measure_ladder
-from ifem_export.material import Material
-from ifem_export.outline import Disc, Outline, Polygon, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import Disc, Outline, Polygon, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.ladder import measure_ladder
+from ifem_export.operators.surface_operator import surface_operator
 
 OUTLINES: dict[str, Outline] = {
     "rectangle": RoundedRectangle(12.0, 10.0, 2.0),

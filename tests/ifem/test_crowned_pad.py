@@ -5,20 +5,20 @@ import pytest
 from ifem_bundles import edit, reseal
 from scipy import sparse
 
-from ifem_export.bundle import build_bundle, geometry_hash
-from ifem_export.bundle_io import load_bundle, write_bundle
-from ifem_export.crown import Paraboloid, Sphere
-from ifem_export.crowned_system import CrownedSystem, pad_system
-from ifem_export.element import hex8_stiffness
+from ifem_export.assembly.weighted_assembly import mesh_stiffness
+from ifem_export.bundle.bundle import build_bundle, geometry_hash
+from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import BundleError, MeshError
-from ifem_export.ladder import measure_ladder, refined
-from ifem_export.material import Material
-from ifem_export.outline import Disc, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.pad_system import PadSystem
-from ifem_export.solver import pad_solver
-from ifem_export.surface_operator import surface_operator
-from ifem_export.weighted_assembly import mesh_stiffness
+from ifem_export.mesh.crown import Paraboloid, Sphere
+from ifem_export.mesh.outline import Disc, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.crowned_system import CrownedSystem, pad_system
+from ifem_export.operators.ladder import measure_ladder, refined
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.solver import pad_solver
+from ifem_export.operators.surface_operator import surface_operator
 
 GEL = Material(0.147, 0.3223, 1070.0)
 DOME = Sphere(12.0)

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from ifem_oracle import rigid_modes
 
-from ifem_export.element import (
+from ifem_export.elements.hex8 import (
     FORMULATIONS,
     elasticity_matrix,
     hex8_stiffness,
     shape_gradients,
     strain_displacement,
 )
+from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError
-from ifem_export.lattice import VTK_CORNERS
-from ifem_export.material import Material
+from ifem_export.mesh.lattice import VTK_CORNERS
 
 SIZE = (0.5, 0.7, 0.4)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from ifem_layer import solve_held
 
-from ifem_export.assembly import assemble_csr
-from ifem_export.element import FORMULATIONS, hex8_stiffness
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.assembly.assembly import assemble_csr
+from ifem_export.elements.hex8 import FORMULATIONS, hex8_stiffness
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
 
 E_MPA = 0.147
 

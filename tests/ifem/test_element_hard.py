@@ -9,19 +9,19 @@ from ifem_layer import solve_held
 from ifem_oracle import random_occupancy, rigid_modes
 from scipy.linalg import cholesky
 
-from ifem_export.assembly import assemble_csr
-from ifem_export.element import (
+from ifem_export.assembly.assembly import assemble_csr
+from ifem_export.elements.hex8 import (
     FORMULATIONS,
     elasticity_matrix,
     hex8_stiffness,
     shape_gradients,
     strain_displacement,
 )
-from ifem_export.element_incompatible import mode_strains
-from ifem_export.element_kinematics import GAUSS, TRACE, deviatoric_matrix
-from ifem_export.lattice import VTK_CORNERS
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.elements.incompatible import mode_strains
+from ifem_export.elements.kinematics import GAUSS, TRACE, deviatoric_matrix
+from ifem_export.elements.material import Material
+from ifem_export.mesh.lattice import VTK_CORNERS
+from ifem_export.mesh.pad_mesh import PadMesh
 
 NUS = (0.0, 0.3223, 0.49, 0.4999)
 MONOMIALS = list(product((0, 1), repeat=3))

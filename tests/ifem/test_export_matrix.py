@@ -9,10 +9,10 @@ import pytest
 from ifem_bundles import make_bundle
 from scipy.io import loadmat, mmread
 
-from ifem_export.bundle import Bundle
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.bundle.export_matrix import export_mat, export_matrix_market, export_safetensors
+from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
-from ifem_export.export_matrix import export_mat, export_matrix_market, export_safetensors
-from ifem_export.material import Material
 
 
 def small_bundle() -> Bundle:

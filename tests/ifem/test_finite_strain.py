@@ -8,12 +8,12 @@ from ifem_oracle import random_occupancy
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
-from ifem_export.assembly import assemble_bsr
-from ifem_export.element import hex8_stiffness
+from ifem_export.assembly.assembly import assemble_bsr
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError, MeshError
-from ifem_export.finite_strain import FiniteStrainError, NeoHookeanPad, internal_force
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.finite_strain.neo_hookean import FiniteStrainError, NeoHookeanPad, internal_force
+from ifem_export.mesh.pad_mesh import PadMesh
 
 SIZE = (0.5, 0.7, 0.4)
 NUS = [0.0, 0.3223, 0.49, 0.4999]
@@ -279,8 +279,8 @@ def test_bad_input_is_refused():
 def test_the_reference_runs_without_numba():
     code = (
         "import sys, numpy as np;"
-        "from ifem_export.finite_strain import NeoHookeanPad;"
-        "from ifem_export.material import Material;"
+        "from ifem_export.finite_strain.neo_hookean import NeoHookeanPad;"
+        "from ifem_export.elements.material import Material;"
         "pad = NeoHookeanPad.of((np.ones((2, 2, 1), bool), (1., 1., 1.)), Material(1., .4, 1.));"
         "pad.force(np.zeros((18, 3)), engine='numpy'); print('numba' in sys.modules)"
     )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ifem_export.errors import InterpolationError
-from ifem_export.interpolation import marker_to_node
+from ifem_export.markers.interpolation import marker_to_node
 
 
 def lattice(nx=7, ny=5, pitch=1.3):

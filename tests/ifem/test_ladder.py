@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 from ifem_bundles import MARKERS
 
-from accuracy_budget.budget import Budget
-from accuracy_budget.errors import BudgetError
-from ifem_export.bundle import build_bundle
-from ifem_export.bundle_io import load_bundle, write_bundle
-from ifem_export.element import Formulation
+from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.errors import BudgetError
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.elements.hex8 import Formulation
+from ifem_export.elements.material import Material
 from ifem_export.errors import BundleError, IfemError
-from ifem_export.ladder import (
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.ladder import (
     lumped,
     measure_ladder,
     operator_choices,
@@ -24,11 +27,8 @@ from ifem_export.ladder import (
     refined,
     time_operators,
 )
-from ifem_export.material import Material
-from ifem_export.operator_ladder import OperatorLadder
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.operators.operator_ladder import OperatorLadder
+from ifem_export.operators.surface_operator import surface_operator
 
 GEL = Material(0.147, 0.3223, 1020.0)
 
@@ -210,7 +210,7 @@ def test_operators_are_timed_with_one_blas_thread(monkeypatch: pytest.MonkeyPatc
     """As the pipeline runs them: threads that wait for each other took forty times as long."""
     from threadpoolctl import threadpool_info, threadpool_limits
 
-    from ifem_export import ladder as measuring
+    from ifem_export.operators import ladder as measuring
 
     seen: list[int] = []
 

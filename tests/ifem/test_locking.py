@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from ifem_layer import mixed_force, press_force, strip_force_closed_form
 
-from ifem_export.element import FORMULATIONS
-from ifem_export.material import Material
+from ifem_export.elements.hex8 import FORMULATIONS
+from ifem_export.elements.material import Material
 
 NUS = (0.3, 0.45, 0.49, 0.499, 0.4999)
 LAYERS = (1, 2, 4, 8)

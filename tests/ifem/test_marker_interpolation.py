@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from ifem_export.errors import InterpolationError
-from ifem_export.marker_interpolation import sparse_interpolation, thin_plate_interpolation
-from ifem_export.marker_roughness import local_roughness
+from ifem_export.markers.interpolation_matrix import sparse_interpolation, thin_plate_interpolation
+from ifem_export.markers.roughness import local_roughness
 
 MAKERS = {"sparse": sparse_interpolation, "thin plate": thin_plate_interpolation}
 

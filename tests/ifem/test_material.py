@@ -2,8 +2,8 @@ import math
 
 import pytest
 
+from ifem_export.elements.material import Material
 from ifem_export.errors import MaterialError
-from ifem_export.material import Material
 
 
 def test_lame_constants_satisfy_their_defining_relations():

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from ifem_export.errors import OutlineError
-from ifem_export.outline import Disc, Polygon, RoundedRectangle
+from ifem_export.mesh.outline import Disc, Polygon, RoundedRectangle
 
 RADII, ANGLES = np.tile([6.0, 3.0], 5), np.arange(10) * math.pi / 5
 STAR = tuple(zip((RADII * np.cos(ANGLES)).tolist(), (RADII * np.sin(ANGLES)).tolist(), strict=True))

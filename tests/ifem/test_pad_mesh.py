@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from ifem_oracle import random_occupancy
 
-from ifem_export.crop import keep_bonded_part
 from ifem_export.errors import MeshError
-from ifem_export.lattice import VTK_CORNERS
-from ifem_export.outline import Disc, Polygon, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.mesh.crop import keep_bonded_part
+from ifem_export.mesh.lattice import VTK_CORNERS
+from ifem_export.mesh.outline import Disc, Polygon, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 
 
 def test_the_papers_mesh_has_1764_elements_not_1964():

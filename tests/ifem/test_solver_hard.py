@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from ifem_export.element import hex8_stiffness
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
-from ifem_export.layered_operator import LEAST_PADDING, even_fast_length, padding_columns
-from ifem_export.material import Material
-from ifem_export.outline import Disc, Outline, Polygon, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.pad_system import PadSystem
-from ifem_export.solver import ConvergenceError, inner_solver, pad_solver
-from ifem_export.sparse_factor import factored, installed_backends
+from ifem_export.mesh.outline import Disc, Outline, Polygon, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.layered_operator import LEAST_PADDING, even_fast_length, padding_columns
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.solver import ConvergenceError, inner_solver, pad_solver
+from ifem_export.operators.sparse_factor import factored, installed_backends
 
 OUTLINES: dict[str, Outline] = {
     "rectangle": RoundedRectangle(16.0, 14.0, 3.0),
@@ -129,10 +129,10 @@ def test_a_matrix_without_a_factor_is_refused() -> None:
 
 THREADS = """
 import hashlib, numpy as np
-from ifem_export.material import Material
-from ifem_export.outline import Disc
-from ifem_export.pad_mesh import build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import Disc
+from ifem_export.mesh.pad_mesh import build_pad_mesh
+from ifem_export.operators.surface_operator import surface_operator
 mesh, _ = build_pad_mesh(Disc(10.0), 2.0, pitch_mm=0.6, layers=4)
 u = np.random.default_rng(0).normal(size=(len(mesh.surface), 3))
 gel = Material(0.147, 0.45, 1000.0)

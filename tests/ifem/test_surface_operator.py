@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ifem_export.assembly import assemble_csr
-from ifem_export.element import hex8_stiffness
+from ifem_export.assembly.assembly import assemble_csr
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError, MeshError
-from ifem_export.material import Material
-from ifem_export.outline import Disc, Outline, Polygon, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.pad_system import PadSystem
-from ifem_export.solver import (
+from ifem_export.mesh.outline import Disc, Outline, Polygon, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.solver import (
     ConjugateGradients,
     ConvergenceError,
     SparseFactor,
     inner_solver,
     pad_solver,
 )
-from ifem_export.surface_operator import RUNGS, one_layer, surface_operator
+from ifem_export.operators.surface_operator import RUNGS, one_layer, surface_operator
 
 OUTLINES: dict[str, Outline] = {
     "rectangle": RoundedRectangle(9.0, 7.0, 1.5),

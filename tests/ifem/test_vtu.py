@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ifem_export.errors import MeshError
-from ifem_export.vtu import write_vtu
+from ifem_export.mesh.vtu import write_vtu
 
 
 def test_pyvista_reads_the_mesh_back(round_pad, tmp_path):

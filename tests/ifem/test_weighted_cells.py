@@ -5,21 +5,21 @@ import math
 import numpy as np
 import pytest
 
-from ifem_export.assembly import assemble_csr
-from ifem_export.bundle import geometry_hash, recipe_force
-from ifem_export.cell_fill import filled_cells
-from ifem_export.crown import Paraboloid, Sphere
-from ifem_export.element import hex8_stiffness
+from ifem_export.assembly.assembly import assemble_csr
+from ifem_export.assembly.weighted_assembly import assemble_weighted_csr, mesh_stiffness
+from ifem_export.bundle.bundle import geometry_hash, recipe_force
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError, OutlineError
-from ifem_export.finite_strain import NeoHookeanPad
-from ifem_export.material import Material
-from ifem_export.outline import Disc, Polygon, RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.pad_system import PadSystem
-from ifem_export.solver import inner_solver, pad_solver
-from ifem_export.surface_operator import one_layer, surface_operator
-from ifem_export.vtu import write_vtu
-from ifem_export.weighted_assembly import assemble_weighted_csr, mesh_stiffness
+from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
+from ifem_export.mesh.cell_fill import filled_cells
+from ifem_export.mesh.crown import Paraboloid, Sphere
+from ifem_export.mesh.outline import Disc, Polygon, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.mesh.vtu import write_vtu
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.solver import inner_solver, pad_solver
+from ifem_export.operators.surface_operator import one_layer, surface_operator
 
 GEL = Material(0.147, 0.3223, 1070.0)
 SIZE = (0.5, 0.7, 0.9)

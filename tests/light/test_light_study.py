@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
-from gelslim_cad.guide_section import guide_profile
+from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.light.bend_choice import brightest_ratio, candidates
 from gelslim_cad.light.exposure import exposure
 from gelslim_cad.light.inputs import light_inputs
@@ -21,9 +21,9 @@ from gelslim_cad.light.scene import dark_faces, launched_na, light_scene
 from gelslim_cad.light.study import Comparison, study_light
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.guide_shapes import MirrorGuide, mirror_profile
-from gelslim_optics.light_result import Estimate
-from gelslim_optics.trace import trace_light
+from gelslim_optics.guide.shapes import MirrorGuide, mirror_profile
+from gelslim_optics.light.result import Estimate
+from gelslim_optics.light.trace import trace_light
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 RAYS = 1 << 14

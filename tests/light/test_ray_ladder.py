@@ -8,12 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from accuracy_budget.budget import Budget
-from accuracy_budget.errors import BudgetError
-from accuracy_budget.machine_times import read_times, write_times
-from gelslim_cad.cli import main
+from gelslim.cli import main
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.guide_section import guide_profile
+from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.light import ray_ladder
 from gelslim_cad.light.ray_ladder import (
     BEYOND,
@@ -29,9 +26,12 @@ from gelslim_cad.light.ray_ladder import (
 )
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import COLOURS, study_light
-from gelslim_cad.pad import spec_hash
+from gelslim_cad.sensor.pad import spec_hash
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.trace import trace_light
+from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.errors import BudgetError
+from gelslim_core.budget.machine_times import read_times, write_times
+from gelslim_optics.light.trace import trace_light
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "gelslim2.yaml")
 JSON = ("--json", "--no-pictures")
@@ -132,7 +132,7 @@ def test_an_answer_keeps_the_error_asked_for(capsys: pytest.CaptureFixture[str])
 def test_extrapolated_rays_that_miss_are_told(
     finger: Dimensions, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gelslim_cad.cli.light import _note_missed
+    from gelslim.cli.commands.light import _note_missed
 
     study = study_light(finger, rays=2048, curve=False)
     half = max(half_widths(study.light))

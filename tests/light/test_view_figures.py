@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from gelslim_cad.dimensions import derive
+from gelslim_cad.report.view_figures import (
+    pad_errors,
+    projection_png,
+    projection_sentence,
+    view_inputs,
+)
 from gelslim_cad.spec.reader import read_spec
-from gelslim_cad.view_figures import pad_errors, projection_png, projection_sentence, view_inputs
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gelslim_cad.markers import Outline, nearest_nodes
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ifem_export.marker_anchors import (
+from ifem_export.markers.anchors import (
     choose_anchor_sites,
     fewest_contradictions,
     most_coincidences,

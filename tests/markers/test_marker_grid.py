@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ifem_export.marker_grid import ANCHOR_LARGE, REGULAR, build_marker_grid
+from ifem_export.markers.grid import ANCHOR_LARGE, REGULAR, build_marker_grid
 
 
 def test_positions_are_a_centred_lattice_in_row_major_order():

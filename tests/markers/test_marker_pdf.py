@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.pdf import SCALE_BAR_MM, render_pdf
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 DPI = 400
 PX_MM = 25.4 / DPI

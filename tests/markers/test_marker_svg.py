@@ -8,7 +8,7 @@ import pytest
 
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.svg import render_svg
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 NS = {"s": "http://www.w3.org/2000/svg"}
 

@@ -7,13 +7,13 @@ import pytest
 
 from gelslim_cad.markers import MARKING_PROCESSES, write_marker_files
 from gelslim_cad.markers.write import render_marker_files
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 SCRIPT = """
 import hashlib
 from gelslim_cad.markers import Outline, nearest_nodes
 from gelslim_cad.markers.write import render_marker_files
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 outline = Outline.rounded_rectangle(20, 21, 2)
 grid = build_marker_grid(15, 17, 1.1, 0.4, "omitted")
 nodes = nearest_nodes(grid.positions_mm, grid.positions_mm)
@@ -55,7 +55,7 @@ def test_a_refused_design_leaves_the_folder_untouched(tmp_path, nodes, outline):
 
 def test_importing_the_package_loads_no_heavy_library():
     code = (
-        "import sys, gelslim_cad.markers, ifem_export.marker_grid; "
+        "import sys, gelslim_cad.markers, ifem_export.markers.grid; "
         "print([m for m in ('ezdxf', 'reportlab', 'matplotlib', 'cadquery') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

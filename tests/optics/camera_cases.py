@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_optics.virtual_camera import Layer, VirtualCamera, reflect_point
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 
 Vector = NDArray[np.float64]
 WIDTH, HEIGHT = 640, 480

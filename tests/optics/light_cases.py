@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
-from gelslim_optics.guide_shapes import (
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide.shapes import (
     CurvedGuide,
     Fit,
     GelSection,
@@ -13,8 +13,8 @@ from gelslim_optics.guide_shapes import (
     curved_profile,
     mirror_profile,
 )
-from gelslim_optics.light_scene import LightScene, Medium, Surface
-from gelslim_optics.light_source import EdgeLaunch, LedRow, Source
+from gelslim_optics.light.scene import LightScene, Medium, Surface
+from gelslim_optics.light.source import EdgeLaunch, LedRow, Source
 
 N_ACRYLIC, N_GEL = 1.4906, 1.41
 COATS = {"paint": Surface(), "mirror": Surface(0.9)}

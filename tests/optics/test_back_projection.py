@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from camera_cases import HEIGHT, WIDTH, finger_camera, random_pose, traced
 
-from gelslim_optics.height_field import HeightGrid
-from gelslim_optics.lens_distortion import LensDistortion
-from gelslim_optics.virtual_camera import VirtualCamera
+from gelslim_optics.camera.height_field import HeightGrid
+from gelslim_optics.camera.lens_distortion import LensDistortion
+from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 LENSES = [None, LensDistortion(k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4, k3=-2e-3)]
 

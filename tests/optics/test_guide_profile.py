@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.path import Path
 
-from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
-from gelslim_optics.guide_shapes import (
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
     MirrorGuide,

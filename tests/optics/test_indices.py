@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gelslim_optics.indices import critical_angle_deg, fresnel_reflectance, pmma_index
-from gelslim_optics.light_scene import PMMA_SELLMEIER
+from gelslim_optics.guide.indices import critical_angle_deg, fresnel_reflectance, pmma_index
+from gelslim_optics.light.scene import PMMA_SELLMEIER
 
 
 def test_pmma_at_the_colours_of_the_leds() -> None:

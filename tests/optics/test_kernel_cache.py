@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gelslim_optics.kernel_cache import drop_stale
+from gelslim_core.kernel_cache import drop_stale
 
 
 @pytest.fixture

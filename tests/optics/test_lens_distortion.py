@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelslim_optics.lens_distortion import LensDistortion
+from gelslim_optics.camera.lens_distortion import LensDistortion
 
 LENSES = [
     LensDistortion(),

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from light_cases import finger, led_rows, media
 
-from gelslim_optics.light_result import paired_ratio
-from gelslim_optics.light_scene import LightScene, Surface, default_media
-from gelslim_optics.light_source import LedRow
-from gelslim_optics.trace import TraceOptions, trace_light, trace_paths
+from gelslim_optics.light.result import paired_ratio
+from gelslim_optics.light.scene import LightScene, Surface, default_media
+from gelslim_optics.light.source import LedRow
+from gelslim_optics.light.trace import TraceOptions, trace_light, trace_paths
 
 RATIOS = {1.0: (0.74, 0.77), 2.05: (0.92, 0.95), 3.0: (1.10, 1.14), 4.0: (1.10, 1.14)}
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from light_cases import bend_scene, finger
 
-from gelslim_optics.guide_profile import GuideProfile
-from gelslim_optics.light_result import LightResult
-from gelslim_optics.light_scene import LightScene, Medium
-from gelslim_optics.light_source import LedRow
-from gelslim_optics.trace import TraceOptions, trace_light
+from gelslim_optics.guide.profile import GuideProfile
+from gelslim_optics.light.result import LightResult
+from gelslim_optics.light.scene import LightScene, Medium
+from gelslim_optics.light.source import LedRow
+from gelslim_optics.light.trace import TraceOptions, trace_light
 
 RAYS = 1 << 13
 
@@ -134,5 +134,7 @@ def test_sobol_beats_chance() -> None:
 
 
 def test_the_compiler_is_loaded_only_to_trace() -> None:
-    code = "import sys, gelslim_optics.trace as t; sys.exit('numba' in sys.modules or t is None)"
+    code = (
+        "import sys, gelslim_optics.light.trace as t; sys.exit('numba' in sys.modules or t is None)"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)

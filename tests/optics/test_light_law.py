@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gelslim_optics.light_law import Dome, Lambertian, MeasuredLaw
-from gelslim_optics.light_points import point_batches
-from gelslim_optics.light_source import EdgeLaunch, LedRow
+from gelslim_optics.light.law import Dome, Lambertian, MeasuredLaw
+from gelslim_optics.light.points import point_batches
+from gelslim_optics.light.source import EdgeLaunch, LedRow
 
 U = (np.arange(100_000) + 0.5) / 100_000
 

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 from shapely.geometry.polygon import orient
 
-from gelslim_optics.guide_facets import facetted_profile
-from gelslim_optics.guide_profile import Edge, GuideProfile, Segment
-from gelslim_optics.light_result import estimate
-from gelslim_optics.light_scene import LightScene
-from gelslim_optics.light_source import LedRow
-from gelslim_optics.tir_certificate import certify_tir
-from gelslim_optics.trace import TraceOptions, trace_light
+from gelslim_optics.guide.facets import facetted_profile
+from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
+from gelslim_optics.guide.tir_certificate import certify_tir
+from gelslim_optics.light.result import estimate
+from gelslim_optics.light.scene import LightScene
+from gelslim_optics.light.source import LedRow
+from gelslim_optics.light.trace import TraceOptions, trace_light
 
 mi = pytest.importorskip(
     "mitsuba",

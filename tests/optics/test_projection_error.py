@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from camera_cases import finger_camera, random_pose
 
-from gelslim_optics.pad_grid import pad_axes
-from gelslim_optics.projection_error import (
+from gelslim_optics.camera.pad_grid import pad_axes
+from gelslim_optics.camera.projection_error import (
     MODELS,
     effective_height_mm,
     error_map,
     projection_error_mm,
 )
-from gelslim_optics.virtual_camera import Layer, VirtualCamera
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
 X, Y = pad_axes(28, 28)
 PRESS = -0.5

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from gelslim_optics.refraction import lateral_reach, newton_slope, ray_slope, reach_growth
+from gelslim_optics.camera.refraction import lateral_reach, newton_slope, ray_slope, reach_growth
 
 LAYERS = [
     ([8.0], [1.0]),

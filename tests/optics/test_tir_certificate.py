@@ -10,14 +10,14 @@ import pytest
 from scipy.integrate import dblquad, quad
 from scipy.stats import qmc
 
-from gelslim_optics.guide_profile import GuideProfile
-from gelslim_optics.guide_shapes import (
+from gelslim_optics.guide.profile import GuideProfile
+from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
     curved_profile,
 )
-from gelslim_optics.tir_bend import guided_2d, guided_3d, largest_na, local_acceptance
-from gelslim_optics.tir_certificate import certify_tir, least_ratio
+from gelslim_optics.guide.tir_bend import guided_2d, guided_3d, largest_na, local_acceptance
+from gelslim_optics.guide.tir_certificate import certify_tir, least_ratio
 
 N, N_GEL = 1.4906, 1.41
 APERTURES = (0.0, 0.3, 0.5, 0.7, 0.8, 1.0)

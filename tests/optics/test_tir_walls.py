@@ -11,17 +11,17 @@ import pytest
 import tir_march
 from tir_march import ARRIVED, LEAKED, LOST
 
-from gelslim_optics.guide_facets import facetted_profile
-from gelslim_optics.guide_profile import Edge, GuideProfile, Segment
-from gelslim_optics.guide_shapes import (
+from gelslim_optics.guide.facets import facetted_profile
+from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
+from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
     MirrorGuide,
     curved_profile,
     mirror_profile,
 )
-from gelslim_optics.tir_certificate import certify_tir
-from gelslim_optics.tir_walls import ENDS, kept_by_walls, survey_walls
+from gelslim_optics.guide.tir_certificate import certify_tir
+from gelslim_optics.guide.tir_walls import ENDS, kept_by_walls, survey_walls
 
 N = 1.4906
 COUNT = 2**15

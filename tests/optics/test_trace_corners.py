@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from light_cases import finger
 
-from gelslim_optics.light_source import EdgeLaunch
-from gelslim_optics.trace import TraceOptions, _job, _run
-from gelslim_optics.trace_geometry import CORNERS, ENDS_STOPPED, LOST, PER_EDGE
+from gelslim_optics.light.source import EdgeLaunch
+from gelslim_optics.light.trace import TraceOptions, _job, _run
+from gelslim_optics.light.trace_geometry import CORNERS, ENDS_STOPPED, LOST, PER_EDGE
 
 
 @pytest.mark.parametrize(("mirror", "crown"), [("", 0.0), ("", 0.7), ("glued", 0.0), ("gap", 0.0)])

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from light_cases import COATS, N_ACRYLIC, bend_scene, lone_bend, loop, media, slab
 
-from gelslim_optics.guide_facets import facetted_profile
-from gelslim_optics.light_result import LightResult
-from gelslim_optics.light_scene import LightScene, Surface
-from gelslim_optics.light_source import EdgeLaunch
-from gelslim_optics.trace import TraceOptions, trace_light
+from gelslim_optics.guide.facets import facetted_profile
+from gelslim_optics.light.result import LightResult
+from gelslim_optics.light.scene import LightScene, Surface
+from gelslim_optics.light.source import EdgeLaunch
+from gelslim_optics.light.trace import TraceOptions, trace_light
 
 
 def full_guidance(na: float) -> float:
@@ -112,7 +112,7 @@ def test_facets_beyond_the_margin_are_refused() -> None:
 
 def test_a_whole_circle_guides_for_ever() -> None:
     """A disc traps light launched steeper than critical; 20 000 faces on one arc, none lost."""
-    from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
+    from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
 
     disc = GuideProfile(
         (

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelslim_optics import trace_geometry as column
-from gelslim_optics.light_result import LightResult
+from gelslim_optics.light import trace_geometry as column
+from gelslim_optics.light.result import LightResult
 
 BINS = 40
 X = (np.arange(BINS) + 0.5) / BINS

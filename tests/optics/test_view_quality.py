@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from camera_cases import TILT, finger_camera
 
-from gelslim_optics.homography import Homography
-from gelslim_optics.lens_distortion import LensDistortion
-from gelslim_optics.pad_grid import grid_points, pad_axes
-from gelslim_optics.virtual_camera import Layer, VirtualCamera
+from gelslim_optics.camera.homography import Homography
+from gelslim_optics.camera.lens_distortion import LensDistortion
+from gelslim_optics.camera.pad_grid import grid_points, pad_axes
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
 X, Y = pad_axes(28, 28)
 AIR = (Layer(2.5, 1.0), Layer(2.0, 1.0))

@@ -11,10 +11,15 @@ import numpy as np
 import pytest
 from camera_cases import HEIGHT, WIDTH, finger_camera, random_pose, rotation_about_y, traced
 
-from gelslim_optics.camera_rays import newton_rays
-from gelslim_optics.lens_distortion import LensDistortion
-from gelslim_optics.refraction_kernel import solve_rays
-from gelslim_optics.virtual_camera import Layer, VirtualCamera, reflect_direction, reflect_point
+from gelslim_optics.camera.lens_distortion import LensDistortion
+from gelslim_optics.camera.rays import newton_rays
+from gelslim_optics.camera.refraction_kernel import solve_rays
+from gelslim_optics.camera.virtual_camera import (
+    Layer,
+    VirtualCamera,
+    reflect_direction,
+    reflect_point,
+)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -261,7 +266,7 @@ def test_layers_that_cannot_be_are_refused() -> None:
 
 def test_a_few_points_need_no_compiler() -> None:
     code = (
-        "import sys; from gelslim_optics.virtual_camera import VirtualCamera, Layer;"
+        "import sys; from gelslim_optics.camera.virtual_camera import VirtualCamera, Layer;"
         "c = VirtualCamera.from_fold(camera_mm=(-26, 0, -11), pitch_rad=.14, mirror_angle_rad=.56,"
         "mirror_point_mm=(-2, 0, -14.3), focal_px=635, image_width_px=640, image_height_px=480,"
         "window_bottom_z_mm=-4.5, layers=(Layer(2.5, 1.49), Layer(2, 1.41)));"

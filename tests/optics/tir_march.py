@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import qmc
 
-from gelslim_optics.guide_profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
 
 LEAKED, RETURNED, ARRIVED, LOST = range(4)
 

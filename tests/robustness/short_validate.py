@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from gelslim_cad.__main__ import run
+from gelslim.__main__ import run
 
 
 def main(begun: Callable[[], None]) -> int:
     """The command line, its experiment cut short before it begins."""
-    from gelslim_cad.cli import main as command
+    from gelslim.cli import main as command
     from gelslim_twin.validation import experiment, truth_gel
     from gelslim_twin.validation import validate as validation
 

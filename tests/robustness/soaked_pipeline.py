@@ -19,14 +19,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import sensor_bundle
 from shaded_frames import pressed_heights, shaded
 
-from gelslim_cad.cli.force_sinks import RunOutputs, result_sinks
-from gelslim_force.calibration import calibrate
-from gelslim_force.force_pipeline import ForcePipeline
-from gelslim_force.force_run import run_frames
+from gelslim.cli.force_sinks import RunOutputs, result_sinks
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.contact.indenter import parse_indenter
+from gelslim_force.contact.indenter_source import indenter_source
 from gelslim_force.frames.frame import Frame
-from gelslim_force.indenter import parse_indenter
-from gelslim_force.indenter_source import indenter_source
-from gelslim_force.pipeline_settings import PipelineSettings
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.run import run_frames
+from gelslim_force.settings import PipelineSettings
 
 FRAMES, EVERY = 1000, 10
 TOUCHED_MM = (None, 1.8, 2.4, 1.8)

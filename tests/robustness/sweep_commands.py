@@ -26,7 +26,7 @@ class Command:
     other: str = ""
     """Replaces the text before `=>` by that after it, for an earlier output of another kind."""
     kills: int = 5
-    program: tuple[str, ...] = ("-m", "gelslim_cad")
+    program: tuple[str, ...] = ("-m", "gelslim")
     ignored: frozenset[str] = field(default=frozenset())
 
     def argv(self, place: Path, out: Path, other: bool = False) -> list[str]:

@@ -79,7 +79,7 @@ def test_markers_on_a_disk_that_is_too_small(
 @pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
 def test_a_bundle_too_large_for_the_disk_says_so(tmp_path: Path) -> None:
     code = (
-        "import resource, sys; from gelslim_cad.cli import main;"
+        "import resource, sys; from gelslim.cli import main;"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000));"
         "sys.exit(main(sys.argv[1:]))"
     )

@@ -13,15 +13,15 @@ import pytest
 from interrupted_run import LINES, interrupted, leaves_nothing
 from sweep_commands import ROOT, environment, heeds_interrupts
 
-from gelslim_cad.cli.failure import _as_json
-from gelslim_cad.ending import SAID, Terminated, asked_to_end, say
+from gelslim.cli.failure import _as_json
+from gelslim.ending import SAID, Terminated, asked_to_end, say
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals process groups")
 BOTH = (signal.SIGINT, signal.SIGTERM)
 
 PROGRAM = """
 import os, signal, sys, time
-from gelslim_cad.__main__ import run
+from gelslim.__main__ import run
 
 def interrupt(times=1):
     for _ in range(times):
@@ -31,7 +31,7 @@ def work():
     {work}
 
 def command(begun):
-    from gelslim_cad.cli.failure import explain_failure
+    from gelslim.cli.failure import explain_failure
     begun()
     try:
         work()
@@ -64,7 +64,7 @@ def program(tmp_path: Path, work: str, number: signal.Signals = signal.SIGINT, *
 def test_a_signal_during_imports_is_one_line(
     number: signal.Signals, at: int, tmp_path: Path
 ) -> None:
-    argv = [sys.executable, "-m", "gelslim_cad", "schema", "-o", str(tmp_path / "schema.json")]
+    argv = [sys.executable, "-m", "gelslim", "schema", "-o", str(tmp_path / "schema.json")]
     run = interrupted(argv, tmp_path / "tmp", number=number, at=f"import:{at}")
     assert run.was_one_line()
     leaves_nothing(run, tmp_path / "tmp", tmp_path)
@@ -76,7 +76,7 @@ def test_one_amidst_the_reading_of_words_is_one_line(words: str, tmp_path: Path)
     """typer ends at Ctrl-C without a word."""
     work = f"""
 import typer
-from gelslim_cad.cli.main import main
+from gelslim.cli.main import main
 real = typer.main.TyperGroup.parse_args
 typer.main.TyperGroup.parse_args = lambda *a: (interrupt(), real(*a))[1]
 os._exit(main({words.split()!r}))
@@ -87,13 +87,13 @@ os._exit(main({words.split()!r}))
 
 def test_the_installed_command_is_guarded_as_the_module_is() -> None:
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    assert 'gelslim = "gelslim_cad.__main__:main"' in text
+    assert 'gelslim = "gelslim.__main__:main"' in text
 
 
 @pytest.mark.parametrize("number", BOTH)
 def test_a_second_one_meanwhile_changes_nothing(number: signal.Signals, tmp_path: Path) -> None:
     work = """
-from whole_files.scratch import scratch_folder
+from gelslim_core.files.scratch import scratch_folder
 with scratch_folder() as folder:
     try:
         (folder / "file").write_bytes(b"x")
@@ -168,7 +168,7 @@ threading.Thread(target=lambda: (time.sleep(0.2), interrupt())).start()
 
 def test_the_impatient_are_let_go(tmp_path: Path) -> None:
     work = """
-from gelslim_cad import ending
+from gelslim import ending
 ending.PATIENCE_S = -1.0
 try:
     interrupt()
@@ -185,8 +185,8 @@ def test_the_impatient_get_their_cursor_back() -> None:
     import pty
 
     work = """
-from gelslim_cad import ending
-from gelslim_cad.cli.progress import progress_bar
+from gelslim import ending
+from gelslim.cli.progress import progress_bar
 ending.PATIENCE_S = -1.0
 with progress_bar(False) as tell:
     tell("work", 0, 1)
@@ -213,7 +213,7 @@ with progress_bar(False) as tell:
 
 def test_an_ignored_signal_stays_ignored(tmp_path: Path) -> None:
     done = subprocess.run(
-        ["sh", "-c", f"trap '' INT; exec {sys.executable} -c 'import gelslim_cad.__main__, signal;"
+        ["sh", "-c", f"trap '' INT; exec {sys.executable} -c 'import gelslim.__main__, signal;"
          "print(signal.getsignal(2) is signal.SIG_IGN)'"],
         env=environment(tmp_path / "tmp"), text=True, capture_output=True, check=True,
     )  # fmt: skip
@@ -244,7 +244,7 @@ def test_the_signal_behind_an_error_is_found() -> None:
 
 POOL = """
 from pool_task import task
-from work_pool.workers import worker_pool
+from gelslim_core.jobs.workers import worker_pool
 with worker_pool(2, "{method}") as pool:
     futures = [pool.submit(task, k) for k in range(6)]
     futures[0].result()
@@ -253,8 +253,8 @@ with worker_pool(2, "{method}") as pool:
 """
 TASK = """
 import pathlib, sys, time
-from whole_files.replaced_file import replacement
-from whole_files.scratch import scratch_folder
+from gelslim_core.files.replaced_file import replacement
+from gelslim_core.files.scratch import scratch_folder
 HERE = pathlib.Path(__file__).parent
 def task(k):
     with scratch_folder(), replacement(HERE / f"made_{k}") as stream:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from whole_files import file_lock, replaced_file, replaced_folder, scratch
-from whole_files.held_interrupt import interrupts_held
+from gelslim_core.files import file_lock, replaced_file, replaced_folder, scratch
+from gelslim_core.files.held_interrupt import interrupts_held
 
 
 @pytest.fixture(autouse=True)

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from sweep_commands import COMMANDS, MINI20, Command, finished
 
-from gelslim_cad.cli import main
-from whole_files.beside import MOST_BYTES, beside
-from whole_files.replaced_file import replace_file
-from whole_files.replaced_folder import replaced_folder
+from gelslim.cli import main
+from gelslim_core.files.beside import MOST_BYTES, beside
+from gelslim_core.files.replaced_file import replace_file
+from gelslim_core.files.replaced_folder import replaced_folder
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="limits of names differ")
 

@@ -17,7 +17,7 @@ class Blocked:
         if name.partition(".")[0] in self.names:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Blocked())
-from gelslim_cad.cli import main
+from gelslim.cli import main
 sys.exit(main(sys.argv[1:]))
 """
 CAD = ("cadquery", "OCP", "trimesh", "manifold3d", "lxml", "networkx", "ezdxf", "reportlab",

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from gelslim_cad.cli import main
-from yaml_model.errors import FieldError
-from yaml_model.folder_name import require_folder_name
+from gelslim.cli import main
+from gelslim_core.yaml.errors import FieldError
+from gelslim_core.yaml.folder_name import require_folder_name
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = (
-    "accuracy_budget", "gelslim_cad", "gelslim_force", "gelslim_optics", "gelslim_twin",
-    "ifem_export", "whole_files", "work_pool", "yaml_model",
+    "gelslim", "gelslim_cad", "gelslim_core", "gelslim_force", "gelslim_optics", "gelslim_twin",
+    "ifem_export",
 )  # fmt: skip
 SOURCES = sorted(p for name in PACKAGES for p in (ROOT / name).rglob("*.py"))
 

@@ -19,11 +19,11 @@ from sensor_samples import sensor_bundle, sensor_grid
 from sim_rig import small_sensor
 from synthetic import Look, render
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.force_pipeline import ForcePipeline
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.pipeline import ForcePipeline
 from gelslim_twin.contact.compliance import SurfaceCompliance
-from ifem_export.bundle_io import load_bundle
-from ifem_export.thin_plate import thin_plate
+from ifem_export.bundle.files import load_bundle
+from ifem_export.markers.thin_plate import thin_plate
 
 
 def test_columns_of_the_compliance_are_the_same_in_whatever_order(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_calibration_and_forces_are_the_same_whatever_the_threads() -> None:
 
 CENTRES = (
     "import hashlib, sensor_samples as s, synthetic, camera_rig;"
-    "from gelslim_force.calibration import calibrate;"
+    "from gelslim_force.calibration.calibration import calibrate;"
     "look = synthetic.Look(noise=2.0);"
     "seen = synthetic.render(s.sensor_grid(), camera_rig.finger_view(), look);"
     "found = calibrate(s.sensor_bundle(), seen.image);"

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from sweep_commands import MINI20
 
+from gelslim.cli import main
+from gelslim.cli.commands.validate import PLOTS, picture_name, picture_names
+from gelslim.scene_sensor import spec_sensor
 from gelslim_cad.build.folder import OutputError, require_ours
-from gelslim_cad.cli import main
-from gelslim_cad.cli.twin_sensor import spec_sensor
-from gelslim_cad.cli.validate import PLOTS, picture_name, picture_names
-from gelslim_force.outputs.output_error import OutputError as RunError
+from gelslim_core.files.output_error import OutputError as RunError
 from gelslim_force.outputs.run_recorder import RunRecorder
 from gelslim_twin.simulation.run_folder import RunFolder, SimulationError
 from gelslim_twin.simulation.stored_sensor import store_sensor

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from whole_files import file_lock, replaced_file, replaced_folder
-from whole_files.file_lock import locked
-from whole_files.replaced_file import is_part, replace_file, replacement, sweep
-from whole_files.replaced_folder import FolderError, recover
-from whole_files.replaced_folder import replaced_folder as replaced
-from whole_files.scratch import scratch_folder
+from gelslim_core.files import file_lock, replaced_file, replaced_folder
+from gelslim_core.files.file_lock import locked
+from gelslim_core.files.replaced_file import is_part, replace_file, replacement, sweep
+from gelslim_core.files.replaced_folder import FolderError, recover
+from gelslim_core.files.replaced_folder import replaced_folder as replaced
+from gelslim_core.files.scratch import scratch_folder
 
 ROOT = Path(__file__).parents[2]
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX locks")
@@ -38,7 +38,7 @@ def ready(process: subprocess.Popen[str]) -> None:
 
 WRITES = """
 import sys
-from whole_files.replaced_file import replacement
+from gelslim_core.files.replaced_file import replacement
 with replacement(sys.argv[1]) as stream:
     stream.write(b"half")
     stream.flush()
@@ -131,7 +131,7 @@ def test_links_are_followed_and_devices_are_left_devices(tmp_path: Path) -> None
 LOCKS = """
 import sys
 from pathlib import Path
-from whole_files.file_lock import locked
+from gelslim_core.files.file_lock import locked
 with locked(Path(sys.argv[1])):
     print("ready", flush=True)
     sys.stdin.readline()
@@ -249,7 +249,7 @@ def test_a_writer_killed_between_its_renames_is_made_good(tmp_path: Path) -> Non
 
 SCRATCH = """
 import sys
-from whole_files.scratch import scratch_folder
+from gelslim_core.files.scratch import scratch_folder
 with scratch_folder() as folder:
     (folder / "big").write_bytes(b"x" * 1000)
     print("ready", flush=True)

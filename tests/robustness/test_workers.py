@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 from sweep_commands import heeds_interrupts
 
-from gelslim_cad.cli.failure import explain_failure
+from gelslim.cli.failure import explain_failure
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 
 POOL = """
 import os, sys, time
-from work_pool.workers import worker_pool
+from gelslim_core.jobs.workers import worker_pool
 
 def main():
     with worker_pool(3, sys.argv[1]) as pool:

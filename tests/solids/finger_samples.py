@@ -9,7 +9,7 @@ from typing import Any
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
 

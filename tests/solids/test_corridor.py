@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from finger_samples import fingers, parts_of
 
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.corridor import blocked_volumes, corner_rays, view_corridor
 
 each_finger = pytest.mark.parametrize("name", list(fingers()))

@@ -7,7 +7,7 @@ import math
 import pytest
 from tooling_samples import gelslim2
 
-from gelslim_cad.casting import Casting, cast_gel
+from gelslim_cad.solids.casting import Casting, cast_gel
 
 
 def test_masses_by_hand() -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.guide_section import guide_profile
+from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.solids.guide import light_guide
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.guide_profile import Arc, GuideProfile, Segment
+from gelslim_optics.guide.profile import Arc, GuideProfile, Segment
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 RAYS = 400

@@ -10,7 +10,7 @@ import pytest
 from tooling_samples import gelslim2
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.solids.gel import gel_solid
 from gelslim_cad.solids.tooling.mould import cavity_in_mould, cavity_solid, mould_parts
 from gelslim_cad.solids.tooling.mould_plan import BORDER_MM, MouldPlan, plan_mould

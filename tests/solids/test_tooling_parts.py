@@ -10,7 +10,7 @@ import pytest
 from tooling_samples import clipped_grid, gelslim2, random_dimensions
 
 from gelslim_cad.export.tessellation import mesh_for
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.markers.stencil import lay_out_stencil
 from gelslim_cad.solids.gel import gel_pad
 from gelslim_cad.solids.prism import outline_wire, prism, rectangle, rounded_polygon
@@ -27,7 +27,7 @@ from gelslim_cad.solids.tooling.fit_coupon import fit_coupon, plan_coupon
 from gelslim_cad.solids.tooling.focus_jig import focus_jig, plan_jig
 from gelslim_cad.solids.tooling.sphere_indenter import sphere_indenter
 from gelslim_cad.solids.tooling.stencil import stencil, stencil_problem
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 
 def shapely_area(points: np.ndarray) -> float:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
-from ifem_export.marker_grid import MarkerGrid, build_marker_grid
+from ifem_export.markers.grid import MarkerGrid, build_marker_grid
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 PINNED_GEL = {

@@ -8,8 +8,8 @@ import pytest
 from pydantic import BaseModel
 
 from gelslim_cad.spec.spec import Spec
-from yaml_model.errors import InputError, Problem
-from yaml_model.reader import Loaded, load_bytes
+from gelslim_core.yaml.errors import InputError, Problem
+from gelslim_core.yaml.reader import Loaded, load_bytes
 
 MINIMAL = """\
 format: gelslim-spec/1

@@ -1,7 +1,6 @@
 """Files that are no spec at all: refused fast, with a line where there is one."""
 
 import hashlib
-import json
 import os
 import pickle
 import time
@@ -11,7 +10,7 @@ import pytest
 from spec_samples import MINIMAL, NAME, load, the_problem
 
 from gelslim_cad.spec.reader import LoadedSpec, read_spec
-from yaml_model.errors import InputError
+from gelslim_core.yaml.errors import InputError
 
 
 def refused(path) -> InputError:
@@ -128,7 +127,7 @@ def test_an_endless_file_is_read_no_further_than_the_limit():
 
 
 def test_a_large_file_is_not_parsed(tmp_path, monkeypatch):
-    import yaml_model.reader as reader
+    import gelslim_core.yaml.reader as reader
 
     def fail(_source):
         raise AssertionError("parsed")
@@ -155,7 +154,7 @@ def test_a_spec_read_from_a_file(tmp_path):
 def test_errors_as_json():
     with pytest.raises(InputError) as caught:
         load(MINIMAL + "    thickness_mm: -2\n")
-    body = json.loads(caught.value.to_json())
+    body = caught.value.to_dict()
     assert body["error"] == "bad input"
     assert body["omitted"] == 0
     assert body["problems"] == [

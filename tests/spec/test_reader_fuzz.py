@@ -13,7 +13,7 @@ from spec_samples import MINIMAL, NAME, load
 
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
-from yaml_model.errors import InputError
+from gelslim_core.yaml.errors import InputError
 
 FUZZ = settings(
     derandomize=True,

@@ -205,7 +205,7 @@ def test_the_source_map_points_at_values_and_at_block_keys():
 
 def test_defaulted_fields_are_exactly_the_leaves_not_given():
     from gelslim_cad.spec.spec import Spec
-    from yaml_model.fields import field_table
+    from gelslim_core.yaml.fields import field_table
 
     loaded = load(MINIMAL + "mesh:\n  layers: 2\n")
     leaves = {field.path for field in field_table(Spec) if not field.models}

@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from spec_samples import load, problems, the_problem
 
-from yaml_model.errors import FieldError
+from gelslim_core.yaml.errors import FieldError
 
 
 class Frozen(BaseModel):

@@ -231,7 +231,7 @@ def test_a_very_long_value_is_shortened():
 
 
 def test_a_flood_of_problems_is_counted_not_listed():
-    from yaml_model.errors import InputError
+    from gelslim_core.yaml.errors import InputError
 
     flood = MINIMAL + "".join(f"    field{i}: 1\n" for i in range(3000))
     with pytest.raises(InputError) as caught:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from yaml_model.scalars import MAX_INT, RefusedScalarError, resolve
+from gelslim_core.yaml.scalars import MAX_INT, RefusedScalarError, resolve
 
 
 @pytest.mark.parametrize(

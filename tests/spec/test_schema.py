@@ -11,8 +11,8 @@ from spec_samples import MINIMAL, load, with_length
 from gelslim_cad.spec.schema import schema_text
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
-from yaml_model.errors import InputError
-from yaml_model.fields import field_table
+from gelslim_core.yaml.errors import InputError
+from gelslim_core.yaml.fields import field_table
 
 COMMITTED = Path(__file__).parents[2] / "docs" / "gelslim-spec-1.schema.json"
 SCHEMA = json.loads(schema_text())

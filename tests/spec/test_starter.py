@@ -7,8 +7,8 @@ from spec_samples import load
 
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
-from yaml_model.errors import InputError
-from yaml_model.fields import field_table
+from gelslim_core.yaml.errors import InputError
+from gelslim_core.yaml.fields import field_table
 
 MARK = re.compile(r"^( *)# (?=[ a-z])", re.MULTILINE)
 

@@ -50,7 +50,7 @@ def run_case(spec_path: Path, last: Stage, reached: Callable[[str], None]) -> Ou
 
 
 def _of_exception(error: Exception, stage: str) -> Outcome:
-    from yaml_model.errors import InputError
+    from gelslim_core.yaml.errors import InputError
 
     if isinstance(error, InputError):
         return Outcome("refused", stage, ("InputError",), str(error))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from random_contact_scenes import Finger, Values, placed_finger, text_of
 from scipy.spatial import cKDTree
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.effect import OBSERVABLES, Bound
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.plan import Plan
@@ -22,11 +23,10 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 Array = NDArray[np.float64]
 MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation")

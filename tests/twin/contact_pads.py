@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.material import Material
-from ifem_export.pad_mesh import PadMesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
 
 Array = NDArray[np.float64]
 YOUNGS_MPA = 0.147

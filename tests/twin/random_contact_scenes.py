@@ -14,14 +14,14 @@ import numpy as np
 from scene_samples import ROOT
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.pad import marker_grid
-from gelslim_cad.sight import camera_record
+from gelslim_cad.geometry.sight import camera_record
+from gelslim_cad.sensor.pad import marker_grid
 from gelslim_cad.spec.reader import read_spec
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.bundle_io import write_bundle
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.bundle.files import write_bundle
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 Values = dict[str, Any]
 KINDS = ("sphere", "cylinder", "ring", "flat_punch", "wedge", "cone", "textured_plane", "stl")

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gelslim_force.detection import Detector
-from gelslim_force.detector_settings import DetectorSettings
-from gelslim_optics.virtual_camera import Layer, VirtualCamera, reflect_point
+from gelslim_force.detection.detection import Detector
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.light_map import LightMap, red_green_sides
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.rendered_frame import RenderedFrame
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 Array = NDArray[np.float64]
 PAD = Pad(22.0, 21.0, 1.0)

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from gelslim_core.yaml.errors import InputError, Problem
 from gelslim_twin.effects.circumstances import SensorFigures
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.question import plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
-from yaml_model.errors import InputError, Problem
 
 ROOT = Path(__file__).parents[2]
 GALLERY = sorted((ROOT / "designs" / "scenes").glob("*.yaml"))

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from render_rig import finger_camera
 
-from ifem_export.bundle import build_bundle
-from ifem_export.bundle_io import write_bundle
-from ifem_export.marker_grid import MarkerGrid, build_marker_grid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.bundle.files import write_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import MarkerGrid, build_marker_grid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 
 SCENE = """\
 format: gelslim-scene/1

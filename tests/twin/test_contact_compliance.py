@@ -16,11 +16,11 @@ from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.pad_symmetry import symmetries
 from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.crown import Paraboloid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 
 Array = NDArray[np.float64]
 GEL = Material(YOUNGS_MPA, 0.49, 1000.0)

@@ -14,8 +14,8 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
-from ifem_export.finite_strain import NeoHookeanPad
-from ifem_export.material import Material
+from ifem_export.elements.material import Material
+from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 
 MATERIAL = Material(0.147, 0.4999, 1000.0)
 SPHERE = Sphere(shape="sphere", radius_mm=6)

@@ -19,11 +19,11 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Ring, Sphere, TexturedPlane
 from gelslim_twin.scene.pose import Pose
-from ifem_export.bundle import build_bundle
-from ifem_export.crown import Paraboloid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 Array = NDArray[np.float64]
 RUNGS = (1e-2, 1e-3, 1e-4)

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.coulomb_balance import balanced
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState
-from ifem_export.bundle import Bundle
+from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from sim_rig import SCENE, small_sensor
 from threadpoolctl import threadpool_limits
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects import friction, nonlinearity, normal_contact
@@ -18,8 +19,7 @@ from gelslim_twin.effects.contact_rungs import RUNGS
 from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.simulation.gel_state import GelState
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 BALL = "- shape: sphere\n    radius_mm: 6"
 TOOLS = {

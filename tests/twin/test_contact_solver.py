@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_state import GelState, Touch
 from gelslim_twin.contact.halved_path import between, reached
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, FlatPunch, Indenter, Ring, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.simulation.gel_state import GelState, Touch
-from ifem_export.bundle import Bundle
+from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
 BALL = Sphere(shape="sphere", radius_mm=6)

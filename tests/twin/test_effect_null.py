@@ -14,15 +14,15 @@ import pytest
 from scene_samples import ROOT
 from sim_rig import small_sensor
 
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.plan import Plan
 from gelslim_twin.scene.question import plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 NULL: dict[str, dict[str, Any]] = {
     "friction": {},
@@ -125,7 +125,7 @@ from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.effects.registry import EFFECTS
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 place = Path({str(folder)!r})
 loaded = read_scene(place / "bare.yaml")
 plan = plan_scene(loaded, bundle_figures(place / "bundle"))

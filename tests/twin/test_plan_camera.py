@@ -9,9 +9,9 @@ import pytest
 from scene_samples import MINIMAL, ROOT, load
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.sight import camera_record
+from gelslim_cad.geometry.sight import camera_record
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.virtual_camera import VirtualCamera
+from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.effects import lens_distortion, refraction
 from gelslim_twin.scene.question import plan_scene, question
 from gelslim_twin.sensor_figures import figures

@@ -11,8 +11,8 @@ from agreement import Outcome, Trial
 from random_contact_scenes import Values, random_contact
 
 from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.effect import OBSERVABLES
-from gelslim_twin.simulation.gel_state import GelState
 
 SLACK = 1e-9
 FAST = {"nonlinearity": "off"}

@@ -11,6 +11,7 @@ from dataclasses import replace
 import pytest
 from scene_samples import GALLERY, MINIMAL, ROOT, SENSOR, load, plan_text, random_scene
 
+from gelslim_core.yaml.errors import InputError
 from gelslim_twin.effects.circumstances import Circumstances, MotionFigures
 from gelslim_twin.effects.effect import GIVEN, OBSERVABLES, Bound, Effect, Rung, picture
 from gelslim_twin.effects.parameters import EffectParameters
@@ -20,7 +21,6 @@ from gelslim_twin.plan import Plan
 from gelslim_twin.planner import PlanError, Question, make_plan
 from gelslim_twin.scene.question import plan_scene, question
 from gelslim_twin.scene.reader import read_scene
-from yaml_model.errors import InputError
 
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 OPTICS = {"perspective", "refraction", "drawing", "shading", "defocus", "sensor_noise"}

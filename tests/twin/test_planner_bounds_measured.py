@@ -15,7 +15,7 @@ from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 BALL = "shape: sphere\n    radius_mm: 6"
 RING = "shape: ring\n    outer_radius_mm: 4\n    inner_radius_mm: 3"

@@ -7,8 +7,8 @@ import pytest
 from render_rig import AXIS_X, AXIS_Y, CAMERA, GRID, PAD, dent, detected_error, moved, renderer, rms
 from scipy.spatial import cKDTree
 
-from gelslim_force.calibration import calibrate
-from gelslim_force.marker_heights import marker_heights_mm
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.motion.marker_heights import marker_heights_mm
 from gelslim_twin.render.domed_top import DomedTop
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.marker_motion import MarkerMotion
@@ -16,12 +16,12 @@ from gelslim_twin.render.sensor_look import sensor_look
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.sight import Sight
 from gelslim_twin.render.surface_state import SurfaceState
-from ifem_export.bundle import Bundle, build_bundle
-from ifem_export.crown import Paraboloid
-from ifem_export.marker_grid import build_marker_grid
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import build_marker_grid
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 CROWN = Paraboloid(0.8, 15.0)
 

@@ -19,8 +19,8 @@ from render_rig import (
 )
 from shapely.geometry import Polygon, box
 
-from gelslim_force.disc_centroid import centroid_offset_px
-from gelslim_optics.lens_distortion import LensDistortion
+from gelslim_force.detection.disc_centroid import centroid_offset_px
+from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_twin.render.coverage_kernel import draw_dots
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.dot_outlines import centroids_px, outlines_px
@@ -28,7 +28,7 @@ from gelslim_twin.render.look import Look
 from gelslim_twin.render.marker_motion import MarkerMotion
 from gelslim_twin.render.printed_dots import PrintedDots
 from gelslim_twin.render.surface_state import SurfaceState
-from ifem_export.marker_grid import build_marker_grid
+from ifem_export.markers.grid import build_marker_grid
 
 DOTS = PrintedDots.nominal(GRID)
 REST = SurfaceState.at_rest(22, 21)

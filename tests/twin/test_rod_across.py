@@ -14,7 +14,7 @@ from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.scene.indenter import Cylinder
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.validation.truth_gel import TruthGel
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 
 def test_rod_across_touches_a_line_across_and_is_pulled_along(tmp_path: Path) -> None:

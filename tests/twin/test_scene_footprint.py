@@ -18,10 +18,10 @@ from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.reach import shape_reach_mm, tool_reach_mm
 from gelslim_twin.scene.stl_extent import footprint_mm, stl_corners
-from ifem_export.material import Material
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
-from ifem_export.surface_operator import surface_operator
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
+from ifem_export.operators.surface_operator import surface_operator
 
 HERE = Path()
 STEP = 0.01

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from gelslim_core.yaml.errors import InputError
 from gelslim_twin.scene.motion import Motion
 from gelslim_twin.scene.motion_csv import read_motion_csv
 from gelslim_twin.scene.pose import Pose, poses
-from yaml_model.errors import InputError
 
 
 def motion(*waypoints: dict, **more: float) -> Motion:

@@ -7,18 +7,18 @@ from pathlib import Path
 import pytest
 from sim_rig import write_sensor, written_scene
 
-from gelslim_cad.cli.main import main
+from gelslim.cli.main import main
+from gelslim_core.yaml.errors import InputError
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.simulate import SimulationJob
 from gelslim_twin.simulation.stored_sensor import BUNDLE
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle_io import load_bundle
-from ifem_export.crown import Paraboloid
-from ifem_export.marker_grid import build_marker_grid
-from ifem_export.outline import RoundedRectangle
-from ifem_export.pad_mesh import build_pad_mesh
-from yaml_model.errors import InputError
+from ifem_export.bundle.files import load_bundle
+from ifem_export.markers.grid import build_marker_grid
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 PADS = {
     "crowned": (Paraboloid(0.4, 9.0), 8.0, "crown_height_mm"),

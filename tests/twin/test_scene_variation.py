@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scene_samples import GALLERY, MINIMAL, SENSOR, load
 
+from gelslim_core.yaml.errors import InputError
 from gelslim_twin.scene.frame_times import FrameTime, frame_times
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.question import plan_scene
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.scene.varied import own_seed
-from yaml_model.errors import InputError
 
 SHEAR = read_scene(next(p for p in GALLERY if p.stem == "shear_sphere"))
 COUNT = 300

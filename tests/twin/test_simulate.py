@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from sim_rig import digests, small_sensor, written_scene
 
-from gelslim_cad.cli.main import main
-from gelslim_force.wrench import resultant
+from gelslim.cli.main import main
+from gelslim_force.forces.wrench import resultant
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_friction_cone_holds_about_the_balls_normal(simulated: Path) -> None:
 
 
 def test_detector_finds_the_true_centroids(simulated: Path) -> None:
-    from gelslim_force.detection import Detector
+    from gelslim_force.detection.detection import Detector
     from gelslim_force.frames.picture import read_picture as picture
 
     held = np.load(simulated / "truth.npz")
@@ -111,7 +111,7 @@ def test_again_keeps_everything_and_another_scene_is_refused(
 
 def test_a_killed_run_goes_on_to_the_same_bytes(place: Path, simulated: Path) -> None:
     folder = place / "out" / "killed"
-    command = [sys.executable, "-m", "gelslim_cad", "simulate", str(place / "scene.yaml"),
+    command = [sys.executable, "-m", "gelslim", "simulate", str(place / "scene.yaml"),
                "-o", str(folder)]  # fmt: skip
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 60
@@ -158,8 +158,8 @@ def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path:
 
     from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
     from gelslim_twin.simulation.twin_sensor import TwinSensor
-    from ifem_export.bundle_io import load_bundle
-    from ifem_export.material import Material
+    from ifem_export.bundle.files import load_bundle
+    from ifem_export.elements.material import Material
 
     bundle = load_bundle(place / "bundle")
     store_sensor(TwinSensor(bundle), tmp_path / "kept", True)
@@ -172,7 +172,7 @@ def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path:
 
 
 def build_bundle_of(bundle, material):
-    from ifem_export.bundle import build_bundle
+    from ifem_export.bundle.bundle import build_bundle
 
     return build_bundle(
         bundle.mesh,
@@ -195,7 +195,7 @@ def test_absent_effects_are_not_in_memory(place: Path) -> None:
     )
     code = (
         "import sys\n"
-        "from gelslim_cad.cli.main import main\n"
+        "from gelslim.cli.main import main\n"
         f"assert main(['simulate', {str(scene)!r}, '-o', {str(place / 'out' / 'still')!r}]) == 0\n"
         "bad = [m for m in sys.modules if m.startswith(('gelslim_twin.render', 'cv2', 'PIL.Image',"
         " 'gelslim_twin.contact.friction', 'gelslim_twin.contact.nonlinear',"

@@ -22,7 +22,7 @@ from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.simulate import simulate
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ import pytest
 from scene_samples import GALLERY, MINIMAL, SENSOR, load
 from sim_rig import digests, small_sensor, written_scene
 
-from accuracy_budget.budget import Budget
-from accuracy_budget.errors import BudgetError
-from accuracy_budget.machine_times import write_times
-from gelslim_cad.cli.main import main
-from gelslim_cad.cli.scene_budget import twin_key
+from gelslim.cli.main import main
+from gelslim.cli.scene_budget import twin_key
+from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.errors import BudgetError
+from gelslim_core.budget.machine_times import write_times
 from gelslim_twin.planner import make_plan
 from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import read_scene

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from sim_rig import small_sensor
 
+from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.scene.indenter import Cylinder
-from gelslim_twin.simulation.gel_state import GelState
 from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.validation import experiment as experiments
 from gelslim_twin.validation.case import other_contacts
@@ -20,7 +20,7 @@ from gelslim_twin.validation.truth_gel import TruthGel
 from gelslim_twin.validation.truth_pad import truth_pad
 from gelslim_twin.validation.validate import validate
 from gelslim_twin.validation.validation import PAPER_N, Validation
-from ifem_export.bundle_io import load_bundle
+from ifem_export.bundle.files import load_bundle
 
 
 @pytest.fixture(scope="module")

@@ -16,9 +16,9 @@ from __future__ import annotations
 import math
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
-from gelslim_cad.part import Part
 from gelslim_cad.solids.materials import PRINTED
 from gelslim_cad.solids.prism import Hole, Point2, prism, rectangle, rounded_polygon
 from gelslim_cad.solids.shapes import single, union

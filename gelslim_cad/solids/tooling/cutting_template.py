@@ -12,10 +12,10 @@
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.stencil import StencilSheet
-from gelslim_cad.part import Part
 from gelslim_cad.solids.prism import prism, rounded_polygon
 from gelslim_cad.solids.shapes import single
 from gelslim_cad.solids.tooling.stock import plate_stock

@@ -14,8 +14,8 @@ end     |      o gel      | |  | tip flap
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
-from gelslim_cad.part import Part
 from gelslim_cad.solids.prism import prism, rounded_polygon
 from gelslim_cad.solids.shapes import single
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.fasteners import SCREWS
+from gelslim_cad.geometry.fasteners import SCREWS
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
-from gelslim_cad.part import Part
 from gelslim_cad.solids.materials import PRINTED
 from gelslim_cad.solids.prism import Hole, prism, rectangle, rounded_polygon
 from gelslim_cad.solids.shapes import box, single, union

@@ -18,7 +18,7 @@ import math
 from dataclasses import dataclass
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.materials import PRINTED
 from gelslim_cad.solids.prism import prism, rectangle
 from gelslim_cad.solids.shapes import box, single, subtract, union

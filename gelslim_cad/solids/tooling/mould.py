@@ -17,7 +17,7 @@ from functools import partial
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.part import Part, Process
+from gelslim_cad.geometry.part import Part, Process
 from gelslim_cad.solids.gel import gel_solid, shaped_gel
 from gelslim_cad.solids.prism import prism
 from gelslim_cad.solids.shapes import Point2, box, single, subtract, union

@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.solids.prism import Hole, rectangle
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.stencil import lay_out_stencil
-from gelslim_cad.part import Part
 from gelslim_cad.solids.tooling.calibration_target import calibration_target
 from gelslim_cad.solids.tooling.cutting_template import cutting_template
 from gelslim_cad.solids.tooling.fabric_skin import fabric_skin
@@ -14,7 +14,7 @@ from gelslim_cad.solids.tooling.focus_jig import focus_jig
 from gelslim_cad.solids.tooling.mould import mould_parts
 from gelslim_cad.solids.tooling.sphere_indenter import sphere_indenter
 from gelslim_cad.solids.tooling.stencil import stencil, stencil_problem
-from ifem_export.marker_grid import MarkerGrid
+from ifem_export.markers.grid import MarkerGrid
 
 
 def tooling_parts(d: Dimensions, grid: MarkerGrid) -> tuple[Part, ...]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.gel_shape import GelShape
-from gelslim_cad.part import Part
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.materials import PRINTED
 from gelslim_cad.solids.prism import prism, rectangle
 from gelslim_cad.solids.shapes import box, rod, single, union

@@ -10,11 +10,11 @@
 
 from __future__ import annotations
 
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.stencil import StencilSheet
-from gelslim_cad.part import Part
 from gelslim_cad.solids.prism import prism
 from gelslim_cad.solids.shapes import SolidError
-from ifem_export.marker_grid import MarkerGrid
+from ifem_export.markers.grid import MarkerGrid
 
 THICKNESS_MM = 0.1
 LEAST_WEB_MM = 0.05

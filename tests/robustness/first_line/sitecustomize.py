@@ -1,6 +1,6 @@
 """Found by the programs under test as they start: tells when they reach their first line.
 
-With FIRST_LINE, a file of that name is made as `gelslim_cad.__main__` is about to run. With
+With FIRST_LINE, a file of that name is made as `gelslim.__main__` is about to run. With
 SIGNAL_AT, such as `change:7:2`, signal 2 is sent to the whole group at the seventh call after it
 that opens a file for writing, makes, moves or removes one; `import:7:2` at the seventh import.
 """
@@ -12,7 +12,7 @@ import os
 import sys
 
 MARK = os.environ.get("FIRST_LINE", "")
-ENTRY = os.path.join("gelslim_cad", "__main__.py")
+ENTRY = os.path.join("gelslim", "__main__.py")
 KIND, _, WHEN = os.environ.get("SIGNAL_AT", "").partition(":")
 CHANGES = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.link")
 seen = {"first line": 0, "calls": 0}

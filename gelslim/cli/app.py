@@ -1,0 +1,95 @@
+"""The application: its commands and options."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from gelslim.cli.carry import carried
+from gelslim.cli.command_list import CommandList
+from gelslim.cli.commands.bench import bench
+from gelslim.cli.commands.build import build
+from gelslim.cli.commands.bundle import bundle
+from gelslim.cli.commands.bundle_export import bundle_export
+from gelslim.cli.commands.bundle_info import bundle_info
+from gelslim.cli.commands.calibrate import calibrate
+from gelslim.cli.commands.check import check
+from gelslim.cli.commands.derive import derive
+from gelslim.cli.commands.diff import diff
+from gelslim.cli.commands.doctor import doctor
+from gelslim.cli.commands.explain import explain
+from gelslim.cli.commands.explore import explore
+from gelslim.cli.commands.family import family
+from gelslim.cli.commands.force import force
+from gelslim.cli.commands.light import light
+from gelslim.cli.commands.markers import markers
+from gelslim.cli.commands.new import new
+from gelslim.cli.commands.optimise import optimise
+from gelslim.cli.commands.plan import plan
+from gelslim.cli.commands.schema import schema
+from gelslim.cli.commands.simulate import simulate
+from gelslim.cli.commands.thinner import thinner
+from gelslim.cli.commands.track import track
+from gelslim.cli.commands.validate import validate
+from gelslim_core import __version__
+
+EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
+
+app = typer.Typer(
+    name="gelslim",
+    cls=CommandList,
+    help="From one YAML spec to a GelSlim-type tactile finger: CAD, marker print, stiffness, "
+    "report.\n\nNew here? `gelslim new my_finger`, then `gelslim check my_finger.yaml`.",
+    epilog=EPILOG,
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"gelslim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Options before any command."""
+
+
+for _command in (
+    new,
+    check,
+    derive,
+    explain,
+    diff,
+    explore,
+    optimise,
+    thinner,
+    build,
+    family,
+    bundle,
+    bundle_info,
+    bundle_export,
+    bench,
+    calibrate,
+    force,
+    track,
+    markers,
+    light,
+    plan,
+    simulate,
+    validate,
+    schema,
+    doctor,
+):
+    app.command()(carried(_command))

@@ -1,0 +1,100 @@
+"""`gelslim build`: the whole finger."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from gelslim_cad.build import BuildResult
+
+
+def build(
+    spec: SpecFile,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME if left out.")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "-j",
+            "--jobs",
+            min=1,
+            max=256,
+            help="Processes; one per processor, at most 4, if left out.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Build every file of the finger.
+
+    CAD, print, mould, laser, markers, bundle, report. Only what changed is made again. Nothing is
+    written when a design rule fails (status 1).
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.commands.check import print_checks
+    from gelslim.cli.progress import progress_bar
+    from gelslim.cli.status import RULE_FAILED
+    from gelslim_cad.build import BuildRefusedError, build_variant
+    from gelslim_cad.spec.reader import read_spec
+
+    started = time.monotonic()
+    folder = out or Path("out") / read_spec(spec).spec.name
+    try:
+        with progress_bar(quiet=as_json) as tell:
+            result = build_variant(spec, folder, jobs=jobs, progress=tell)
+    except BuildRefusedError as refused:
+        failed = [c for c in refused.checks if c.status == "fail"]
+        if as_json:
+            failures = [asdict(c) for c in failed]
+            print_json({"ok": False, "message": str(refused), "failed": failures})
+        elif failed:
+            print_checks(failed, brief=True)
+            print(f"{str(refused).splitlines()[0]}. `gelslim check {spec}` says what would help.")
+        else:
+            print(refused, file=sys.stderr)
+        return RULE_FAILED
+    if as_json:
+        print_json(_record(result))
+    else:
+        _report(result, time.monotonic() - started)
+    return 0
+
+
+def _record(result: BuildResult) -> dict[str, Any]:
+    return {
+        "ok": True,
+        "folder": str(result.folder),
+        "up_to_date": result.up_to_date,
+        "rebuilt": result.rebuilt,
+        "files": result.files,
+        "warnings": [asdict(c) for c in result.checks if c.status == "warn"],
+        "binding": result.binding,
+    }
+
+
+def _report(result: BuildResult, seconds: float) -> None:
+    from gelslim.cli.answer import say
+    from gelslim.cli.commands.check import print_checks
+
+    warnings = [c for c in result.checks if c.status == "warn"]
+    here = Path.cwd()
+    folder = result.folder
+    shown = folder.relative_to(here) if folder.is_relative_to(here) else folder
+    if result.up_to_date:
+        print(f"Up to date: {len(result.files)} files in {shown} ({seconds:.1f} s)")
+    else:
+        print_checks(warnings, brief=True)
+        if result.binding:
+            say(result.binding[0])
+        print(f"Built {len(result.files)} files in {shown} ({seconds:.1f} s)")
+    for name, purpose in (("report.html", "look here first"), ("BUILD.md", "how to make it")):
+        if name in result.files:
+            print(f"  {shown / name}  {purpose}")

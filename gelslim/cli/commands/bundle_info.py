@@ -1,0 +1,62 @@
+"""`gelslim bundle-info`: what a stiffness bundle holds and whether it can be trusted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gelslim.cli.options import AsJson
+
+
+def bundle_info(
+    path: Annotated[Path, typer.Argument(metavar="BUNDLE", help="The bundle.")],
+    as_json: AsJson = False,
+) -> int:
+    """Describe a stiffness bundle and verify it.
+
+    Every file's hash, all values and the stored pair of displacement and force are checked
+    (status 2 where something is wrong).
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.status import BAD_INPUT
+    from ifem_export.bundle.summary import summarise_bundle
+
+    found = summarise_bundle(path)
+    if as_json:
+        print_json(found)
+    else:
+        _describe(path, found)
+    return 0 if found["verification"]["ok"] else BAD_INPUT
+
+
+def _describe(path: Path, found: dict[str, Any]) -> None:
+    from gelslim.cli.answer import say
+
+    mesh, material = found["mesh"], found["material"]
+    cells = " x ".join(str(c) for c in mesh["cells"])
+    size = " x ".join(f"{h:.4g}" for h in mesh["cell_size_mm"])
+    stored = f"stored, {found['stiffness']['nonzeros']} entries"
+    print(f"{path}: {found['format']}, {found['total_bytes'] / 1e6:.2f} MB")
+    print(f"  sensor     spec {found['spec_hash'][:12]}, geometry {found['geometry_hash'][:12]}")
+    print(f"  mesh       {cells} cells of {size} mm: {mesh['elements']} elements, "
+          f"{mesh['nodes']} nodes, {mesh['surface_nodes']} on the surface")  # fmt: skip
+    print(f"  element    {found['element']['type']} {found['element']['formulation']}")
+    print(f"  gel        E = {material['youngs_modulus_mpa']:g} MPa, "
+          f"nu = {material['poissons_ratio']:g}")  # fmt: skip
+    print(f"  stiffness  {stored if found['stiffness']['stored'] else 'assembled when needed'}")
+    markers = found["markers"]
+    print(f"  markers    {markers['count'] if markers else 'none'}")
+    ladder = found.get("ladder") or {}
+    for rung in ladder.get("rungs", ()):
+        inside = ", ".join(f"{k} {v:g}" for k, v in rung["parameters"].items())
+        label = f"{rung['rung']} ({inside})" if inside else rung["rung"]
+        mark = ", chosen" if label == ladder.get("operator") else ""
+        print(f"  operator   {label}: field error {rung['error_field']:.2%}, "
+              f"{rung['milliseconds']:.3f} ms{mark}")  # fmt: skip
+    verdict = found["verification"]
+    if verdict["ok"]:
+        print("  verified   all hashes, values and the self-test pair")
+    else:
+        say(f"  NOT VALID  {verdict['file']}: {verdict['reason']}; {verdict['remedy']}")

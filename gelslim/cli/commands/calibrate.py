@@ -1,0 +1,74 @@
+"""`gelslim calibrate`: the built sensor from one picture without contact."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gelslim.cli.options import AsJson, SensorBundle
+
+if TYPE_CHECKING:
+    from gelslim_force.calibration.sensor_calibration import SensorCalibration
+
+
+def calibrate(
+    bundle: SensorBundle,
+    reference: Annotated[
+        Path,
+        typer.Argument(
+            metavar="REFERENCE",
+            help="Picture without contact: an image, a .npy array, or a folder of these to "
+            "average.",
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Calibration file to write; none if left out."),
+    ] = None,
+    allow_contact: Annotated[
+        bool,
+        typer.Option(
+            "--allow-contact",
+            help="Accept dots that are off together at one place: a print warped there.",
+        ),
+    ] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Calibrate a built sensor against its design.
+
+    Finds pose, focal length and distortion of the camera and every marker's place from one
+    picture without contact and the known print, says how far the sensor is from its design, and
+    refuses pictures of another sensor, turned ones, and contact (status 2).
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.output import replace_file, spare_strangers
+    from gelslim_core.files.atomic_file import json_bytes
+    from gelslim_force.calibration.calibration import calibrate as calibrated
+    from gelslim_force.calibration.file import calibration_record
+    from gelslim_force.calibration.reference_picture import read_reference
+    from ifem_export.bundle.files import load_bundle
+
+    if out is not None:
+        spare_strangers(out, b"gelslim-calibration/", "calibration")
+    sensor = load_bundle(bundle)
+    found = calibrated(sensor, read_reference(reference), allow_contact=allow_contact)
+    record = calibration_record(found)
+    if out is not None:
+        replace_file(out, json_bytes(record))
+    if as_json:
+        print_json(record)
+        return 0
+    _describe(found)
+    print(f"Wrote {out}" if out else "Not kept: -o FILE writes the calibration.")
+    return 0
+
+
+def _describe(found: SensorCalibration) -> None:
+    from gelslim.cli.answer import say
+
+    for line in found.diagnosis:
+        say(line)
+    for line in found.warnings:
+        say(f"Look at this: {line}.", style="yellow")

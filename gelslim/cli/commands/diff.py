@@ -1,0 +1,243 @@
+"""`gelslim diff`: what changes from one spec to another."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gelslim_cad.compare.comparison import Change, Comparison, RuleChange
+    from gelslim_cad.compare.part_change import PartChanges
+    from gelslim_cad.explore.price import Measured
+    from gelslim_cad.spec import Spec
+
+STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
+FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
+WIDE = 100
+"""From this width on the table says what each dimension is."""
+
+
+def diff(
+    first: SpecFile,
+    second: SpecFile,
+    parts: Annotated[
+        bool, typer.Option(help="Compare the solids too (some seconds; needs the cad extra).")
+    ] = True,
+    price: Annotated[
+        bool, typer.Option(help="Trace the light and measure the force error of both.")
+    ] = True,
+    as_json: AsJson = False,
+) -> int:
+    """Compare two specs.
+
+    Fields, dimensions, rules, parts and bundle that change, and what the second finger costs
+    against the first. Nothing is built. Exit status 0 whether or not they differ.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim_cad.compare.comparison import compare
+    from gelslim_cad.spec.reader import read_spec
+
+    one, two = read_spec(first), read_spec(second)
+    found = compare(one.spec, two.spec)
+    made, note = _parts(one, two) if parts and not found.same else (None, "")
+    costs = _measured(one.spec, two.spec) if price and not found.same else ()
+    if as_json:
+        record = _record(str(first), str(second), found, made, note)
+        print_json({**record, "price": _price_record(costs)})
+        return 0
+    _report(str(first), str(second), found)
+    _report_parts(made, note)
+    _report_price(str(first), str(second), costs)
+    return 0
+
+
+def _measured(one: Spec, two: Spec) -> tuple[Measured, ...]:
+    from gelslim_cad.explore.price import measured
+
+    return measured(one), measured(two)
+
+
+def _price_record(costs: Sequence[Measured]) -> list[dict[str, Any]] | None:
+    from gelslim.cli.price_table import price_record
+    from gelslim_cad.explore.price import prices
+
+    return price_record(prices(*costs)) if costs else None
+
+
+def _report_price(first: str, second: str, costs: Sequence[Measured]) -> None:
+    from gelslim.cli.price_table import print_broken, print_prices
+    from gelslim_cad.explore.price import prices
+
+    if not costs:
+        return
+    print_prices("what it costs", prices(*costs), "before", "after")
+    for name, found in zip((first, second), costs, strict=True):
+        print_broken(name, found)
+
+
+def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
+    """Changed parts, or why they could not be compared."""
+    from gelslim.extras import installed
+
+    if not installed("cadquery"):
+        return None, "not compared: cadquery is missing; run: pip install 'gelslim-cad[cad]'"
+    from gelslim_cad.compare.part_change import part_changes
+    from gelslim_cad.solids.shapes import SolidError
+
+    try:
+        return part_changes(one, two), ""
+    except SolidError as error:
+        return None, f"not compared: {error}"
+
+
+def _record(
+    first: str, second: str, found: Comparison, made: PartChanges | None, note: str
+) -> dict[str, Any]:
+    return {
+        "format": "gelslim-diff/1",
+        "first": first,
+        "second": second,
+        "same": found.same,
+        "fields": [{**asdict(c), "difference": c.difference} for c in found.fields],
+        "dimensions": [{**asdict(c), "difference": c.difference} for c in found.dimensions],
+        "rules": [
+            {"id": c.id, "verdict": c.verdict, "before": asdict(c.before), "after": asdict(c.after)}
+            for c in found.rules
+        ],
+        "bundle": [asdict(c) for c in found.bundle],
+        "parts": None if made is None else asdict(made),
+        "parts_note": note,
+    }
+
+
+def _report(first: str, second: str, found: Comparison) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from gelslim.cli.answer import console, number, say
+
+    if found.same:
+        say(f"{first} and {second} give the same finger.")
+        return
+    _changes("fields of the spec", found.fields, every=True)
+    _changes("dimensions that follow", found.dimensions)
+    if found.rules:
+        table = Table("design rules", box=None, pad_edge=False)
+        for column in ("before", "after", "limit", "margin", ""):
+            table.add_column(column, justify="right" if column else "left", no_wrap=True)
+        order = list(STYLE)
+        shown = [c for c in found.rules if _shows(c)]
+        for c in sorted(shown, key=lambda c: order.index(c.verdict)):
+            b, a = c.before, c.after
+            table.add_row(
+                c.id,
+                number(b.value, b.unit),
+                number(a.value, a.unit),
+                _limit(b.limit, a.limit),
+                "" if a.margin is None else number(a.margin),
+                Text(f"{b.status} → {a.status}" if b.status != a.status else a.status)
+                if not STYLE[c.verdict]
+                else Text(f"{b.status} → {a.status}, {c.verdict}", style=STYLE[c.verdict]),
+            )
+        console().print(table)
+        _note_unshown(len(found.rules) - len(shown))
+        print()
+    for block in found.bundle:
+        words = f"{block.before} → {block.after}" if block.before != block.after else block.after
+        say(f"bundle, {block.block}: {words}")
+
+
+def _shows(change: RuleChange) -> bool:
+    """Whether the change is to be seen in the digits that are written."""
+    from gelslim.cli.answer import number
+
+    b, a = change.before, change.after
+    pairs = ((b.value, a.value), (b.limit, a.limit))
+    return b.status != a.status or any(number(x) != number(y) for x, y in pairs)
+
+
+def _note_unshown(count: int) -> None:
+    if count:
+        print(f"{count} more differ{'s' if count == 1 else ''} in digits not shown.")
+
+
+def _limit(before: float | None, after: float | None) -> str:
+    from gelslim.cli.answer import number
+    from gelslim_cad.compare.comparison import differ
+
+    if differ(before, after):
+        return f"{number(before)} → {number(after)}"
+    return number(after)
+
+
+def _changes(title: str, changes: Sequence[Change], every: bool = False) -> None:
+    """A table of the changes: of `every` one, or of those that the digits show."""
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, given, number
+
+    spelt = given if every else number
+    if not changes:
+        return
+    screen = console()
+    table = Table(box=None, pad_edge=False)
+    table.add_column(title, no_wrap=True)
+    for column in ("before", "after", "difference"):
+        table.add_column(column, justify="right", overflow="fold")
+    told = screen.width >= WIDE
+    if told:
+        table.add_column("", style="dim", overflow="fold")
+    shown = [c for c in changes if every or number(c.before) != number(c.after)]
+    for c in sorted(shown, key=lambda c: c.name not in FIRST):
+        step = c.difference
+        cells = (
+            c.name,
+            spelt(c.before, c.unit),
+            spelt(c.after, c.unit),
+            "" if step is None else f"{'+' if step > 0 else ''}{number(step, c.unit)}",
+            c.meaning,
+        )
+        table.add_row(*cells[: 5 if told else 4])
+    screen.print(table)
+    _note_unshown(len(changes) - len(shown))
+    print()
+
+
+def _report_parts(made: PartChanges | None, note: str) -> None:
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, number, say
+
+    if note:
+        say(f"parts: {note}")
+    if made is None:
+        return
+    table = Table("parts", "", box=None, pad_edge=False)
+    for column in ("volume before", "after", "size after"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for c in (c for c in made.changed if c.how != "moved"):
+        table.add_row(
+            c.name,
+            c.how,
+            "" if c.volume_before_mm3 is None else number(c.volume_before_mm3, "mm³"),
+            "" if c.volume_after_mm3 is None else number(c.volume_after_mm3, "mm³"),
+            _size(c.size_after_mm),
+        )
+    print()
+    console().print(table)
+    moved = [c.name for c in made.changed if c.how == "moved"]
+    if moved:
+        say(f"Only moved: {', '.join(moved)}.")
+    if made.kept:
+        say(f"Unchanged: {', '.join(made.kept)}.")
+    say(f"A build does {len(made.units)} units of work again.")
+
+
+def _size(sides: tuple[float, float, float] | None) -> str:
+    return "" if sides is None else " × ".join(f"{s:.1f}" for s in sides)

@@ -1,0 +1,152 @@
+"""`gelslim doctor`: what is installed, what is missing, how fast this machine is."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from gelslim.doctor.libraries import ExtraState
+    from gelslim.doctor.machine import Kernels, Threads
+    from gelslim.doctor.realtime import RealTime
+
+
+def doctor(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only look; load, draw and time nothing.")
+    ] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Tell what is installed and what is missing.
+
+    Says what each missing extra would enable. Loads every library, draws a test picture and times
+    a small force operator: about ten seconds. Exit status 0 whatever is missing.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.progress import progress_bar
+    from gelslim.doctor.libraries import extras, required
+    from gelslim.doctor.machine import drawing, kernels, missing_graphics, system, threads
+    from gelslim_core import __version__
+
+    with progress_bar(quiet=as_json) as tell:
+        say_step = tell or (lambda text, done, total: None)
+        say_step("libraries", 0, 3)
+        base, optional = required(), extras(load=not quick)
+        say_step("rendering", 1, 3)
+        graphics, picture = missing_graphics(), "not tried" if quick else drawing()
+        say_step("force operators", 2, 3)
+        cores, cache = threads(), kernels()
+        speed, problem = (None, "not timed") if quick else _speed()
+    if as_json:
+        print_json(
+            {
+                "format": "gelslim-doctor/1",
+                "version": __version__,
+                "system": system(),
+                "required": [asdict(lib) for lib in base],
+                "extras": [asdict(e) for e in optional],
+                "missing_graphics": [{"library": lib, "package": p} for lib, p in graphics],
+                "picture": {"drawn": not picture, "problem": picture},
+                "threads": asdict(cores),
+                "kernels": {**asdict(cache), "warm": cache.warm},
+                "real_time": None if speed is None else _speed_record(speed),
+                "real_time_problem": problem,
+            }
+        )
+        return 0
+    print(f"gelslim {__version__} on {system()}")
+    print("  " + ", ".join(f"{lib.module} {lib.version or 'MISSING'}" for lib in base))
+    _tell_extras(optional)
+    _tell_rendering(graphics, picture)
+    _tell_machine(cores, cache)
+    _tell_speed(speed, problem)
+    return 0
+
+
+def _speed() -> tuple[RealTime | None, str]:
+    """The timing, or why there is none: whatever is wrong here, the rest is still told."""
+    from gelslim.doctor.realtime import time_operators
+
+    try:
+        return time_operators(), ""
+    except Exception as error:
+        return None, f"{type(error).__name__}: {error}"
+
+
+def _speed_record(speed: RealTime) -> dict[str, Any]:
+    return {**asdict(speed), "ready": speed.ready, "advice": speed.advice}
+
+
+def _tell_extras(optional: tuple[ExtraState, ...]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from gelslim.cli.answer import console
+
+    table = Table("extra", "", "enables", box=None, pad_edge=False)
+    for extra in optional:
+        state = Text("ready", style="green") if extra.ready else Text("missing", style="yellow")
+        table.add_row(extra.name, state, extra.enables)
+        lacking = [lib.module for lib in extra.libraries if not lib.version]
+        if lacking:
+            table.add_row("", "", f"lacks {', '.join(lacking)}; {extra.command}")
+        for lib in extra.libraries:
+            if lib.problem:
+                table.add_row("", "", f"{lib.module} does not load: {lib.problem}")
+    print()
+    console().print(table)
+    print()
+
+
+def _tell_rendering(graphics: tuple[tuple[str, str], ...], picture: str) -> None:
+    from gelslim.cli.answer import say
+
+    if graphics:
+        packages = " ".join(package for _, package in graphics)
+        names = ", ".join(lib for lib, _ in graphics)
+        say(f"rendering: {names} cannot load; on Debian or Ubuntu: apt-get install {packages}")
+    say(f"rendering: {picture or 'a test picture came out'}")
+
+
+def _tell_machine(cores: Threads, cache: Kernels) -> None:
+    from gelslim.cli.answer import say
+
+    limits = "".join(f", {name}={value}" for name, value in cores.limits.items())
+    told = dict.fromkeys(f"{name} {count}" for name, count in cores.pools)
+    pools = ", ".join(told) or "none found"
+    say(f"processors: {cores.usable} of {cores.processors} usable; thread pools: {pools}{limits}")
+    if cache.warm:
+        say(f"compiled kernels: {cache.cached} kept {cache.folder}")
+    else:
+        say("compiled kernels: none kept yet; the first run of a command compiles them")
+    if not cache.writable:
+        say(
+            "compiled kernels: their folder is read-only, so each process compiles anew; "
+            "set NUMBA_CACHE_DIR to a folder that can be written"
+        )
+
+
+def _tell_speed(speed: RealTime | None, problem: str) -> None:
+    from gelslim.cli.answer import say
+    from gelslim.doctor.realtime import CELLS, FRAME_RATE_HZ, LAYERS, PASSES
+
+    if speed is None:
+        say(f"real time: {problem}")
+        return
+    times = ", ".join(
+        f"{t.operator} {t.one_thread_ms:.2f} ms (all threads {t.all_threads_ms:.2f})"
+        for t in speed.operators
+    )
+    say(f"real time: forces of a {CELLS} × {CELLS} × {LAYERS} pad take {times}")
+    verdict = "ready" if speed.ready else "not ready"
+    say(
+        f"real time: {verdict}, {PASSES} calls of {speed.quickest.operator} "
+        f"{'fit' if speed.ready else 'do not fit'} into a frame at {FRAME_RATE_HZ:g} Hz",
+        style="green" if speed.ready else "yellow",
+    )
+    if speed.advice:
+        say(f"real time: {speed.advice}")

@@ -1,0 +1,190 @@
+"""`gelslim explore`: thousands of designs, what is feasible and what it costs."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gelslim.cli.options import AsJson, DrawPictures, SpecFile
+
+if TYPE_CHECKING:
+    from gelslim_cad.explore.study import Exploration
+
+Vary = Annotated[
+    list[str],
+    typer.Option("--vary", metavar="PATH=VALUES", help="Field and values: 16:50:1 or 2,2.9,4."),
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option("-j", "--jobs", min=1, help="Processes; left out: one per processor."),
+]
+Scheduler = Annotated[
+    str, typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, as tcp://host:8786.")
+]
+NoisePx = Annotated[
+    float, typer.Option(min=0.0, help="Error of a marker's position in px, for --force-error.")
+]
+MOST_REASONS = 5
+Rays = Annotated[int, typer.Option(min=1024, max=1 << 24, help="Rays per guide, for --light.")]
+
+
+def explore(
+    spec: SpecFile,
+    vary: Vary,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-explore if left out.")
+    ] = None,
+    light: Annotated[bool, typer.Option("--light", help="Trace the light of each.")] = False,
+    force_error: Annotated[
+        bool, typer.Option("--force-error", help="Expected force error of each.")
+    ] = False,
+    column: Annotated[
+        list[str] | None, typer.Option(help="A further dimension for the table; repeatable.")
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    rays: Rays = 1 << 13,
+    marker_noise_px: NoisePx = 0.05,
+    pictures: DrawPictures = True,
+    as_json: AsJson = False,
+) -> int:
+    """Explore every combination of some values.
+
+    Dimensions and design rules of each design, on request light and expected force error: a table
+    (CSV, and Parquet where pyarrow is installed), Pareto plots and a map of what is feasible and
+    what binds. Run again after an interrupt, it goes on where it stopped.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.failure import CommandError
+    from gelslim.cli.progress import progress_bar
+    from gelslim_cad.explore.axis import parse_axis
+    from gelslim_cad.explore.engine import Engine, processors
+    from gelslim_cad.explore.error import ExploreError
+    from gelslim_cad.explore.space import Space
+    from gelslim_cad.explore.study import Request
+    from gelslim_cad.explore.study import explore as run
+    from gelslim_cad.spec.reader import read_spec
+
+    started = time.monotonic()
+    loaded = read_spec(spec)
+    folder = out or Path("out") / f"{loaded.spec.name}-explore"
+    try:
+        space = Space.of(loaded.spec, [parse_axis(v) for v in vary])
+        request = Request(space, light, force_error, tuple(column or ()), rays, marker_noise_px)
+        with progress_bar(quiet=as_json) as tell:
+            found = run(request, folder, Engine(jobs or processors(), scheduler), tell)
+    except ExploreError as error:
+        raise CommandError(f"gelslim explore: {error}") from error
+    files = write_exploration(folder, found, pictures=pictures)
+    if as_json:
+        print_json({**_record(found), "folder": str(folder), "files": files})
+        return 0
+    _report(found)
+    print(f"Wrote {', '.join(files)} to {folder}/ ({time.monotonic() - started:.1f} s)")
+    return 0
+
+
+def write_exploration(folder: Path, found: Exploration, *, pictures: bool) -> list[str]:
+    """Write table and pictures and return their names; what cannot be made here is left out."""
+    import sys
+
+    from gelslim.cli.output import replace_file
+    from gelslim.extras import installed
+    from gelslim_cad.explore.table import csv_bytes, parquet_bytes
+
+    made = {"designs.csv": csv_bytes(found.columns)}
+    notes = []
+    if installed("pyarrow"):
+        made["designs.parquet"] = parquet_bytes(found.columns)
+    else:
+        notes.append("no Parquet table: pip install 'gelslim-cad[record]'")
+    if pictures and installed("matplotlib"):
+        from gelslim_cad.explore.figures import feasibility_png, pareto_png
+
+        made |= {"pareto.png": pareto_png(found), "feasibility.png": feasibility_png(found)}
+    elif pictures:
+        notes.append("no pictures: pip install 'gelslim-cad[cad]'")
+    for name, data in made.items():
+        replace_file(folder / name, data)
+    for note in notes:
+        print(note, file=sys.stderr)
+    return list(made)
+
+
+def _record(found: Exploration) -> dict[str, object]:
+    from gelslim_cad.explore.pareto import THICKNESS, TRADES, front
+
+    rows = found.rows_where("feasible")
+    fronts = {}
+    for goal in (g for g in TRADES if g.column in found.columns):
+        x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
+        fronts[goal.column] = [rows[k] for k in front(x, goal.costs(y))]
+    return {
+        "format": "gelslim-explore/1",
+        "name": found.space.spec.name,
+        "designs": found.space.count,
+        "axes": {a.path: a.values for a in found.space.axes},
+        "feasible": len(rows),
+        "illegal": len(found.rows_where("illegal")),
+        "binding": binding_counts(found),
+        "refusals": refusals(found),
+        "pareto": fronts,
+        "tasks": {"done": found.done, "taken_over": found.taken_over},
+    }
+
+
+def binding_counts(found: Exploration) -> dict[str, int]:
+    """How many designs fail for each reason, most frequent first."""
+    pairs = zip(found.columns["status"], found.columns["binding"], strict=True)
+    names = [b for s, b in pairs if s != "feasible"]
+    return dict(sorted(((n, names.count(n)) for n in set(names)), key=lambda p: (-p[1], p[0])))
+
+
+def refusals(found: Exploration) -> dict[str, int]:
+    """Why the spec would not accept designs, the most frequent reasons first."""
+    counts = Counter(r for r in found.columns["reason"] if r)
+    return dict(sorted(counts.items(), key=lambda p: (-p[1], p[0]))[:MOST_REASONS])
+
+
+def _report(found: Exploration) -> None:
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, number, say
+    from gelslim_cad.explore.axis import shown
+    from gelslim_cad.explore.judge import REFUSED
+    from gelslim_cad.explore.pareto import THICKNESS, TRADES, front
+
+    rows = found.rows_where("feasible")
+    resumed = f", {found.taken_over} tasks taken over" if found.taken_over else ""
+    say(f"{found.space.count} designs, {len(rows)} feasible{resumed}.")
+    for name, count in binding_counts(found).items():
+        if name == REFUSED:
+            say(f"  {count:>6} refused by the spec")
+            for reason, times in refusals(found).items():
+                say(f"  {times:>10} {reason}")
+        else:
+            say(f"  {count:>6} stopped by {name}")
+    if not rows:
+        return
+    table = Table("best feasible design", box=None, pad_edge=False)
+    table.add_column("", justify="right")
+    table.add_column("thickness", justify="right")
+    table.add_column("with")
+    for goal in (THICKNESS, *(g for g in TRADES if g.column in found.columns)):
+        x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
+        best = rows[front(goal.costs(y), x)[0]]
+        chosen = (
+            f"{a.path.removeprefix('design.')} {shown(found.columns[a.path][best])}"
+            for a in found.space.axes
+        )
+        table.add_row(
+            f"{'most' if goal.larger else 'least'} {goal.words}",
+            number(found.columns[goal.column][best], goal.unit),
+            number(found.columns[THICKNESS.column][best], "mm"),
+            ", ".join(chosen),
+        )
+    console().print(table)

@@ -1,0 +1,170 @@
+"""`gelslim family`: several fingers built and drawn side by side."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim.cli.options import AsJson
+
+if TYPE_CHECKING:
+    from gelslim_cad.family.member import Member
+    from gelslim_cad.spec import Spec
+
+
+def family(
+    specs: Annotated[
+        list[Path], typer.Argument(metavar="SPEC...", help="The fingers' YAML files.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder of all fingers.")] = Path(
+        "out/family"
+    ),
+    jobs: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=1, help="Worker processes of each build.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Build several fingers and draw them to scale.
+
+    Each goes to a folder of its own, where what has not changed is taken over. Exit status 1 when
+    a finger breaks a design rule; the others are built and drawn all the same.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.status import OK, RULE_FAILED
+    from gelslim.extras import require
+    from gelslim_cad.spec.reader import read_spec
+
+    started = time.monotonic()
+    require("cadquery", "trimesh")
+    loaded = [read_spec(s) for s in specs]
+    _distinct([x.spec.name for x in loaded])
+    built = _built([(s, x.spec) for s, x in zip(specs, loaded, strict=True)], out, jobs, as_json)
+    files, note = _draw(out, built.members)
+    if as_json:
+        print_json(
+            {
+                "format": "gelslim-family/1",
+                "folder": str(out),
+                "files": files,
+                "members": [_record(m, built.units[m.name]) for m in built.members],
+                "refused": built.refused,
+                "note": note,
+            }
+        )
+    else:
+        _report(built)
+        if note:
+            print(note)
+        if built.members:
+            done = time.monotonic() - started
+            print(f"{len(built.members)} fingers in {out}/, {', '.join(files)} ({done:.1f} s)")
+    return RULE_FAILED if built.refused else OK
+
+
+@dataclass(frozen=True)
+class _Built:
+    """What came of each finger, by name."""
+
+    members: list[Member]
+    units: dict[str, int]
+    """Units of work that were not taken over from an earlier build."""
+    refused: dict[str, str]
+    """Why a finger is not built."""
+
+
+def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: bool) -> _Built:
+    """Every finger built into a folder of its own, those that break a design rule apart."""
+    from gelslim.cli.progress import progress_bar
+    from gelslim_cad.build import build_variant
+    from gelslim_cad.build.variant import BuildRefusedError
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.family.member import member
+
+    built = _Built([], {}, {})
+    with progress_bar(quiet=quiet) as tell:
+        for path, spec in specs:
+            folder = out / spec.name
+            try:
+                result = build_variant(path, folder, jobs=jobs, progress=_named(tell, spec.name))
+            except BuildRefusedError as error:
+                built.refused[spec.name] = str(error)
+                continue
+            built.units[spec.name] = len(result.rebuilt)
+            built.members.append(member(spec.name, derive(spec), folder))
+    return built
+
+
+def _distinct(names: list[str]) -> None:
+    from gelslim.cli.failure import CommandError
+
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise CommandError(
+            f"gelslim family: two specs are called {twice[0]}; give each a name of its own, "
+            "as it names the folder"
+        )
+
+
+def _named(tell: Any, name: str) -> Any:
+    if tell is None:
+        return None
+    return lambda text, done, total: tell(f"{name}: {text}", done, total)
+
+
+def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
+    """Table and picture; why there is no picture, if so."""
+    from gelslim.cli.output import replace_file
+    from gelslim_cad.explore.table import csv_bytes
+    from gelslim_cad.family.picture import family_png
+    from gelslim_cad.report.pictures import PictureError
+
+    if not members:
+        return [], ""
+    rows = [_record(m, 0) for m in members]
+    names = [n for n in rows[0] if n.endswith(("_mm", "name"))]
+    replace_file(out / "family.csv", csv_bytes({n: [r[n] for r in rows] for n in names}))
+    try:
+        replace_file(out / "family.png", family_png(members))
+    except PictureError as error:
+        return ["family.csv"], f"no picture: {error}"
+    return ["family.csv", "family.png"], ""
+
+
+def _record(m: Member, rebuilt: int) -> dict[str, Any]:
+    return {
+        "name": m.name,
+        "gel_length_mm": m.gel_mm[0],
+        "gel_width_mm": m.gel_mm[1],
+        "gel_thickness_mm": m.gel_mm[2],
+        "finger_length_mm": m.size_mm[0],
+        "finger_width_mm": m.size_mm[1],
+        "finger_thickness_mm": m.size_mm[2],
+        "folder": str(m.folder),
+        "units_rebuilt": rebuilt,
+    }
+
+
+def _report(built: _Built) -> None:
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, number, say
+
+    table = Table("finger", box=None, pad_edge=False)
+    for column in ("gel", "thickness", "width", "length", "units built"):
+        table.add_column(column, justify="right")
+    for m in built.members:
+        length, width, thickness = m.size_mm
+        table.add_row(
+            m.name,
+            f"{m.gel_mm[0]:g} × {m.gel_mm[1]:g} × {m.gel_mm[2]:g} mm",
+            *(number(v, "mm") for v in (thickness, width, length)),
+            str(built.units[m.name]) if built.units[m.name] else "up to date",
+        )
+    if built.members:
+        console().print(table)
+    for name, message in built.refused.items():
+        say(f"{name} is not built: {message}", style="bold red")

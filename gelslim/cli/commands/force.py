@@ -1,0 +1,200 @@
+"""`gelslim force`: marker frames to forces."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gelslim.cli import force_options as option
+from gelslim.cli.budget import FieldError, FrameTime
+from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, SensorBundle
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from gelslim.cli.force_sinks import RunOutputs
+    from gelslim_core.budget.budget import Budget
+    from gelslim_force.calibration.sensor_calibration import SensorCalibration
+    from gelslim_force.frames.frame import FrameSource
+    from gelslim_force.pipeline import ForcePipeline, NormalSource
+    from gelslim_force.run import RunSummary
+    from gelslim_force.settings import PipelineSettings
+    from ifem_export.bundle.bundle import Bundle
+
+
+def force(
+    bundle: SensorBundle,
+    frames: option.Frames,
+    reference: option.Reference = None,
+    calibration: option.Calibration = None,
+    out: option.RunFolder = None,
+    indenter: option.KnownIndenter = None,
+    depth_mm: option.KnownDepth = None,
+    depth_maps: option.DepthMaps = None,
+    error: FieldError = None,
+    within: FrameTime = None,
+    operator: option.OperatorName = None,
+    method: option.Method = "auto",
+    compensation: option.Compensation = "exact",
+    interpolation: option.Interpolation = "sparse",
+    gel: option.GelLaw = "linear",
+    friction: option.Friction = 1.0,
+    fields: option.FieldFormat = "npz",
+    pictures: OverlayPictures = 6,
+    video: option.OverlayVideo = None,
+    mcap: option.Recording = None,
+    view: option.LiveView = False,
+    most_frames: MostFrames = None,
+    overwrite: option.ReplaceRun = False,
+    as_json: AsJson = False,
+) -> int:
+    """Estimate forces from marker frames.
+
+    Follows the markers, corrects for projection, and applies the bundle's stiffness: force per
+    node, pressure and traction, wrench with its standard deviation. Without an indenter, a depth
+    or depth maps the normal force stays unknown. Writes a run folder: wrenches.csv, fields,
+    overlay pictures.
+    """
+    from gelslim.cli.budget import budget_of
+    from gelslim.cli.force_report import answer_json, report
+    from gelslim.cli.force_sinks import RunOutputs
+    from gelslim.cli.status import BAD_INPUT
+    from gelslim_force.frames.source import open_frames
+    from gelslim_force.pipeline import ForcePipeline
+    from ifem_export.bundle.files import load_bundle
+
+    _require_consistent(fields, indenter, depth_maps)
+    budget = budget_of(error, within)
+    sensor = load_bundle(bundle)
+    if not budget.unlimited and operator is None:
+        sensor = _budgeted(sensor, budget, bundle, gel)
+    chosen = {
+        "operator": operator, "method": method, "compensation": compensation,
+        "interpolation": interpolation, "gel": gel, "friction": friction,
+    }  # fmt: skip
+    settings = _settings(chosen, budget)
+    built, picture = _calibrated(sensor, reference, calibration, indenter is not None)
+    folder = out or Path("out") / f"{bundle.resolve().name}-force"
+    outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
+    with open_frames(frames) as source:
+        pipeline = ForcePipeline(sensor, built, settings)
+        pipeline.normal = _normal_source(pipeline, picture, indenter, depth_mm, depth_maps)
+        told = {
+            "bundle": str(bundle), "frames": frames,
+            **chosen, "operator": pipeline.operator_name, "indenter": indenter,
+            "reference": str(reference) if reference else None,
+            "calibration": str(calibration) if calibration else None,
+        }  # fmt: skip
+        summary, drawn = _run(pipeline, source, most_frames, outputs, told)
+    say = answer_json if as_json else report
+    say(folder, pipeline, summary, drawn)
+    return 0 if summary.with_forces else BAD_INPUT
+
+
+def _require_consistent(fields: str, indenter: str | None, depth_maps: Path | None) -> None:
+    from gelslim.cli.failure import CommandError
+
+    if fields not in ("npz", "parquet", "none"):
+        raise CommandError(f"--fields {fields}: npz, parquet or none")
+    if indenter and depth_maps:
+        raise CommandError("give an indenter or depth maps, not both")
+
+
+def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
+    """The pipeline's settings for the options of these names. Raises CommandError."""
+    from gelslim.cli.failure import CommandError
+    from gelslim_force.forces.estimator import ForceSettings
+    from gelslim_force.settings import PipelineSettings
+
+    try:
+        return PipelineSettings(
+            rung=chosen["operator"],
+            budget=budget,
+            compensation=chosen["compensation"],
+            interpolation=chosen["interpolation"],
+            gel=chosen["gel"],
+            force=ForceSettings(method=chosen["method"], friction=chosen["friction"]),
+        )
+    except ValueError as wrong:
+        raise CommandError(str(wrong)) from wrong
+
+
+def _run(
+    pipeline: ForcePipeline,
+    source: FrameSource,
+    most_frames: int | None,
+    outputs: RunOutputs,
+    chosen: dict[str, Any],
+) -> tuple[RunSummary, list[str]]:
+    """Put the frames through the pipeline; what came of it, and the pictures drawn."""
+    from itertools import islice
+
+    from gelslim.cli.force_sinks import result_sinks
+    from gelslim.cli.progress import progress_bar
+    from gelslim_force.run import run_frames
+
+    frames_per_s = source.frames_per_s or 30.0
+    with ExitStack() as stack, progress_bar(quiet=outputs.quiet) as tell:
+        sinks, kept = result_sinks(stack, pipeline, outputs, chosen, frames_per_s)
+        frames = source if most_frames is None else islice(source, most_frames)
+        summary = run_frames(pipeline, frames, sinks, source.count, progress=tell)
+    return summary, [] if kept is None else [str(f) for f in kept.write()]
+
+
+def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
+    """The sensor with this machine's times; what a budget cannot know of it is said."""
+    from gelslim.cli.budget import note_choice, on_this_machine
+    from gelslim_core.budget.machine_times import read_times
+
+    timed = on_this_machine(sensor)
+    if timed.ladder is not None:
+        choice = timed.ladder.choose(budget)
+        if gel != "linear":
+            told = f"the ladder was measured on a linear gel; its errors say little of {gel}"
+            choice = replace(choice, remarks=(*choice.remarks, told))
+        here = choice.rung.name in read_times(sensor.times_key)
+        note_choice(choice, budget, here, f"gelslim bench {path}")
+    return timed
+
+
+def _calibrated(
+    sensor: Bundle, reference: Path | None, file: Path | None, needs_picture: bool
+) -> tuple[SensorCalibration, NDArray[np.uint8] | None]:
+    from gelslim.cli.failure import CommandError
+    from gelslim_force.calibration.calibration import calibrate
+    from gelslim_force.calibration.file import read_calibration
+    from gelslim_force.calibration.reference_picture import read_reference
+
+    if reference is None and (file is None or needs_picture):
+        wanted = "the contact patch shows against it" if needs_picture else "or --calibration FILE"
+        raise CommandError(f"give --reference PICTURE, one without contact ({wanted})")
+    picture = None if reference is None else read_reference(reference)
+    if file is not None:
+        return read_calibration(file), picture
+    assert picture is not None
+    return calibrate(sensor, picture), picture
+
+
+def _normal_source(
+    pipeline: ForcePipeline,
+    picture: NDArray[np.uint8] | None,
+    indenter: str | None,
+    depth_mm: float | None,
+    depth_maps: Path | None,
+) -> NormalSource | None:
+    if depth_maps is not None:
+        from gelslim_force.contact.depth_source import DepthMapSource, read_depth_maps
+
+        return DepthMapSource(
+            pipeline.calibration.camera, pipeline.points_mm, read_depth_maps(depth_maps)
+        )
+    if indenter is None:
+        return None
+    from gelslim_force.contact.indenter import parse_indenter
+    from gelslim_force.contact.indenter_source import indenter_source
+
+    assert picture is not None
+    return indenter_source(pipeline, picture, parse_indenter(indenter), depth_mm)

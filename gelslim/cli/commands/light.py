@@ -1,0 +1,233 @@
+"""`gelslim light`: certificate, flux ledger, comparison and exposure of the light guide."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gelslim.cli.options import AsJson, DrawPictures, SpecFile
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gelslim_cad.dimensions import Dimensions
+    from gelslim_cad.light.study import Comparison, LightStudy, Progress
+    from gelslim_cad.spec import Spec
+    from gelslim_core.budget.budget import Budget
+    from gelslim_optics.light.result import Estimate, LightResult
+
+PICTURES = ("light_paths.png", "irradiance.png", "light_ratio.png")
+FIRST = "delivered"
+"""Entry of the ledger that is told first; the others follow by size."""
+LEAST_SHARE = 5e-4
+"""Of all light: less is not told."""
+MARK = "gelslim light"
+"""In the first picture's text: it is one of an earlier run."""
+
+RaysPerGuide = Annotated[
+    int | None,
+    typer.Option(min=1024, max=1 << 28, help="Rays traced per guide; 131072 if left out."),
+]
+LightError = Annotated[
+    str | None,
+    typer.Option(
+        help="Error allowed in either colour's light on the coat (half of its 95 % interval), as "
+        "1%; picks the rays."
+    ),
+]
+TraceTime = Annotated[
+    str | None,
+    typer.Option(
+        "--time",
+        "--time-ms",
+        help="Time that the study may take, as 2s, pictures and choosing left out; picks the rays.",
+    ),
+]
+
+
+def light(
+    spec: SpecFile,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder of the pictures; out/NAME-light if left out."),
+    ] = None,
+    rays: RaysPerGuide = None,
+    error: LightError = None,
+    within: TraceTime = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the rays.")] = 0,
+    pictures: DrawPictures = True,
+    as_json: AsJson = False,
+) -> int:
+    """Trace the light guide and compare it with straight guides.
+
+    Certificate of total internal reflection, where the light goes, brightness against straight
+    guides with 45° mirrors, exposure and frame rate.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.budget import budget_of
+    from gelslim.cli.failure import CommandError
+    from gelslim.cli.output import spare_strangers_in
+    from gelslim.cli.progress import progress_bar
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.light.record import study_record
+    from gelslim_cad.light.study import RAYS, study_light
+    from gelslim_cad.spec.reader import read_spec
+
+    started = time.monotonic()
+    loaded = read_spec(spec)
+    d = derive(loaded.spec)
+    budget = budget_of(error, within)
+    if rays is not None and not budget.unlimited:
+        raise CommandError("give --rays or a budget, not both")
+    folder = out or Path("out") / f"{loaded.spec.name}-light"
+    if pictures:
+        spare_strangers_in(folder, PICTURES, PICTURES[0], MARK.encode())
+    with progress_bar(quiet=as_json) as tell:
+        if not budget.unlimited:
+            rays = _budgeted(loaded.spec, d, budget, seed, spec, tell)
+        study = study_light(d, rays=rays or RAYS, seed=seed, progress=tell)
+    _note_missed(study, budget)
+    if pictures:
+        _draw(folder, d, study)
+    if as_json:
+        print_json(study_record(study))
+        return 0
+    _report(loaded.spec.name, study)
+    if pictures:
+        print(f"Pictures in {folder}/ ({time.monotonic() - started:.1f} s)")
+    return 0
+
+
+def _draw(folder: Path, d: Dimensions, study: LightStudy) -> None:
+    from gelslim.cli.output import replace_file
+    from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
+
+    made = (paths_png(d, MARK), irradiance_png(d, study), ratio_png(study))
+    for name, content in zip(PICTURES, made, strict=True):
+        replace_file(folder / name, content)
+
+
+def _budgeted(
+    spec: Spec, d: Dimensions, budget: Budget, seed: int, path: Path, tell: Progress | None
+) -> int:
+    """Rays per guide for a budget; without times of this machine, one of time measures them."""
+    from gelslim.cli.budget import keep_times, note_choice
+    from gelslim_cad.light.ray_ladder import (
+        TRACED,
+        measure_errors,
+        measure_times,
+        rays_of,
+        rung_name,
+        times_key,
+    )
+    from gelslim_cad.sensor.pad import spec_hash
+    from gelslim_core.budget.machine_times import read_times
+
+    key = times_key(spec_hash(spec))
+    times = read_times(key)
+    errors = measure_errors(d, seed, tell)
+    if budget.time_ms is not None and not {rung_name(r) for r in TRACED} <= set(times):
+        times = measure_times(d, tell)
+        keep_times(key, times)
+    choice = errors.ladder(times).choose(budget)
+    note_choice(choice, budget, bool(times), f"gelslim bench {path}")
+    return rays_of(choice.rung)
+
+
+def _note_missed(study: LightStudy, budget: Budget) -> None:
+    """Say where the answer's own interval is wider than asked: only extrapolated rays can be."""
+    from gelslim_cad.light.ray_ladder import half_widths
+    from gelslim_core.budget.budget import shown_share
+
+    half = max(half_widths(study.light))
+    if not budget.allows_error(half):
+        rays = study.light.rays
+        print(
+            f"gelslim: the light came out within {shown_share(half)} with {rays} rays; "
+            f"--rays {2 * rays} errs less",
+            file=sys.stderr,
+        )
+
+
+def _report(name: str, study: LightStudy) -> None:
+    from gelslim.cli.answer import say
+
+    for sentence in study.certificate.sentences():
+        say(sentence)
+    print()
+    _comparisons(name, study.comparisons)
+    print()
+    _ledger(study.light)
+    print()
+    for colour in ("red", "green"):
+        _evenness(study.light, colour)
+    for ours, glued in zip(study.exposures, study.glued_exposures, strict=True):
+        say(f"{ours.sentence()} (with glued mirrors: {glued.frame_rate_hz:.0f}).")
+
+
+def _comparisons(name: str, found: Sequence[Comparison]) -> None:
+    """How many times the light of each other guide, with what its interval allows to say."""
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, say
+    from gelslim_cad.light.study import QUANTITIES
+
+    table = Table(
+        "straight guide with", "light", "times", "95 % interval", "", box=None, pad_edge=False
+    )
+    alike = ""
+    for c in found:
+        other, _, alike = c.other.partition(" (")
+        interval = f"{c.ratio.low:.3f} to {c.ratio.high:.3f}"
+        kind = other.removeprefix("a straight guide with ")
+        place = QUANTITIES[c.quantity].removeprefix("light ")
+        table.add_row(kind, place, f"{c.ratio.value:.3f}", interval, c.verdict)
+    say(f"Light of {name} over that of others ({alike}:" if alike else f"Light of {name}:")
+    console().print(table)
+
+
+def _ledger(result: LightResult) -> None:
+    """The ledger, in the finger's terms: light that leaves ends in its black inside."""
+    from rich.table import Table
+
+    from gelslim.cli.answer import console
+
+    title = f"where the light goes ({result.rays} rays)"
+    table = Table(title, "share", "95 % interval", box=None, pad_edge=False)
+    for name, found in sorted(result.ledger().items(), key=lambda e: (e[0] != FIRST, -e[1].value)):
+        if found.value >= LEAST_SHARE:
+            table.add_row(_named(name), f"{found.value:.2%}", _interval(found))
+    console().print(table)
+
+
+def _named(entry: str) -> str:
+    known = {
+        "delivered": "coat of the gel",
+        "absorbed": "absorbed on the way",
+        "missed_foot": "missed the guide's foot",
+        "foot_reflection": "reflected at the foot",
+        "truncated": "weight cut off",
+        "lost": "lost at corners",
+    }
+    group, _, face = entry.partition(".")
+    if not face:
+        return known.get(entry, entry)
+    back = group == "returned" and face.startswith("foot")
+    way = "back to the LEDs by" if back else ("stopped at" if group == "stopped" else "leaked by")
+    return f"{way} {face.replace('_', ' ')}"
+
+
+def _interval(found: Estimate) -> str:
+    return f"{found.low:.2%} to {found.high:.2%}"
+
+
+def _evenness(result: LightResult, colour: str) -> None:
+    even, rise = result.uniformity(colour), result.elevation_deg(colour)
+    print(
+        f"{colour} on the coat: darkest 64th {even.min_over_mean:.0%} of the mean, "
+        f"standard deviation {even.cv:.0%}; light grazes at {rise.value:.0f}° on average"
+    )

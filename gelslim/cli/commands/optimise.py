@@ -1,0 +1,209 @@
+"""`gelslim optimise`: the thinnest, brightest or most accurate feasible design."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim.cli.commands.explore import Jobs, NoisePx, Rays, Scheduler, Vary
+from gelslim.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from gelslim_cad.explore.optimum import Neighbour, Optimum
+    from gelslim_cad.explore.price import Measured
+    from gelslim_cad.spec import Spec
+
+
+class Aim(StrEnum):
+    """What to make best."""
+
+    thin = "thin"
+    bright = "bright"
+    accurate = "accurate"
+
+
+def optimise(
+    spec: SpecFile,
+    vary: Vary,
+    aim: Annotated[
+        Aim,
+        typer.Option("--for", help="Thinnest finger, shortest exposure or least force error."),
+    ] = Aim.thin,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-optimise if left out.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the best design to this file, as a spec.")
+    ] = None,
+    rounds: Annotated[
+        int, typer.Option(min=0, max=12, help="Rounds of finer steps around the best.")
+    ] = 3,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    rays: Rays = 1 << 13,
+    marker_noise_px: NoisePx = 0.05,
+    as_json: AsJson = False,
+) -> int:
+    """Find the best feasible design, what binds it, and what it costs.
+
+    Every combination of the values, then finer steps around the best; its price is against the
+    spec as it is. Exit status 1 when no design is feasible.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.output import replace_file, spare_strangers
+    from gelslim_cad.explore.saved import spec_text
+    from gelslim_cad.explore.space import changed
+    from gelslim_cad.spec.reader import read_spec
+
+    if save is not None:
+        spare_strangers(save, b"gelslim-spec/", "spec")
+    loaded = read_spec(spec)
+    folder = out or Path("out") / f"{loaded.spec.name}-optimise"
+    effort = _Effort(jobs, scheduler, rays, marker_noise_px, rounds)
+    best = _best(loaded.spec, vary, aim, folder, effort, quiet=as_json)
+    chosen = changed(loaded.spec, best.values)
+    words, price = _binding(chosen), _Price.of(loaded.spec, chosen, effort)
+    if save is not None:
+        replace_file(save, spec_text(loaded.text, best.values).encode())
+    if as_json:
+        print_json({**_record(best, words), "price": price.record()})
+        return 0
+    _report(loaded.spec.name, best, words)
+    price.print()
+    if save is not None:
+        print(f"Wrote {save}. Next: gelslim check {save}")
+    return 0
+
+
+@dataclass(frozen=True)
+class _Effort:
+    """What the search may use, and how closely it looks."""
+
+    jobs: int | None
+    scheduler: str
+    rays: int
+    noise_px: float
+    rounds: int
+
+
+@dataclass(frozen=True)
+class _Price:
+    """The best design against the spec as it is."""
+
+    before: Measured
+    after: Measured
+
+    @classmethod
+    def of(cls, spec: Spec, chosen: Spec, effort: _Effort) -> _Price:
+        from gelslim_cad.explore.price import measured
+
+        before, after = (measured(s, effort.rays, effort.noise_px) for s in (spec, chosen))
+        return cls(before, after)
+
+    def record(self) -> list[dict[str, Any]]:
+        from gelslim.cli.price_table import price_record
+        from gelslim_cad.explore.price import prices
+
+        return price_record(prices(self.before, self.after))
+
+    def print(self) -> None:
+        from gelslim.cli.price_table import print_broken, print_prices
+        from gelslim_cad.explore.price import prices
+
+        print_prices("what it costs", prices(self.before, self.after), "as it is", "best")
+        print_broken("The spec as it is", self.before)
+
+
+def _best(
+    spec: Spec, vary: list[str], aim: Aim, folder: Path, effort: _Effort, *, quiet: bool
+) -> Optimum:
+    """The best feasible design. Raises CommandError where the axes are no good or none is."""
+    from gelslim.cli.failure import CommandError
+    from gelslim.cli.progress import progress_bar
+    from gelslim_cad.explore.axis import parse_axis
+    from gelslim_cad.explore.engine import Engine, processors
+    from gelslim_cad.explore.error import ExploreError
+    from gelslim_cad.explore.optimum import optimise as run
+    from gelslim_cad.explore.space import Space
+    from gelslim_cad.explore.study import Request
+
+    try:
+        space = Space.of(spec, [parse_axis(v) for v in vary])
+        request = Request(space, rays=effort.rays, noise_px=effort.noise_px)
+        engine = Engine(effort.jobs or processors(), effort.scheduler)
+        with progress_bar(quiet=quiet) as tell:
+            return run(request, aim.value, folder, engine, rounds=effort.rounds, progress=tell)
+    except ExploreError as error:
+        raise CommandError(f"gelslim optimise: {error}", _status(error)) from error
+
+
+def _status(error: Exception) -> int:
+    from gelslim.cli.status import BAD_INPUT, RULE_FAILED
+
+    return RULE_FAILED if "is feasible" in str(error) else BAD_INPUT
+
+
+def _binding(chosen: Any) -> tuple[str, ...]:
+    from gelslim_cad.checks.binding import binding_sentences
+    from gelslim_cad.dimensions import derive
+
+    return binding_sentences(chosen, derive(chosen))
+
+
+def _record(best: Optimum, words: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "format": "gelslim-optimum/1",
+        "goal": asdict(best.goal),
+        "values": dict(best.values),
+        "best": dict(best.row),
+        "neighbours": [asdict(n) for n in best.neighbours],
+        "at_end_of_range": best.at_end,
+        "designs": best.designs,
+        "feasible": best.feasible,
+        "binding": words,
+    }
+
+
+def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, number, say
+    from gelslim_cad.explore.axis import shown
+
+    value = best.row[best.goal.column]
+    say(
+        f"{name}: least {best.goal.words} {number(value, best.goal.unit)} "
+        f"({best.feasible} of {best.designs} designs tried are feasible)",
+        style="bold",
+    )
+    for path, chosen in best.values.items():
+        end = ", an end of its range" if path in best.at_end else ""
+        say(f"  {path}: {shown(chosen)}{end}")
+    for sentence in words:
+        say(sentence)
+    table = Table("a step further", box=None, pad_edge=False)
+    table.add_column(best.goal.words, justify="right")
+    table.add_column("difference", justify="right")
+    table.add_column("what stops it")
+    for n in best.neighbours:
+        here = n.goal if n.status == "feasible" else None
+        table.add_row(
+            f"{n.path.removeprefix('design.')} {shown(n.value)}",
+            "" if here is None else number(here, best.goal.unit),
+            "" if here is None else f"{'+' if here > value else ''}{number(here - value)}",
+            _stop(n),
+        )
+    console().print(table)
+
+
+def _stop(n: Neighbour) -> str:
+    """What stops a step further, and from where on."""
+    from gelslim_cad.explore.axis import shown
+
+    if n.status == "feasible":
+        return ""
+    return n.binding if n.holds_to is None else f"{n.stops} beyond {shown(n.holds_to)}"

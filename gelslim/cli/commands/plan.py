@@ -1,0 +1,83 @@
+"""`gelslim plan`: which effects a scene needs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gelslim.cli.options import AsJson
+from gelslim.cli.scene_budget import PoseTime, SceneError
+
+if TYPE_CHECKING:
+    from gelslim_twin.plan import Choice, Plan
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene's YAML file.")]
+
+
+def plan(
+    scene: SceneFile,
+    error: SceneError = None,
+    within: PoseTime = None,
+    as_json: AsJson = False,
+) -> int:
+    """Print which effects a contact scene needs.
+
+    Each effect, in or out and why, the largest error of leaving it out, the rung chosen and the
+    time predicted for it. Nothing is simulated.
+    """
+    from gelslim.cli.scene_budget import budgeted_scene
+    from gelslim.scene_sensor import require_within_gel, sensor_figures
+    from gelslim_twin.scene.question import plan_scene
+    from gelslim_twin.scene.reader import read_scene
+
+    loaded = budgeted_scene(read_scene(scene), error, within)
+    figures = sensor_figures(loaded)
+    require_within_gel(loaded, figures.thickness_mm)
+    made = plan_scene(loaded, figures)
+    if as_json:
+        print(made.to_json(), end="")
+    else:
+        print_plan(made)
+    return 0
+
+
+def print_plan(made: Plan) -> None:
+    """A table for people, and what exceeds the tolerance."""
+    from rich.table import Table
+
+    from gelslim.cli.answer import console, say
+    from gelslim_twin.effects.effect import unit_of
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for title in ("effect", "", "if left out", "rung", "ms"):
+        table.add_column(title, no_wrap=True)
+    table.add_column("why")
+    for choice in made.choices:
+        table.add_row(*_row(choice), style=None if choice.included else "dim")
+    console().print(table)
+    print(
+        f"{made.scene}: {made.predicted_ms:.3g} ms per pose predicted, {made.poses} poses, "
+        f"{made.predicted_ms * made.poses / 1000:.3g} s."
+    )
+    for observable, error in made.over_tolerance:
+        unit = "N" if unit_of(observable) == "n" else "px"
+        spoilt = [c.effect for c in made.choices if observable in c.over_share]
+        say(
+            f"The {observable} may err by {error:.3g} {unit}, more than the tolerance: "
+            f"{', '.join(spoilt)}. Switch it on or raise the tolerance.",
+            style="bold red",
+        )
+
+
+def _row(choice: Choice) -> tuple[str, ...]:
+    value, unit = choice.telling(choice.bound)
+    return (
+        choice.effect,
+        "in" if choice.included else "out",
+        f"{value:.3g} {unit}" if value else "0",
+        choice.rung,
+        f"{choice.predicted_ms:.3g}" if choice.included else "",
+        choice.why,
+    )

@@ -1,0 +1,56 @@
+"""`gelslim schema`: the JSON Schema of the spec or of scenes, or the same as a page to read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def schema(
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Write to this file instead.")
+    ] = None,
+    scene: Annotated[
+        bool, typer.Option("--scene", help="Of contact scenes instead of specs.")
+    ] = False,
+    markdown: Annotated[
+        bool, typer.Option("--markdown", help="As a page to read: every field in tables.")
+    ] = False,
+) -> int:
+    """Print the JSON Schema of the spec.
+
+    Editors check and complete the YAML by it.
+    """
+    text = _page(scene) if markdown else _schema(scene)
+    if out is None:
+        print(text, end="")
+        return 0
+    from gelslim.cli.output import replace_file, spare_strangers
+
+    spare_strangers(out, b"gelslim-", "schema of gelslim")
+    replace_file(out, text.encode())
+    use = "" if markdown else " In VS Code, name it in the setting yaml.schemas."
+    print(f"Wrote {out}.{use}")
+    return 0
+
+
+def _schema(scene: bool) -> str:
+    if scene:
+        from gelslim_twin.scene.reader import scene_schema_text
+
+        return scene_schema_text()
+    from gelslim_cad.spec.schema import schema_text
+
+    return schema_text()
+
+
+def _page(scene: bool) -> str:
+    if scene:
+        from gelslim_twin.scene.reference import reference_text as scene_reference_text
+
+        return scene_reference_text()
+    from gelslim_cad.spec.reference import reference_text
+
+    return reference_text()

@@ -1,0 +1,131 @@
+"""`gelslim thinner`: what a thinner finger costs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gelslim.cli.commands.explore import NoisePx, Rays
+from gelslim.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from gelslim_cad.explore.price import Price
+    from gelslim_cad.explore.thinner import Concession, Offer
+
+
+def thinner(
+    spec: SpecFile,
+    to: Annotated[
+        float | None,
+        typer.Option(metavar="MM", min=0.1, help="Thickness to reach; a usual step if left out."),
+    ] = None,
+    rays: Rays = 1 << 13,
+    marker_noise_px: NoisePx = 0.05,
+    as_json: AsJson = False,
+) -> int:
+    """Say what a thinner finger costs.
+
+    Each field that can give way, alone: the thickness it leaves and, against the finger as it is,
+    keystone, blur, brightness, exposure, force error and stiffness in per cent. Exit status 1
+    where no field alone reaches the thickness.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.failure import CommandError
+    from gelslim.cli.status import OK, RULE_FAILED
+    from gelslim_cad.explore.error import ExploreError
+    from gelslim_cad.explore.thinner import thinner as run
+    from gelslim_cad.spec.reader import read_spec
+
+    loaded = read_spec(spec)
+    try:
+        offer = run(loaded.spec, to, rays, marker_noise_px)
+    except ExploreError as error:
+        raise CommandError(f"gelslim thinner: {error}") from error
+    if as_json:
+        print_json(_record(loaded.spec.name, offer))
+    else:
+        _report(loaded.spec.name, str(spec), offer)
+    return OK if any(c.reaches for c in offer.concessions) else RULE_FAILED
+
+
+def _record(name: str, offer: Offer) -> dict[str, Any]:
+    from gelslim.cli.price_table import price_record
+
+    return {
+        "format": "gelslim-thinner/1",
+        "name": name,
+        "to_mm": offer.to_mm,
+        "present": dict(offer.present.figures),
+        "concessions": [
+            {
+                "path": c.path,
+                "before": c.before,
+                "after": c.after,
+                "thickness_mm": c.thickness_mm,
+                "reaches": c.reaches,
+                "breaks": c.breaks,
+                "price": price_record(c.prices),
+            }
+            for c in offer.concessions
+        ],
+    }
+
+
+def _report(name: str, path: str, offer: Offer) -> None:
+    from gelslim.cli.answer import say
+    from gelslim.cli.price_table import told
+    from gelslim_cad.explore.price import FIGURES
+
+    aim = "" if offer.to_mm is None else f", {offer.to_mm:g} mm asked for"
+    say(f"{name} is {offer.present_mm:.2f} mm thick{aim}.", style="bold")
+    present = (f"{f.words} {told(f, offer.present.figures[f.name])}" for f in FIGURES[1:])
+    say(f"As it is: {', '.join(present)}.")
+    reached = [c for c in offer.concessions if c.reaches]
+    if offer.to_mm is not None and not reached:
+        print()
+        say(
+            f"No field alone makes it {offer.to_mm:g} mm thick. Several together: "
+            f"gelslim optimise {path} --for thin --vary FIELD=... --vary FIELD=..."
+        )
+    elif not reached:
+        say("No usual step makes it thinner.")
+    for c in offer.concessions:
+        _tell(c, offer)
+
+
+def _tell(c: Concession, offer: Offer) -> None:
+    """What one field gives, and what it costs, gains and changes."""
+    from gelslim.cli.answer import number, say
+    from gelslim_cad.explore.price import SAME
+
+    short = "" if c.reaches or c.breaks or offer.to_mm is None else ", the thinnest it can do alone"
+    print()
+    say(
+        f"{c.path.removeprefix('design.')} {number(c.before)} → {number(c.after)}: "
+        f"{c.thickness_mm:.2f} mm, {offer.present_mm - c.thickness_mm:.2f} mm less{short}",
+        style="bold" if c.reaches else "",
+    )
+    if c.breaks:
+        _indented(f"forbidden: breaks {', '.join(c.breaks)}", style="red")
+        return
+    changes = [p for p in c.prices[1:] if p.change is None or abs(p.change) >= SAME]
+    for word, verdict in (("costs", "worse"), ("gains", "better"), ("changes", "")):
+        listed = ", ".join(_change(p) for p in changes if p.verdict == verdict)
+        if listed or word == "costs":
+            _indented(f"{word} {listed or 'nothing among these figures'}")
+
+
+def _indented(text: str, style: str = "") -> None:
+    from rich.padding import Padding
+    from rich.text import Text
+
+    from gelslim.cli.answer import console
+
+    console().print(Padding(Text(text, style=style), (0, 0, 0, 2), expand=False))
+
+
+def _change(p: Price) -> str:
+    from gelslim.cli.price_table import per_cent, told
+
+    return f"{p.figure.words} {per_cent(p.change)} ({told(p.figure, p.after)})"

@@ -1,0 +1,152 @@
+"""`gelslim validate`: what a sensor will measure, against known forces."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gelslim.cli.budget import FieldError, FrameTime
+from gelslim.cli.options import AsJson, SpecFile
+
+if TYPE_CHECKING:
+    from gelslim_core.budget.budget import Budget
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.validation.validation import Validation
+    from ifem_export.bundle.bundle import Bundle
+    from ifem_export.operators.ladder import Progress
+    from ifem_export.operators.operator_ladder import OperatorLadder
+
+RECORD = "validation.json"
+PLOTS = ("resultants.png", "fields.png", "error_budget.png")
+
+
+def validate(
+    spec: SpecFile,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-validation if left out.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of noise, dirt and print faults.")] = 0,
+    error: FieldError = None,
+    within: FrameTime = None,
+    pictures: Annotated[bool, typer.Option(help="Write plots and overlay pictures.")] = True,
+    as_json: AsJson = False,
+) -> int:
+    """Try a sensor on contacts of known force.
+
+    The experiment of the GelSlim 2.0 paper: a ball pressed into the gel and slid in many
+    directions, simulated on a finer gel at large strain, drawn as this sensor's camera would see
+    it, and put through the force pipeline and through the paper's choices. Then an error budget,
+    and rods and a punch. --error and --time pick the pipeline's operator from a ladder measured
+    first.
+    """
+    from gelslim.cli.answer import print_json
+    from gelslim.cli.budget import budget_of
+    from gelslim.cli.output import replace_file, spare_strangers_in
+    from gelslim.cli.progress import progress_bar
+    from gelslim.cli.validate_tables import print_validation
+    from gelslim.scene_sensor import spec_sensor
+    from gelslim_cad.spec.reader import read_spec
+    from gelslim_core.files.atomic_file import json_bytes
+    from gelslim_force.outputs.packed_frame import plain
+    from gelslim_twin.validation.validate import validate as validated
+
+    started = time.monotonic()
+    budget = budget_of(error, within)
+    name = read_spec(spec).spec.name
+    folder = out or Path("out") / f"{name}-validation"
+    with progress_bar(quiet=as_json) as tell:
+        made = spec_sensor(spec)
+        names = [RECORD, *(picture_names(made) if pictures else [])]
+        spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
+        kept = folder / "sensor"
+        sensor, operator = _stored(spec, made, budget, kept, tell)
+        found = validated(sensor, kept, seed, tell, budget)
+    record = plain(found.to_record()) | operator
+    replace_file(folder / RECORD, json_bytes(record))
+    written = [RECORD, *(_draw(found, folder) if pictures else [])]
+    if as_json:
+        print_json(record)
+        return 0
+    print_validation(found)
+    print(f"\nIn {folder}/: {', '.join(written)} ({time.monotonic() - started:.0f} s).")
+    return 0
+
+
+def _stored(
+    spec: Path, made: TwinSensor, budget: Budget, kept: Path, tell: Progress | None
+) -> tuple[TwinSensor, dict[str, str]]:
+    """The sensor by way of the folder `kept`; and, where a budget picked one, its operator."""
+    from gelslim.cli.commands.bundle import chosen_label
+    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
+
+    # A budget that no operator keeps is refused before anything is written.
+    ladder = None if budget.unlimited else _ladder(spec, made.bundle, tell)
+    label = "" if ladder is None else chosen_label(ladder, budget)
+    store_sensor(made, kept, True)
+    sensor = stored_sensor(kept)
+    if not label:
+        return sensor, {}
+    # The pipeline starts with its bundle's choice wherever a chain names no other.
+    chosen = replace(sensor.bundle, ladder=ladder, operator=label)
+    return replace(sensor, bundle=chosen), {"operator": label}
+
+
+def _ladder(spec: Path, bundle: Bundle, tell: Progress | None) -> OperatorLadder:
+    """The operators of the sensor, measured here and now."""
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.sensor.pad import reference_mesh
+    from gelslim_cad.spec.reader import read_spec
+    from ifem_export.operators.ladder import measure_ladder
+
+    fine = reference_mesh(derive(read_spec(spec).spec), bundle.mesh)
+    return measure_ladder(
+        bundle.mesh, bundle.material, bundle.formulation, progress=tell, reference=fine
+    )
+
+
+def _draw(found: Validation, folder: Path) -> list[str]:
+    """Plots, and the last frame of some contacts with what our pipeline finds in it."""
+    from gelslim.cli.output import replace_file
+    from gelslim.cli.validate_figures import budget_png, fields_png, resultants_png
+    from gelslim_force.outputs.arrow_scale import scale_of_run
+    from gelslim_force.outputs.overlay import Overlay, write_overlay
+    from gelslim_twin.validation.validation import PAPER_N, PAPER_RELATIVE
+
+    slides = len(found.experiment.tests)
+    deepest, others = found.samples[slides - 1], found.samples[slides:]
+    resultants, fields, budget = PLOTS
+    plots = {resultants: resultants_png(found), fields: fields_png(found, deepest)}
+    if found.budget:
+        plots[budget] = budget_png(found.budget, PAPER_N, PAPER_RELATIVE)
+    for name, content in plots.items():
+        replace_file(folder / name, content)
+    camera = found.calibration.camera
+    shape = (camera.image_height_px, camera.image_width_px)
+    overlay = Overlay(shape, camera.project, found.calibration.reference.places_px)
+    names = list(plots)
+    for sample in (deepest, *others):
+        result = next(iter(sample.results.values()))
+        picture = overlay.draw(sample.image, result, scale_of_run([result]))
+        names.append(picture_name(sample.name))
+        write_overlay(folder / names[-1], picture)
+    return names
+
+
+def picture_names(sensor: TwinSensor) -> list[str]:
+    """All that `_draw` may write, known before the minutes that the experiment takes."""
+    from gelslim_twin.validation.case import other_contacts
+    from gelslim_twin.validation.experiment import DIRECTIONS
+
+    mesh = sensor.bundle.mesh
+    cases = other_contacts(mesh.layers * mesh.cell_size_mm[2], *sensor.size_mm)
+    samples = (f"slide {DIRECTIONS}", *(case.name for case in cases))
+    return [*PLOTS, *map(picture_name, samples)]
+
+
+def picture_name(sample: str) -> str:
+    """The file that shows a sample of this name."""
+    return f"{sample.replace(' ', '_').replace(',', '')}.png"

@@ -1,0 +1,80 @@
+"""Files and folders that commands write: whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sized
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gelslim_core.files.replaced_file import replace_file as whole_file
+
+if TYPE_CHECKING:
+    from gelslim_cad.dimensions import Dimensions
+
+MARK_BYTES = 1 << 16
+PAD_RULES = ("gel.", "mesh.", "marker.")
+"""Beginnings of the ids of rules that bear on pad, mesh and marker print."""
+
+
+def replace_file(target: Path, data: bytes) -> None:
+    """Write `data` to `target` in one step; folders above it are made. Raises OSError."""
+    whole_file(target, data, parents=True)
+
+
+def spare_strangers(target: Path, mark: bytes, what: str) -> None:
+    """Raise CommandError where `target` is a file without `mark` near its beginning.
+
+    What an earlier run wrote may be replaced; what the user has there must not be.
+    """
+    from gelslim.cli.failure import CommandError
+
+    if not target.is_file():
+        return
+    with open(target, "rb") as stream:
+        if mark in stream.read(MARK_BYTES):
+            return
+    raise CommandError(f"{target} exists and is no {what}; give another name or remove it")
+
+
+def spare_strangers_in(folder: Path, names: Iterable[str], first: str, mark: bytes) -> None:
+    """Raise CommandError where `folder` has files of these names that no earlier run wrote.
+
+    A run writes the file `first` before all others, and it has `mark` near its beginning.
+    """
+    from gelslim.cli.failure import CommandError
+
+    there = [name for name in names if (folder / name).exists()]
+    if not there:
+        return
+    try:
+        with open(folder / first, "rb") as stream:
+            if mark in stream.read(MARK_BYTES):
+                return
+    except OSError:
+        pass
+    raise CommandError(
+        f"{folder}: holds a {there[0]} of other origin, which this would replace; "
+        "choose another --out"
+    )
+
+
+def written(folder: Path, files: Sized) -> str:
+    """One line that says what was written where."""
+    return f"Wrote {len(files)} files to {folder}{os.sep}"
+
+
+def require_pad_rules(d: Dimensions, command: str, force: bool) -> None:
+    """Raise CommandError (status 1) where a rule on gel, mesh or markers fails."""
+    from gelslim.cli.failure import CommandError
+    from gelslim.cli.status import RULE_FAILED
+    from gelslim_cad.checks import check
+
+    failed = [c for c in check(d) if c.status == "fail" and c.id.startswith(PAD_RULES)]
+    if failed and not force:
+        lines = [f"  {c.id}: {c.reason}. {c.advice} ({c.parameter})" for c in failed]
+        raise CommandError(
+            f"{command}: a design rule fails; nothing was written (--force writes anyway)\n"
+            + "\n".join(lines),
+            RULE_FAILED,
+        )

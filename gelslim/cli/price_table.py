@@ -1,0 +1,83 @@
+"""The price of a changed finger, for people and for programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gelslim_cad.explore.price import Figure, Measured, Price
+
+STYLE = {"better": "green", "worse": "bold red", "": ""}
+SHARES = ("force.error",)
+"""Figures that are parts of a whole, told in per cent."""
+
+
+def price_record(prices: Sequence[Price]) -> list[dict[str, Any]]:
+    """Each figure with both values, its relative change, and whether it is better or worse."""
+    return [
+        {
+            "name": p.figure.name,
+            "what": p.figure.words,
+            "unit": p.figure.unit,
+            "before": p.before,
+            "after": p.after,
+            "change": p.change,
+            "verdict": p.verdict,
+        }
+        for p in prices
+    ]
+
+
+def print_prices(title: str, prices: Sequence[Price], before: str, after: str) -> None:
+    """A table of all figures: both values, the difference in per cent, better or worse."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from gelslim.cli.answer import console
+
+    table = Table(title, box=None, pad_edge=False)
+    for column in (before, after, "change", ""):
+        table.add_column(column, justify="right" if column else "left", no_wrap=True)
+    for p in prices:
+        table.add_row(
+            p.figure.words,
+            told(p.figure, p.before),
+            told(p.figure, p.after),
+            per_cent(p.change),
+            Text(p.verdict, style=STYLE[p.verdict]),
+        )
+    print()
+    console().print(table)
+
+
+def print_broken(name: str, found: Measured) -> None:
+    """Say which rules leave a finger without light and force error."""
+    from gelslim.cli.answer import say
+
+    if found.failed:
+        say(f"{name} breaks {', '.join(found.failed)}: no light and no force error of it.")
+
+
+def told(figure: Figure, value: float | None) -> str:
+    """A figure for people."""
+    from gelslim.cli.answer import number
+
+    if value is None:
+        return "–"
+    if figure.name in SHARES:
+        return f"{100 * value:.1f} %"
+    return number(value, figure.unit)
+
+
+def per_cent(change: float | None) -> str:
+    """A relative change for people."""
+    from gelslim_cad.explore.price import SAME
+
+    if change is None:
+        return "–"
+    if abs(change) < SAME:
+        return "same"
+    digits = 0 if abs(change) >= 1 else 1
+    return f"{100 * change:+.{digits}f} %"

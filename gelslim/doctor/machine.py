@@ -1,0 +1,130 @@
+"""Processors, threads, compiled kernels and what rendering needs."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from gelslim.extras import installed
+from gelslim_cad.build.fingerprint import PACKAGES
+from gelslim_cad.explore.engine import processors
+
+GL_LIBRARIES = {
+    "libGL.so.1": "libgl1",
+    "libEGL.so.1": "libegl1",
+    "libX11.so.6": "libx11-6",
+    "libXrender.so.1": "libxrender1",
+}
+"""What CAD and rendering load on Linux, and the Debian package of each."""
+DRAW_S = 120
+_DRAW = """
+import numpy as np
+from gelslim_cad.report.pictures import PictureError, picture_whole
+corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+try:
+    data = picture_whole([("test", corners, faces, (0.5, 0.5, 0.5, 1.0), (0, 0, 0))])
+    print("drawn" if data.startswith(b"\\x89PNG") else "no picture came out")
+except PictureError as error:
+    print(error)
+"""
+
+
+@dataclass(frozen=True)
+class Threads:
+    """Processors and what limits the threads of the numeric libraries."""
+
+    processors: int
+    usable: int
+    limits: dict[str, str]
+    """Environment variables that are set."""
+    pools: tuple[tuple[str, int], ...]
+    """Thread pools of BLAS and OpenMP with their number of threads."""
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """Compiled kernels kept on disk; cold ones cost seconds at the first call."""
+
+    cached: int
+    folder: str
+    writable: bool
+
+    @property
+    def warm(self) -> bool:
+        """Whether some are kept."""
+        return self.cached > 0
+
+
+def threads() -> Threads:
+    """What this process would use."""
+    import numpy as np
+    import scipy.linalg  # noqa: F401  (loads its BLAS)
+    from threadpoolctl import threadpool_info
+
+    np.zeros((2, 2)) @ np.zeros((2, 2))
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    pools = tuple((str(p["internal_api"]), int(p["num_threads"])) for p in threadpool_info())
+    limits = {n: os.environ[n] for n in names if n in os.environ}
+    return Threads(os.cpu_count() or 1, processors(), limits, pools)
+
+
+def kernels() -> Kernels:
+    """Where numba keeps what it has compiled of this project, and how much is there."""
+    other = os.environ.get("NUMBA_CACHE_DIR")
+    roots = [Path(other)] if other else [Path(str(resources.files(p))) for p in _packages()]
+    found = [index for root in roots for index in root.rglob("*.nbi")]
+    writable = all(os.access(r if r.exists() else r.parent, os.W_OK) for r in roots)
+    return Kernels(len(found), other or "beside the sources", writable)
+
+
+def _packages() -> tuple[str, ...]:
+    return tuple(p for p in (*PACKAGES, "gelslim_force", "gelslim_twin") if installed(p))
+
+
+def missing_graphics() -> tuple[tuple[str, str], ...]:
+    """Shared libraries that do not load, each with its Debian package; none but on Linux."""
+    if not sys.platform.startswith("linux"):
+        return ()
+    return tuple((lib, package) for lib, package in GL_LIBRARIES.items() if not _loads(lib))
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def drawing() -> str:
+    """Why no picture can be drawn off screen; empty where a test picture comes out."""
+    if not installed("vtkmodules"):
+        return "VTK is not installed: pip install 'gelslim-cad[view]'"
+    try:
+        run = subprocess.run(
+            [sys.executable, "-c", _DRAW],
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            timeout=DRAW_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return f"the test picture did not come out: {error}"
+    said = run.stdout.strip().splitlines()
+    if said and said[-1] == "drawn":
+        return ""
+    return said[-1] if said else f"drawing ends the process with status {run.returncode}"
+
+
+def system() -> str:
+    """Operating system, machine and Python in one line."""
+    return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"

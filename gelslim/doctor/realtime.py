@@ -1,0 +1,89 @@
+"""How fast forces come on this machine: the operators of a small pad, timed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+CELLS, CELL_MM, LAYERS = 32, 0.6, 4
+PASSES = 4
+"""Of forces per frame: the pipeline calls the operator about so often with a contact model."""
+FRAME_RATE_HZ = 90.0
+"""Of the Raspberry Pi spy camera at 640 × 480."""
+
+
+@dataclass(frozen=True)
+class Timed:
+    """An operator: time of a call in ms on one BLAS thread and on as many as the library takes."""
+
+    operator: str
+    one_thread_ms: float
+    all_threads_ms: float
+
+    @property
+    def best_ms(self) -> float:
+        """The quicker of the two."""
+        return min(self.one_thread_ms, self.all_threads_ms)
+
+
+@dataclass(frozen=True)
+class RealTime:
+    """Operators timed on a pad of 32 × 32 cells in four layers."""
+
+    operators: tuple[Timed, ...]
+
+    @property
+    def quickest(self) -> Timed:
+        """The quickest operator."""
+        return min(self.operators, key=lambda t: t.best_ms)
+
+    @property
+    def ready(self) -> bool:
+        """Whether `PASSES` calls of the quickest operator fit into a frame."""
+        return self.quickest.best_ms * PASSES < 1000 / FRAME_RATE_HZ
+
+    @property
+    def advice(self) -> str:
+        """What to set, where threads hurt; empty where they do not."""
+        worse = [t for t in self.operators if t.all_threads_ms > 1.5 * t.one_thread_ms]
+        if not worse:
+            return ""
+        names = ", ".join(t.operator for t in worse)
+        return (
+            f"more BLAS threads slow down {names}: set OMP_NUM_THREADS=1 and "
+            "OPENBLAS_NUM_THREADS=1 for the force pipeline"
+        )
+
+
+def time_operators() -> RealTime:
+    """Time the FFT, iterative and factored operators: a second or two."""
+    from threadpoolctl import threadpool_limits
+
+    from ifem_export.elements.material import Material
+    from ifem_export.mesh.pad_mesh import PadMesh
+    from ifem_export.operators.ladder import bumps, timed_ms
+    from ifem_export.operators.surface_operator import surface_operator
+
+    side, thickness = CELLS * CELL_MM, 2.0
+    mesh = PadMesh.from_occupancy(
+        np.ones((CELLS, CELLS, LAYERS), bool),
+        (CELL_MM, CELL_MM, thickness / LAYERS),
+        (-side / 2, -side / 2, -thickness),
+    )
+    gel = Material(0.147, 0.3223, 1000.0)
+    points = np.asarray(mesh.nodes_mm)[mesh.surface]
+    fields = [field(points) for field in bumps(mesh)]
+    choices: tuple[tuple[Any, dict[str, Any]], ...] = (
+        ("fft", {}),
+        ("pcg", {"rtol": 1e-2}),
+        ("factor", {}),
+    )
+    timed = []
+    for rung, parameters in choices:
+        operator = surface_operator(mesh, gel, "bbar", rung, **parameters)
+        with threadpool_limits(1):
+            alone = timed_ms(operator, fields)
+        timed.append(Timed(rung, alone, timed_ms(operator, fields)))
+    return RealTime(tuple(timed))

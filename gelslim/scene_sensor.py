@@ -1,0 +1,174 @@
+"""The sensor that a scene names, resolved: from its spec, or from a bundle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from gelslim_cad.dimensions import Dimensions
+    from gelslim_core.yaml.errors import InputError
+    from gelslim_twin.effects.circumstances import SensorFigures
+    from gelslim_twin.render.light_map import LightMap
+    from gelslim_twin.scene.reader import LoadedScene
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from ifem_export.bundle.bundle import Bundle
+
+DEEPEST_SHARE = 0.9
+"""Of the gel's thickness: what lies deeper is no contact with a gel that is still whole."""
+RAYS = 1 << 16
+RED_SHARE = 0.45
+"""Red is seen weaker than green on published frames of this finger."""
+ELEVATION_DEG = 25.0
+"""At which light rises through the gel on the mean; the tracer bins no directions."""
+
+
+def sensor_figures(loaded: LoadedScene) -> SensorFigures:
+    """The figures that planning needs, without a stiffness.
+
+    Raises `InputError` for a sensor that is missing or a spec with faults, IfemError for a folder
+    that is no bundle.
+    """
+    from gelslim_twin.sensor_figures import bundle_figures
+
+    _require_present(loaded)
+    if loaded.scene.sensor.bundle is not None:
+        return bundle_figures(loaded.sensor_path)
+    return _spec_figures(loaded)
+
+
+def sensor_bundle(loaded: LoadedScene) -> Bundle:
+    """The stiffness bundle of the scene's sensor: read, or made from the spec without a ladder.
+
+    Raises as `sensor_figures`.
+    """
+    _require_present(loaded)
+    if loaded.scene.sensor.bundle is not None:
+        from ifem_export.bundle.files import load_bundle
+
+        return load_bundle(loaded.sensor_path)
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.spec.reader import read_spec
+
+    spec = read_spec(loaded.sensor_path).spec
+    d = derive(spec)
+    grid = marker_grid(d)
+    return make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
+
+
+def twin_sensor(loaded: LoadedScene) -> TwinSensor:
+    """The sensor to simulate: bundle, outline and, from a spec, the light of its guide.
+
+    Raises as `sensor_figures`.
+    """
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+
+    if loaded.scene.sensor.bundle is not None:
+        return TwinSensor(sensor_bundle(loaded))
+    _require_present(loaded)
+    return spec_sensor(loaded.sensor_path)
+
+
+def spec_sensor(path: Path) -> TwinSensor:
+    """The sensor of a spec: bundle without a ladder, outline, and its guide's light when asked.
+
+    Raises `InputError` for a spec with faults.
+    """
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.spec.reader import read_spec
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+
+    spec = read_spec(path).spec
+    d = derive(spec)
+    grid = marker_grid(d)
+    bundle = make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
+    length, width = float(d["design.gel.length_mm"]), float(d["design.gel.width_mm"])
+    corner = float(d["design.gel.corner_radius_mm"])
+    return TwinSensor(bundle, lambda: _traced(d), length, width, corner)
+
+
+def _traced(d: Dimensions) -> LightMap:
+    """The guide's light on the pad, traced."""
+    import numpy as np
+
+    from gelslim_cad.geometry.guide_section import guide_profile
+    from gelslim_cad.light.scene import light_scene
+    from gelslim_optics.light.trace import trace_light
+    from gelslim_twin.render.light_map import LED_COLOURS, LightMap
+
+    traced = trace_light(light_scene(d, guide_profile(d)), RAYS, seed=0)
+    return LightMap.from_bins(
+        np.stack([RED_SHARE * traced.irradiance("red"), traced.irradiance("green")]),
+        float(d["design.gel.length_mm"]),
+        float(d["design.gel.width_mm"]),
+        azimuth_deg=np.array([90.0, -90.0]),
+        elevation_deg=np.full(2, ELEVATION_DEG),
+        colour=LED_COLOURS,
+        smooth_mm=0.6,
+    )
+
+
+def require_within_gel(loaded: LoadedScene, thickness_mm: float) -> None:
+    """Raise `InputError` for a tool that is pressed through nearly the whole gel."""
+    most = DEEPEST_SHARE * thickness_mm
+    lowest = min(indenter.raised_mm for indenter in loaded.scene.indenters)
+    depth = max(pose.depth_mm for pose in loaded.poses) - lowest
+    if depth <= most:
+        return
+    field = "motion.csv" if loaded.scene.motion.csv is not None else "motion.waypoints"
+    for number, waypoint in enumerate(loaded.scene.motion.waypoints or ()):
+        if getattr(waypoint, "depth_mm", 0.0) and waypoint.move == "press":
+            field = f"motion.waypoints[{number}].depth_mm"
+    raise loaded.problem(
+        field,
+        f"{depth + lowest:g}",
+        f"the tool goes {depth:g} mm deep into a gel of {thickness_mm:g} mm",
+        f"press at most {most:.3g} mm deep, {DEEPEST_SHARE:.0%} of the gel",
+    )
+
+
+def _require_present(loaded: LoadedScene) -> None:
+    sensor, path = loaded.scene.sensor, loaded.sensor_path
+    if sensor.spec is not None and not path.is_file():
+        raise _missing(loaded, "sensor.spec", sensor.spec, "no such file")
+    if sensor.bundle is not None and not path.is_dir():
+        raise _missing(loaded, "sensor.bundle", sensor.bundle, "no such folder")
+
+
+def _missing(loaded: LoadedScene, field: str, value: str, message: str) -> InputError:
+    from gelslim_core.yaml.errors import shown
+
+    return loaded.problem(
+        field, shown(value), message, f"paths are relative to the scene's folder, {loaded.folder}"
+    )
+
+
+def _spec_figures(loaded: LoadedScene) -> SensorFigures:
+    import numpy as np
+
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.geometry.sight import camera_record
+    from gelslim_cad.sensor.pad import marker_grid, pad_mesh
+    from gelslim_cad.spec.reader import read_spec
+    from gelslim_twin.sensor_figures import figures
+
+    spec = read_spec(loaded.sensor_path).spec
+    d = derive(spec)
+    grid = marker_grid(d)
+    mesh, _ = pad_mesh(d, grid)
+    cells = mesh.occupancy.shape
+    size = tuple(n * h for n, h in zip(cells, mesh.cell_size_mm, strict=True))
+    gel = spec.material.gel
+    return figures(
+        camera_record(d),
+        size_mm=(float(size[0]), float(size[1]), float(size[2])),
+        material=(gel.youngs_modulus_mpa, gel.poissons_ratio),
+        surface_nodes=len(mesh.surface),
+        layers=mesh.layers,
+        markers=len(grid),
+        marker_pitch_mm=float(d["design.markers.pitch_mm"]),
+        marker_diameter_mm=float(np.median(grid.diameter_mm)),
+    )

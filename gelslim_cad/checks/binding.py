@@ -1,0 +1,177 @@
+"""What binds the finger's thickness, and what it would gain from giving way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.checks.relaxation import Relaxation, given, ladders, relaxations
+from gelslim_cad.dimensions import Dimensions, derive_batch
+from gelslim_cad.spec import Spec
+
+ACTIVE = 0.004
+LEAST_SAVING_MM = 0.05
+SENTENCES_AT_MOST = 6
+
+
+SETTERS = {
+    "mirror": "the depth of the mirror under the window",
+    "camera": "the height of the camera housing",
+    "guide": "the bend, leg and LED board of the light guide",
+}
+LIMITS = {
+    "blur": "blur at the far edge",
+    "field of view along": "the field of view along the finger",
+    "field of view across": "the field of view across the finger",
+    "pixels per marker": "the pixels per marker at the far edge",
+    "keystone": "the keystone limit",
+    "lens travel": "how far the lens can be unscrewed",
+    "camera below window": "the room for the camera under the window",
+    "camera beside view": "the camera housing beside the view",
+    "camera clear of mirror": "the gap between camera and mirror",
+    "mirror before camera": "the gap between camera and mirror",
+    "camera clear of ledge": "the ledge above the camera",
+}
+
+
+def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
+    """Plain sentences: what sets the thickness, what gives, and what would make it fit."""
+    steps = relaxations(spec)
+    if not bool(np.all(d.feasible())):
+        return _infeasible(spec, d, steps)
+    tried = _try(spec, [(s,) for s in steps])
+    thickness = float(d["finger.thickness_mm"])
+    return (
+        _what_binds(d, thickness),
+        *_savings(steps, tried, thickness),
+        *_too_thick(spec, steps, thickness),
+    )
+
+
+def _try(spec: Spec, sets: Sequence[tuple[Relaxation, ...]]) -> tuple[Any, Any]:
+    """Thickness and feasibility of the spec under each set of relaxations, in one batch."""
+    paths = {s.path for chosen in sets for s in chosen}
+    columns = {
+        path: np.array(
+            [
+                next((s.value for s in chosen if s.path == path), given(spec, path))
+                for chosen in sets
+            ],
+            dtype=float,
+        )
+        for path in sorted(paths)
+    }
+    batch = derive_batch(spec, columns)
+    return batch["finger.thickness_mm"], batch.feasible()
+
+
+def _what_binds(d: Dimensions, thickness: float) -> str:
+    depths = {
+        "mirror": d["finger.mirror_depth_mm"],
+        "camera": d["finger.camera_depth_mm"],
+        "guide": d["guide.stack_mm"],
+    }
+    setter = max(depths, key=lambda k: depths[k])
+    text = f"Thickness {thickness:.2f} mm is set by {SETTERS[setter]}"
+    if setter == "guide":
+        return text + "."
+    active = [
+        LIMITS[name]
+        for name, value in d.fold.violations.items()
+        if name in LIMITS and float(np.reshape(value, -1)[0]) > -ACTIVE
+    ]
+    if not active:
+        return text + "."
+    return f"{text}; it cannot be less because of {_list(active)}."
+
+
+def _savings(
+    steps: tuple[Relaxation, ...], tried: tuple[Any, Any], thickness: float
+) -> tuple[str, ...]:
+    gains = [
+        (thickness - float(t), s.words)
+        for s, t, ok in zip(steps, *tried, strict=True)
+        if ok and thickness - t > LEAST_SAVING_MM
+    ]
+    gains.sort(key=lambda g: -g[0])
+    return tuple(
+        f"{words[0].upper()}{words[1:]} saves {gain:.2f} mm of thickness."
+        for gain, words in gains[:SENTENCES_AT_MOST]
+    )
+
+
+def _too_thick(spec: Spec, steps: tuple[Relaxation, ...], thickness: float) -> tuple[str, ...]:
+    limit = spec.design.envelope.max_thickness_mm
+    if limit is None or thickness <= limit + 1e-9:
+        return ()
+    start = (
+        f"design.envelope.max_thickness_mm allows {limit:g} mm; "
+        f"{thickness - limit:.2f} mm must be saved."
+    )
+    return (start, *_what_fits(spec, steps, limit))
+
+
+def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
+    missed = sorted(
+        ((float(np.reshape(v, -1)[0]), n) for n, v in d.fold.violations.items()), reverse=True
+    )
+    names = [LIMITS.get(n, n) for v, n in missed if v > 1e-6]
+    limit = spec.design.envelope.max_thickness_mm
+    within = "" if limit is None else f", let alone within {limit:g} mm"
+    text = f"No finger of this gel and camera keeps every limit{within}; missed: {_list(names)}."
+    if limit is None:
+        return (text, *_what_fits(spec, steps, math.inf))
+    thicker = "In a thicker finger it would fit with"
+    return (
+        text,
+        *_what_fits(spec, steps, limit),
+        *(s.replace("It would fit with", thicker) for s in _what_fits(spec, steps, math.inf)),
+    )
+
+
+def _what_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> tuple[str, ...]:
+    """What makes the design feasible and thin enough: one step, one field, or two steps."""
+    rungs = ladders(spec)
+    sets = [(s,) for s in steps] + [(s,) for ladder in rungs for s in ladder]
+    fits = _fitting(spec, sets, limit)
+    single = [(fits[(s,)], s.words) for s in steps if (s,) in fits]
+    if single:
+        best, words = min(single)
+        return (f"It would fit with {words}: {best:.2f} mm.",)
+    alone = [next((s for s in ladder if (s,) in fits), None) for ladder in rungs]
+    ways = [f"{s.words} ({fits[(s,)]:.2f} mm)" for s in alone if s is not None]
+    if ways:
+        return (f"It would fit with {' or with '.join(ways)}.",)
+    pairs = [(a, b) for i, a in enumerate(steps) for b in steps[i + 1 :]]
+    fits = _fitting(spec, pairs, limit)
+    if fits:
+        chosen = min(fits, key=lambda c: fits[c])
+        return (f"It would fit with {_list([s.words for s in chosen])}: {fits[chosen]:.2f} mm.",)
+    return (
+        "No one field alone and no two of the usual steps make it fit: use a smaller gel and "
+        "a camera with a wider field of view or a smaller aperture, or allow a thicker finger.",
+    )
+
+
+def _fitting(
+    spec: Spec, sets: Sequence[tuple[Relaxation, ...]], limit: float
+) -> dict[tuple[Relaxation, ...], float]:
+    """Those sets of relaxations that fit, each with the thickness it gives."""
+    if not sets:
+        return {}
+    thickness, feasible = _try(spec, sets)
+    return {
+        chosen: float(t)
+        for chosen, t, ok in zip(sets, thickness, feasible, strict=True)
+        if ok and t <= limit + 1e-9
+    }
+
+
+def _list(words: list[str]) -> str:
+    unique = list(dict.fromkeys(words))
+    if len(unique) < 2:
+        return "".join(unique)
+    return ", ".join(unique[:-1]) + " and " + unique[-1]

@@ -1,0 +1,162 @@
+"""How a value comes about: the chain of formulas with numbers, back to the lines of the spec."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from gelslim_cad.checks import RULES, check
+from gelslim_cad.checks.rule import Rule
+from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.dimensions.bend import chosen_here
+from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.registry import REGISTRY, Dimension, unit_of
+from gelslim_cad.spec import Spec
+from gelslim_cad.spec.reader import LoadedSpec
+from gelslim_core.errors import GelslimError
+from gelslim_core.yaml.fields import field_at
+
+Kind = Literal["dimension", "field", "solver", "rule"]
+BEND, BEND_FIELD = "guide.bend_ratio", "design.light_guide.bend_radius_ratio"
+AT_WORK = 0.004
+"""A limit closer than this part of its scale is said to be at work."""
+
+
+class UnknownNameError(GelslimError, ValueError):
+    """No dimension, rule or spec field has the name; the message suggests the closest."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value and what it was computed from.
+
+    A node that occurs twice is written out the first time; then `repeated` is set and `inputs`
+    is empty. `origin` is where a spec field was given: `file:line`, or `default`.
+    """
+
+    name: str
+    kind: Kind
+    value: Any
+    unit: str
+    meaning: str
+    formula: str = ""
+    source: str = ""
+    origin: str = ""
+    note: str = ""
+    repeated: bool = False
+    inputs: tuple[Node, ...] = ()
+
+
+def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
+    """The tree under the dimension, rule or spec field `name`.
+
+    Raises UnknownNameError with the closest names.
+    """
+    tracer = _Tracer(loaded, d)
+    if name in tracer.dimensions:
+        return tracer.node(name)
+    if name in RULES:
+        return tracer.rule(name)
+    for path in (name, f"design.{name}"):
+        if path in d.given:
+            return replace(tracer.node(path), note=_used_by(d, path))
+    known = dict.fromkeys((*d.values, *d.given, *RULES))
+    raise UnknownNameError(_unknown(name, tuple(known)))
+
+
+class _Tracer:
+    """Walks from a value to its inputs, each only once."""
+
+    def __init__(self, loaded: LoadedSpec, d: Dimensions) -> None:
+        self.loaded = loaded
+        self.d = d
+        self.dimensions = {entry.name for entry in REGISTRY.values()}
+        self.seen: set[str] = set()
+
+    def node(self, name: str) -> Node:
+        if name not in self.dimensions:
+            return self._field(name)
+        entry = definition(name)
+        kind: Kind = "solver" if entry.internal else "dimension"
+        value = None if entry.internal else self.d[name]
+        first = name not in self.seen
+        self.seen.add(name)
+        return Node(
+            name,
+            kind,
+            value,
+            entry.unit,
+            entry.title,
+            formula=entry.formula,
+            source=entry.source,
+            note=_limits_at_work(self.d.fold) if entry.internal else "",
+            repeated=not first,
+            inputs=self._inputs(self._heeded(entry)) if first else (),
+        )
+
+    def _heeded(self, entry: Dimension) -> tuple[str, ...]:
+        """The inputs that the value depends on: a given bend asks nothing of the light."""
+        if entry.name == BEND and not chosen_here(self.d.given[BEND_FIELD]):
+            return tuple(p for p in entry.inputs if self.d.argument(p)[0] == BEND_FIELD)
+        return entry.inputs
+
+    def rule(self, name: str) -> Node:
+        entry = RULES[name]
+        result = next(c for c in check(self.d) if c.id == name)
+        limit = "" if result.limit is None else f", limit {result.limit:.4g} {result.unit}".rstrip()
+        return Node(
+            name,
+            "rule",
+            result.value,
+            result.unit,
+            entry.title,
+            formula=f"{entry.title}: {result.status}{limit}",
+            note=entry.why,
+            inputs=self._inputs(entry.inputs),
+        )
+
+    def _inputs(self, parameters: tuple[str, ...]) -> tuple[Node, ...]:
+        return tuple(self.node(self.d.argument(p)[0]) for p in parameters)
+
+    def _field(self, path: str) -> Node:
+        place = self.loaded.source_map.get(path)
+        origin = "default" if place is None else f"{self.loaded.path}:{place.line}"
+        described = field_at(Spec, path)
+        return Node(
+            path,
+            "field",
+            self.d.given[path],
+            unit_of(path),
+            described.description if described else "",
+            origin=origin,
+        )
+
+
+def _used_by(d: Dimensions, path: str) -> str:
+    """Which dimensions and rules take the field directly."""
+    entries: tuple[Dimension | Rule, ...] = (*REGISTRY.values(), *RULES.values())
+    users = [
+        entry.id if isinstance(entry, Rule) else entry.name
+        for entry in entries
+        if path in (d.argument(p)[0] for p in entry.inputs)
+    ]
+    return "Used by: " + (", ".join(dict.fromkeys(users)) or "the files only")
+
+
+def _limits_at_work(fold: Fold) -> str:
+    missed = [n for n, v in fold.violations.items() if float(v.flat[0]) > 1e-6]
+    if missed:
+        return "no fold keeps every limit; missed: " + ", ".join(missed)
+    active = [n for n, v in fold.violations.items() if float(v.flat[0]) > -AT_WORK]
+    return "limits at work: " + (", ".join(active) or "none")
+
+
+def _unknown(name: str, known: tuple[str, ...]) -> str:
+    close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+    last = name.rsplit(".", 1)[-1]
+    close += [k for k in known if k.rsplit(".", 1)[-1] == last and k not in close][:3]
+    hint = (
+        f"did you mean {' or '.join(close)}?" if close else "`gelslim derive` lists all dimensions"
+    )
+    return f"no dimension, rule or spec field is called {name}; {hint}"

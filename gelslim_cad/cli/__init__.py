@@ -1,5 +1,0 @@
-"""The command line `gelslim`: one module per command, everything heavy imported when used."""
-
-from gelslim_cad.cli.main import main
-
-__all__ = ["main"]

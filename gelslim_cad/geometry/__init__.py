@@ -1,0 +1,1 @@
+"""Closed forms of one finger that its parts, light and sensor share."""

@@ -1,0 +1,1 @@
+"""A sensor made from a spec, for bundle, force pipeline and twin."""

@@ -1,0 +1,140 @@
+"""Marker grid, pad mesh and stiffness bundle of a finger: one marker grid serves them all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import numpy as np
+
+from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.sight import camera_record
+from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
+from gelslim_cad.markers.outline import Outline
+from gelslim_cad.spec import Spec
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.material import Material
+from ifem_export.markers.grid import MarkerGrid, build_marker_grid
+from ifem_export.mesh.crop import CropReport
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.ladder import REFERENCE_LAYERS
+from ifem_export.operators.operator_ladder import OperatorLadder
+
+
+def spec_hash(spec: Spec) -> str:
+    """SHA-256 of the spec's content: comments, order and spelt-out defaults do not change it."""
+    content = json.dumps(spec.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def pad_outline(d: Dimensions) -> RoundedRectangle:
+    """The gel seen from above."""
+    return RoundedRectangle(
+        d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.corner_radius_mm"]
+    )
+
+
+def marker_grid(d: Dimensions) -> MarkerGrid:
+    """The printed lattice, dots that would cross the gel's outline left out."""
+    grid = build_marker_grid(
+        round(d["marker_grid.rows"]),
+        round(d["marker_grid.columns"]),
+        d["design.markers.pitch_mm"],
+        d["design.markers.diameter_mm"],
+        anchors=d["design.markers.anchors"],
+    )
+    outline = pad_outline(d)
+    return grid.clipped(lambda points: outline.contains(points[:, 0], points[:, 1]))
+
+
+def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
+    """Hex-8 mesh of the pad; nodes meet the markers where the cell size allows it."""
+    outline, shape = pad_outline(d), GelShape.of(d)
+    cut = {
+        "crown": _crown(shape),
+        "weighting": d["mesh.weighting"],
+        "floor": d["mesh.least_fill"],
+    }
+    if d["mesh.cells_along"] is not None:
+        cells = (d["mesh.cells_along"], d["mesh.cells_across"], d["mesh.layers"])
+        return build_pad_mesh(outline, shape.thickness_mm, cells=cells, **cut)
+    return build_pad_mesh(
+        outline,
+        shape.thickness_mm,
+        pitch_mm=(d["pad_mesh.cell_x_mm"], d["pad_mesh.cell_y_mm"]),
+        layers=d["mesh.layers"],
+        align_to_mm=grid.positions_mm,
+        alignment_tolerance_mm=None,
+        **cut,
+    )
+
+
+def reference_mesh(d: Dimensions, mesh: PadMesh) -> PadMesh | None:
+    """Mesh of half the pitch and eight layers to measure a cut or crowned pad against.
+
+    None where the pad's own cells can be split.
+    """
+    if mesh.fill is None and mesh.surface_shift is None:
+        return None
+    shape = GelShape.of(d)
+    return build_pad_mesh(
+        pad_outline(d),
+        shape.thickness_mm,
+        pitch_mm=(mesh.cell_size_mm[0] / 2, mesh.cell_size_mm[1] / 2),
+        layers=max(REFERENCE_LAYERS, mesh.layers),
+        align_to_mm=mesh.nodes_mm[mesh.surface[:1]],
+        crown=_crown(shape),
+        weighting="volume_fraction",
+        floor=d["mesh.least_fill"],
+    )[0]
+
+
+def _crown(shape: GelShape) -> Paraboloid | None:
+    return Paraboloid(shape.crown_mm, shape.rim_mm) if shape.crown_mm > 0 else None
+
+
+def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NearestNodes, Outline]:
+    """What the marker files need beside the grid: nearest surface node per dot, gel outline."""
+    mesh, _ = pad_mesh(d, grid)
+    nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
+    gel = pad_outline(d)
+    return nodes, Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
+
+
+def gel_material(spec: Spec) -> Material:
+    """The gel as the stiffness needs it."""
+    gel = spec.material.gel
+    return Material(gel.youngs_modulus_mpa, gel.poissons_ratio, gel.density_kg_m3)
+
+
+def make_bundle(
+    spec: Spec,
+    d: Dimensions,
+    mesh: PadMesh,
+    grid: MarkerGrid,
+    *,
+    with_stiffness: bool = False,
+    ladder: OperatorLadder | None = None,
+    operator: str = "",
+) -> Bundle:
+    """The stiffness bundle of this sensor; K itself only `with_stiffness`: its recipe is there."""
+    return build_bundle(
+        mesh,
+        gel_material(spec),
+        spec.mesh.element,
+        marker_positions_mm=grid.positions_mm,
+        marker_arrays={
+            "row": grid.row,
+            "column": grid.column,
+            "diameter_mm": grid.diameter_mm,
+            "kind": np.asarray(grid.kind),
+        },
+        camera=camera_record(d),
+        spec_hash=spec_hash(spec),
+        with_stiffness=with_stiffness,
+        ladder=ladder,
+        operator=operator,
+    )

@@ -1,0 +1,118 @@
+"""A file that is there whole or not at all.
+
+It is written beside its place as `.0123456789abcdef.part`, forced to the disk and moved there. The
+part is locked by its writer, so that what a killed process left can be told from what another one
+is writing: the first write of a process into a folder removes such leftovers.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import re
+import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+from gelslim_core.files.file_lock import locked_new, orphaned, released
+from gelslim_core.files.held_interrupt import interrupts_held
+
+PART = re.compile(r"\.[0-9a-f]{16}\.part")
+_swept: set[tuple[int, str]] = set()
+
+
+def replace_file(path: str | os.PathLike[str], data: bytes, parents: bool = False) -> None:
+    """Write `data` to `path` in one step; `parents` makes the folders above.
+
+    A link is followed; a device or pipe is written to as it is. Raises OSError that names `path`;
+    the old file, if any, is then as it was.
+    """
+    with replacement(path, parents) as stream:
+        stream.write(data)
+
+
+@contextlib.contextmanager
+def replacement(path: str | os.PathLike[str], parents: bool = False) -> Iterator[IO[bytes]]:
+    """A stream whose content takes the place of `path` when the block ends without an error.
+
+    As `replace_file`.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        kind = _kind(target)
+        if kind == stat.S_IFDIR:
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if kind not in (0, stat.S_IFREG):
+            with open(target, "wb") as stream:
+                yield stream
+            return
+        if parents:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        sweep(target.parent)
+        with _part_beside(target) as stream:
+            yield stream
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from error
+
+
+def is_part(name: str) -> bool:
+    """Whether a file of this name is, or was, a part of `replace_file`."""
+    return bool(PART.fullmatch(name))
+
+
+def sweep(folder: Path, again: bool = False) -> None:
+    """Remove parts in `folder` whose writers are no more; once per process unless `again`."""
+    key = (os.getpid(), os.fspath(folder))
+    if key in _swept and not again:
+        return
+    _swept.add(key)
+    with contextlib.suppress(OSError):
+        for name in [entry.name for entry in os.scandir(folder) if is_part(entry.name)]:
+            with orphaned(folder / name) as free:
+                if free:
+                    (folder / name).unlink()
+
+
+@contextlib.contextmanager
+def _part_beside(target: Path) -> Iterator[IO[bytes]]:
+    with interrupts_held() as let_through:
+        part, descriptor = _new_part(target.parent)
+        try:
+            # closefd=False: the lock goes with the descriptor, which outlives the stream.
+            with let_through(), open(descriptor, "wb", closefd=False) as stream:
+                yield stream
+                stream.flush()
+                os.fsync(descriptor)
+            if sys.platform == "win32":
+                released(descriptor)
+                descriptor = -1
+            os.replace(part, target)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise
+        finally:
+            if descriptor >= 0:
+                released(descriptor)
+
+
+def _new_part(folder: Path) -> tuple[Path, int]:
+    while True:
+        part = folder / f".{os.urandom(8).hex()}.part"
+        with contextlib.suppress(FileExistsError):
+            descriptor = locked_new(part)
+            if descriptor is not None:
+                return part, descriptor
+
+
+def _kind(target: Path) -> int:
+    """Kind of what is at `target`; 0 for nothing."""
+    try:
+        return stat.S_IFMT(os.stat(target).st_mode)
+    except FileNotFoundError:
+        return 0

@@ -1,0 +1,116 @@
+"""How far a built sensor is from its design, in numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.calibration.camera_deviation import deviated_camera
+from gelslim_force.calibration.residual_bump import ResidualField
+from gelslim_optics.camera.lens_distortion import LensDistortion
+
+if TYPE_CHECKING:
+    from gelslim_force.calibration.fit import CameraFit
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
+
+Array = NDArray[np.float64]
+_STEP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltDeviation:
+    """The fitted deviations with what follows from them on the pad."""
+
+    values: Array
+    """(13,) in the order and units of `camera_deviation.PARAMETERS`."""
+    sigma: Array
+    """(13,) their standard deviations."""
+    tolerance: Array
+    """(13,) standard deviations expected of the build."""
+    weak: tuple[tuple[float, Array], ...]
+    """See `CameraFit.weak_directions`."""
+    rotation_deg: float
+    """Angle of the whole rotation."""
+    shift_mm: float
+    """Length of the pinhole's shift."""
+    scale_percent: float
+    """Change of the picture's mean scale (px per mm) over the print."""
+    distortion_px: float
+    """Largest change of a dot's place by the change of the distortion alone."""
+    moved_px: float
+    """Median distance of the dots from where the design's camera would see them."""
+    map_sigma_mm: float
+    """Root mean square uncertainty of places on the gel, each axis, from the camera's fit."""
+    lean_sigma_mm_per_mm: float
+    """Root mean square uncertainty of the sideways motion that a press of 1 mm seems to make."""
+    noise_px: float
+    """Standard deviation of one dot along one axis: detection and print."""
+    own_mm: float
+    """The same on the gel, against the neighbours."""
+    shared_mm: float
+    """Root mean square of what neighbours are off by together."""
+
+
+def built_deviation(
+    fit: CameraFit, rest_mm: Array, points_mm: Array, residuals: ResidualField
+) -> BuiltDeviation:
+    """Return the numbers of a fit; `rest_mm` (n, 2) and `points_mm` (n, 3) are its dots."""
+    design, built = fit.design, fit.camera
+    was, now = (np.sqrt(np.abs(np.linalg.det(c.jacobian(points_mm)))) for c in (design, built))
+    place, lean = _uncertainty(fit, points_mm)
+    seen = built.project(np.column_stack([rest_mm, points_mm[:, 2]]))
+    moved = seen - design.project(points_mm)
+    return BuiltDeviation(
+        values=fit.values,
+        sigma=fit.sigma,
+        tolerance=fit.tolerance,
+        weak=tuple(fit.weak_directions),
+        rotation_deg=float(np.linalg.norm(fit.values[:3])),
+        shift_mm=float(np.linalg.norm(fit.values[3:6])),
+        scale_percent=float(100 * (np.mean(now) / np.mean(was) - 1)),
+        distortion_px=_bent_px(fit, points_mm),
+        moved_px=float(np.median(np.hypot(*moved.T))),
+        map_sigma_mm=place,
+        lean_sigma_mm_per_mm=lean,
+        noise_px=fit.noise_px,
+        own_mm=residuals.own_mm,
+        shared_mm=residuals.shared_mm,
+    )
+
+
+def lean_mm_per_mm(camera: VirtualCamera, flat_mm: Array) -> Array:
+    """Return the motion (n, 2) on the rest plane that a motion of 1 mm along z looks like."""
+    motion = camera.jacobian_3d(flat_mm)
+    return np.asarray(np.linalg.solve(motion[:, :, :2], motion[:, :, 2:])[:, :, 0], dtype=float)
+
+
+def _uncertainty(fit: CameraFit, flat: Array) -> tuple[float, float]:
+    """Rms standard deviation along one axis of places on the gel and of their lean."""
+    to_gel = np.linalg.inv(fit.camera.jacobian(flat))
+    places, leans = [], []
+    for k, unit in enumerate(fit.tolerance):
+        step = np.zeros(len(fit.tolerance))
+        step[k] = _STEP * unit
+        low, high = (deviated_camera(fit.design, fit.values + s * step) for s in (-1, 1))
+        moved = (high.project(flat) - low.project(flat)) / (2 * step[k])
+        places.append((to_gel @ moved[:, :, None])[:, :, 0])
+        leans.append((lean_mm_per_mm(high, flat) - lean_mm_per_mm(low, flat)) / (2 * step[k]))
+    place, lean = (_spread(np.stack(v, axis=-1), fit.covariance) for v in (places, leans))
+    return place, lean
+
+
+def _spread(slopes: Array, covariance: Array) -> float:
+    flat = slopes.reshape(-1, slopes.shape[-1])
+    return float(np.sqrt(np.einsum("ki,ij,kj->k", flat, covariance, flat).mean()))
+
+
+def _bent_px(fit: CameraFit, flat: Array) -> float:
+    """Largest move of a dot's place where the built lens replaces the design's."""
+    straight = dataclasses.replace(fit.camera, lens=None)
+    rays = (straight.project(flat) - straight.principal_px) / straight.focal_px
+    was, now = ((c.lens or LensDistortion()).distort(rays) for c in (fit.design, fit.camera))
+    return float(fit.camera.focal_px * np.hypot(*(now - was).T).max())

@@ -1,0 +1,101 @@
+"""How a built camera may differ from its design, in thirteen numbers with their tolerances."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from gelslim_optics.camera.lens_distortion import LensDistortion
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+
+Array = NDArray[np.float64]
+PARAMETERS = (
+    "rotation_x_deg",
+    "rotation_y_deg",
+    "rotation_z_deg",
+    "shift_x_mm",
+    "shift_y_mm",
+    "shift_z_mm",
+    "focal_percent",
+    "k1",
+    "k2",
+    "p1",
+    "p2",
+    "principal_x_px",
+    "principal_y_px",
+)
+"""Order of the values: the virtual camera's rotation vector and shift in the sensor frame, the
+change of its focal length, and what is added to the design's distortion coefficients and to the
+place where its axis meets the picture."""
+
+
+@dataclass(frozen=True)
+class CameraTolerance:
+    """Standard deviations of a built camera about its design. Raises ValueError unless > 0.
+
+    Shift along x and y and rotation about z hold the placement of the print on the gel too: flat
+    layers look alike from everywhere, so one picture cannot tell a shifted print from a shifted
+    camera.
+    """
+
+    tilt_deg: float = 1.0
+    """About x and y."""
+    turn_deg: float = 1.5
+    """About z, print included."""
+    lateral_mm: float = 0.4
+    """Along x and y, print included."""
+    height_mm: float = 0.3
+    focal_percent: float = 2.0
+    k1: float = 0.05
+    k2: float = 0.02
+    tangential: float = 0.004
+    """p1 and p2."""
+    principal_share: float = 0.002
+    """Offset of the lens from the picture's middle, as a share of the picture's width. Small, as
+    tilt does nearly the same: a larger offset is found all the same where the picture shows it."""
+
+    def __post_init__(self) -> None:
+        for name, value in dataclasses.asdict(self).items():
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"camera tolerance {name} = {value!r}: must be a number > 0")
+
+    def sigma(self, design: VirtualCamera) -> Array:
+        """Standard deviations (13,) in the order and units of `PARAMETERS`."""
+        return np.array(
+            [self.tilt_deg] * 2
+            + [self.turn_deg]
+            + [self.lateral_mm] * 2
+            + [self.height_mm, self.focal_percent, self.k1, self.k2]
+            + [self.tangential] * 2
+            + [self.principal_share * design.image_width_px] * 2
+        )
+
+
+def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
+    """Return the design's camera changed by `values` (13,), see `PARAMETERS`.
+
+    The camera turns about its own pinhole. Raises ValueError for values that make no camera.
+    """
+    v = np.asarray(values, dtype=float)
+    if v.shape != (len(PARAMETERS),):
+        raise ValueError(f"camera deviation of shape {v.shape}: must be ({len(PARAMETERS)},)")
+    turned = Rotation.from_rotvec(np.radians(v[:3])).apply(design.axes)
+    lens = design.lens or LensDistortion()
+    bent = LensDistortion(
+        k1=lens.k1 + v[7], k2=lens.k2 + v[8], p1=lens.p1 + v[9], p2=lens.p2 + v[10], k3=lens.k3
+    )
+    x, y = design.principal_offset_px
+    return dataclasses.replace(
+        design,
+        principal_offset_px=(x + v[11], y + v[12]),
+        position_mm=design.position_mm + v[3:6],
+        right=turned[0],
+        down=turned[1],
+        forward=turned[2],
+        focal_px=design.focal_px * (1 + v[6] / 100),
+        lens=bent if any(dataclasses.astuple(bent)) else None,
+    )

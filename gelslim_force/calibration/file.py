@@ -1,0 +1,185 @@
+"""Calibrations as JSON, format `gelslim-calibration/1`; lengths in mm and px as named."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_core.files.atomic_file import json_bytes, replace_file
+from gelslim_force.calibration.built_deviation import BuiltDeviation
+from gelslim_force.calibration.camera_deviation import PARAMETERS
+from gelslim_force.calibration.error import CalibrationError
+from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.detection.detections import Detections
+from gelslim_force.detection.settings import DetectorSettings
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+from ifem_export.markers.grid import MarkerGrid
+
+FORMAT = "gelslim-calibration/1"
+_GRID = ("positions_mm", "row", "column", "diameter_mm", "kind", "pitch_mm", "lattice_shape",
+         "omitted")  # fmt: skip
+_DOTS = ("centres_px", "area_px", "contrast", "moments_px2", "flags")
+_ARRAYS = ("values", "sigma", "tolerance")
+
+
+def calibration_record(calibration: SensorCalibration) -> dict[str, Any]:
+    """Return plain values: numbers, text, lists and dicts."""
+    c = calibration
+    return {
+        "format": FORMAT,
+        "geometry_hash": c.geometry_hash,
+        "camera": c.camera.to_record(),
+        "deviation": None if c.deviation is None else _deviation_record(c.deviation),
+        "diagnosis": list(c.diagnosis),
+        "warnings": list(c.warnings),
+        "detector": dataclasses.asdict(c.detector),
+        "grid": {name: _plain(getattr(c.grid, name)) for name in _GRID},
+        "markers": c.markers.tolist(),
+        "dots": {name: _plain(getattr(c.dots, name)) for name in _DOTS},
+        "residual_px": c.residual_px.tolist(),
+        "rest_mm": c.rest_mm.tolist(),
+    }
+
+
+def calibration_of(record: Mapping[str, Any]) -> SensorCalibration:
+    """Return the calibration of a record.
+
+    Raises ValueError, KeyError or TypeError for a record of another make; see
+    `read_calibration` for a file's clear words.
+    """
+    if record.get("format") != FORMAT:
+        raise ValueError(f"its format is {record.get('format')!r}, only {FORMAT} is known")
+    deviation = record["deviation"]
+    grid, dots = record["grid"], record["dots"]
+    return SensorCalibration(
+        camera=VirtualCamera.from_record(record["camera"]),
+        grid=MarkerGrid(
+            positions_mm=_floats(grid["positions_mm"]),
+            row=_whole(grid["row"]),
+            column=_whole(grid["column"]),
+            diameter_mm=_floats(grid["diameter_mm"]),
+            kind=_whole(grid["kind"]),
+            pitch_mm=float(grid["pitch_mm"]),
+            lattice_shape=(int(grid["lattice_shape"][0]), int(grid["lattice_shape"][1])),
+            omitted=_whole(grid["omitted"]).reshape(-1, 2),
+        ),
+        markers=_whole(record["markers"]),
+        dots=Detections(
+            centres_px=_finite(dots["centres_px"], "centres_px"),
+            area_px=_finite(dots["area_px"], "area_px"),
+            contrast=_finite(dots["contrast"], "contrast"),
+            moments_px2=_finite(dots["moments_px2"], "moments_px2"),
+            flags=_whole(dots["flags"]),
+        ),
+        residual_px=_floats(record["residual_px"]),
+        rest_mm=_floats(record["rest_mm"]),
+        detector=DetectorSettings(**record["detector"]),
+        geometry_hash=str(record["geometry_hash"]),
+        deviation=None if deviation is None else _deviation_of(deviation),
+        diagnosis=tuple(str(line) for line in record["diagnosis"]),
+        warnings=tuple(str(line) for line in record["warnings"]),
+    )
+
+
+def write_calibration(calibration: SensorCalibration, path: str | os.PathLike[str]) -> None:
+    """Write the file whole or not at all. Raises OSError."""
+    replace_file(path, json_bytes(calibration_record(calibration)))
+
+
+def read_calibration(path: str | os.PathLike[str]) -> SensorCalibration:
+    """Read a file. Raises CalibrationError where there is none or it is not to be trusted."""
+    place = Path(path)
+    try:
+        record = json.loads(place.read_bytes().decode("utf-8"))
+    except OSError as error:
+        reason = error.strerror or "cannot be read"
+        raise CalibrationError(
+            f"{place}: {reason.lower()}; make it with `gelslim calibrate BUNDLE REFERENCE -o FILE`"
+        ) from error
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise _unusable(place, f"it is no JSON ({error})") from error
+    if not isinstance(record, Mapping):
+        raise _unusable(place, "it holds no record")
+    try:
+        return calibration_of(record)
+    except KeyError as error:
+        raise _unusable(place, f"{error.args[0]} is missing") from error
+    except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
+        raise _unusable(place, str(error)) from error
+
+
+def _unusable(place: Path, reason: str) -> CalibrationError:
+    return CalibrationError(
+        f"{place} is no calibration that can be used: {reason}; calibrate again with "
+        "`gelslim calibrate BUNDLE REFERENCE -o FILE`"
+    )
+
+
+def _deviation_record(deviation: BuiltDeviation) -> dict[str, Any]:
+    record: dict[str, Any] = {}
+    for field in dataclasses.fields(deviation):
+        value = getattr(deviation, field.name)
+        if field.name in _ARRAYS:
+            value = dict(zip(PARAMETERS, value.tolist(), strict=True))
+        elif field.name == "weak":
+            value = [
+                {
+                    "prior_variance_left": left,
+                    "direction": dict(zip(PARAMETERS, along.tolist(), strict=True)),
+                }
+                for left, along in value
+            ]
+        record[field.name] = value
+    return record
+
+
+def _deviation_of(record: Mapping[str, Any]) -> BuiltDeviation:
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(BuiltDeviation):
+        value = record[field.name]
+        if field.name in _ARRAYS:
+            values[field.name] = _by_parameter(value)
+        elif field.name == "weak":
+            values[field.name] = tuple(
+                (float(w["prior_variance_left"]), _by_parameter(w["direction"])) for w in value
+            )
+        else:
+            values[field.name] = float(value)
+    return BuiltDeviation(**values)
+
+
+def _by_parameter(value: Mapping[str, Any]) -> NDArray[np.float64]:
+    return _floats([value[name] for name in PARAMETERS])
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _array(kind: type) -> Callable[[Any], NDArray[Any]]:
+    def made(values: Any) -> NDArray[Any]:
+        array = np.array(values)
+        if array.size and array.dtype.kind not in "if":
+            raise ValueError(f"a list holds {array.dtype}, not numbers")
+        if kind is np.int64 and not np.array_equal(array, np.rint(array)):
+            raise ValueError("a list of ids, indices or flags holds numbers that are not whole")
+        return array.astype(kind)
+
+    return made
+
+
+_floats, _whole = _array(np.float64), _array(np.int64)
+
+
+def _finite(values: Any, name: str) -> NDArray[np.float64]:
+    array: NDArray[np.float64] = _floats(values)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} holds a value that is not finite")
+    return array

@@ -1,0 +1,222 @@
+"""The built camera from the dots of one no-contact frame: least squares with tolerances as prior.
+
+Minimises the dots' distances from where the camera should see them, over their noise, plus each
+deviation from the design over its tolerance: the most probable camera for normal deviations.
+What one picture of a plane cannot tell (a longer lens or a nearer gel) is thus settled by the
+tolerances, and said to be so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+
+from gelslim_force.calibration.camera_deviation import PARAMETERS, CameraTolerance, deviated_camera
+from gelslim_force.detection.disc_centroid import centroid_offset_px
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+
+Array = NDArray[np.float64]
+_FIRST_NOISE_PX = 0.5
+_LEAST_NOISE_PX = 2e-3
+_SOFT = 2.0
+_FAR = 4.5
+_STEP = 1e-4
+_WIDEST = 12.0
+_ROUNDS = 3
+_LEAST_DOTS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFit:
+    """A fitted camera, what the dots leave over, and how sure each deviation is."""
+
+    design: VirtualCamera
+    camera: VirtualCamera
+    values: Array
+    """(13,) deviations, see `PARAMETERS`."""
+    covariance: Array
+    """(13, 13) of the values, prior included."""
+    information: Array
+    """(13, 13) inverse covariance that the picture alone gives."""
+    tolerance: Array
+    """(13,) prior standard deviations."""
+    offset_px: Array
+    """(n, 2) centroid of each dot's image minus image of the dot's centre."""
+    residual_px: Array
+    """(n, 2) seen minus expected centroid."""
+    used: NDArray[np.bool_]
+    """(n,) dots the fit rests on; the others lie too far from it."""
+    noise_px: float
+    """Standard deviation of a used dot along one axis: detection and print."""
+
+    @cached_property
+    def sigma(self) -> Array:
+        """(13,) standard deviations of the values."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @cached_property
+    def weak_directions(self) -> list[tuple[float, Array]]:
+        """Combinations of deviations that the picture tells less of than the tolerances do.
+
+        Each with the share of the prior variance that is left (1/2 ... 1) and its direction (13,)
+        in units of the tolerances, unit length, weakest first.
+        """
+        scaled = self.information * np.outer(self.tolerance, self.tolerance)
+        strength, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+        weak = [(float(1 / (1 + max(s, 0.0))), v) for s, v in zip(strength, vectors.T, strict=True)]
+        return [(left, _signed(v)) for left, v in weak if left > 0.5]
+
+
+def fit_camera(
+    design: VirtualCamera,
+    points_mm: ArrayLike,
+    diameter_mm: ArrayLike,
+    centres_px: ArrayLike,
+    tolerance: CameraTolerance | None = None,
+    believed: ArrayLike | None = None,
+    heights_mm: ArrayLike = 0.0,
+) -> CameraFit:
+    """Fit the camera to n dots.
+
+    Args:
+        design: where the fit starts.
+        points_mm: (n, 2) dots on the rest plane.
+        diameter_mm: (n,) theirs.
+        centres_px: (n, 2) centroids seen.
+        tolerance: of the built camera.
+        believed: (n,) dots to fit by; the others get residuals only.
+        heights_mm: one or (n,), of the gel under the dots.
+
+    Two rounds with a robust loss find the noise and the dots that do not belong; the last one
+    is plain least squares over the others. Raises ValueError for shapes that do not fit, values
+    that are not finite or fewer than 12 dots.
+    """
+    points, seen = np.asarray(points_mm, dtype=float), np.asarray(centres_px, dtype=float)
+    diameter = np.asarray(diameter_mm, dtype=float)
+    if points.shape != seen.shape or points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points {points.shape} and centres {seen.shape}: both must be (n, 2)")
+    if len(points) < _LEAST_DOTS or not np.isfinite([points, seen]).all():
+        raise ValueError(f"{len(points)} dots: a camera needs at least {_LEAST_DOTS}, all finite")
+    heights = np.broadcast_to(np.asarray(heights_mm, dtype=float), len(points))
+    solid = np.column_stack([points, heights])
+    problem = _Problem(design, solid, (tolerance or CameraTolerance()).sigma(design))
+    trusted = np.ones(len(points), dtype=bool) if believed is None else np.array(believed, bool)
+    if trusted.sum() < _LEAST_DOTS:
+        raise ValueError(f"{int(trusted.sum())} dots to fit by: at least {_LEAST_DOTS} are needed")
+    unit = np.zeros(len(PARAMETERS))
+    used, noise = trusted, _FIRST_NOISE_PX
+    for turn in range(_ROUNDS):
+        camera = problem.camera(unit)
+        offset = centroid_offset_px(camera, points, diameter)
+        last = turn == _ROUNDS - 1
+        unit = problem.solved(unit, seen - offset, used, noise, robust=not last)
+        left = seen - offset - problem.image(unit)
+        if not last:
+            noise = max(1.4826 * float(np.median(np.abs(left[trusted]))), _LEAST_NOISE_PX)
+            used = trusted & (np.hypot(*left.T) <= _FAR * noise)
+            used = used if used.sum() >= _LEAST_DOTS else trusted
+    return _judged(problem, unit, offset, left, used, noise)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Dots (n, 3) at rest and a camera in units of its tolerances."""
+
+    design: VirtualCamera
+    points_mm: Array
+    tolerance: Array
+
+    def camera(self, unit: Array) -> VirtualCamera:
+        return deviated_camera(self.design, unit * self.tolerance)
+
+    def image(self, unit: Array) -> Array:
+        return self.camera(unit).project(self.points_mm)
+
+    def jacobian(self, unit: Array) -> Array:
+        """(2 n, 13) of the image by central differences."""
+        columns = []
+        for k in range(len(unit)):
+            step = np.zeros(len(unit))
+            step[k] = _STEP
+            columns.append((self.image(unit + step) - self.image(unit - step)) / (2 * _STEP))
+        return np.stack(columns, axis=-1).reshape(-1, len(unit))
+
+    def solved(
+        self, unit: Array, target: Array, used: NDArray[np.bool_], noise: float, robust: bool
+    ) -> Array:
+        rows = np.repeat(used, 2)
+        count = int(rows.sum())
+
+        def misfit(u: Array) -> Array:
+            try:
+                left = (self.image(u) - target).ravel()[rows] / noise
+            except ValueError:
+                # Beyond the distortion's domain: no better than the worst, so the step shrinks.
+                left = np.full(count, 1e6)
+            return np.concatenate([left, u])
+
+        def slopes(u: Array) -> Array:
+            return np.vstack([self.jacobian(u)[rows] / noise, np.eye(len(u))])
+
+        def softened(z: Array) -> Array:
+            """Soft absolute value for dots; the prior stays quadratic."""
+            rho = np.vstack([z, np.ones_like(z), np.zeros_like(z)])
+            t = 1 + z[:count] / _SOFT**2
+            rho[:, :count] = [
+                2 * _SOFT**2 * (np.sqrt(t) - 1),
+                1 / np.sqrt(t),
+                -0.5 / _SOFT**2 * t**-1.5,
+            ]
+            return rho
+
+        found = least_squares(
+            misfit,
+            np.clip(unit, -0.99 * _WIDEST, 0.99 * _WIDEST),
+            jac=slopes,
+            bounds=(-_WIDEST, _WIDEST),
+            loss=softened if robust else "linear",
+            xtol=1e-10,
+            ftol=1e-10,
+            gtol=1e-8,
+            max_nfev=60,
+        )
+        return np.asarray(found.x)
+
+
+def _judged(
+    problem: _Problem,
+    unit: Array,
+    offset: Array,
+    left: Array,
+    used: NDArray[np.bool_],
+    noise: float,
+) -> CameraFit:
+    slopes = problem.jacobian(unit)[np.repeat(used, 2)]
+    squared = slopes.T @ slopes
+    free = squared / noise**2
+    taken = float(np.trace(np.linalg.solve(free + np.eye(len(unit)), free)))
+    spare = max(2 * int(used.sum()) - taken, 1.0)
+    noise = max(float(np.sqrt((left[used] ** 2).sum() / spare)), _LEAST_NOISE_PX)
+    scale = np.outer(problem.tolerance, problem.tolerance)
+    data = squared / noise**2
+    return CameraFit(
+        design=problem.design,
+        camera=problem.camera(unit),
+        values=unit * problem.tolerance,
+        covariance=np.linalg.inv(data + np.eye(len(unit))) * scale,
+        information=data / scale,
+        tolerance=problem.tolerance,
+        offset_px=offset,
+        residual_px=left,
+        used=used,
+        noise_px=noise,
+    )
+
+
+def _signed(vector: Array) -> Array:
+    """The direction whose largest part is positive."""
+    return vector if vector[np.argmax(np.abs(vector))] > 0 else -vector

@@ -1,0 +1,1 @@
+"""Where the gel is touched and how far it is pressed in."""

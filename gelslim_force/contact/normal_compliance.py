@@ -1,0 +1,129 @@
+"""How far the pad's surface sinks under normal forces, column by column, kept.
+
+A column holds the normal displacement of all c surface nodes under 1 N on one of them. A pad that
+is its own mirror image needs columns for one of each set of equivalent nodes only: an eighth of
+them on a square pad. Columns are made when first asked for, in batches.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ifem_export.operators.sparse_factor import Factor, factored
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+BATCH = 32
+REVERSALS: tuple[tuple[int, ...], ...] = ((), (0,), (1,), (0, 1))
+"""Axes to reverse."""
+
+
+class Compliant(Protocol):
+    """What is needed of a surface operator."""
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Displacement (c, 3) in mm under forces (c, 3) in N."""
+
+
+class NormalCompliance:
+    """C_zz of a surface operator: float32 columns in mm/N.
+
+    `displacement` makes them, or, for an operator that carries the pad's whole system and solves
+    it, one factor with many right-hand sides (the same numbers, several times faster).
+    """
+
+    def __init__(self, operator: Compliant, columns: int) -> None:
+        self._operator = operator
+        self._columns = columns
+        self._values = np.zeros((columns, columns), dtype=np.float32)
+        self._known = np.zeros(columns, dtype=bool)
+        self._factor: Factor | None = None
+        self._twins = _symmetries(operator, columns)
+        """(g, c) permutations of the nodes that leave the pad unchanged, the identity first."""
+        images = self._twins.min(axis=0)
+        self._original: Nodes = images
+        self._by: Nodes = self._twins.argmin(axis=0)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the table, whole from the start."""
+        return int(self._values.nbytes)
+
+    @property
+    def ready(self) -> float:
+        """Share of the columns that are made."""
+        return float(self._known.mean())
+
+    def prepare(self) -> None:
+        """Make all columns now."""
+        self._make(np.arange(self._columns))
+
+    def block(self, nodes: Nodes) -> Array:
+        """C_zz (n, n) among `nodes` (n,), symmetric."""
+        self._make(nodes)
+        block = self._values[np.ix_(nodes, nodes)].astype(float)
+        return np.asarray((block + block.T) / 2)
+
+    def apply(self, nodes: Nodes, force_n: Array) -> Array:
+        """Normal displacement (c,) or (c, k) in mm under forces (n,) or (n, k) on `nodes`."""
+        self._make(nodes)
+        # Rows stand for columns: the compliance is symmetric.
+        return np.asarray(self._values[nodes].T @ force_n.astype(np.float32), dtype=float)
+
+    def _make(self, nodes: Nodes) -> None:
+        if self._known[nodes].all():
+            return
+        missing = np.asarray(nodes)[~self._known[nodes]]
+        originals = np.unique(self._original[missing])
+        originals = originals[~self._known[originals]]
+        for first in range(0, len(originals), BATCH):
+            part = originals[first : first + BATCH]
+            self._values[part] = self._solved(part).T
+            self._known[part] = True
+        for node in missing[~self._known[missing]]:
+            twin = self._twins[self._by[node]]
+            self._values[node] = self._values[self._original[node], twin]
+            self._known[node] = True
+
+    def _solved(self, nodes: Nodes) -> Array:
+        """Columns (c, n)."""
+        system = getattr(self._operator, "system", None)
+        if system is None or not hasattr(self._operator, "whole"):
+            return np.column_stack([self._one(node) for node in nodes])
+        if self._factor is None:
+            self._factor = factored(system.stiffness)
+        unknowns = system.stiffness.shape[0]
+        loads = np.zeros((unknowns, len(nodes)))
+        loads[unknowns - 3 * self._columns + 3 * nodes + 2, np.arange(len(nodes))] = 1.0
+        moved = self._factor.solve(loads)
+        return np.asarray(moved[unknowns - 3 * self._columns :][2::3])
+
+    def _one(self, node: int) -> Array:
+        force = np.zeros((self._columns, 3))
+        force[node, 2] = 1.0
+        return np.asarray(self._operator.displacement(force)[:, 2])
+
+
+def _symmetries(operator: Compliant, columns: int) -> Nodes:
+    """Node permutations of the mirror images, and quarter turns, that the pad is equal to."""
+    identity = np.arange(columns)
+    system = getattr(operator, "system", None)
+    if system is None:
+        return identity[None]
+    cells = np.asarray(system.mesh.occupancy)[:, :, 0].T
+    rows, across = np.asarray(system.places).T
+    numbers = np.full((cells.shape[0] + 1, cells.shape[1] + 1), -1)
+    numbers[rows, across] = identity
+    pitch_x, pitch_y, _ = system.mesh.cell_size_mm
+    square = abs(pitch_x - pitch_y) <= 1e-12 * pitch_x
+    found = []
+    for transposed in (False, True) if square else (False,):
+        for flips in REVERSALS:
+            image = np.flip(cells.T if transposed else cells, flips)
+            if image.shape == cells.shape and (image == cells).all():
+                moved = np.flip(numbers.T if transposed else numbers, flips)
+                found.append(moved[rows, across])
+    return np.array(found)

@@ -1,0 +1,269 @@
+"""Normal displacement of the whole surface from the contact patch of a known indenter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from gelslim_force.contact.indenter import Flat, Indenter
+from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
+from gelslim_force.contact.patch import ContactPatch, turned
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SELF_SHARE = 0.5
+"""Part of a node's own compliance that grows as only a share of its area is loaded."""
+LEAST_SHARE = 0.02
+SHIFTS = ((0.25, 0.25), (0.25, -0.25), (-0.25, 0.25), (-0.25, -0.25))
+STEPS = 40
+DISCRETE = 0.2
+"""Relative error of the depth at a patch one node spacing in size; falls with the square."""
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMotion:
+    """Normal displacement at the c surface nodes; NaN throughout where unknown."""
+
+    w_mm: Array
+    """(c,) negative where the gel is pressed in."""
+    sigma_mm: Array
+    """(c,) standard deviation."""
+    patch: Mask
+    """(c,) nodes that the indenter touches."""
+    depth_mm: float
+    """Of the indenter's lowest point below the rest surface; NaN where unknown."""
+    depth_sigma_mm: float
+    force_n: Array
+    """(c,) push on the nodes, positive into the gel, of this contact without friction."""
+    problem: str = ""
+    """Why it is unknown, in words."""
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a displacement."""
+        return not self.problem
+
+    @property
+    def push_n(self) -> float:
+        """Total normal force without friction."""
+        return float(self.force_n.sum())
+
+
+class NormalModel:
+    """Frictionless contact of a rigid indenter on a pad's surface operator.
+
+    Inside the patch the surface follows the indenter, w = profile - depth; beside it the surface
+    is free and bulges as the pad's elasticity asks. The depth is the one at which the pressure
+    falls to zero at the rim seen: the contact area is that of the greatest force (Barber, J.
+    Elasticity 4, 1974), so dF/da = depth k'(a) - Φ'(a) = 0, with k the stiffness of a flat punch
+    of the patch's outline and Φ the force that the profile saves. It needs no modulus.
+
+    `points_mm` (c, 3) are the surface nodes in the operator's order, on a lattice of `pitch_mm`.
+    Not safe for use from two threads at once.
+    """
+
+    def __init__(self, operator: Compliant, points_mm: ArrayLike) -> None:
+        points = np.array(points_mm, dtype=float)
+        if points.ndim != 2 or points.shape[1] < 2 or not np.isfinite(points).all():
+            raise ValueError(f"surface nodes of shape {points.shape}: give (c, 3) finite, in mm")
+        self.points_mm = points[:, :2]
+        self.pitch_mm = _pitch(self.points_mm)
+        self.compliance = NormalCompliance(operator, len(points))
+
+    def prepare(self) -> None:
+        """Make the whole compliance now, so that no frame waits for a part of it."""
+        self.compliance.prepare()
+
+    def motion(
+        self,
+        patch: ContactPatch,
+        indenter: Indenter,
+        depth_mm: float | None = None,
+        depth_sigma_mm: float = 0.0,
+    ) -> NormalMotion:
+        """Motion under `indenter` with the patch seen; `depth_mm` where it is known otherwise.
+
+        A flat punch's depth does not show in its patch: without `depth_mm` it stays unknown.
+        Raises ValueError for a depth that is not positive and finite.
+        """
+        if depth_mm is None:
+            if isinstance(indenter, Flat):
+                return self.unknown("a flat punch's patch does not tell its depth: supply it")
+            patch, depth, spread = self._settled(patch, indenter)
+            if not np.isfinite(depth):
+                return self.unknown(_why_no_depth(patch, indenter))
+            # To first order a smooth indenter's depth goes as the square of its patch.
+            growth = 2 * depth / patch.size_mm
+        else:
+            if not (np.isfinite(depth_mm) and depth_mm > 0):
+                raise ValueError(f"depth_mm = {depth_mm:g}: must be finite and above 0")
+            depth, spread, growth = depth_mm, depth_sigma_mm, 0.0
+            patch = patch.at_height(self._rim_height(patch, indenter, depth))
+        gap = depth - self._profile(patch, indenter)
+        touched, push, factor = self._contact(gap, patch)
+        if not len(touched):
+            return self.unknown("the patch lies beside the pad's surface nodes")
+        sensitivity = self._sensitivity(patch, indenter, touched)
+        moved = self.compliance.apply(
+            touched, np.column_stack([push, cho_solve(factor, sensitivity)])
+        )
+        by = np.column_stack([moved[:, 2], moved[:, 3], growth * moved[:, 1], moved[:, 4]])
+        variance = np.einsum("ci,ij,cj->c", by, patch.covariance, by) + (moved[:, 1] * spread) ** 2
+        w = -moved[:, 0]
+        w[touched] = -gap[touched]
+        mask = np.zeros(len(w), dtype=bool)
+        mask[touched] = True
+        force = np.zeros(len(w))
+        force[touched] = push
+        total = float(np.hypot(growth * patch.sigma_mm, spread))
+        return NormalMotion(w, np.sqrt(np.maximum(variance, 0)), mask, depth, total, force)
+
+    def cap_only(self, patch: ContactPatch, indenter: Indenter) -> NormalMotion:
+        """The paper's model: the indenter's cap below the patch's rim, no motion beside it.
+
+        Its depth is the cap's height, profile(size): the rim is taken to be at rest.
+        """
+        if isinstance(indenter, Flat):
+            return self.unknown("a flat punch has no cap")
+        depth = self._rim_profile(patch, indenter)
+        if not np.isfinite(depth):
+            return self.unknown(_why_no_depth(patch, indenter))
+        gap = depth - self._profile(patch, indenter)
+        inside = gap > 0
+        spread = 2 * depth / patch.size_mm * patch.sigma_mm
+        w, zero = np.where(inside, -gap, 0.0), np.zeros(len(gap))
+        return NormalMotion(w, np.where(inside, spread, 0.0), inside, depth, spread, zero)
+
+    def unknown(self, problem: str) -> NormalMotion:
+        """A motion that is not known, and why."""
+        nan, none = np.full(len(self.points_mm), np.nan), np.zeros(len(self.points_mm), bool)
+        return NormalMotion(nan, nan, none, np.nan, np.nan, nan, problem)
+
+    def depth_mm(self, patch: ContactPatch, indenter: Indenter) -> float:
+        """Depth at which the pressure falls to zero at the patch's rim; NaN where there is none.
+
+        Taken with the patch shifted by a quarter of the node spacing in four directions, which
+        evens out where the rim passes between the nodes.
+        """
+        if not np.isfinite(self._rim_profile(patch, indenter)):
+            return np.nan
+        from gelslim_force.contact.punch_kernel import punches
+
+        half = self.pitch_mm / 2
+        near = np.flatnonzero(patch.outside_mm(*self.points_mm.T) < 2 * self.pitch_mm)
+        x, y = self.points_mm[near].T
+        shares, profiles = [], []
+        for shift in SHIFTS:
+            moved = replace(patch, centre_mm=patch.centre_mm + self.pitch_mm * np.array(shift))
+            outside = moved.outside_mm(x, y)
+            shares += [0.5 - (outside - sign * half) / self.pitch_mm for sign in (1, -1)]
+            profiles += 2 * [np.asarray(indenter.profile(*moved.local(x, y)), dtype=float)]
+        block = self.compliance.block(near)
+        # A force on a part of a node's area sinks in further, as 1/side of the loaded square.
+        own = SELF_SHARE * float(np.median(np.diag(block))) if len(near) else 0.0
+        found = np.empty((len(shares), 2))
+        shares_of = np.clip(shares, 0.0, 1.0)
+        punches(block, own, shares_of, np.array(profiles), LEAST_SHARE, found)
+        gained, saved = found[0::2].sum(axis=0) - found[1::2].sum(axis=0)
+        return float(saved / gained) if gained > 0 else np.nan
+
+    def _settled(
+        self, patch: ContactPatch, indenter: Indenter
+    ) -> tuple[ContactPatch, float, float]:
+        """Patch at the height its depth puts it, depth and its error from the mesh."""
+        depth = self.depth_mm(patch, indenter)
+        if not np.isfinite(depth):
+            return patch, np.nan, np.nan
+        seen = patch.size_mm
+        patch = patch.at_height(self._rim_height(patch, indenter, depth))
+        # The shift moves the patch by less than a node: the depth follows its size alone.
+        depth *= (patch.size_mm / seen) ** 2
+        return patch, depth, DISCRETE * (self.pitch_mm / patch.size_mm) ** 2 * depth
+
+    def _rim_profile(self, patch: ContactPatch, indenter: Indenter) -> float:
+        if isinstance(indenter, Flat):
+            return 0.0
+        return float(
+            indenter.profile(*((patch.size_mm, 0.0)[:: 1 if patch.kind == "disc" else -1]))
+        )
+
+    def _rim_height(self, patch: ContactPatch, indenter: Indenter, depth: float) -> float:
+        rim = self._rim_profile(patch, indenter)
+        return -depth + (rim if np.isfinite(rim) else 0.0)
+
+    def _profile(self, patch: ContactPatch, indenter: Indenter) -> Array:
+        return np.asarray(indenter.profile(*patch.local(*self.points_mm.T)), dtype=float)
+
+    def _contact(
+        self, gap: Array, patch: ContactPatch
+    ) -> tuple[NDArray[np.intp], Array, tuple[Array, bool]]:
+        """Nodes touched, the push on them and the factor of their compliance, by active set."""
+        active = (patch.outside_mm(*self.points_mm.T) < 0) & np.isfinite(gap)
+        active |= (gap > 0) & ~active.any()
+        slack = 1e-6 * max(float(gap.max()), 1e-9)
+        nodes, push, factor = np.flatnonzero(active), np.zeros(0), None
+        for step in range(STEPS):
+            if not len(nodes):
+                break
+            try:
+                factor = cho_factor(self.compliance.block(nodes))
+            except LinAlgError as error:
+                raise ValueError("the pad's compliance is not positive definite") from error
+            push = cho_solve(factor, gap[nodes])
+            pulled = push < 0
+            if pulled.any():
+                active[nodes[pulled]] = False
+                nodes = np.flatnonzero(active)
+                continue
+            within = gap - self.compliance.apply(nodes, push) > slack
+            within[nodes] = False
+            # Nodes on the brink could take turns for ever: a push, however small, may stay.
+            if not within.any() or step > STEPS - 10:
+                break
+            active |= within
+            nodes = np.flatnonzero(active)
+        return nodes, push, factor  # type: ignore[return-value]
+
+    def _sensitivity(
+        self, patch: ContactPatch, indenter: Indenter, nodes: NDArray[np.intp]
+    ) -> Array:
+        """Change (n, 4) of the gap at the nodes per depth, x, y and angle."""
+        x, y = self.points_mm[nodes].T
+        turn, small = np.deg2rad(patch.angle_deg), 1e-5
+
+        def profile(dx: float, dy: float, dt: float) -> Array:
+            place = patch.centre_mm + np.array([dx, dy])
+            return np.asarray(indenter.profile(*turned(x, y, place, turn + dt)), dtype=float)
+
+        columns = [np.ones(len(nodes))]
+        for move in ((small, 0.0, 0.0), (0.0, small, 0.0), (0.0, 0.0, small)):
+            back = (-move[0], -move[1], -move[2])
+            with np.errstate(invalid="ignore"):
+                change = (profile(*back) - profile(*move)) / (2 * small)
+            columns.append(np.where(np.isfinite(change), change, 0.0))
+        return np.column_stack(columns)
+
+
+def _pitch(points_mm: Array) -> float:
+    """Node spacing: the geometric mean of the least steps along x and y."""
+    steps = []
+    for values in points_mm.T:
+        gaps = np.diff(np.unique(np.round(values, 9)))
+        if not len(gaps):
+            raise ValueError("the surface nodes lie on one line: they must cover an area")
+        steps.append(float(gaps.min()))
+    return float(np.sqrt(steps[0] * steps[1]))
+
+
+def _why_no_depth(patch: ContactPatch, indenter: Indenter) -> str:
+    radius = getattr(indenter, "radius_mm", None)
+    if radius is not None and patch.size_mm > radius:
+        return (
+            f"the patch of {patch.size_mm:.2f} mm is wider than the indenter of {radius:g} mm "
+            "radius: another indenter, or another thing, touches the gel"
+        )
+    return "the patch holds too few surface nodes"

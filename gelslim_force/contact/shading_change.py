@@ -1,0 +1,193 @@
+"""How the light on the gel changes from the reference to a frame, in coarse bins.
+
+The change is logarithmic: where red and green come from opposite sides, log R/G follows the
+surface's slope across the finger, whatever the paint and the lamps' fall-off; the brightness that
+is left carries the slope along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.frames.read_only import read_only
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+LEAST_LEVEL = 8.0
+"""Mean grey value of the reference under which a channel says nothing."""
+FLOOR = 5.0
+LEAST_FREE = 0.34
+"""Share of a bin's pixels that must be free of ink and glare."""
+MEDIAN_OF = 1500
+ROBUST = 1.4826
+"""Standard deviation of a normal law over its median absolute deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShadingChange:
+    """Change of log R/G and of log brightness in the used channels, one layer per combination."""
+
+    change: NDArray[np.floating]
+    """(c, rows, columns) about the median over the pad; 0 where not valid."""
+    valid: Mask
+    """(rows, columns) bins on the pad with enough free pixels."""
+    noise: NDArray[np.floating]
+    """(c, rows, columns) standard deviation of each bin, from the spread off the patch; where there
+    is little light, or few free pixels, it is larger."""
+
+
+class ShadingReference:
+    """Reference frame (h, w, 3) or (h, w) uint8 with its markers, and the bins' layout.
+
+    `on_pad` (rows, columns) is set later by who knows where the bins lie on the gel.
+    """
+
+    def __init__(
+        self, image: NDArray[np.uint8], markers_px: Array, radius_px: Array, bin_px: int
+    ) -> None:
+        self.image = as_picture(image)
+        self.bin_px = bin_px
+        height, width, channels = self.image.shape
+        self.shape = (height // bin_px, width // bin_px)
+        self.on_pad = np.ones(self.shape, dtype=bool)
+        self._radius = radius_px
+        from gelslim_force.contact.shading_kernel import block_discs, whole_sums
+
+        self._blocked = np.zeros((height, width), dtype=np.uint8)
+        self._touched = np.zeros(self.shape, dtype=np.uint8)
+        block_discs(self._blocked, markers_px, radius_px, bin_px, self._touched)
+        self._scratch = np.empty_like(self._blocked), np.empty_like(self._touched)
+        self._sums = np.zeros((2, *self.shape, channels), dtype=np.int64)
+        self._glaring = np.zeros((2, *self.shape), dtype=np.uint8)
+        whole_sums(self.image, bin_px, self._sums[0], self._glaring[0])
+        self._ratios = np.ones((channels, *self.shape), dtype=np.float32)
+        self._counts = np.zeros(self.shape, dtype=np.int64)
+        levels = self._levels()
+        level = self.image.reshape(-1, channels).mean(axis=0)
+        self._used = np.flatnonzero(level >= LEAST_LEVEL)
+        if not len(self._used):
+            raise ValueError(
+                f"the reference frame is dark (mean {level.max():.0f} of 255): no shading"
+            )
+        self._unrest = _unrest(levels[self._used])
+
+    def _levels(self) -> NDArray[np.float32]:
+        """Mean grey value (c, rows, columns) of the free pixels of each bin; 0 where none is."""
+        rows, columns = self.shape
+        size = self.bin_px
+        cut = slice(0, rows * size), slice(0, columns * size)
+        free = (self._blocked[cut] == 0).astype(np.float32)
+
+        def summed(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+            return picture.reshape(rows, size, columns, size).sum(axis=(1, 3))
+
+        count = np.maximum(summed(free), 1)
+        channels = np.moveaxis(self.image[cut], 2, 0)
+        return np.stack([summed(c * free) / count for c in channels])
+
+    def centres_px(self) -> Array:
+        """Centres (rows * columns, 2) of the bins."""
+        y, x = np.mgrid[: self.shape[0], : self.shape[1]]
+        places = np.column_stack([x.ravel(), y.ravel()])
+        return places * self.bin_px + (self.bin_px - 1) / 2
+
+    def change(
+        self, image: NDArray[np.uint8], markers_px: Array | None, radius_px: Array | None = None
+    ) -> ShadingChange:
+        """Change from the reference to `image`, both without the markers of either.
+
+        Raises ValueError for an image of another shape.
+        """
+        from gelslim_force.contact.shading_kernel import block_discs, light_ratios, whole_sums
+
+        picture = as_picture(image)
+        if picture.shape != self.image.shape:
+            raise ValueError(
+                f"the frame has shape {picture.shape}, the reference {self.image.shape}: "
+                "use frames of one camera mode"
+            )
+        blocked, touched = self._scratch
+        np.copyto(blocked, self._blocked)
+        np.copyto(touched, self._touched)
+        if markers_px is not None and len(markers_px):
+            radius = radius_px
+            if radius is None:
+                radius = np.full(len(markers_px), float(np.median(self._radius)))
+            block_discs(blocked, np.asarray(markers_px, dtype=float), radius, self.bin_px, touched)
+        whole_sums(picture, self.bin_px, self._sums[1], self._glaring[1])
+        glaring = self._glaring[0] | self._glaring[1]
+        # A few grey values keep a channel that goes black from outweighing all others.
+        light_ratios(
+            self.image, picture, blocked, touched, glaring, self.bin_px, self._sums, FLOOR,
+            self._ratios, self._counts,
+        )  # fmt: skip
+        free = self._counts >= LEAST_FREE * self.bin_px**2
+        share = np.sqrt(np.float32(self.bin_px**2) / np.maximum(self._counts, 1))
+        unrest = self._unrest * share.astype(np.float32)
+        return _about_median(
+            _combined(np.log(self._ratios[self._used])), free & self.on_pad, unrest
+        )
+
+
+def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An (h, w, c) view. Raises ValueError for another shape or type."""
+    picture = np.asarray(image)
+    channels = 1 if picture.ndim == 2 else picture.shape[-1]
+    if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or channels not in (1, 3):
+        raise ValueError(
+            f"image of shape {picture.shape} and type {picture.dtype}: give (h, w, 3) or (h, w) "
+            "uint8"
+        )
+    if min(picture.shape[:2]) < 32:
+        raise ValueError(f"image of {picture.shape[1]} x {picture.shape[0]} px: 32 x 32 at least")
+    return read_only(picture if picture.ndim == 3 else picture[:, :, None])
+
+
+def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Log R/G first, then the brightness, then what further channels add; (c, rows, columns)."""
+    if len(log) == 1:
+        return log
+    out = np.empty_like(log)
+    np.subtract(log[0], log[1], out=out[0])
+    np.add(log[0], log[1], out=out[1])
+    out[1] *= 0.5
+    np.subtract(log[2:], out[1], out=out[2:])
+    return out
+
+
+def _unrest(levels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How noisy each bin of each layer of `_combined` is, up to a factor per layer.
+
+    Noise of one size in grey values, whatever the light (gamma takes away most of what shot noise
+    adds to bright pixels), makes a logarithm err as 1 over the level.
+    """
+    square = 1 / np.square(levels + np.float32(FLOOR))
+    if len(square) == 1:
+        return np.sqrt(square)
+    both = square[:1] + square[1:2]
+    return np.sqrt(np.concatenate([both, both / 4, square[2:] + both / 4]))
+
+
+def _about_median(
+    change: NDArray[np.floating], valid: Mask, unrest: NDArray[np.floating]
+) -> ShadingChange:
+    layers = len(change)
+    used = np.flatnonzero(valid)
+    if not len(used):
+        return ShadingChange(np.zeros_like(change), valid, np.full_like(change, np.inf))
+    some = used[:: max(1, len(used) // MEDIAN_OF)]
+    seen, scale = (a.reshape(layers, -1)[:, some] for a in (change, unrest))
+    middle = _middles(seen)
+    spread = ROBUST * _middles(np.abs(seen - middle) / scale)
+    change -= middle[:, :, None]
+    change *= valid
+    return ShadingChange(change, valid, np.maximum(spread[:, :, None] * unrest, 1e-4))
+
+
+def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:
+    """(c, 1) upper medians."""
+    half = rows.shape[1] // 2
+    return np.partition(rows, half, axis=1)[:, half : half + 1]

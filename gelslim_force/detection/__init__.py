@@ -1,0 +1,1 @@
+"""Marker centres in one picture."""

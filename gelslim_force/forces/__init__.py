@@ -1,0 +1,1 @@
+"""From displacements to the force field, the wrench and its covariance."""

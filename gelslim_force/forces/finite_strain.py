@@ -1,0 +1,90 @@
+"""Surface forces of a neo-Hookean pad from the motion of its outer surface.
+
+No force acts on inner nodes: their motion is found by Newton steps with the linear stiffness,
+
+    u_i <- u_i - K_ii⁻¹ F_i(u),
+
+with Anderson's acceleration, from the linear extension of the surface motion; the rest left after
+the last evaluation is condensed onto the surface. A pad of one layer has no inner nodes and needs
+one evaluation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gelslim_force.contact.anderson import Anderson
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
+from ifem_export.operators.surface_field import checked
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteStrainForce:
+    """Forces (c, 3) in N for motions (c, 3) in mm of `PadMesh.surface`."""
+
+    bundle: Bundle
+    tolerance: float = 0.01
+    """Rest on the inner nodes, relative to the surface forces."""
+    most_steps: int = 12
+    inner_rtol: float = 1e-3
+
+    @cached_property
+    def system(self) -> PadSystem:
+        """Linear stiffness of the pad. Raises MeshError for a pad whose layers differ."""
+        return PadSystem(self.bundle.mesh, np.asarray(self.bundle.element_matrix))
+
+    @cached_property
+    def pad(self) -> NeoHookeanPad:
+        """The pad at large strain."""
+        return NeoHookeanPad.of(self.bundle.mesh, self.bundle.material)
+
+    @cached_property
+    def inner(self) -> Solver:
+        """Solver of the inner nodes."""
+        return inner_solver(self.system, "pcg")
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """Forces that hold the surface in a motion (c, 3).
+
+        Raises IfemError for a wrong shape, FiniteStrainError for a motion that turns a cell
+        inside out, ConvergenceError where the inner nodes find no balance.
+        """
+        u = checked(displacement_mm, self.system.columns)
+        whole = np.zeros((self.bundle.mesh.n_nodes, 3))
+        whole[-self.system.columns :] = u
+        if self.system.layers == 1:
+            return np.asarray(self.pad.force(whole)[-self.system.columns :])
+        return self._balanced(whole, u)
+
+    def _balanced(self, whole: Array, u: Array) -> Array:
+        columns = self.system.columns
+        inside = slice(columns, -columns)
+        pull = self.system.surface_to_inner @ u.reshape(-1)
+        whole[inside] = self.inner.solve(-pull, self.inner_rtol).x.reshape(-1, 3)
+        memory = Anderson()
+        trail: list[float] = []
+        for _ in range(self.most_steps):
+            found = self.pad.force(whole)
+            rest, force = found[inside], found[-columns:]
+            size = float(np.linalg.norm(force))
+            trail.append(float(np.linalg.norm(rest)))
+            done = trail[-1] <= self.tolerance * size or size == 0.0
+            step = self.inner.solve(-rest.reshape(-1), 0.05 if done else self.inner_rtol).x
+            if done:
+                carried = self.system.inner_to_surface @ step
+                return np.asarray(force + carried.reshape(-1, 3))
+            whole[inside] = memory.next(whole[inside].reshape(-1), step).reshape(-1, 3)
+        shown = ", ".join(f"{t:.2g}" for t in trail)
+        raise ConvergenceError(
+            f"inner nodes of the neo-Hookean pad are not balanced after {self.most_steps} steps "
+            f"(rest {shown} N): the motion strains the gel too far for the linear stiffness"
+        )

@@ -1,0 +1,1 @@
+"""The regular grid that the markers form in the picture."""

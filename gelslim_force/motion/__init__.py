@@ -1,0 +1,1 @@
+"""From marker positions in the picture to displacements of the gel surface."""

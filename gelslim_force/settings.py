@@ -1,0 +1,85 @@
+"""What a user may choose about the force pipeline; the defaults suit a 90 Hz camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from gelslim_core.budget.budget import Budget
+from gelslim_force.forces.estimator import ForceSettings
+from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.errors import IfemError
+from ifem_export.operators.operator_ladder import OperatorLadder, operator_label
+from ifem_export.operators.surface_operator import RUNGS, Rung, SurfaceOperator
+
+QUICK = operator_label("fft", {"lumped": 1})
+Interpolation = Literal["sparse", "thin_plate"]
+Gel = Literal["linear", "neo_hookean"]
+
+
+@dataclass(frozen=True)
+class PipelineSettings:
+    """Choices of the pipeline. Raises ValueError for impossible ones.
+
+    Operator: a rung by name, or a budget (error of the force field, time of the operator per
+    frame) that picks from the bundle's measured ladder; else the bundle's own choice.
+    """
+
+    rung: Rung | None = None
+    budget: Budget | None = None
+    compensation: Compensation = "exact"
+    interpolation: Interpolation = "sparse"
+    gel: Gel = "linear"
+    force: ForceSettings = field(default_factory=ForceSettings)
+    noise_px: float | None = None
+    """Standard deviation of a marker's place; estimated on each frame where None."""
+    unknown_normal_mm: float = 0.3
+    """Depth that may go unseen without a normal source: what projection makes of it enters the
+    covariance of the wrench."""
+    least_coverage: float = 0.3
+    """Share of the markers seen under which a frame gives no forces."""
+
+    def __post_init__(self) -> None:
+        if self.rung is not None and self.rung not in RUNGS:
+            raise ValueError(f"operator {self.rung!r}: must be one of {', '.join(RUNGS)}")
+        if self.rung is not None and self.budget is not None and not self.budget.unlimited:
+            raise ValueError("give an operator by name or a budget, not both")
+        if self.compensation not in COMPENSATIONS:
+            raise ValueError(
+                f"compensation {self.compensation!r}: must be one of {', '.join(COMPENSATIONS)}"
+            )
+        if self.interpolation not in ("sparse", "thin_plate"):
+            raise ValueError(f"interpolation {self.interpolation!r}: sparse or thin_plate")
+        if self.gel not in ("linear", "neo_hookean"):
+            raise ValueError(f"gel {self.gel!r}: linear or neo_hookean")
+        if self.noise_px is not None and not self.noise_px >= 0:
+            raise ValueError(f"noise_px = {self.noise_px:g}: must be >= 0")
+        if not 0 <= self.least_coverage <= 1:
+            raise ValueError(f"least_coverage = {self.least_coverage:g}: must be in 0 ... 1")
+
+    def operator(self, bundle: Bundle) -> SurfaceOperator:
+        """Operator of the bundle that these settings ask for.
+
+        Raises BudgetError where no rung keeps the budget, IfemError for a budget without ladder.
+        """
+        return bundle.surface_operator(self.rung, budget=self.budget)
+
+    def compliance(self, bundle: Bundle) -> SurfaceOperator:
+        """The operator that a masked fit asks many times per frame.
+
+        A quick one, unless a budget asks for less error than that has: then the one chosen, at
+        many times the time. Raises as `operator`.
+        """
+        if self._too_coarse(bundle.ladder):
+            return self.operator(bundle)
+        try:
+            return bundle.surface_operator("fft", lumped=1)
+        except IfemError:
+            return self.operator(bundle)
+
+    def _too_coarse(self, ladder: OperatorLadder | None) -> bool:
+        if ladder is None or self.budget is None:
+            return False
+        quick = ladder.named(QUICK)
+        return quick is not None and not self.budget.allows_error(quick.error_field)

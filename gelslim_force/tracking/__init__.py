@@ -1,0 +1,1 @@
+"""Which detected dot is which marker, from frame to frame."""

@@ -1,0 +1,180 @@
+"""Compiled matching of markers to dots. Import only where it runs: numba.
+
+Arrays: `reference` (n, 2) and `places` (n, 2) px, `near` (n, k) neighbours of each marker on the
+lattice or -1, `pitch` (n,) distance to the nearest of them, `points` (m, 2) dots of the frame,
+`match` (n,) dot of each marker or -1, `trusted` (n,) whether the match may be built upon.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gelslim_core.kernel_cache import drop_stale
+from gelslim_force.detection.darkness_kernel import COMPILED
+from gelslim_force.tracking.local_motion_kernel import local_affine, local_place, local_quadratic
+
+drop_stale(["matching_kernel"], ["local_motion_kernel"], Path(__file__).parent)
+
+_LEVELS = 12
+
+
+@njit(**COMPILED)
+def nearest(points: Any, x: Any, y: Any) -> Any:
+    """Index of the dot nearest to (x, y) and its squared distance; -1 without dots."""
+    best, least = -1, 1e300
+    for k in range(points.shape[0]):
+        dx, dy = points[k, 0] - x, points[k, 1] - y
+        gap = dx * dx + dy * dy
+        if gap < least:
+            best, least = k, gap
+    return best, least
+
+
+@njit(**COMPILED)
+def mutual(places: Any, points: Any, pitch: Any, gate: Any, match: Any) -> None:
+    """Match markers and dots that are each other's nearest, within `gate` pitches."""
+    owner = np.full(points.shape[0], -1, dtype=np.int64)
+    least = np.full(points.shape[0], 1e300)
+    for i in range(places.shape[0]):
+        match[i] = -1
+        if not math.isfinite(places[i, 0] + places[i, 1]):
+            continue
+        k, gap = nearest(points, places[i, 0], places[i, 1])
+        if k >= 0 and gap < (gate * pitch[i]) ** 2 and gap < least[k]:
+            owner[k], least[k] = i, gap
+    for k in range(points.shape[0]):
+        if owner[k] >= 0:
+            match[owner[k]] = k
+
+
+@njit(**COMPILED)
+def verify(
+    reference: Any,
+    near: Any,
+    pitch: Any,
+    points: Any,
+    match: Any,
+    trusted: Any,
+    gate: Any,
+    rounds: Any,
+) -> Any:
+    """Trust matches whose neighbours' affine motion leads to them; returns how many are."""
+    agrees = np.zeros(reference.shape[0], dtype=np.bool_)
+    count = 0
+    for _ in range(rounds):
+        count, changed = 0, False
+        for i in range(reference.shape[0]):
+            agrees[i] = False
+            if match[i] < 0:
+                continue
+            limit = (gate * pitch[i]) ** 2
+            x, y, n = local_affine(i, reference, near, points, match, trusted)
+            dx, dy = points[match[i], 0] - x, points[match[i], 1] - y
+            agrees[i] = n >= 4 and dx * dx + dy * dy < limit
+            if not agrees[i]:
+                x, y, n = local_quadratic(i, reference, near, pitch, points, match, trusted)
+                dx, dy = points[match[i], 0] - x, points[match[i], 1] - y
+                agrees[i] = n >= 4 and dx * dx + dy * dy < limit
+        for i in range(reference.shape[0]):
+            changed |= agrees[i] != trusted[i]
+            trusted[i] = agrees[i]
+            count += agrees[i]
+        if not changed:
+            break
+    return count
+
+
+@njit(**COMPILED)
+def patches(
+    reference: Any, near: Any, pitch: Any, points: Any, match: Any, trusted: Any, gate: Any
+) -> Any:
+    """Return the patch (n,) of each trusted marker, -1 for others; a patch moves alike.
+
+    Markers off by a pitch agree among themselves, but a step in motion surrounds them.
+    """
+    patch = np.full(reference.shape[0], -1, dtype=np.int64)
+    todo = np.empty(reference.shape[0], dtype=np.int64)
+    count = 0
+    for seed in range(reference.shape[0]):
+        if not trusted[seed] or patch[seed] >= 0:
+            continue
+        open_ = 1
+        todo[0] = seed
+        patch[seed] = count
+        while open_ > 0:
+            open_ -= 1
+            i = todo[open_]
+            for k in range(near.shape[1]):
+                j = near[i, k]
+                if j < 0 or not trusted[j] or patch[j] >= 0:
+                    continue
+                du = reference[j, 0] - reference[i, 0]
+                dv = reference[j, 1] - reference[i, 1]
+                dx = points[match[j], 0] - points[match[i], 0] - du
+                dy = points[match[j], 1] - points[match[i], 1] - dv
+                steps = math.sqrt(du * du + dv * dv)
+                if math.sqrt(dx * dx + dy * dy) < gate * min(steps, 1.5 * pitch[i]):
+                    patch[j] = count
+                    todo[open_] = j
+                    open_ += 1
+        count += 1
+    return patch
+
+
+@njit(**COMPILED)
+def grow(
+    reference: Any, near: Any, pitch: Any, points: Any, match: Any, trusted: Any, gate: Any
+) -> Any:
+    """Extend the trusted patch ring by ring, best-supported markers first; returns its size."""
+    n, m = reference.shape[0], points.shape[0]
+    owner = np.full(m, -1, dtype=np.int64)
+    offer = np.empty(n, dtype=np.int64)
+    gap2 = np.empty(n)
+    count = 0
+    for i in range(n):
+        if trusted[i]:
+            owner[match[i]] = i
+            count += 1
+        else:
+            match[i] = -1
+    level = 0
+    while level < _LEVELS:
+        # Surest first: small gaps before large ones, many neighbours before few.
+        fewest, reach = 12 - 3 * (level % 4), gate * (1 + level // 4) / 3
+        added = 0
+        for i in range(n):
+            offer[i] = -1
+            if trusted[i]:
+                continue
+            x, y, support = local_place(i, reference, near, pitch, points, match, trusted)
+            if support < max(fewest, 4):
+                continue
+            k, gap = nearest(points, x, y)
+            gap /= pitch[i] ** 2
+            if k < 0 or owner[k] >= 0 or gap > reach * reach:
+                continue
+            offer[i], gap2[i] = k, gap
+        for i in range(n):
+            k = offer[i]
+            if k < 0:
+                continue
+            rival = False
+            for j in range(n):
+                if j != i and offer[j] == k and (gap2[j], j) < (gap2[i], i):
+                    rival = True
+                    break
+            if not rival:
+                match[i] = k
+                added += 1
+        for i in range(n):
+            if not trusted[i] and match[i] >= 0:
+                trusted[i] = True
+                owner[match[i]] = i
+        count += added
+        level = 0 if added else level + 1
+    return count

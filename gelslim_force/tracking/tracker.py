@@ -1,0 +1,194 @@
+"""Markers followed from frame to frame: the one place with a memory.
+
+Each frame is first searched only where the markers should be. When too few are verified, or a
+check is due, the whole frame is searched and matched anew; when the anchors contradict, the
+lattice is registered from scratch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from gelslim_force.detection.detection import Detector, as_planes
+from gelslim_force.detection.detections import Detections
+from gelslim_force.lattice.growth import LatticeError
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
+from gelslim_force.lattice.registration import Registration, register
+from gelslim_force.tracking.anchor_check import anchors_slipped
+from gelslim_force.tracking.matching import match
+from gelslim_force.tracking.tracks import Tracks
+from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
+
+_SAME_PX = 1.0
+_LEAST_TO_FOLLOW = 0.25
+"""Share of the markers that a full search must find for the next frame to go on from it."""
+Route = Literal["near", "full", "registered"]
+"""How a frame's markers were found: near predictions, in the whole frame, or by the anchors."""
+
+
+@dataclass(frozen=True)
+class TrackerSettings:
+    """When the tracker leaves its fast path. Raises ValueError for shares outside 0 ... 1."""
+
+    least_coverage: float = 0.97
+    """Share of the markers tracked in the last full search that the fast path must find."""
+    full_every: int = 30
+    """Frames after which the whole frame is searched again in any case."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.least_coverage <= 1.0:
+            raise ValueError(f"least_coverage = {self.least_coverage:g}: must be in 0 ... 1")
+        if self.full_every < 1:
+            raise ValueError(f"full_every = {self.full_every}: must be at least 1")
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedFrame:
+    """One frame's tracks, with the dots they refer to."""
+
+    tracks: Tracks
+    detections: Detections
+    route: Route
+    slipped: bool
+    """The anchors contradict the tracks, and registration could not set it right."""
+
+
+class Tracker:
+    """Follows the markers of one reference; feed frames in order.
+
+    With a `grid` whose anchors are large dots, a slip of the whole lattice is noticed and undone.
+    """
+
+    def __init__(
+        self,
+        detector: Detector,
+        reference: ReferenceLattice,
+        reference_dots: Detections,
+        grid: MarkerGrid | None = None,
+        settings: TrackerSettings | None = None,
+    ) -> None:
+        """`reference_dots` are the reference's markers, in its order."""
+        if len(reference_dots) != len(reference):
+            raise ValueError(
+                f"{len(reference_dots)} reference dots for {len(reference)} markers: "
+                "give one for each, in the same order"
+            )
+        self._detector, self._reference, self._grid = detector, reference, grid
+        self._settings = settings or TrackerSettings()
+        self._area = reference_dots.area_px
+        self._large = np.zeros(len(reference), dtype=bool)
+        if grid is not None:
+            self._large = grid.kind[reference.markers] == ANCHOR_LARGE
+        self._rest_moments = reference_dots.moments_px2
+        self.reset()
+
+    @classmethod
+    def from_registration(
+        cls,
+        detector: Detector,
+        registration: Registration,
+        detections: Detections,
+        grid: MarkerGrid,
+        settings: TrackerSettings | None = None,
+    ) -> Tracker:
+        """Return a tracker for the markers registered in a no-contact frame."""
+        reference = ReferenceLattice.from_registration(registration, grid)
+        dots = detections.take(registration.dots[reference.markers])
+        return cls(detector, reference, dots, grid, settings)
+
+    @property
+    def reference(self) -> ReferenceLattice:
+        """The markers followed."""
+        return self._reference
+
+    def reset(self) -> None:
+        """Forget all motion; the next frame is searched whole."""
+        self._places = self._reference.places_px.copy()
+        self._velocity = np.zeros_like(self._places)
+        self._moments = self._rest_moments.copy()
+        self._usual = 0
+        self._age = self._settings.full_every
+
+    def update(self, image: NDArray[np.uint8]) -> TrackedFrame:
+        """Return the markers of the next frame. Raises ValueError for what is no frame."""
+        as_planes(image)
+        expected = self._places + self._velocity
+        result = None
+        if self._age < self._settings.full_every:
+            result = self._near(image, expected)
+        if result is None:
+            result = self._full(image, expected)
+            # A frame that shows next to nothing says nothing about where to look in the next one.
+            blind = result.tracks.coverage < _LEAST_TO_FOLLOW
+            self._age = self._settings.full_every if blind else 0
+            self._usual = int(result.tracks.tracked.sum())
+        self._age += 1
+        self._remember(result)
+        return result
+
+    def _near(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame | None:
+        known = np.isfinite(expected).all(axis=1, keepdims=True)
+        places = np.where(known, expected, -1.0)
+        dots = self._detector.detect_near(image, places, self._moments, compare=False)
+        dots = dots.take(dots.found)
+        tracks = match(self._reference, dots.centres_px, expected)
+        if tracks.tracked.sum() < self._usual:
+            dots, tracks = self._looked_again(image, dots, tracks, expected)
+        if tracks.tracked.sum() < self._settings.least_coverage * self._usual:
+            return None
+        return TrackedFrame(tracks, dots, "near", False)
+
+    def _looked_again(
+        self,
+        image: NDArray[np.uint8],
+        dots: Detections,
+        tracks: Tracks,
+        expected: NDArray[np.float64],
+    ) -> tuple[Detections, Tracks]:
+        """Look for lost markers where their neighbours' motion puts them: it changed at once."""
+        lost = np.flatnonzero(~tracks.tracked & tracks.known)
+        more = self._detector.detect_near(image, tracks.places_px[lost], self._rest_moments[lost])
+        more = more.take(more.found)
+        if len(more) and len(dots):
+            gap, _ = cKDTree(dots.centres_px).query(more.centres_px)
+            more = more.take(gap > _SAME_PX)
+        if not len(more):
+            return dots, tracks
+        dots = dots.joined(more)
+        return dots, match(self._reference, dots.centres_px, expected)
+
+    def _full(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame:
+        dots = self._detector.detect(image)
+        tracks = match(self._reference, dots.centres_px, expected)
+        if not anchors_slipped(tracks, dots.area_px, self._area, self._large):
+            return TrackedFrame(tracks, dots, "full", False)
+        registered = self._registered(dots, image.shape)
+        if registered is None:
+            return TrackedFrame(tracks, dots, "full", True)
+        return TrackedFrame(registered, dots, "registered", False)
+
+    def _registered(self, dots: Detections, shape: tuple[int, ...]) -> Tracks | None:
+        if self._grid is None:
+            return None
+        try:
+            found = register(dots, self._grid, shape)
+        except LatticeError:
+            return None
+        tracks = match(self._reference, dots.centres_px, found.centres_px[self._reference.markers])
+        slipped = anchors_slipped(tracks, dots.area_px, self._area, self._large)
+        return None if slipped else tracks
+
+    def _remember(self, result: TrackedFrame) -> None:
+        tracks = result.tracks
+        step = tracks.places_px - self._places
+        moved = np.isfinite(step).all(axis=1, keepdims=True)
+        self._velocity = np.where(moved, step, 0.0)
+        # A lost marker is next looked for where it was last seen.
+        self._places = np.where(tracks.known[:, None], tracks.places_px, self._places)
+        seen = tracks.tracked
+        self._moments[seen] = result.detections.moments_px2[tracks.dots[seen]]

@@ -1,0 +1,1 @@
+"""The virtual camera: projection over the mirror and through flat layers."""

@@ -1,0 +1,204 @@
+"""Brown–Conrady lens distortion, with the domain on which it can be inverted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+MAX_NEWTON_STEPS = 80
+MAX_HALVINGS = 40
+STEP_LEFT = 1e-15
+MISS_LEFT = 4e-16
+# Points whose work fits into the processor's cache.
+COMPILED_FROM = 64
+BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class LensDistortion:
+    """Radial and tangential distortion of image coordinates normalised by the focal length.
+
+    With ρ² = x² + y² and f = 1 + k1 ρ² + k2 ρ⁴ + k3 ρ⁶ (Brown 1966, Conrady 1919; coefficients
+    in the order and sense of OpenCV):
+        x' = x f + 2 p1 x y + p2 (ρ² + 2 x²),  y' = y f + p1 (ρ² + 2 y²) + 2 p2 x y.
+    Raises ValueError for a coefficient that is not finite.
+    """
+
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not np.isfinite(value):
+                raise ValueError(f"distortion coefficient {name} = {value} is not finite")
+
+    @cached_property
+    def monotone_radius(self) -> float:
+        """Radius ρ of the disc of undistorted coordinates on which the map is one-to-one.
+
+        The map is the gradient of a potential, so its Jacobian is symmetric. Its radial part has
+        the eigenvalues f and (ρ f)', its tangential part none below -6 |p| ρ: up to the first
+        ρ at which min(f, (ρ f)') = 6 |p| ρ the potential is strictly convex, hence the gradient
+        one-to-one. Without p1, p2 it is where ρ f stops growing. inf if that never happens.
+        """
+        slope = -6 * float(np.hypot(self.p1, self.p2))
+        outward = [7 * self.k3, 0.0, 5 * self.k2, 0.0, 3 * self.k1, slope, 1.0]
+        around = [self.k3, 0.0, self.k2, 0.0, self.k1, slope, 1.0]
+        roots = np.concatenate([np.roots(outward), np.roots(around)])
+        # A double root comes out of the eigenvalue solver as a nearly real pair.
+        real = roots[np.abs(roots.imag) <= 1e-7 * np.abs(roots)].real
+        return float(min(real[real > 0], default=np.inf))
+
+    def distort(self, undistorted: ArrayLike) -> Array:
+        """Distorted coordinates (n, 2) of undistorted ones (n, 2); NaN stays NaN.
+
+        Raises ValueError for points beyond the monotone radius, where the polynomial folds the
+        image back over itself.
+        """
+        xy = np.asarray(undistorted, dtype=float)
+        radius = np.hypot(xy[..., 0], xy[..., 1])
+        beyond = radius >= self.monotone_radius
+        if beyond.any():
+            raise ValueError(
+                f"{int(beyond.sum())} of {radius.size} points lie beyond the distortion's monotone "
+                f"radius of {self.monotone_radius:.6g} focal lengths (farthest: "
+                f"{np.nanmax(radius):.6g}), where it folds back: the coefficients do not hold there"
+            )
+        return self._map(xy)
+
+    def undistort(self, distorted: ArrayLike) -> Array:
+        """Undistorted coordinates (n, 2) of distorted ones (n, 2); NaN stays NaN.
+
+        Newton, halving a step that leaves the monotone disc or does not bring the image nearer.
+        Raises ValueError for points that no point within the monotone radius is distorted to.
+        """
+        target = np.atleast_2d(np.asarray(distorted, dtype=float))
+        undistorted, left = self._settled(target)
+        lost = np.zeros(len(target), dtype=bool)
+        for k in range(0, len(left), BLOCK):
+            part = left[k : k + BLOCK]
+            undistorted[part], lost[part] = self._inverted(target[part])
+        if lost.any():
+            worst = target[lost][np.argmax(np.hypot(*target[lost].T))]
+            raise ValueError(
+                f"{int(lost.sum())} of {len(target)} points, such as ({worst[0]:.6g}, "
+                f"{worst[1]:.6g}) focal lengths from the axis, are the image of no point within "
+                f"the distortion's monotone radius of {self.monotone_radius:.6g}: the coefficients "
+                "do not hold there"
+            )
+        return undistorted.reshape(np.shape(distorted))
+
+    def _settled(self, target: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Points (n, 2) where plain Newton, compiled, settles; and which are left to do."""
+        xy = np.array(target)
+        if len(target) < COMPILED_FROM:
+            return xy, np.arange(len(target))
+        from gelslim_optics.camera.undistort_kernel import undistort
+
+        settled = np.zeros(len(target), dtype=bool)
+        coefficients = np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
+        points = np.ascontiguousarray(target)
+        undistort(points, coefficients, self.monotone_radius, xy, settled)
+        return xy, np.flatnonzero(~settled)
+
+    def jacobian(self, undistorted: ArrayLike) -> Array:
+        """Derivative (n, 2, 2) of the distorted by the undistorted coordinates (n, 2)."""
+        xx, cross, yy = self._stretch(np.asarray(undistorted, dtype=float))
+        return np.stack([np.stack([xx, cross], -1), np.stack([cross, yy], -1)], -2)
+
+    def _stretch(self, xy: Array) -> tuple[Array, Array, Array]:
+        """The Jacobian's elements xx, xy = yx and yy."""
+        x, y = xy[..., 0], xy[..., 1]
+        s = x * x + y * y
+        f = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
+        g = 2 * (self.k1 + s * (2 * self.k2 + s * 3 * self.k3))
+        cross = g * x * y + 2 * self.p1 * x + 2 * self.p2 * y
+        xx = f + g * x * x + 2 * self.p1 * y + 6 * self.p2 * x
+        yy = f + g * y * y + 6 * self.p1 * y + 2 * self.p2 * x
+        return xx, cross, yy
+
+    def to_record(self) -> dict[str, float]:
+        """The coefficients by name."""
+        return asdict(self)
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, object]) -> LensDistortion:
+        """Inverse of `to_record`; coefficients left out are zero.
+
+        Raises ValueError for a name or a value that is no coefficient.
+        """
+        names = [f.name for f in fields(cls)]
+        values: dict[str, float] = {}
+        for name, value in record.items():
+            if name not in names or isinstance(value, bool) or not isinstance(value, int | float):
+                raise ValueError(
+                    f"lens distortion has no {name} = {value!r}: it takes numbers for "
+                    f"{', '.join(names)}"
+                )
+            values[name] = float(value)
+        return cls(**values)
+
+    def _map(self, xy: Array) -> Array:
+        x, y = xy[..., 0], xy[..., 1]
+        s = x * x + y * y
+        f = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
+        return np.stack(
+            [
+                x * f + 2 * self.p1 * x * y + self.p2 * (s + 2 * x * x),
+                y * f + self.p1 * (s + 2 * y * y) + 2 * self.p2 * x * y,
+            ],
+            axis=-1,
+        )
+
+    def _inverted(self, target: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Points (n, 2) distorted to `target`, and which have none."""
+        xy = target.copy()
+        radius = np.hypot(xy[:, 0], xy[:, 1])
+        outside = radius >= self.monotone_radius
+        xy[outside] *= (0.9 * self.monotone_radius / radius[outside])[:, None]
+        whole = np.isfinite(target).all(axis=1)
+        xy[~whole] = np.nan
+        open_ = np.flatnonzero(whole)
+        lost = np.zeros(len(xy), dtype=bool)
+        for _ in range(MAX_NEWTON_STEPS):
+            if not len(open_):
+                break
+            xy[open_], settled, stuck = self._newton_step(xy[open_], target[open_])
+            lost[open_[stuck]] = True
+            open_ = open_[~(settled | stuck)]
+        lost[open_] = True
+        return xy, lost
+
+    def _newton_step(
+        self, xy: Array, target: Array
+    ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """One damped step from `xy` (n, 2); which points have arrived, which find no way on."""
+        miss = target - self._map(xy)
+        off = np.hypot(miss[:, 0], miss[:, 1])
+        xx, cross, yy = self._stretch(xy)
+        u, v = miss.T
+        step = np.stack([yy * u - cross * v, xx * v - cross * u], -1)
+        step /= (xx * yy - cross * cross)[:, None]
+        size = 1 + np.hypot(target[:, 0], target[:, 1])
+        # Near the fold the step stays long when the image is already met to the last digit.
+        near = (np.hypot(step[:, 0], step[:, 1]) <= STEP_LEFT * size) | (off <= MISS_LEFT * size)
+        part = np.where(near, 0.0, 1.0)
+        for _ in range(MAX_HALVINGS):
+            tried = xy + part[:, None] * step
+            left = target - self._map(tried)
+            worse = np.hypot(left[:, 0], left[:, 1]) >= off
+            worse |= np.hypot(tried[:, 0], tried[:, 1]) >= self.monotone_radius
+            worse &= ~near
+            if not worse.any():
+                break
+            part = np.where(worse, part / 2, part)
+        return np.where(worse[:, None], xy, tried), near, worse

@@ -1,0 +1,88 @@
+"""The virtual camera as plain values, as a bundle carries it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gelslim_optics.camera.layer import Layer
+from gelslim_optics.camera.lens_distortion import LensDistortion
+
+if TYPE_CHECKING:
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
+
+MODEL = "folded pinhole behind flat layers"
+VECTORS = ("position_mm", "right", "down", "forward")
+LENGTHS = ("focal_px", "window_bottom_z_mm")
+COUNTS = ("image_width_px", "image_height_px")
+
+
+def camera_to_record(camera: VirtualCamera) -> dict[str, object]:
+    """Numbers, lists and dicts; `lens_distortion` and `principal_offset_px` only where any."""
+    record: dict[str, object] = {"model": MODEL}
+    record |= {name: getattr(camera, name).tolist() for name in VECTORS}
+    record |= {"focal_px": float(camera.focal_px)}
+    record |= {name: getattr(camera, name) for name in COUNTS}
+    record |= {
+        "window_bottom_z_mm": float(camera.window_bottom_z_mm),
+        "layers": [
+            {"thickness_mm": float(v.thickness_mm), "index": float(v.index)} for v in camera.layers
+        ],
+    }
+    if camera.lens is not None:
+        record["lens_distortion"] = camera.lens.to_record()
+    if any(camera.principal_offset_px):
+        record["principal_offset_px"] = list(camera.principal_offset_px)
+    return record
+
+
+def camera_from_record(record: Mapping[str, object]) -> dict[str, Any]:
+    """Arguments of the camera that `record` describes.
+
+    Raises ValueError for another model, or for values that are missing or of the wrong kind.
+    """
+    if record.get("model") != MODEL:
+        raise ValueError(
+            f'the camera record is of the model {record.get("model")!r}: only "{MODEL}" is known'
+        )
+    values: dict[str, Any] = {name: _vector(record, name) for name in VECTORS}
+    values |= {name: _number(record, name) for name in LENGTHS}
+    for name in COUNTS:
+        count = _number(record, name)
+        if count != int(count):
+            raise ValueError(f"the camera record's {name} = {count:g} is not a whole number")
+        values[name] = int(count)
+    layers = _entry(record, "layers")
+    if not isinstance(layers, list | tuple) or not all(isinstance(v, Mapping) for v in layers):
+        raise ValueError("the camera record's layers must be a list of thickness_mm and index")
+    values["layers"] = tuple(Layer(_number(v, "thickness_mm"), _number(v, "index")) for v in layers)
+    lens = record.get("lens_distortion")
+    if lens is not None:
+        if not isinstance(lens, Mapping):
+            raise ValueError("the camera record's lens_distortion must give coefficients by name")
+        values["lens"] = LensDistortion.from_record(lens)
+    if "principal_offset_px" in record:
+        values["principal_offset_px"] = tuple(_vector(record, "principal_offset_px", 2))
+    return values
+
+
+def _entry(record: Mapping[str, object], name: str) -> object:
+    if name not in record:
+        raise ValueError(f"the camera record has no {name}")
+    return record[name]
+
+
+def _number(record: Mapping[str, object], name: str) -> float:
+    value = _entry(record, name)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise ValueError(f"the camera record's {name} = {value!r} must be a finite number")
+    return float(value)
+
+
+def _vector(record: Mapping[str, object], name: str, count: int = 3) -> list[float]:
+    value = _entry(record, name)
+    if not isinstance(value, list | tuple) or len(value) != count:
+        raise ValueError(f"the camera record's {name} = {value!r} must be {count} numbers")
+    return [_number({name: v}, name) for v in value]

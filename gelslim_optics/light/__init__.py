@@ -1,0 +1,1 @@
+"""Light traced from the LEDs through the guide onto the gel."""

@@ -1,0 +1,244 @@
+"""What the rays told: flux ledger with intervals, irradiance of the gel's face, uniformity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_optics.light import trace_geometry as column
+
+Array = NDArray[np.float64]
+LEAKED, STOPPED, RETURNED = "leaked", "stopped", "returned"
+PATCHES = 8
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean over independent replicates, its standard error and 95 % interval (Student's t)."""
+
+    value: float
+    standard_error: float
+    low: float
+    high: float
+
+
+def estimate(replicates: Array) -> Estimate:
+    """Estimate from one value per replicate; with a single one the interval is unbounded."""
+    values = np.asarray(replicates, dtype=float)
+    mean = float(np.mean(values))
+    if values.size < 2:
+        return Estimate(mean, math.inf, -math.inf, math.inf)
+    from scipy.special import stdtrit
+
+    error = float(np.std(values, ddof=1)) / math.sqrt(values.size)
+    half = float(stdtrit(values.size - 1, 0.975)) * error
+    return Estimate(mean, error, mean - half, mean + half)
+
+
+@dataclass(frozen=True)
+class Uniformity:
+    """Evenness of an irradiance map, without what the rays' scatter adds to it.
+
+    `min_over_mean` is of the darkest of PATCHES x PATCHES patches, `cv` the standard deviation of
+    the bins over their mean.
+    """
+
+    min_over_mean: float
+    cv: float
+
+
+@dataclass(frozen=True)
+class LightResult:
+    """Tallies of a trace, per flux of 1 emitted by each source.
+
+    `tallies` (source, replicate, column), `maps` (source, replicate, x bins, y bins) hold flux;
+    `shares` are the sources' parts of all emitted flux. Columns: see `trace_geometry`.
+    """
+
+    colours: tuple[str, ...]
+    shares: tuple[float, ...]
+    edges: tuple[str, ...]
+    face: str
+    rays: int
+    tallies: Array
+    maps: Array
+    bin_area_mm2: float
+
+    def replicates(self, entry: str, colour: str | None = None) -> Array:
+        """One value per replicate of a ledger entry, as a share of the emitted flux.
+
+        Beside the ledger's entries: `arrived` (at the gel's face, again after each reflection
+        there) and `entered_gel` (net through the bonded face). `colour` restricts to the sources
+        of that colour (and their flux). Raises KeyError for an unknown entry.
+        """
+        extra = {"arrived": column.ARRIVED, "entered_gel": column.ENTERED_GEL}
+        places = {**self._columns(), **extra}
+        if entry not in places:
+            raise KeyError(f"the ledger has no entry {entry!r}; it has {', '.join(places)}")
+        return self._sum(colour)[:, places[entry]]
+
+    def ledger(self, colour: str | None = None) -> dict[str, Estimate]:
+        """Where the emitted flux went; the values sum to 1.
+
+        delivered: absorbed by the coat of the gel's face. leaked.EDGE: left for good, last out of
+        a solid through that edge; leaked.ends, leaked.gel_ends: through end faces. stopped.EDGE:
+        absorbed by a mirror or coat there. returned.EDGE: out of a foot. foot_reflection and
+        missed_foot: never entered. absorbed: in the media. truncated: weight cut off. lost: at
+        corners, should be 0. Edges that never saw light are left out.
+        """
+        sums = self._sum(colour)
+        return {
+            name: estimate(sums[:, place])
+            for name, place in self._columns().items()
+            if "." not in name or np.any(sums[:, place])
+        }
+
+    def value(self, entry: str, colour: str | None = None) -> float:
+        """Mean of a ledger entry."""
+        return float(np.mean(self.replicates(entry, colour)))
+
+    def total(self, group: str, colour: str | None = None) -> Estimate:
+        """Sum of all entries `group`.EDGE, e.g. leaked; 0 if there are none."""
+        sums = self._sum(colour)
+        chosen = [c for name, c in self._columns().items() if name.startswith(f"{group}.")]
+        return estimate(np.sum(sums[:, chosen], axis=1))
+
+    def ledger_gap(self) -> float:
+        """Largest departure from 1 of a replicate's and source's ledger."""
+        places = list(self._columns().values())
+        return float(np.max(np.abs(np.sum(self.tallies[:, :, places], axis=2) - 1)))
+
+    def irradiance(self, colour: str | None = None) -> Array:
+        """Map (x bins, y bins) of flux arriving at the gel's face per mm² and emitted flux."""
+        weights = self._weights(colour)
+        flux = np.tensordot(weights, self.maps.mean(axis=1), axes=(0, 0))
+        return np.asarray(flux / self.bin_area_mm2)
+
+    def uniformity(self, colour: str | None = None) -> Uniformity:
+        """Evenness of the irradiance map; nan where no light arrives.
+
+        Squares are products of different replicates, whose scatter is independent, and the
+        darkest patch is measured by the replicates that did not choose it. A single replicate
+        leaves its scatter in.
+        """
+        maps = np.tensordot(self._weights(colour), self.maps, axes=(0, 0))
+        mean = float(np.mean(maps))
+        if mean == 0:
+            return Uniformity(math.nan, math.nan)
+        maps = maps / mean
+        excess = _mean_square(maps.reshape(len(maps), -1)) - _mean_square(
+            maps.mean(axis=(1, 2))[:, None]
+        )
+        return Uniformity(_darkest(_patches(maps)), math.sqrt(max(excess, 0.0)))
+
+    def arrived(self, colour: str | None = None) -> Estimate:
+        """Flux that reaches the gel's face, again after each reflection there."""
+        return estimate(self._sum(colour)[:, column.ARRIVED])
+
+    def entered_gel(self, colour: str | None = None) -> Estimate:
+        """Net flux through the bonded face into the gel."""
+        return estimate(self._sum(colour)[:, column.ENTERED_GEL])
+
+    def elevation_deg(self, colour: str | None = None) -> Estimate:
+        """Flux-weighted mean angle between arriving light and the gel's face."""
+        return self._per_arrival(colour, column.ELEVATION, np.degrees)
+
+    def slope_sensitivity(self, colour: str | None = None) -> Estimate:
+        """Relative change of the mean irradiance per unit slope of the face along +y.
+
+        A facet turned by a small slope h changes the irradiance by -h (d·y)/(d·n) of each ray d.
+        """
+        return self._per_arrival(colour, column.SLOPE, lambda value: value)
+
+    @property
+    def crossings(self) -> float:
+        """Faces met, per ray."""
+        return float(np.mean(self.tallies[:, :, column.CROSSINGS]))
+
+    @property
+    def corners(self) -> float:
+        """Share of rays that rounding put past a corner and that were led on from it."""
+        return float(np.mean(self.tallies[:, :, column.CORNERS]))
+
+    def _per_arrival(
+        self, colour: str | None, place: int, turn: Callable[[Array], Array]
+    ) -> Estimate:
+        sums = self._sum(colour)
+        arrived = sums[:, column.ARRIVED]
+        if np.any(arrived == 0):
+            return Estimate(math.nan, math.nan, math.nan, math.nan)
+        return estimate(turn(sums[:, place] / arrived))
+
+    def _weights(self, colour: str | None) -> Array:
+        chosen = np.array([colour is None or c == colour for c in self.colours])
+        if not np.any(chosen):
+            raise KeyError(f"no light source is {colour}; there are {', '.join(set(self.colours))}")
+        weights = np.where(chosen, np.asarray(self.shares), 0.0)
+        return np.asarray(weights / np.sum(weights))
+
+    def _sum(self, colour: str | None) -> Array:
+        return np.asarray(np.tensordot(self._weights(colour), self.tallies, axes=(0, 0)))
+
+    def _columns(self) -> dict[str, int]:
+        places = {
+            "absorbed": column.ABSORBED,
+            "missed_foot": column.MISSED,
+            "foot_reflection": column.FOOT_REFLECTION,
+            "truncated": column.TRUNCATED,
+            "lost": column.LOST,
+            "leaked.ends": column.ENDS,
+            "leaked.gel_ends": column.GEL_ENDS,
+            "stopped.ends": column.ENDS_STOPPED,
+        }
+        groups = {}
+        for group, name in enumerate((LEAKED, STOPPED, RETURNED)):
+            for i, edge in enumerate(self.edges):
+                groups[f"{name}.{edge}"] = column.PER_EDGE + group * len(self.edges) + i
+        delivered = groups.pop(f"{STOPPED}.{self.face}", None)
+        first = {} if delivered is None else {"delivered": delivered}
+        return {**first, **places, **groups}
+
+
+def paired_ratio(ours: LightResult, other: LightResult, entry: str = "delivered") -> Estimate:
+    """Ratio of an entry in two traces of the same seed, rays and replicates, paired by replicate.
+
+    Raises ValueError where the replicates do not match or the other's entry is 0.
+    """
+    a, b = ours.replicates(entry), other.replicates(entry)
+    if a.size != b.size:
+        raise ValueError(f"{a.size} and {b.size} replicates cannot be paired")
+    if float(np.mean(b)) == 0:
+        raise ValueError(f"the ratio of {entry} is undefined: the other design has none")
+    ratio = float(np.mean(a) / np.mean(b))
+    # Linearised (delta method), so that the ratio of means keeps no bias of a mean of ratios.
+    spread = estimate(ratio + (a - ratio * b) / float(np.mean(b)))
+    return Estimate(ratio, spread.standard_error, spread.low, spread.high)
+
+
+def _mean_square(maps: Array) -> float:
+    """Mean over bins of the squared expectation, from maps (replicate, bin): no bias by scatter."""
+    count = len(maps)
+    if count < 2:
+        return float(np.mean(maps**2))
+    products = maps.sum(axis=0) ** 2 - (maps**2).sum(axis=0)
+    return float(np.mean(products)) / (count * (count - 1))
+
+
+def _darkest(maps: Array) -> float:
+    """Mean of each replicate's value where the others are darkest, maps (replicate, bin)."""
+    if len(maps) < 2:
+        return float(np.min(maps))
+    others = maps.sum(axis=0) - maps
+    return float(np.mean(maps[np.arange(len(maps)), np.argmin(others, axis=1)]))
+
+
+def _patches(maps: Array) -> Array:
+    """Maps (replicate, x, y) as means over PATCHES x PATCHES patches, (replicate, patch)."""
+    for axis in (1, 2):
+        parts = np.array_split(maps, min(PATCHES, maps.shape[axis]), axis=axis)
+        maps = np.stack([part.mean(axis=axis) for part in parts], axis=axis)
+    return np.asarray(maps.reshape(len(maps), -1))

@@ -1,0 +1,117 @@
+"""What light meets: an extruded profile, its media and surfaces, and the emitters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gelslim_optics.guide.profile import GuideProfile
+from gelslim_optics.light.source import Source
+
+AIR = "air"
+GEL = "gel"
+PMMA_SELLMEIER = (1.1819, 0.011313)
+
+
+@dataclass(frozen=True)
+class Medium:
+    """A clear medium: refractive index and absorption (1/mm, Beer-Lambert).
+
+    `sellmeier` = (B, C): n² = 1 + B λ²/(λ² - C), λ in µm, used for sources that state their
+    wavelength. Otherwise `red_index` and `green_index` go before `index` for those colours.
+    """
+
+    index: float
+    absorption_per_mm: float = 0.0
+    red_index: float | None = None
+    green_index: float | None = None
+    sellmeier: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for value in (self.index, self.red_index, self.green_index):
+            if value is not None and not (math.isfinite(value) and 1 <= value <= 4):
+                raise ValueError(f"refractive index = {value!r}: must be between 1 and 4")
+        if not (math.isfinite(self.absorption_per_mm) and self.absorption_per_mm >= 0):
+            raise ValueError(f"absorption_per_mm = {self.absorption_per_mm!r}: must be >= 0")
+
+    def index_for(self, colour: str, wavelength_um: float | None = None) -> float:
+        """Index for light of a colour and, if given, wavelength."""
+        if self.sellmeier is not None and wavelength_um is not None:
+            b, c = self.sellmeier
+            square = wavelength_um**2
+            return math.sqrt(1 + b * square / (square - c))
+        named = {"red": self.red_index, "green": self.green_index}.get(colour)
+        return self.index if named is None else named
+
+
+@dataclass(frozen=True)
+class Surface:
+    """An opaque surface; what it does not reflect it absorbs. Specular unless `diffuse`."""
+
+    reflectance: float = 0.0
+    diffuse: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.reflectance <= 1:
+            raise ValueError(f"reflectance = {self.reflectance!r}: must be between 0 and 1")
+
+
+def default_media() -> dict[str, Medium]:
+    """Air, PMMA (window and separate leg) and silicone gel; n of PMMA at 590 nm."""
+    pmma = Medium(1.4906, absorption_per_mm=0.001, sellmeier=PMMA_SELLMEIER)
+    return {AIR: Medium(1.0), "acrylic": pmma, "leg": pmma, GEL: Medium(1.41)}
+
+
+def default_surfaces() -> dict[str, Surface]:
+    """Black paint coat and an aluminium mirror."""
+    return {"paint": Surface(), "mirror": Surface(0.9)}
+
+
+@dataclass(frozen=True)
+class LightScene:
+    """A profile extruded over `x_mm`, with emitters.
+
+    The gel covers `gel_x_mm` only, within `x_mm`: elsewhere the bonded face meets air and the
+    gel's other faces are absent. `ends` names what the faces x = x0, x1 meet (air, or a
+    surface). Light that crosses an edge of `feet` into the air ends there (LED board): it is
+    `returned`. Light that leaves elsewhere goes on in the air: it may meet a mirror, enter again
+    or reach the gel's sides; once it meets nothing more, the back of a coat, or a foot from
+    outside, it has leaked, through the edge by which it last left a solid. `face` is the edge
+    whose arriving light is mapped and counted as delivered.
+
+    Raises ValueError for extents out of order and media the scene does not describe.
+    """
+
+    profile: GuideProfile
+    x_mm: tuple[float, float]
+    gel_x_mm: tuple[float, float]
+    sources: tuple[Source, ...]
+    media: Mapping[str, Medium] = field(default_factory=default_media)
+    surfaces: Mapping[str, Surface] = field(default_factory=default_surfaces)
+    ends: str = AIR
+    feet: tuple[str, ...] = ("foot_left", "foot_right")
+    face: str = "gel_face"
+
+    def __post_init__(self) -> None:
+        (x0, x1), (g0, g1) = self.x_mm, self.gel_x_mm
+        if not (math.isfinite(x0) and math.isfinite(x1) and x0 < x1):
+            raise ValueError(f"x_mm = {self.x_mm}: must be two finite lengths in order")
+        if not x0 <= g0 < g1 <= x1:
+            raise ValueError(f"gel_x_mm = {self.gel_x_mm}: must be in order and within {self.x_mm}")
+        if AIR not in self.media:
+            raise ValueError("the scene's media lack air")
+        if self.ends != AIR and self.ends not in self.surfaces:
+            raise ValueError(f"ends = {self.ends!r}: must be air or one of {sorted(self.surfaces)}")
+        known = set(self.media) | set(self.surfaces)
+        for edge in self.profile.edges:
+            for medium in (edge.left, edge.right):
+                if medium not in known:
+                    raise ValueError(f"edge {edge.name} meets {medium!r}, which has no properties")
+        if not self.sources:
+            raise ValueError("the scene has no light source")
+
+    @property
+    def colours(self) -> tuple[str, ...]:
+        """Colours of the sources, in order of first appearance."""
+        return tuple(dict.fromkeys(source.colour for source in self.sources))

@@ -1,0 +1,280 @@
+"""Compiled ray loop. Import this module only where rays are traced: it loads numba."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gelslim_optics.light.trace_crossing import (
+    AIR,
+    COMPILED,
+    NOTHING,
+    edge_normal,
+    gel_plane,
+    next_edge,
+    side_medium,
+)
+from gelslim_optics.light.trace_face import (
+    MIX_A,
+    STEP,
+    fresnel,
+    map_arrival,
+    scramble,
+    turn_back,
+    uniform,
+)
+from gelslim_optics.light.trace_geometry import (
+    ABSORBED,
+    CORNERS,
+    CROSSINGS,
+    ENDS,
+    ENDS_STOPPED,
+    ENTERED_GEL,
+    EXIT,
+    FOOT_REFLECTION,
+    GEL_ENDS,
+    LOST,
+    MISSED,
+    OWNER,
+    PER_EDGE,
+    PRESENCE,
+    TRUNCATED,
+)
+
+# Faces that are no edge of the profile: end of the guide, end of the gel.
+END, GEL_END = -2, -3
+
+
+@njit(**COMPILED)
+def trace_block(
+    shape: Any,
+    facts: Any,
+    near: Any,
+    coats: Any,
+    box: Any,
+    marks: Any,
+    index: Any,
+    absorption: Any,
+    starts: Any,
+    medium: int,
+    first_edge: int,
+    key: Any,
+    first_ray: int,
+    limits: Any,
+    ray: Any,
+    stack: Any,
+    notes: Any,
+    seeds: Any,
+    sums: Any,
+    heat: Any,
+    trail: Any,
+) -> int:
+    """Trace rays (n, 8) into `sums` and `heat`; returns the number of rows written to `trail`.
+
+    `limits`: smallest weight split at a face, weight cut off, most faces met. `ray` (7),
+    `stack` (d, 7), `notes` (d, 4) and `seeds` (d) are room to work in. `trail` rows: ray, branch,
+    x, y, z; none are written where it is empty.
+    """
+    split, cut, most = limits[0], limits[1], int(limits[2])
+    depth = stack.shape[0]
+    edges = (sums.shape[0] - PER_EDGE) // 3
+    leaked, stopped, returned = PER_EDGE, PER_EDGE + edges, PER_EDGE + 2 * edges
+    outside, gel, face = marks[0], marks[1], marks[2]
+    written = 0
+    for r in range(starts.shape[0]):
+        sums[FOOT_REFLECTION] += starts[r, 7]
+        if starts[r, 6] == 0.0:
+            sums[MISSED] += 1.0 - starts[r, 7]
+            continue
+        top, branch = 1, -1
+        for i in range(7):
+            stack[0, i] = starts[r, i]
+        notes[0, 0], notes[0, 1], notes[0, 2], notes[0, 3] = first_edge, medium, first_edge, 0
+        seeds[0] = scramble(key + STEP * np.uint64(first_ray + r + 1))
+        while top > 0:
+            top -= 1
+            branch += 1
+            for i in range(7):
+                ray[i] = stack[top, i]
+            last, now, left, bounce = notes[top, 0], notes[top, 1], notes[top, 2], notes[top, 3]
+            path = seeds[top]
+            written = note(trail, written, r, branch, ray)
+            while True:
+                w = ray[6]
+                if w < cut or bounce >= most:
+                    sums[TRUNCATED] += w
+                    break
+                bounce += 1
+                sums[CROSSINGS] += 1.0
+                x, dx = ray[0], ray[3]
+                e, t, way, trouble = next_edge(
+                    shape,
+                    facts,
+                    near,
+                    coats,
+                    box,
+                    gel,
+                    now,
+                    last,
+                    x,
+                    ray[1],
+                    ray[2],
+                    dx,
+                    ray[4],
+                    ray[5],
+                )
+                plane = 0.0
+                if now == AIR:
+                    t_end = gel_plane(
+                        shape, facts, near, box, gel, last, x, ray[1], ray[2], dx, ray[4], ray[5]
+                    )
+                    if t_end < t:
+                        e, t, trouble = GEL_END, t_end, 0
+                        plane = box[2] if dx > 0 else box[3]
+                elif dx != 0.0:
+                    side = (2 if now == gel else 0) + (1 if dx > 0 else 0)
+                    plane = box[side]
+                    t_end = max((plane - x) / dx, 0.0)
+                    if t_end < t:
+                        e, t, trouble = GEL_END if now == gel else END, t_end, 0
+                if trouble == 2:
+                    sums[LOST] += w
+                    break
+                sums[CORNERS] += trouble
+                if e == NOTHING:
+                    book_leak(sums, left, leaked, facts, w)
+                    break
+                for i in range(3):
+                    ray[i] += t * ray[3 + i]
+                if e < 0:
+                    ray[0] = plane
+                written = note(trail, written, r, branch, ray)
+                if absorption[now] > 0.0:
+                    w *= math.exp(-absorption[now] * t)
+                    sums[ABSORBED] += ray[6] - w
+                    ray[6] = w
+                # Beyond the face, and its normal along the ray.
+                if e == END or (
+                    e == GEL_END and now == gel and (plane == box[0] or plane == box[1])
+                ):
+                    beyond = outside
+                elif e == GEL_END:
+                    beyond = AIR if now == gel else gel
+                else:
+                    beyond = side_medium(facts, box, gel, e, way, ray[0])
+                if e < 0:
+                    normal = (1.0 if dx > 0 else -1.0, 0.0, 0.0)
+                else:
+                    ny, nz = edge_normal(shape, e, ray[1], ray[2])
+                    normal = (0.0, ny, nz) if way else (0.0, -ny, -nz)
+                cosine = max(ray[3] * normal[0] + ray[4] * normal[1] + ray[5] * normal[2], 0.0)
+                if (
+                    now == AIR
+                    and e >= 0
+                    and (
+                        facts[e, EXIT] == 1
+                        or coats[side_medium(facts, box, gel, e, not way, ray[0]), 0] > 0.0
+                    )
+                ):
+                    # The LED board at a foot, or the back of a coat.
+                    book_leak(sums, left, leaked, facts, w)
+                    break
+                if coats[beyond, 0] > 0.0:
+                    if e >= 0 and facts[e, OWNER] == face:
+                        map_arrival(shape, box, e, ray, w, cosine, normal[1], normal[2], sums, heat)
+                    kept = w * turn_back(coats, beyond, ray, path, bounce, normal, cosine)
+                    if e in (END, GEL_END):
+                        sums[ENDS_STOPPED] += w - kept
+                    else:
+                        sums[stopped + facts[e, OWNER]] += w - kept
+                    ray[6] = kept
+                    last = e
+                    if kept == 0.0:
+                        break
+                    continue
+                back, behind = fresnel(index[now], index[beyond], cosine)
+                into = w * (1.0 - back)
+                # Share out the weight: `into` goes through, the rest is reflected.
+                small = min(into, w - into)
+                if small < split and back < 1.0 and back > 0.0:
+                    u = uniform(path, bounce, 0)
+                    if w <= split:
+                        into = 0.0 if u < back else w
+                    elif u * split < small:
+                        into = split if into == small else w - split
+                    else:
+                        into = 0.0 if into == small else w
+                elif top >= depth - 1 and 0.0 < into < w:
+                    into = 0.0 if uniform(path, bounce, 0) < back else w
+                reflected = w - into
+                if into > 0.0:
+                    if e >= 0 and facts[e, PRESENCE] == 1:
+                        sums[ENTERED_GEL] += (
+                            into if beyond == gel else (-into if now == gel else 0.0)
+                        )
+                    gone = beyond == AIR and (
+                        e == END or (e == GEL_END and (plane == box[0] or plane == box[1]))
+                    )
+                    if gone:
+                        sums[ENDS if e == END else GEL_ENDS] += into
+                        into = 0.0
+                    elif e >= 0 and facts[e, EXIT] == 1 and beyond == AIR:
+                        sums[returned + facts[e, OWNER]] += into
+                        into = 0.0
+                if into > 0.0:
+                    ratio = index[now] / index[beyond]
+                    turn = behind - ratio * cosine
+                    if reflected > 0.0:
+                        for i in range(3):
+                            stack[top, i] = ray[i]
+                            stack[top, 3 + i] = ray[3 + i] - 2 * cosine * normal[i]
+                        stack[top, 6] = reflected
+                        notes[top, 0], notes[top, 1] = e, now
+                        notes[top, 2], notes[top, 3] = left, bounce
+                        seeds[top] = scramble((path ^ MIX_A) + STEP * np.uint64(bounce))
+                        top += 1
+                    for i in range(3):
+                        ray[3 + i] = ratio * ray[3 + i] + turn * normal[i]
+                    if beyond == AIR and now != AIR:
+                        left = e
+                    now = beyond
+                    ray[6] = into
+                elif reflected > 0.0:
+                    for i in range(3):
+                        ray[3 + i] -= 2 * cosine * normal[i]
+                    ray[6] = reflected
+                else:
+                    break
+                last = e
+                # Newton step to unit length: rounding must not build up over many faces.
+                size2 = ray[3] ** 2 + ray[4] ** 2 + ray[5] ** 2
+                scale = 1.5 - 0.5 * size2
+                for i in range(3):
+                    ray[3 + i] *= scale
+    return written
+
+
+@njit(**COMPILED)
+def note(trail: Any, written: int, ray_number: int, branch: int, ray: Any) -> int:
+    """Write a point of a ray's path where there is room."""
+    if written < trail.shape[0]:
+        trail[written, 0] = ray_number
+        trail[written, 1] = branch
+        for i in range(3):
+            trail[written, 2 + i] = ray[i]
+        written += 1
+    return written
+
+
+@njit(**COMPILED)
+def book_leak(sums: Any, left: int, leaked: int, facts: Any, w: float) -> None:
+    """Flux that left for good, by the face it last left a solid through."""
+    if left >= 0:
+        sums[leaked + facts[left, OWNER]] += w
+    elif left == GEL_END:
+        sums[GEL_ENDS] += w
+    else:
+        sums[LOST] += w

@@ -1,0 +1,1 @@
+"""The global stiffness matrix of a cropped lattice of equal cells."""

@@ -1,0 +1,82 @@
+"""Stiffness rows of a lattice node by which of its eight cells exist.
+
+All cells of a uniform lattice share one element matrix, so a node's rows of K depend only on
+the 8-bit mask of its existing cells: 256 masks x 27 neighbours x 3x3 covers every crop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ifem_export.mesh.lattice import VTK_CORNERS
+
+
+@dataclass(frozen=True, eq=False)
+class NeighbourPattern:
+    """Which of a node's 27 neighbours share a cell with it, by mask.
+
+    Neighbour slot 9(dz+1)+3(dy+1)+(dx+1) lies at offset (dx, dy, dz); slots increase with the
+    neighbour's number.
+
+    Args:
+        counts: (256,) neighbours, the node itself included.
+        slots: (256, 27) uint8, the present slots in increasing order, then the absent ones.
+    """
+
+    counts: NDArray[np.int64]
+    slots: NDArray[np.uint8]
+
+
+@lru_cache(maxsize=1)
+def shared_cells() -> tuple[tuple[tuple[int, int, int], ...], ...]:
+    """For each slot the (cell bit, node's corner, neighbour's corner) of the cells they share.
+
+    Cells are in lattice order, so that the sums for (i, j) and (j, i) run over the same cells
+    in the same order: that makes the assembled matrix symmetric to the bit.
+    """
+    corner_number = {tuple(corner): a for a, corner in enumerate(VTK_CORNERS.tolist())}
+    shared = []
+    for slot in range(27):
+        dz, dy, dx = slot // 9 - 1, slot // 3 % 3 - 1, slot % 3 - 1
+        pairs = []
+        for bit in range(8):
+            here = (1 - (bit & 1), 1 - (bit >> 1 & 1), 1 - (bit >> 2 & 1))
+            there = (here[0] + dx, here[1] + dy, here[2] + dz)
+            if there in corner_number:
+                pairs.append((bit, corner_number[here], corner_number[there]))
+        shared.append(tuple(pairs))
+    return tuple(shared)
+
+
+@lru_cache(maxsize=1)
+def neighbour_pattern() -> NeighbourPattern:
+    """The neighbour pattern, the same for every element matrix."""
+    masks = np.arange(256)
+    present = np.zeros((256, 27), dtype=bool)
+    for slot, pairs in enumerate(shared_cells()):
+        for bit, _, _ in pairs:
+            present[:, slot] |= (masks >> bit & 1).astype(bool)
+    order = np.argsort(~present, axis=1, kind="stable").astype(np.uint8)
+    return NeighbourPattern(present.sum(axis=1), order)
+
+
+def occupancy_table(element_matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Stiffness blocks by mask and neighbour.
+
+    Args:
+        element_matrix: (24, 24) in N/mm.
+
+    Returns:
+        (256, 27, 3, 3) in N/mm; zero where no cell is shared.
+    """
+    blocks = element_matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3)
+    bits = (np.arange(256)[:, None] >> np.arange(8) & 1).astype(float)
+    table = np.zeros((256, 27, 3, 3))
+    for slot, pairs in enumerate(shared_cells()):
+        for bit, a, b in pairs:
+            table[:, slot] += bits[:, bit, None, None] * blocks[a, b]
+    return table

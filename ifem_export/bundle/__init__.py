@@ -1,0 +1,1 @@
+"""The sensor bundle on disk: arrays, manifest, checks and exports."""

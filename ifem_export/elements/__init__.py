@@ -1,0 +1,1 @@
+"""Stiffness of one hexahedron and the material behind it."""

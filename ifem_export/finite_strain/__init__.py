@@ -1,0 +1,1 @@
+"""The neo-Hookean pad at large deformation."""

@@ -1,0 +1,1 @@
+"""Contact forces from measured displacements as a constrained fit."""

@@ -1,0 +1,1 @@
+"""The marker grid and the interpolation from markers to surface nodes."""

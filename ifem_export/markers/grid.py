@@ -1,0 +1,286 @@
+"""The lattice of dots on the gel: one source for the print, the mesh nodes and the tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ifem_export.markers.anchors import choose_anchor_sites, fewest_contradictions
+
+Anchors = Literal["odd_sized", "omitted", "none"]
+"""How anchors show: a larger dot, a site without a dot, or no anchors."""
+REGULAR, ANCHOR_LARGE = 0, 1
+"""Values of `MarkerGrid.kind`."""
+_RIM_POINTS = 32
+_LATTICE_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerGrid:
+    """Dots on a square lattice centred on the sensor frame's origin.
+
+    x runs along the finger towards the tip and grows with the row, y runs across it and grows
+    with the column. Markers are in row-major order, and a marker's index is its id. Arrays are
+    read-only copies. Raises ValueError where arrays disagree in length, a marker is not on its
+    lattice site, a site is used twice, or dots would overlap.
+    """
+
+    positions_mm: NDArray[np.float64]
+    """(m, 2) dot centres in the sensor frame."""
+    row: NDArray[np.int64]
+    """(m,) lattice row, 0 at the smallest x."""
+    column: NDArray[np.int64]
+    """(m,) lattice column, 0 at the smallest y."""
+    diameter_mm: NDArray[np.float64]
+    """(m,) dot diameters."""
+    kind: NDArray[np.int64]
+    """(m,) `REGULAR` or `ANCHOR_LARGE`."""
+    pitch_mm: float
+    lattice_shape: tuple[int, int]
+    """(rows, columns) of the whole lattice, clipped dots included."""
+    omitted: NDArray[np.int64]
+    """(k, 2) sites (row, column) left without a dot on purpose; clipped sites are not listed."""
+
+    def __post_init__(self) -> None:
+        shape = (int(self.lattice_shape[0]), int(self.lattice_shape[1]))
+        object.__setattr__(self, "lattice_shape", shape)
+        object.__setattr__(self, "pitch_mm", float(self.pitch_mm))
+        for name in ("positions_mm", "diameter_mm"):
+            object.__setattr__(self, name, _frozen(getattr(self, name), np.float64))
+        for name in ("row", "column", "kind", "omitted"):
+            object.__setattr__(self, name, _frozen(getattr(self, name), np.int64))
+        _check_lengths(self)
+        _check_values(self)
+        _check_sites(self)
+        gap = self.smallest_gap_mm
+        if gap < -1e-9:
+            raise ValueError(
+                f"marker dots overlap by {-gap:.4g} mm: the pitch is {self.pitch_mm:g} mm and the "
+                f"largest dot {self.diameter_mm.max():g} mm; use a larger pitch or smaller dots"
+            )
+
+    def __len__(self) -> int:
+        """Return the number of dots."""
+        return len(self.row)
+
+    @property
+    def anchor_sites(self) -> NDArray[np.int64]:
+        """Sites (k, 2) of all anchors, large and omitted, in row-major order."""
+        large = self.kind == ANCHOR_LARGE
+        sites = np.vstack([np.column_stack([self.row, self.column])[large], self.omitted])
+        return sites[np.lexsort((sites[:, 1], sites[:, 0]))]
+
+    @property
+    def index_map(self) -> NDArray[np.int64]:
+        """Marker id (rows, columns) at each lattice site, -1 where there is no dot."""
+        ids = np.full(self.lattice_shape, -1, dtype=np.int64)
+        ids[self.row, self.column] = np.arange(len(self))
+        return ids
+
+    @property
+    def anchor_margin(self) -> int:
+        """Contradictions met by the most plausible wrong shift, turn or mirror image.
+
+        2 or more: the lattice stays unambiguous when any one anchor is not seen. 1: only while
+        all are seen. 0: ambiguous (always so without anchors). See `marker_anchors`.
+        """
+        anchors = np.zeros(self.lattice_shape, dtype=bool)
+        anchors[tuple(self.anchor_sites.T)] = True
+        return fewest_contradictions((self.index_map >= 0) | anchors, anchors)
+
+    @property
+    def smallest_gap_mm(self) -> float:
+        """Least distance between the rims of two neighbouring dots; inf without neighbours."""
+        size = np.full(self.lattice_shape, np.nan)
+        size[self.row, self.column] = self.diameter_mm
+        reach = [size[1:] + size[:-1], size[:, 1:] + size[:, :-1]]
+        sums = np.concatenate([pair.ravel() for pair in reach])
+        diagonal = np.concatenate(
+            [(size[1:, 1:] + size[:-1, :-1]).ravel(), (size[1:, :-1] + size[:-1, 1:]).ravel()]
+        )
+        gaps = np.concatenate(
+            [self.pitch_mm - sums / 2, self.pitch_mm * np.sqrt(2.0) - diagonal / 2]
+        )
+        gaps = gaps[np.isfinite(gaps)]
+        return float(gaps.min()) if len(gaps) else float("inf")
+
+    def sites_mm(self, sites: ArrayLike) -> NDArray[np.float64]:
+        """Return the positions (k, 2) in the sensor frame of lattice sites (k, 2)."""
+        return _lattice_mm(np.asarray(sites, dtype=np.int64), self.lattice_shape, self.pitch_mm)
+
+    def clipped(self, contains: Callable[[NDArray[np.float64]], ArrayLike]) -> MarkerGrid:
+        """Return the grid without the dots that cross an outline.
+
+        `contains` takes points (n, 2) in mm and returns (n,) booleans; it is asked for 32 points
+        on each dot's rim and for its centre. Omitted sites whose missing dot would cross the
+        outline are dropped too, for there a missing dot tells nothing. Ids are renumbered;
+        lattice indices stay. Raises ValueError when no dot is left.
+        """
+        keep = _rims_inside(self.positions_mm, self.diameter_mm, contains)
+        if not keep.any():
+            raise ValueError(
+                f"none of the {len(self)} markers lies inside the outline; "
+                "use a smaller marker pitch or dot, or a larger gel"
+            )
+        hole_mm = np.full(len(self.omitted), self.diameter_mm[keep].max())
+        known = _rims_inside(self.sites_mm(self.omitted), hole_mm, contains)
+        return MarkerGrid(
+            positions_mm=self.positions_mm[keep],
+            row=self.row[keep],
+            column=self.column[keep],
+            diameter_mm=self.diameter_mm[keep],
+            kind=self.kind[keep],
+            pitch_mm=self.pitch_mm,
+            lattice_shape=self.lattice_shape,
+            omitted=self.omitted[known],
+        )
+
+
+def build_marker_grid(
+    rows: int,
+    columns: int,
+    pitch_mm: float,
+    diameter_mm: float,
+    anchors: Anchors = "odd_sized",
+    anchor_scale: float = 1.5,
+) -> MarkerGrid:
+    """Return a full lattice centred on the origin, with anchors.
+
+    `rows` run along x, `columns` along y. Odd-sized anchors have `anchor_scale` times the
+    diameter. Raises ValueError for sizes that cannot be made (counts under 1, lengths not
+    positive or not finite, overlapping dots, a scale not above 1) and for anchors on a lattice
+    of fewer than 5 rows or columns.
+    """
+    _check_request(rows, columns, pitch_mm, diameter_mm, anchors, anchor_scale)
+    sites = np.argwhere(np.ones((rows, columns), dtype=bool))
+    chosen = np.zeros((rows, columns), dtype=bool)
+    if anchors != "none":
+        chosen[tuple(choose_anchor_sites(rows, columns).T)] = True
+    large = chosen if anchors == "odd_sized" else np.zeros_like(chosen)
+    hole = chosen if anchors == "omitted" else np.zeros_like(chosen)
+    sites = sites[~hole.ravel()]
+    kind = large[tuple(sites.T)].astype(np.int64)
+    return MarkerGrid(
+        positions_mm=_lattice_mm(sites, (rows, columns), pitch_mm),
+        row=sites[:, 0],
+        column=sites[:, 1],
+        diameter_mm=np.where(kind == ANCHOR_LARGE, diameter_mm * anchor_scale, diameter_mm),
+        kind=kind,
+        pitch_mm=pitch_mm,
+        lattice_shape=(rows, columns),
+        omitted=np.argwhere(hole),
+    )
+
+
+def _lattice_mm(
+    sites: NDArray[np.int64], shape: tuple[int, int], pitch_mm: float
+) -> NDArray[np.float64]:
+    return (sites.reshape(-1, 2) - (np.array(shape) - 1) / 2) * pitch_mm
+
+
+def _frozen(values: ArrayLike, dtype: type) -> NDArray:
+    array = np.array(values)
+    if dtype is np.int64 and array.size and not np.array_equal(array, np.rint(array)):
+        raise ValueError("marker grid: lattice indices and kinds must be whole numbers")
+    array = array.astype(dtype)
+    array.setflags(write=False)
+    return array
+
+
+def _rims_inside(
+    centres_mm: NDArray[np.float64],
+    diameter_mm: NDArray[np.float64],
+    contains: Callable[[NDArray[np.float64]], ArrayLike],
+) -> NDArray[np.bool_]:
+    angle = np.linspace(0.0, 2.0 * np.pi, _RIM_POINTS, endpoint=False)
+    disc = np.vstack([np.column_stack([np.cos(angle), np.sin(angle)]), [[0.0, 0.0]]]) / 2
+    points = centres_mm[:, None, :] + diameter_mm[:, None, None] * disc
+    inside = np.asarray(contains(points.reshape(-1, 2)), dtype=bool)
+    if inside.shape != (points.shape[0] * points.shape[1],):
+        raise ValueError(
+            f"contains must return one boolean per point, got shape {inside.shape} "
+            f"for {points.shape[0] * points.shape[1]} points"
+        )
+    return np.all(inside.reshape(points.shape[:2]), axis=1)
+
+
+def _check_request(
+    rows: int,
+    columns: int,
+    pitch_mm: float,
+    diameter_mm: float,
+    anchors: str,
+    anchor_scale: float,
+) -> None:
+    for name, count in (("rows", rows), ("columns", columns)):
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+            raise ValueError(f"marker {name} = {count!r}: must be a whole number, at least 1")
+    for name, length in (("pitch_mm", pitch_mm), ("diameter_mm", diameter_mm)):
+        if not (np.isfinite(length) and length > 0):
+            raise ValueError(f"marker {name} = {length!r}: must be a finite length > 0")
+    if anchors not in ("odd_sized", "omitted", "none"):
+        raise ValueError(f"marker anchors = {anchors!r}: must be 'odd_sized', 'omitted' or 'none'")
+    if anchors == "odd_sized" and not (np.isfinite(anchor_scale) and anchor_scale > 1):
+        raise ValueError(
+            f"marker anchor_scale = {anchor_scale!r}: must be > 1, or the anchors look like the "
+            "other dots; 1.5 is usual"
+        )
+    if diameter_mm > pitch_mm:
+        raise ValueError(
+            f"marker diameter_mm = {diameter_mm:g} exceeds pitch_mm = {pitch_mm:g}: the dots would "
+            "overlap; use a larger pitch or smaller dots"
+        )
+
+
+def _check_lengths(grid: MarkerGrid) -> None:
+    count = len(grid.row)
+    expected = {"positions_mm": (count, 2)} | dict.fromkeys(
+        ("row", "column", "diameter_mm", "kind"), (count,)
+    )
+    for name, shape in expected.items():
+        if getattr(grid, name).shape != shape:
+            raise ValueError(
+                f"marker grid: {name} has shape {getattr(grid, name).shape}, expected {shape}"
+            )
+    if grid.omitted.size == 0:
+        empty = np.zeros((0, 2), dtype=np.int64)
+        empty.setflags(write=False)
+        object.__setattr__(grid, "omitted", empty)
+    if grid.omitted.ndim != 2 or grid.omitted.shape[1] != 2:
+        raise ValueError(
+            f"marker grid: omitted has shape {grid.omitted.shape}, expected (k, 2) sites"
+        )
+    if count == 0:
+        raise ValueError("marker grid: no markers; use a smaller pitch or a larger gel")
+
+
+def _check_values(grid: MarkerGrid) -> None:
+    if not (np.isfinite(grid.pitch_mm) and grid.pitch_mm > 0):
+        raise ValueError(f"marker grid: pitch_mm = {grid.pitch_mm}: must be a finite length > 0")
+    if not np.all(np.isfinite(grid.diameter_mm) & (grid.diameter_mm > 0)):
+        raise ValueError("marker grid: every diameter_mm must be a finite length > 0")
+    if not np.isin(grid.kind, (REGULAR, ANCHOR_LARGE)).all():
+        raise ValueError("marker grid: kind must be 0 (regular) or 1 (large anchor)")
+
+
+def _check_sites(grid: MarkerGrid) -> None:
+    rows, columns = grid.lattice_shape
+    dots = np.column_stack([grid.row, grid.column])
+    sites = np.vstack([dots, grid.omitted])
+    if (sites < 0).any() or (sites >= np.array([rows, columns])).any():
+        raise ValueError(f"marker grid: a site lies outside the {rows} x {columns} lattice")
+    flat = sites[:, 0] * columns + sites[:, 1]
+    if len(np.unique(flat)) != len(flat):
+        raise ValueError("marker grid: a lattice site is used twice")
+    if np.any(np.diff(flat[: len(dots)]) < 0):
+        raise ValueError("marker grid: markers must be in row-major order")
+    off_mm = np.abs(grid.positions_mm - grid.sites_mm(dots))
+    if not np.all(off_mm <= _LATTICE_TOLERANCE * grid.pitch_mm):
+        raise ValueError(
+            f"marker grid: a marker lies {off_mm.max():.4g} mm off its lattice site; "
+            "positions are (row, column) times the pitch, centred on the origin"
+        )

@@ -1,0 +1,232 @@
+"""Displacement of the surface nodes from that of the markers, some of which may be lost.
+
+Two interpolations share one interface. `sparse_interpolation` is bilinear in the lattice's cells:
+four weights a node, never more noise than a marker has, constant beyond the outermost markers.
+`thin_plate_interpolation` bends least: a dense matrix, closer to smooth fields, affine beyond.
+
+A lost marker takes the value that makes the field least rough, with B the roughness (of the
+spline its bending energy; else the distance from locally fitted planes):
+
+    B_RR d_R = -B_RK d_K     (R lost, K kept)
+
+For the spline that is the spline of the kept markers itself: the lost ones get no weight, as if
+they had never been there. Only B_RR is factored anew, so a frame may lose others than the last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, sparse
+
+from ifem_export.errors import InterpolationError
+from ifem_export.markers.interpolation import checked_markers, marker_to_node, points_in_plane
+from ifem_export.markers.roughness import local_roughness
+from ifem_export.markers.thin_plate import thin_plate
+
+Array = NDArray[np.float64]
+Operator: TypeAlias = Any
+"""(n, k) dense or CSR: what both take is @ and row selection."""
+_SINGULAR = 1e-12
+_ON_A_LINE = 1e-9
+
+
+class MarkerInterpolation(Protocol):
+    """Carries values from k markers to s surface nodes."""
+
+    @property
+    def n_markers(self) -> int:
+        """Markers k, lost ones included."""
+
+    @property
+    def n_nodes(self) -> int:
+        """Surface nodes s."""
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """(k,) markers whose values are not read."""
+
+    def __call__(self, values: ArrayLike) -> Array:
+        """Values (s, m) at the nodes from (k, m) at the markers; rows of lost ones may be NaN.
+
+        Raises InterpolationError for a wrong shape or a kept value that is not finite.
+        """
+
+    def transposed(self, values: ArrayLike) -> Array:
+        """The transpose: (k, m) at the markers from (s, m) at the nodes; 0 at lost ones."""
+
+    def with_missing(self, mask: ArrayLike) -> MarkerInterpolation:
+        """The same without the markers of (k,) bool `mask`, which replaces an earlier mask.
+
+        Raises InterpolationError where those kept carry no field.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class _Fill:
+    """Values of the lost markers `lost` from those of the kept ones."""
+
+    lost: NDArray[np.int64]
+    rows: Operator
+    factor: tuple[Array, bool]
+
+    def __call__(self, kept: Array) -> Array:
+        return np.asarray(linalg.cho_solve(self.factor, -(self.rows @ kept), check_finite=False))
+
+    def transposed(self, lost: Array) -> Array:
+        """The transpose, (k, m) from (r, m)."""
+        solved = linalg.cho_solve(self.factor, lost, check_finite=False)
+        return np.asarray(-(self.rows.T @ solved))
+
+
+@dataclass(frozen=True, eq=False)
+class FilledInterpolation:
+    """A matrix from markers to nodes, and a roughness that tells what lost markers would read.
+
+    Args:
+        markers_mm: (k, 2) positions at rest.
+        to_nodes: (s, k), dense or CSR; rows sum to 1.
+        roughness: (k, k), dense or CSR; symmetric, positive semi-definite, zero on affine
+            fields.
+        fill: made by `with_missing`.
+    """
+
+    markers_mm: Array
+    to_nodes: Operator
+    roughness: Operator
+    fill: _Fill | None = None
+
+    @property
+    def n_markers(self) -> int:
+        """Markers k, lost ones included."""
+        return int(self.to_nodes.shape[1])
+
+    @property
+    def n_nodes(self) -> int:
+        """Surface nodes s."""
+        return int(self.to_nodes.shape[0])
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """(k,) markers whose values are not read."""
+        mask = np.zeros(self.n_markers, dtype=bool)
+        if self.fill is not None:
+            mask[self.fill.lost] = True
+        return mask
+
+    def __call__(self, values: ArrayLike) -> Array:
+        """See `MarkerInterpolation`."""
+        d = np.array(values, dtype=float)
+        if d.ndim != 2 or len(d) != self.n_markers:
+            raise InterpolationError(
+                f"marker values have shape {d.shape}: must be ({self.n_markers}, m), one row per "
+                "marker"
+            )
+        if self.fill is not None:
+            d[self.fill.lost] = 0.0
+        if not np.isfinite(d).all():
+            first = int(np.flatnonzero(~np.isfinite(d).all(axis=1))[0])
+            raise InterpolationError(
+                f"the value of marker {first} is not finite: name lost markers in with_missing"
+            )
+        if self.fill is not None:
+            d[self.fill.lost] = self.fill(d)
+        return np.asarray(self.to_nodes @ d)
+
+    def transposed(self, values: ArrayLike) -> Array:
+        """See `MarkerInterpolation`."""
+        found = np.array(self.to_nodes.T @ np.asarray(values, dtype=float))
+        if self.fill is not None:
+            found += self.fill.transposed(found[self.fill.lost])
+            found[self.fill.lost] = 0.0
+        return found
+
+    def with_missing(self, mask: ArrayLike) -> FilledInterpolation:
+        """See `MarkerInterpolation`."""
+        lost = np.asarray(mask)
+        if lost.shape != (self.n_markers,) or lost.dtype != np.bool_:
+            raise InterpolationError(
+                f"the mask of lost markers has shape {lost.shape} and type {lost.dtype}: must be "
+                f"({self.n_markers},) bool"
+            )
+        where = np.flatnonzero(lost)
+        if len(where) == 0:
+            return replace(self, fill=None)
+        _require_field(self.markers_mm[~lost], self.markers_mm)
+        rows = self.roughness[where]
+        square = rows[:, where]
+        block = square.toarray() if sparse.issparse(square) else square
+        return replace(self, fill=_Fill(where, rows, _factored(np.asarray(block))))
+
+    def dense(self) -> Array:
+        """The effective matrix (s, k), zero in the columns of lost markers."""
+        found = self(np.where(self.lost[:, None], 0.0, np.eye(self.n_markers)))
+        found[:, self.lost] = 0.0
+        return found
+
+    def noise_gain(self) -> Array:
+        """(s,) standard deviation at each node for independent unit noise on the markers."""
+        return np.asarray(np.linalg.norm(self.dense(), axis=1))
+
+
+def sparse_interpolation(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> FilledInterpolation:
+    """Interpolation by `marker_to_node`; arguments and errors as there."""
+    operator = marker_to_node(markers_mm, nodes_mm)
+    return filled_sparse(points_in_plane(markers_mm, "markers_mm"), operator)
+
+
+def filled_sparse(markers_mm: Array, to_nodes: sparse.csr_array) -> FilledInterpolation:
+    """The interpolation of a stored operator (s, k)."""
+    return FilledInterpolation(markers_mm, to_nodes, local_roughness(markers_mm))
+
+
+def thin_plate_interpolation(
+    markers_mm: ArrayLike, nodes_mm: ArrayLike, smoothing_mm2: float = 0.0
+) -> FilledInterpolation:
+    """Interpolation by `thin_plate`.
+
+    Args:
+        markers_mm: (k, 2) or (k, 3) positions at rest, 3 <= k <= 4000; only x and y are used.
+        nodes_mm: (s, 2) or (s, 3).
+        smoothing_mm2: see `thin_plate`; 0 passes through every marker.
+
+    Raises:
+        InterpolationError: as `marker_to_node`, too many markers or a smoothing below 0.
+    """
+    markers = checked_markers(markers_mm)
+    nodes = points_in_plane(nodes_mm, "nodes_mm")
+    spline = thin_plate(markers, nodes, smoothing_mm2)
+    return FilledInterpolation(markers, spline.to_nodes, spline.bending)
+
+
+def _require_field(kept: Array, markers: Array) -> None:
+    if len(kept) < 3:
+        raise InterpolationError(
+            f"{len(kept)} of {len(markers)} markers are left: a displacement field needs at "
+            "least 3, not on one line"
+        )
+    spread = np.linalg.eigvalsh(np.cov(kept.T))
+    if spread[0] <= _ON_A_LINE**2 * spread[1]:
+        raise InterpolationError(
+            f"the {len(kept)} markers left lie on one line: a field needs a second row"
+        )
+
+
+def _factored(block: Array) -> tuple[Array, bool]:
+    """Cholesky factor of B_RR, refused where the kept markers leave a motion of others open."""
+    scale = 1.0 / np.sqrt(np.diag(block)) if (np.diag(block) > 0).all() else None
+    try:
+        if scale is None:
+            raise linalg.LinAlgError
+        factor, lower = linalg.cho_factor(block, lower=True, check_finite=False)
+        if (np.diag(factor) * scale).min() ** 2 <= _SINGULAR:
+            raise linalg.LinAlgError
+    except linalg.LinAlgError as error:
+        raise InterpolationError(
+            f"the markers left say nothing about some of the {len(block)} lost ones: too many are "
+            "missing in one place"
+        ) from error
+    return factor, bool(lower)

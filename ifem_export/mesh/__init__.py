@@ -1,0 +1,1 @@
+"""The mesh of the gel pad: outline, cells, nodes and surfaces."""

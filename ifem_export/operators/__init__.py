@@ -1,0 +1,1 @@
+"""Surface operators, which map displacements of the outer surface to forces."""

@@ -1,0 +1,42 @@
+"""Compiled loops of the surface operators. Import only where they run: this loads numba."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+
+@njit(cache=True, nogil=True, fastmath=False)
+def apply_stencil(types: Any, neighbours: Any, table: Any, u: Any, f: Any) -> None:
+    """f = K u for surface nodes that see their eight neighbours only.
+
+    `types` (c,) chooses the blocks of `table` (t, 3, 3, 9) (row, column, neighbour);
+    `neighbours` (c, 9) are node numbers, c for an absent one; `u` (c + 1, 3) ends in zeros.
+    """
+    for node in range(len(types)):
+        blocks = table[types[node]]
+        a = b = c = 0.0
+        for slot in range(9):
+            other = neighbours[node, slot]
+            x, y, z = u[other, 0], u[other, 1], u[other, 2]
+            a += blocks[0, 0, slot] * x + blocks[0, 1, slot] * y + blocks[0, 2, slot] * z
+            b += blocks[1, 0, slot] * x + blocks[1, 1, slot] * y + blocks[1, 2, slot] * z
+            c += blocks[2, 0, slot] * x + blocks[2, 1, slot] * y + blocks[2, 2, slot] * z
+        f[node, 0], f[node, 1], f[node, 2] = a, b, c
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gathered(kernel: Any, places: Any, out: Any) -> None:
+    """Write the products (3n, 3n) of nodes at lattice `places` (n, 2) from a periodic `kernel`
+    (rows, columns, 3, 3)."""
+    rows, columns = kernel.shape[0], kernel.shape[1]
+    for i in range(len(places)):
+        for j in range(i + 1):
+            y = (places[i, 0] - places[j, 0]) % rows
+            x = (places[i, 1] - places[j, 1]) % columns
+            for a in range(3):
+                for b in range(3):
+                    value = kernel[y, x, a, b]
+                    out[3 * i + a, 3 * j + b] = value
+                    out[3 * j + b, 3 * i + a] = value
