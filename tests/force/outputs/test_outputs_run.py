@@ -20,7 +20,7 @@ from gelslim_force.outputs import optional_library
 from gelslim_force.outputs.recorded_run import read_run
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
 
-HERE = Path(__file__).parent
+SAMPLES = Path(__file__).parents[1]
 MIXED = [
     samples.unreadable(0),
     samples.frame(1),
@@ -137,7 +137,7 @@ for k in range(11):
 
 
 def child(folder: Path, end: str, fields: str = "npz") -> subprocess.CompletedProcess[str]:
-    code = CHILD.format(here=str(HERE), folder=str(folder), fields=fields, end=end)
+    code = CHILD.format(here=str(SAMPLES), folder=str(folder), fields=fields, end=end)
     return subprocess.run(
         [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=False
     )
@@ -189,7 +189,7 @@ def test_a_full_disk_is_a_clear_error_and_keeps_what_was_written(tmp_path: Path)
     folder = tmp_path / "full"
     code = f"""
 import resource, signal, sys
-sys.path[:0] = [{str(HERE)!r}]
+sys.path[:0] = [{str(SAMPLES)!r}]
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 import output_samples as samples
 from gelslim_core.files.output_error import OutputError

@@ -13,7 +13,7 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 
 FRAMES = Path(
-    os.environ.get("GELSLIM_REAL_FRAMES", Path(__file__).parents[3] / "shared" / "real_frames")
+    os.environ.get("GELSLIM_REAL_FRAMES", Path(__file__).parents[4] / "shared" / "real_frames")
 )
 # Middle and half-width in px of the coloured spot, read off the pictures by eye.
 SEEN = {

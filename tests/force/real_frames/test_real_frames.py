@@ -18,7 +18,7 @@ from gelslim_force.tracking.matching import match
 pytest.importorskip("PIL")
 from gelslim_force.frames.picture import read_picture
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FRAMES = Path(os.environ.get("GELSLIM_REAL_FRAMES", ROOT.parent / "shared" / "real_frames"))
 PRESSES = ("press_5", "press_14", "press_18", "press_26", "press_33", "press_38", "press_44",
            "press_49")  # fmt: skip

@@ -18,7 +18,7 @@ from gelslim_force.outputs.mcap_recording import McapRecording
 from gelslim_force.outputs.ros_messages import FORCE_FIELD, force_field, nanoseconds, schema
 
 pytest.importorskip("mcap_ros2")
-HERE = Path(__file__).parent
+SAMPLES = Path(__file__).parents[1]
 FRAMES = [
     samples.unreadable(0, "größe 3×5 px"),
     samples.frame(1),
@@ -126,7 +126,7 @@ def test_a_killed_recording_can_be_recovered(tmp_path: Path) -> None:
     path = tmp_path / "killed.mcap"
     code = f"""
 import os, signal, sys
-sys.path[:0] = [{str(HERE)!r}]
+sys.path[:0] = [{str(SAMPLES)!r}]
 import output_samples as samples
 from gelslim_force.outputs.mcap_recording import McapRecording
 out = McapRecording({str(path)!r})

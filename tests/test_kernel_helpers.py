@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PACKAGES = ("gelslim_optics", "ifem_export", "gelslim_force", "gelslim_twin")
 GUARDED_ELSEWHERE = {"trace_kernel"}
 """Whose one caller drops what is stale before the import."""
