@@ -193,7 +193,7 @@ def rest_lattice(rig: Rig) -> ReferenceLattice:
     flat = np.column_stack([rig.grid.positions_mm, np.zeros(len(rig.grid))])
     return ReferenceLattice(
         sites=np.column_stack([rig.grid.row, rig.grid.column]),
-        places_px=rig.camera.project(flat),
+        positions_px=rig.camera.project(flat),
         markers=np.arange(len(rig.grid)),
     )
 
@@ -214,7 +214,7 @@ def shot(
     flat = np.column_stack([places + moved, np.zeros(len(places))])
     points = rig.camera.project(flat) + rng.normal(0, DOT_NOISE_PX, (len(places), 2))
     kept = np.flatnonzero(rng.random(len(places)) >= MISSING)
-    low, high = reference.places_px.min(axis=0), reference.places_px.max(axis=0)
+    low, high = reference.positions_px.min(axis=0), reference.positions_px.max(axis=0)
     extra = rng.uniform(low, high, (round(SPURIOUS * len(places)), 2))
     dots = np.vstack([points[kept], extra])
     truth = np.concatenate([kept, np.full(len(extra), -1)])

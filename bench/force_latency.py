@@ -149,20 +149,20 @@ def paper_chain(
     from ifem_export.markers.interpolation import marker_to_node
 
     reference = calibration.reference
-    view = MarkerView(calibration.camera, reference.places_px)
+    view = MarkerView(calibration.camera, reference.positions_px)
     detector = Detector(calibration.detector)
     operator = rig.bundle.surface_operator("paper")
     nodes = np.asarray(rig.bundle.mesh.surface_mm)
     to_markers = marker_to_node(nodes, view.rest_mm)
-    last = [reference.places_px]
+    last = [reference.positions_px]
 
     def run(k: int) -> dict[str, float]:
         marks = [time.perf_counter()]
         dots = detector.detect(frames[k])
         tracks = match(reference, dots.centres_px, last[0], "nearest")
-        last[0] = tracks.places_px
+        last[0] = tracks.positions_px
         marks.append(time.perf_counter())
-        lateral = view.lateral_motion(tracks.places_px, to_markers @ normal_mm[k], "printed")
+        lateral = view.lateral_motion(tracks.positions_px, to_markers @ normal_mm[k], "printed")
         marks.append(time.perf_counter())
         u = np.empty_like(nodes)
         rest = view.rest_mm[:, :2]

@@ -33,7 +33,7 @@ def main() -> None:
     print("found", result.wrench.force_n.round(3), "N, truth", [*SHEAR_N, -NORMAL_N], "N")
     print("coverage", result.coverage, result.problems)
     built = pipeline.calibration
-    overlay = Overlay(rest.shape[:2], built.camera.project, built.reference.places_px)
+    overlay = Overlay(rest.shape[:2], built.camera.project, built.reference.positions_px)
     picture = overlay.draw(image, result, scale_of_run([result]))
     # 256 colours: the sensor's noise does not compress otherwise.
     Image.fromarray(picture).quantize(256).save(TARGET, optimize=True)

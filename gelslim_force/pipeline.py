@@ -85,7 +85,7 @@ class ForcePipeline:
         self._motion = SurfaceMotion(
             MarkerView(
                 calibration.camera,
-                reference.places_px,
+                reference.positions_px,
                 marker_heights_mm(bundle)[reference.markers],
             ),
             reference.markers,
@@ -160,7 +160,7 @@ class ForcePipeline:
             return self._numbered(
                 time_s, tracks=tracks, stage_ms=clock.stages, problems=(*problems, short)
             )
-        reading, motion = self._motions(image, tracks.places_px, normal_mm, clock)
+        reading, motion = self._motions(image, tracks.positions_px, normal_mm, clock)
         if reading is not None and not reading.known:
             problems = (*problems, reading.problem)
         known = reading is not None and reading.known

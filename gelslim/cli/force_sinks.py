@@ -110,5 +110,5 @@ def _overlay(pipeline: ForcePipeline) -> Overlay:
     return Overlay(
         (camera.image_height_px, camera.image_width_px),
         camera.project,
-        pipeline.calibration.reference.places_px,
+        pipeline.calibration.reference.positions_px,
     )

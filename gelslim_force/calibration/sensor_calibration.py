@@ -107,7 +107,7 @@ class SensorCalibration:
         apart = np.abs(sites[:, None, :] - sites[None, :, :]).max(axis=2)
         keep = (apart <= _REACH).sum(axis=1) > 1
         return ReferenceLattice(
-            sites=sites[keep], places_px=self.reference_px[keep], markers=self.markers[keep]
+            sites=sites[keep], positions_px=self.reference_px[keep], markers=self.markers[keep]
         )
 
     def tracker(self, settings: TrackerSettings | None = None) -> Tracker:

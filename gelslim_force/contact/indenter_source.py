@@ -125,7 +125,7 @@ def indenter_source(
     finder = PatchFinder(
         built.camera,
         reference,
-        followed.places_px,
+        followed.positions_px,
         marker_radius_px=radius[index],
         surface_mm=pipeline.points_mm,
         indenter=indenter,

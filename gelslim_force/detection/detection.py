@@ -59,7 +59,7 @@ class Detector:
     def detect_near(
         self,
         image: NDArray[np.uint8],
-        places_px: NDArray[np.float64],
+        positions_px: NDArray[np.float64],
         moments_px2: NDArray[np.float64],
         *,
         compare: bool = True,
@@ -73,7 +73,7 @@ class Detector:
         Raises ValueError for an image of another kind or arrays of other shapes.
         """
         planes = as_planes(image)
-        starts = np.array(places_px, dtype=float)
+        starts = np.array(positions_px, dtype=float)
         moments = np.array(moments_px2, dtype=float)
         if starts.ndim != 2 or starts.shape[1] != 2 or moments.shape != (len(starts), 3):
             raise ValueError(

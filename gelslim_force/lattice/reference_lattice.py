@@ -26,25 +26,29 @@ class ReferenceLattice:
 
     sites: NDArray[np.int64]
     """(n, 2) row and column."""
-    places_px: NDArray[np.float64]
+    positions_px: NDArray[np.float64]
     """(n, 2)."""
     markers: NDArray[np.int64]
     """(n,) id of each in the grid; 0 ... n - 1 where no grid is known."""
 
     def __post_init__(self) -> None:
-        for name, dtype in (("sites", np.int64), ("places_px", np.float64), ("markers", np.int64)):
+        for name, dtype in (
+            ("sites", np.int64),
+            ("positions_px", np.float64),
+            ("markers", np.int64),
+        ):
             array = np.array(getattr(self, name), dtype=dtype)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         count = len(self.markers)
-        if self.sites.shape != (count, 2) or self.places_px.shape != (count, 2):
+        if self.sites.shape != (count, 2) or self.positions_px.shape != (count, 2):
             raise ValueError(
-                f"reference lattice: sites {self.sites.shape} and places {self.places_px.shape} "
+                f"reference lattice: sites {self.sites.shape} and places {self.positions_px.shape} "
                 f"must be ({count}, 2)"
             )
         if count < 9:
             raise ValueError(f"reference lattice: {count} markers are too few to track; min. 9")
-        if not np.isfinite(self.places_px).all():
+        if not np.isfinite(self.positions_px).all():
             raise ValueError("reference lattice: a place is not finite; leave lost markers out")
         if len(np.unique(self.sites, axis=0)) != count:
             raise ValueError("reference lattice: a site is used twice")
@@ -77,7 +81,7 @@ class ReferenceLattice:
         pitch = np.full(len(self), np.inf)
         for k in range(4):
             j = self.neighbours[:, k]
-            gap = np.hypot(*(self.places_px[j] - self.places_px).T)
+            gap = np.hypot(*(self.positions_px[j] - self.positions_px).T)
             pitch = np.where(j >= 0, np.minimum(pitch, gap), pitch)
         known = np.isfinite(pitch)
         if not known.any():
@@ -103,4 +107,4 @@ def _connected(sites: ArrayLike, places: ArrayLike, markers: ArrayLike) -> Refer
     at, where, ids = np.asarray(sites), np.asarray(places), np.asarray(markers)
     gap = np.abs(at[:, None, :] - at[None, :, :]).max(axis=2)
     keep = ((gap <= _REACH).sum(axis=1)) > 1
-    return ReferenceLattice(sites=at[keep], places_px=where[keep], markers=ids[keep])
+    return ReferenceLattice(sites=at[keep], positions_px=where[keep], markers=ids[keep])

@@ -180,7 +180,7 @@ class Overlay:
 
     def _rest_of(self, tracks: Tracks) -> NDArray[np.float64]:
         """Places at rest (m, 2), remembered for the markers that are lost now."""
-        now = tracks.places_px - tracks.displacement_px
+        now = tracks.positions_px - tracks.displacement_px
         if self._rest is None or len(self._rest) != len(tracks):
             self._rest = np.full((len(tracks), 2), np.nan)
         new = np.isnan(self._rest).any(axis=1) & np.isfinite(now).all(axis=1)

@@ -77,7 +77,7 @@ def _marker_arrays(
     count = len(tracks) if tracks is not None else 0 if motion is None else len(motion)
     nowhere = np.full((count, 3), np.nan)
     return {
-        "places_px": np.array(nowhere[:, :2] if tracks is None else tracks.places_px, real),
+        "places_px": np.array(nowhere[:, :2] if tracks is None else tracks.positions_px, real),
         "displacement_px": np.array(
             nowhere[:, :2] if tracks is None else tracks.displacement_px, real
         ),

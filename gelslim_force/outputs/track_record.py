@@ -48,7 +48,7 @@ class TrackRecord:
             self._places.append(np.full((count, 2), np.nan, dtype=np.float32))
             self._status.append(np.full(count, _NONE, dtype=np.uint8))
         else:
-            self._places.append(tracks.places_px.astype(np.float32))
+            self._places.append(tracks.positions_px.astype(np.float32))
             self._status.append(tracks.status.astype(np.uint8))
         self._index.append(result.index)
         self._time_s.append(result.time_s)
@@ -61,7 +61,7 @@ class TrackRecord:
         values of `MarkerStatus`, 255 where a frame has no tracks; coverage (f,); frame_index
         (f,); time_s (f,); sites (n, 2) row and column; rest_px (n, 2).
         """
-        count, rest = len(self._rest.reference), self._rest.reference.places_px
+        count, rest = len(self._rest.reference), self._rest.reference.positions_px
         places = np.array(self._places, dtype=np.float32).reshape(-1, count, 2)
         status = np.array(self._status, dtype=np.uint8).reshape(-1, count)
         return {
@@ -141,4 +141,4 @@ class TrackRecord:
     def _moved(self, k: int) -> NDArray[np.float64]:
         """Lengths in px of the displacements of the markers seen in frame number k."""
         seen = self._status[k] == int(MarkerStatus.TRACKED)
-        return np.hypot(*(self._places[k][seen] - self._rest.reference.places_px[seen]).T)
+        return np.hypot(*(self._places[k][seen] - self._rest.reference.positions_px[seen]).T)

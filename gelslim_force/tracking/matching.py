@@ -50,7 +50,9 @@ def match(
     points = read_only(np.asarray(points_px, dtype=float))
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
         raise ValueError(f"dots {points.shape} must be finite places (m, 2)")
-    expected = reference.places_px if expected_px is None else np.asarray(expected_px, dtype=float)
+    expected = (
+        reference.positions_px if expected_px is None else np.asarray(expected_px, dtype=float)
+    )
     if expected.shape != (len(reference), 2):
         raise ValueError(f"expected places {expected.shape} must be ({len(reference)}, 2)")
     expected = read_only(expected)
@@ -81,7 +83,7 @@ def _robust(
     from gelslim_force.tracking import matching_kernel as mk
     from gelslim_force.tracking.steep_kernel import settle
 
-    rest, near, pitch = reference.places_px, reference.neighbours, reference.pitch_px
+    rest, near, pitch = reference.positions_px, reference.neighbours, reference.pitch_px
     dots = np.full(len(reference), -1, dtype=np.int64)
     mk.mutual(expected, points, pitch, _GATE, dots)
     offered = dots >= 0
@@ -117,7 +119,7 @@ def _grown(
     """Grow the largest patches in turn until one explains nearly all dots; the best of them."""
     from gelslim_force.tracking import matching_kernel as mk
 
-    rest, near, pitch = reference.places_px, reference.neighbours, reference.pitch_px
+    rest, near, pitch = reference.positions_px, reference.neighbours, reference.pitch_px
     enough = _CLEAN * min(len(reference), len(points))
     best, most = (dots.copy(), np.zeros_like(trusted)), -1
     for alike in _ALIKE:
@@ -150,7 +152,7 @@ def _shifted(
     """
     from gelslim_force.tracking import matching_kernel as mk
 
-    rest, near, pitch = reference.places_px, reference.neighbours, reference.pitch_px
+    rest, near, pitch = reference.positions_px, reference.neighbours, reference.pitch_px
     low = reference.sites.min(axis=0) - _SHIFTS
     table = np.full(tuple(reference.sites.max(axis=0) - low + 1 + _SHIFTS), -1, dtype=np.int64)
     table[tuple((reference.sites - low).T)] = np.arange(len(reference))
@@ -182,8 +184,8 @@ def _tracks(
     seen = dots >= 0
     places[seen] = points[dots[seen]]
     return Tracks(
-        places_px=places,
-        displacement_px=places - reference.places_px,
+        positions_px=places,
+        displacement_px=places - reference.positions_px,
         status=status,
         dots=dots,
     )

@@ -108,7 +108,7 @@ class Tracker:
 
     def reset(self) -> None:
         """Forget all motion; the next frame is searched whole."""
-        self._places = self._reference.places_px.copy()
+        self._places = self._reference.positions_px.copy()
         self._velocity = np.zeros_like(self._places)
         self._moments = self._rest_moments.copy()
         self._usual = 0
@@ -152,7 +152,9 @@ class Tracker:
     ) -> tuple[Detections, Tracks]:
         """Look for lost markers where their neighbours' motion puts them: it changed at once."""
         lost = np.flatnonzero(~tracks.tracked & tracks.known)
-        more = self._detector.detect_near(image, tracks.places_px[lost], self._rest_moments[lost])
+        more = self._detector.detect_near(
+            image, tracks.positions_px[lost], self._rest_moments[lost]
+        )
         more = more.take(more.found)
         if len(more) and len(dots):
             gap, _ = cKDTree(dots.centres_px).query(more.centres_px)
@@ -185,10 +187,10 @@ class Tracker:
 
     def _remember(self, result: TrackedFrame) -> None:
         tracks = result.tracks
-        step = tracks.places_px - self._places
+        step = tracks.positions_px - self._places
         moved = np.isfinite(step).all(axis=1, keepdims=True)
         self._velocity = np.where(moved, step, 0.0)
         # A lost marker is next looked for where it was last seen.
-        self._places = np.where(tracks.known[:, None], tracks.places_px, self._places)
+        self._places = np.where(tracks.known[:, None], tracks.positions_px, self._places)
         seen = tracks.tracked
         self._moments[seen] = result.detections.moments_px2[tracks.dots[seen]]

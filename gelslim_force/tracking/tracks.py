@@ -26,7 +26,7 @@ class MarkerStatus(IntEnum):
 class Tracks:
     """n markers in one frame, in the order of the reference; arrays are read-only."""
 
-    places_px: NDArray[np.float64]
+    positions_px: NDArray[np.float64]
     """(n, 2); NaN where not known."""
     displacement_px: NDArray[np.float64]
     """(n, 2) from the reference; NaN where not known."""
@@ -36,7 +36,7 @@ class Tracks:
     """(n,) detection of each tracked marker, -1 for the others."""
 
     def __post_init__(self) -> None:
-        for name in ("places_px", "displacement_px", "status", "dots"):
+        for name in ("positions_px", "displacement_px", "status", "dots"):
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -53,7 +53,7 @@ class Tracks:
     @property
     def known(self) -> NDArray[np.bool_]:
         """(n,) with a place, seen or predicted."""
-        return np.isfinite(self.places_px[:, 0]) & np.isfinite(self.places_px[:, 1])
+        return np.isfinite(self.positions_px[:, 0]) & np.isfinite(self.positions_px[:, 1])
 
     @property
     def coverage(self) -> float:

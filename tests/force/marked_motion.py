@@ -26,7 +26,7 @@ def seen_at(moved_mm: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
 REST_PX = seen_at()
 REFERENCE = ReferenceLattice(
     sites=np.column_stack([GRID.row, GRID.column]),
-    places_px=REST_PX,
+    positions_px=REST_PX,
     markers=np.arange(len(GRID)),
 )
 

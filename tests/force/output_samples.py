@@ -125,7 +125,7 @@ def assert_same(found: FrameResult, given: FrameResult, relative: float) -> None
     assert found.normal_known == given.normal_known
     assert dict(found.stage_ms) == dict(given.stage_ms)
     pairs: list[tuple[object, object, tuple[str, ...]]] = [
-        (found.tracks, given.tracks, ("places_px", "displacement_px", "status", "dots")),
+        (found.tracks, given.tracks, ("positions_px", "displacement_px", "status", "dots")),
         (
             found.field,
             given.field,

@@ -89,7 +89,7 @@ CENTRES = (
     "look = synthetic.Look(noise=2.0);"
     "seen = synthetic.render(s.sensor_grid(), camera_rig.finger_view(), look);"
     "found = calibrate(s.sensor_bundle(), seen.image);"
-    "print(hashlib.sha256(found.reference.places_px.tobytes()).hexdigest())"
+    "print(hashlib.sha256(found.reference.positions_px.tobytes()).hexdigest())"
 )
 
 

@@ -200,7 +200,7 @@ def _picture_sink(rest: DotsAtRest, folder: Path, most: int) -> PictureSink | No
     if not most:
         return None
     height, width = rest.image_shape[:2]
-    overlay = Overlay((height, width), None, rest.reference.places_px)
+    overlay = Overlay((height, width), None, rest.reference.positions_px)
     return PictureSink(overlay, folder / "pictures", most)
 
 

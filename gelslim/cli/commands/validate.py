@@ -126,7 +126,7 @@ def _draw(found: Validation, folder: Path) -> list[str]:
         replace_file(folder / name, content)
     camera = found.calibration.camera
     shape = (camera.image_height_px, camera.image_width_px)
-    overlay = Overlay(shape, camera.project, found.calibration.reference.places_px)
+    overlay = Overlay(shape, camera.project, found.calibration.reference.positions_px)
     names = list(plots)
     for sample in (deepest, *others):
         result = next(iter(sample.results.values()))

@@ -212,7 +212,7 @@ def test_tracker_follows_the_calibrated_markers():
     shift = np.array([0.25, -0.15]) + 0.02 * rng.normal(size=(len(GRID), 2))
     moved = tracker.update(seen_by(GRID, BUILD, missing=0.03, moved_mm=shift)).tracks
     assert moved.coverage > 0.97
-    now = found.camera.backproject(moved.places_px[moved.tracked])[:, :2]
+    now = found.camera.backproject(moved.positions_px[moved.tracked])[:, :2]
     expected = shift[found.markers][moved.tracked]
     assert np.abs(now - found.rest_mm[moved.tracked] - expected).max() < 0.006
 

@@ -71,12 +71,12 @@ def test_gelslim3_double_dots_are_matched_from_rest_to_press(gelslim3, name):
     assert 2.5 < np.nanmax(length) < 15
     if name in SEEN:
         x, y, half = SEEN[name]
-        away = np.hypot(*(gelslim3.reference.places_px - [x, y]).T)
+        away = np.hypot(*(gelslim3.reference.positions_px - [x, y]).T)
         far = tracks.tracked & (away > 2.5 * half)
         assert far.sum() > 150
         assert np.median(length[far]) < 0.3
         assert np.hypot(*np.median(tracks.displacement_px[far], axis=0)) < 0.15
-        peak = gelslim3.reference.places_px[np.nanargmax(np.where(tracks.tracked, length, 0))]
+        peak = gelslim3.reference.positions_px[np.nanargmax(np.where(tracks.tracked, length, 0))]
         assert np.hypot(*(peak - [x, y])) < 1.3 * half, "the largest motion is at the contact"
 
 

@@ -95,13 +95,14 @@ def test_predicted_places_of_missing_markers_are_near_the_truth():
     predicted = tracks.status == MarkerStatus.PREDICTED
     assert predicted.sum() > 20
     off = (
-        np.hypot(*(tracks.places_px - seen_at(moved))[predicted].T) / REFERENCE.pitch_px[predicted]
+        np.hypot(*(tracks.positions_px - seen_at(moved))[predicted].T)
+        / REFERENCE.pitch_px[predicted]
     )
     assert np.median(off) < 0.03
     assert off.max() < 0.25
-    known = np.isfinite(tracks.places_px).all(axis=1)
+    known = np.isfinite(tracks.positions_px).all(axis=1)
     assert np.allclose(
-        tracks.displacement_px[known], (tracks.places_px - REST_PX)[known], atol=1e-12
+        tracks.displacement_px[known], (tracks.positions_px - REST_PX)[known], atol=1e-12
     )
 
 
@@ -110,7 +111,7 @@ def test_a_dot_that_contradicts_its_neighbours_is_rejected():
     dots[150] += 0.3 * REFERENCE.pitch_px[150] * np.array([1.0, 0.0])
     tracks = match(REFERENCE, dots)
     assert tracks.status[150] == MarkerStatus.REJECTED
-    assert np.hypot(*(tracks.places_px[150] - REST_PX[150])) < 0.3
+    assert np.hypot(*(tracks.positions_px[150] - REST_PX[150])) < 0.3
     assert tracks.tracked.sum() == len(GRID) - 1
 
 

@@ -46,7 +46,7 @@ def errors(tracker, tracked, frame):
     """Distance (k,) of the tracked markers from their true centres, and which they are."""
     seen = np.flatnonzero(tracked.tracks.tracked)
     true = frame.centres_px[tracker.reference.markers[seen]]
-    return np.hypot(*(tracked.tracks.places_px[seen] - true).T), tracker.reference.markers[seen]
+    return np.hypot(*(tracked.tracks.positions_px[seen] - true).T), tracker.reference.markers[seen]
 
 
 def test_a_press_is_followed_on_the_fast_path(rest):
@@ -72,7 +72,7 @@ def test_the_fast_path_gives_what_the_full_search_gives(rest):
         a, b = fast.update(image), full.update(image)
         both = a.tracks.tracked & b.tracks.tracked
         assert both.mean() > 0.99
-        apart = np.hypot(*(a.tracks.places_px - b.tracks.places_px)[both].T)
+        apart = np.hypot(*(a.tracks.positions_px - b.tracks.positions_px)[both].T)
         assert np.percentile(apart, 99) < 0.01
         assert apart.max() < 0.1
     assert (a.route, b.route) == ("near", "full")
@@ -200,7 +200,7 @@ def test_reset_forgets_all_motion(rest):
     tracker.reset()
     again = [tracker.update(frame_at(a).image).tracks for a in (0.3, 0.6)]
     for a, b in zip(first, again, strict=True):
-        assert np.array_equal(a.places_px, b.places_px, equal_nan=True)
+        assert np.array_equal(a.positions_px, b.positions_px, equal_nan=True)
 
 
 def test_a_long_stream_keeps_no_more_than_its_last_frame(rest):
