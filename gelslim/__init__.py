@@ -1,1 +1,69 @@
-"""Tactile fingers of the GelSlim type: the command line and the public names."""
+"""Tactile fingers of the GelSlim type: from a spec to parts, forces and simulated contacts.
+
+Each name is loaded when it is first used, so that `import gelslim` is fast and needs neither CAD
+nor rendering libraries.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gelslim_core import __version__
+from gelslim_core.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from gelslim.contacts import plan, simulate, validate
+    from gelslim.design import build, check, derive, make_bundle
+    from gelslim.examples import examples
+    from gelslim_cad.spec.reader import read_spec
+    from gelslim_core.budget.budget import Budget
+    from gelslim_core.errors import GelslimError
+    from gelslim_force.calibration.calibration import calibrate
+    from gelslim_force.frames.source import open_frames
+    from gelslim_force.pipeline import ForcePipeline
+    from gelslim_twin.scene.reader import read_scene
+    from ifem_export.bundle.files import load_bundle, write_bundle
+
+__all__ = [
+    "Budget",
+    "ForcePipeline",
+    "GelslimError",
+    "__version__",
+    "build",
+    "calibrate",
+    "check",
+    "derive",
+    "examples",
+    "load_bundle",
+    "make_bundle",
+    "open_frames",
+    "plan",
+    "read_scene",
+    "read_spec",
+    "simulate",
+    "validate",
+    "write_bundle",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__,
+    {
+        "Budget": "gelslim_core.budget.budget",
+        "ForcePipeline": "gelslim_force.pipeline",
+        "GelslimError": "gelslim_core.errors",
+        "build": "gelslim.design",
+        "calibrate": "gelslim_force.calibration.calibration",
+        "check": "gelslim.design",
+        "derive": "gelslim.design",
+        "examples": "gelslim.examples",
+        "load_bundle": "ifem_export.bundle.files",
+        "make_bundle": "gelslim.design",
+        "open_frames": "gelslim_force.frames.source",
+        "plan": "gelslim.contacts",
+        "read_scene": "gelslim_twin.scene.reader",
+        "read_spec": "gelslim_cad.spec.reader",
+        "simulate": "gelslim.contacts",
+        "validate": "gelslim.contacts",
+        "write_bundle": "ifem_export.bundle.files",
+    },
+)

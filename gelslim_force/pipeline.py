@@ -56,6 +56,10 @@ class ForcePipeline:
         normal: finds the normal motion in each frame; None leaves normal forces unknown unless
             `process` is given the motion.
 
+    Attributes:
+        bundle: the sensor.
+        calibration: its camera and markers at rest.
+
     Raises:
         IfemError: no operator keeps the budget, or the bundle has no markers.
         ValueError: the calibration belongs to another bundle.

@@ -35,7 +35,9 @@ BELOW: dict[str, tuple[str, ...]] = {
 """What each package may import; the two packages of a pair never import each other."""
 
 ROOMS: dict[str, tuple[str, ...]] = {
-    "gelslim_core": ("errors", "lazy", "figure", "kernel_cache", "budget", "files", "jobs", "yaml"),
+    "gelslim_core": (
+        "errors", "lazy", "extras", "figure", "kernel_cache", "budget", "files", "jobs", "yaml",
+    ),
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (
         "errors", "mesh", "assembly", "elements", "finite_strain", "operators", "inverse",
@@ -53,7 +55,9 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "spec", "markers", "geometry", "light", "dimensions", "checks", "export", "proof",
         "solids", "report", "sensor", "build", "compare", "explore", "family",
     ),
-    "gelslim": ("extras", "ending", "scene_sensor", "doctor", "cli", "__main__"),
+    "gelslim": (
+        "ending", "examples", "scene_sensor", "design", "contacts", "doctor", "cli", "__main__",
+    ),
 }  # fmt: skip
 """The rooms of each package from the ground up: a room imports only those before it."""
 

@@ -18,6 +18,7 @@ from gelslim.cli.commands.check import check
 from gelslim.cli.commands.derive import derive
 from gelslim.cli.commands.diff import diff
 from gelslim.cli.commands.doctor import doctor
+from gelslim.cli.commands.examples import examples
 from gelslim.cli.commands.explain import explain
 from gelslim.cli.commands.explore import explore
 from gelslim.cli.commands.family import family
@@ -67,6 +68,7 @@ def _options(
 
 
 for _command in (
+    examples,
     new,
     check,
     derive,

@@ -71,7 +71,7 @@ def bench_light(path: Path, progress: Progress | None = None) -> Part:
 
 def bench_simulation(sensor: TwinSensor, progress: Progress | None = None) -> Part:
     """Time a simulated pose against what its effects declare."""
-    from gelslim.cli.scene_budget import twin_key
+    from gelslim.contacts import twin_key
     from gelslim_twin.simulation.pace import measure_paces
 
     now, figures = measure_paces(sensor, progress)

@@ -8,7 +8,7 @@ from typing import Any
 from typer.core import TyperGroup
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
-    "Design a finger": ("new", "check", "derive", "explain", "diff"),
+    "Design a finger": ("new", "examples", "check", "derive", "explain", "diff"),
     "Search for one": ("thinner", "explore", "optimise"),
     "Try it before it is built": ("light", "plan", "simulate", "validate"),
     "Make its files": ("build", "family", "markers", "bundle", "bundle-info", "bundle-export"),

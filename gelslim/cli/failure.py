@@ -14,8 +14,8 @@ import typer
 
 from gelslim.cli.status import BAD_INPUT, FAULT, RULE_FAILED
 from gelslim.ending import SAID, asked_to_end
-from gelslim.extras import extra_of
 from gelslim_core.errors import GelslimError
+from gelslim_core.extras import extra_of, install_command
 
 # typer brings its own click from 0.20 on and uses the installed one before: ask typer for it.
 _USAGE_ERROR = typer.BadParameter.__mro__[1]
@@ -90,7 +90,7 @@ def _missing(error: ImportError) -> tuple[int, str]:
     if extra and isinstance(error, ModuleNotFoundError):
         return BAD_INPUT, (
             f"gelslim: this command needs {top}, which is not installed; "
-            f"run: pip install 'gelslim-cad[{extra}]' (`gelslim doctor` lists all extras)"
+            f"run: {install_command(extra)} (`gelslim doctor` lists all extras)"
         )
     if extra or ".so" in str(error):
         return BAD_INPUT, (

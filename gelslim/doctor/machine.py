@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from gelslim.extras import installed
 from gelslim_cad.build.fingerprint import PACKAGES
 from gelslim_cad.explore.engine import processors
+from gelslim_core.extras import install_command, installed
 
 GL_LIBRARIES = {
     "libGL.so.1": "libgl1",
@@ -106,7 +106,7 @@ def _loads(library: str) -> bool:
 def drawing() -> str:
     """Why no picture can be drawn off screen; empty where a test picture comes out."""
     if not installed("vtkmodules"):
-        return "VTK is not installed: pip install 'gelslim-cad[view]'"
+        return f"VTK is not installed: {install_command('view')}"
     try:
         run = subprocess.run(
             [sys.executable, "-c", _DRAW],

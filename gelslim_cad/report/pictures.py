@@ -15,6 +15,7 @@ import numpy as np
 
 from gelslim_cad.report.data import Picture
 from gelslim_cad.report.stage import Stage, View
+from gelslim_core.extras import install_command
 
 Mesh = tuple[
     str,
@@ -167,7 +168,7 @@ def _missing(reason: str) -> str:
     for library, package in packages.items():
         if library in reason:
             return f"VTK cannot load {library}: install the Debian package {package} ({reason})"
-    return f"VTK is not installed: pip install 'gelslim-cad[view]' ({reason})"
+    return f"VTK is not installed: {install_command('view')} ({reason})"
 
 
 def _loads(library: str) -> bool:

@@ -20,9 +20,16 @@ class LoadedSpec(Loaded[Spec]):
 
 
 def read_spec(path: str | os.PathLike[str]) -> LoadedSpec:
-    """The spec in the YAML file at `path`.
+    """Read the spec of a finger.
 
-    Raises `InputError` with every problem found: nothing is guessed, nothing is read in part.
+    Args:
+        path: The YAML file.
+
+    Returns:
+        The spec with the lines of its fields.
+
+    Raises:
+        InputError: Every problem of the file. A file with faults is not read in part.
     """
     loaded = read_model(path, Spec)
     return LoadedSpec(

@@ -64,6 +64,11 @@ def starter_text(
     return text
 
 
+def require_name(name: str) -> None:
+    """Raise `InputError` for a name that no finger may have."""
+    starter_text(name)
+
+
 def _block(
     model: type[BaseModel], path: str, values: Mapping[str, Any], depth: int
 ) -> Iterator[str]:

@@ -19,9 +19,14 @@ _TIME = re.compile(r"([-+0-9.eE]+?)\s*([a-zµ]*)")
 class Budget:
     """Limits on error and time; None is no limit.
 
-    `error` is relative, 0.03 for 3 %; `time_ms` is in milliseconds, of what the ladder times.
     `Budget(error=0.03, time="2s")` reads the time from words, `parse` both.
-    Raises BudgetError for a limit that is not a finite number above 0 or an error above 10.
+
+    Attributes:
+        error: Relative error, 0.03 for 3 %.
+        time_ms: Time in milliseconds of what the ladder times.
+
+    Raises:
+        BudgetError: A limit is not a finite number above 0, or the error is above 10.
     """
 
     error: float | None = None

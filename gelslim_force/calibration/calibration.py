@@ -55,6 +55,9 @@ def calibrate(
         allow_contact: accept a place where neighbouring dots are off together, for prints that
             are warped there.
 
+    Returns:
+        The built camera, and every marker's position at rest.
+
     Raises:
         CalibrationError: no such sensor at rest is seen: another size of picture, too few dots,
             another print, a turned or mirrored picture, contact, a camera far out of tolerance.

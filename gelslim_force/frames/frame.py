@@ -10,6 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.extras import install_command
 from ifem_export.errors import IfemError
 
 Picture = NDArray[np.uint8]
@@ -92,5 +93,5 @@ def with_vision(purpose: str, error: ImportError) -> FrameSourceError:
     """Return the error for an optional library that is missing."""
     return FrameSourceError(
         f"{purpose} needs the Python package {(error.name or 'opencv')!r} ({error}); "
-        "install it with: pip install 'gelslim-cad[vision]'"
+        f"install it with: {install_command('vision')}"
     )

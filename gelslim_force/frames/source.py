@@ -25,12 +25,18 @@ _STREAMS = ("rtsp://", "rtmp://", "http://", "https://", "udp://", "tcp://")
 def open_frames(
     source: str | os.PathLike[str] | NDArray[np.uint8], frames_per_s: float | None = None
 ) -> ThreadedReader:
-    """Return a source's frames, read ahead in a thread; use it in a `with` block.
+    """Open a source of frames, read ahead in a thread; use it in a `with` block.
 
-    `source` is a folder of pictures, a picture, a video, an `.npy` or `.npz` file, an array, or
-    for live frames `camera:0`, `camera:/dev/video0` or a stream's address. `frames_per_s` sets
-    the times of sources that do not know theirs, and overrides a video's.
-    Raises FrameSourceError where nothing can be read.
+    Args:
+        source: A folder of pictures, a picture, a video, an `.npy` or `.npz` file, an array, or
+            for live frames `camera:0`, `camera:/dev/video0` or the address of a stream.
+        frames_per_s: Rate of sources that do not know their times; overrides that of a video.
+
+    Returns:
+        An iterator over the frames.
+
+    Raises:
+        FrameSourceError: Nothing can be read there.
     """
     if frames_per_s is not None and not 0.001 <= frames_per_s <= 1e5:
         raise FrameSourceError(f"{frames_per_s:g} frames per second: must be in 0.001 ... 100000")

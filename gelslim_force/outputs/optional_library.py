@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+from gelslim_core.extras import install_command
 from gelslim_core.files.output_error import OutputError
 
 
@@ -18,7 +19,7 @@ def load(module: str, extra: str, purpose: str) -> Any:
     except ImportError as error:
         raise OutputError(
             f"{purpose} needs the Python package {module.partition('.')[0]!r} ({error}); "
-            f"install it with: pip install 'gelslim-cad[{extra}]'"
+            f"install it with: {install_command(extra)}"
         ) from error
 
 

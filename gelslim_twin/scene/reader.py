@@ -73,10 +73,18 @@ class LoadedScene(Loaded[Scene]):
 
 
 def read_scene(path: str | os.PathLike[str]) -> LoadedScene:
-    """The scene in the YAML file at `path`, with the poses of its motion.
+    """Read a contact scene, with the poses of its motion.
 
-    Raises `InputError` with every problem found in it, or in a file that it names. The sensor
-    need not be there yet: whoever uses it says so.
+    The sensor need not exist yet; what uses the sensor reports that it is missing.
+
+    Args:
+        path: The YAML file.
+
+    Returns:
+        The scene with the lines of its fields, and its poses.
+
+    Raises:
+        InputError: Every problem of the file, or of a file that it names.
     """
     loaded = read_model(path, Scene)
     motion, folder = loaded.model.motion, Path(loaded.path).parent

@@ -46,6 +46,10 @@ class Validation:
     samples: tuple[Sample, ...]
     points_mm: NDArray[np.float64]
     calibration: SensorCalibration
+    operator: str = ""
+    """Label of the force operator that a budget chose; empty without a budget."""
+    remarks: tuple[str, ...] = ()
+    """What lies outside the calibrated range of that choice."""
 
     def to_record(self) -> dict[str, Any]:
         """Plain values."""
@@ -62,4 +66,5 @@ class Validation:
             "budget": [asdict(s) for s in self.budget],
             "frames": [asdict(s) for s in self.scores],
             "other_contacts": {n: [asdict(s) for s in v] for n, v in self.others.items()},
+            **({"operator": self.operator} if self.operator else {}),
         }

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.extras import install_command
 from gelslim_core.files.replaced_file import replace_file
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.errors import IfemError
@@ -56,7 +57,7 @@ def export_safetensors(bundle: Bundle, path: str | os.PathLike[str]) -> None:
         from safetensors.numpy import save
     except ImportError as error:
         raise IfemError(
-            "writing safetensors needs the package safetensors: pip install 'gelslim-cad[export]'"
+            f"writing safetensors needs the package safetensors: {install_command('export')}"
         ) from error
     matrix = bundle.stiffness_matrix
     arrays = {

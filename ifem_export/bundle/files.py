@@ -33,6 +33,10 @@ _ALTERED = "copy the bundle again from where it was built, or " + REBUILD
 def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
     """Check the bundle and write it as a directory, replacing a bundle already there.
 
+    Args:
+        path: the bundle's directory; folders above it are made.
+        bundle: what to write.
+
     Raises:
         BundleError: the bundle does not hold together, something else is at `path`, or the
             disk refuses.
@@ -81,6 +85,9 @@ def load_bundle(
         verify: check every file's SHA-256, all values and the self-test pair. Without it only
             the manifest and the array headers are read, and nothing else until it is used.
         expected_geometry_hash: refuse the bundle of any other pad.
+
+    Returns:
+        The bundle.
 
     Raises:
         BundleError: names the file, what is wrong and what to do.

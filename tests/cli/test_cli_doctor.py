@@ -15,7 +15,7 @@ from gelslim import extras as extras_module
 from gelslim.cli import main
 from gelslim.doctor import libraries
 from gelslim.doctor.realtime import RealTime, Timed
-from gelslim.extras import EXTRAS, extra_of, installed
+from gelslim_core.extras import EXTRAS, extra_of, installed
 
 
 def answered(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:

@@ -68,7 +68,7 @@ def test_bad_requests(
 def test_without_parquet_and_pictures_the_table_is_still_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim.extras.installed", lambda module: False)
+    monkeypatch.setattr("gelslim_core.extras.installed", lambda module: False)
     command = ["explore", str(MINI20), "--vary", "gel.length_mm=16", "-o", str(tmp_path / "x")]
     assert main(command) == 0
     captured = capsys.readouterr()

@@ -111,7 +111,7 @@ def test_two_specs_of_one_name_are_refused(
 def test_without_the_cad_extra_nothing_is_left_behind(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim.extras.installed", lambda module: module != "cadquery")
+    monkeypatch.setattr("gelslim_core.extras.installed", lambda module: module != "cadquery")
     assert main(["family", str(DESIGNS / "mini20.yaml"), "-o", str(tmp_path / "f")]) == 2
     assert "pip install 'gelslim-cad[cad]'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -12,7 +12,7 @@ from scene_samples import GALLERY, MINIMAL, SENSOR, load
 from sim_rig import digests, small_sensor, written_scene
 
 from gelslim.cli.main import main
-from gelslim.cli.scene_budget import twin_key
+from gelslim.contacts import twin_key
 from gelslim_core.budget.budget import Budget
 from gelslim_core.budget.errors import BudgetError
 from gelslim_core.budget.machine_times import write_times

@@ -12,11 +12,7 @@ from gelslim.cli.budget import FieldError, FrameTime
 from gelslim.cli.options import AsJson, Force, SpecFile
 
 if TYPE_CHECKING:
-    from gelslim_cad.dimensions import Dimensions
-    from gelslim_cad.spec import Spec
-    from gelslim_core.budget.budget import Budget
     from ifem_export.bundle.bundle import Bundle
-    from ifem_export.mesh.pad_mesh import PadMesh
     from ifem_export.operators.operator_ladder import OperatorLadder
 
 
@@ -48,8 +44,8 @@ def bundle(
     from gelslim.cli.budget import budget_of
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import require_pad_rules, written
-    from gelslim_cad.dimensions import derive
-    from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim.cli.progress import progress_bar
+    from gelslim.design import derive, make_bundle
     from gelslim_cad.spec.reader import read_spec
     from ifem_export.bundle.files import write_bundle
 
@@ -57,41 +53,26 @@ def bundle(
     if not (ladder or budget.unlimited):
         raise CommandError("--no-ladder leaves a budget nothing to choose from: give one of them")
     loaded = read_spec(spec).spec
-    d = derive(loaded)
-    require_pad_rules(d, "gelslim bundle", force)
-    grid = marker_grid(d)
-    mesh, _ = pad_mesh(d, grid)
-    measured, label = None, ""
-    if ladder:
-        measured = _measured(loaded, d, mesh, dense, quiet=as_json)
-        label = chosen_label(measured, budget)
+    require_pad_rules(derive(loaded), "gelslim bundle", force)
+    with progress_bar(quiet=as_json) as tell:
+        made = make_bundle(
+            loaded, budget, measure=ladder, dense=dense, with_stiffness=with_k, progress=tell
+        )
+    for remark in made.remarks:
+        print(f"gelslim: {remark}", file=sys.stderr)
     folder = out or Path("out") / f"{loaded.name}-bundle"
-    made = make_bundle(
-        loaded, d, mesh, grid, with_stiffness=with_k, ladder=measured, operator=label
-    )
-    write_bundle(folder, made)
+    write_bundle(folder, made.bundle)
     files = sorted(p.name for p in folder.iterdir())
+    markers = 0 if made.bundle.markers is None else len(made.bundle.markers.positions_mm)
     if as_json:
-        print_json({"folder": str(folder), "files": files, **_record(made, len(grid))})
+        print_json({"folder": str(folder), "files": files, **_record(made.bundle, markers)})
         return 0
-    if measured is not None:
-        print_ladder(measured, label)
-    counts = f"{mesh.n_elements} elements, {mesh.n_nodes} nodes, {len(grid)} markers"
+    if made.ladder is not None:
+        print_ladder(made.ladder, made.operator)
+    mesh = made.bundle.mesh
+    counts = f"{mesh.n_elements} elements, {mesh.n_nodes} nodes, {markers} markers"
     print(f"{written(folder, files)}: {counts}.")
     return 0
-
-
-def _measured(
-    spec: Spec, d: Dimensions, mesh: PadMesh, dense: bool, *, quiet: bool
-) -> OperatorLadder:
-    """Error and time of every operator on this pad, with or without the dense one."""
-    from gelslim.cli.progress import progress_bar
-    from gelslim_cad.sensor.pad import gel_material, reference_mesh
-    from ifem_export.operators.ladder import measure_ladder
-
-    gel, element, fine = gel_material(spec), spec.mesh.element, reference_mesh(d, mesh)
-    with progress_bar(quiet=quiet) as tell:
-        return measure_ladder(mesh, gel, element, dense=dense, progress=tell, reference=fine)
 
 
 def _record(made: Bundle, markers: int) -> dict[str, Any]:
@@ -102,19 +83,6 @@ def _record(made: Bundle, markers: int) -> dict[str, Any]:
         "operator": made.operator,
         "ladder": made.ladder.to_record() if made.ladder is not None else None,
     }
-
-
-def chosen_label(ladder: OperatorLadder, budget: Budget) -> str:
-    """Label of the operator that a budget picks, else of the one a bundle starts with.
-
-    The ladder was measured here and now, so that its times are this machine's. Raises BudgetError.
-    """
-    if budget.unlimited:
-        return ladder.balanced().label
-    choice = ladder.choose(budget)
-    for remark in choice.remarks:
-        print(f"gelslim: {remark}", file=sys.stderr)
-    return choice.rung.name
 
 
 def print_ladder(ladder: OperatorLadder, chosen: str) -> None:

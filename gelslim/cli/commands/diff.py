@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gelslim.cli.options import AsJson, SpecFile
+from gelslim_core.extras import install_command
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,10 +84,10 @@ def _report_price(first: str, second: str, costs: Sequence[Measured]) -> None:
 
 def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
     """Changed parts, or why they could not be compared."""
-    from gelslim.extras import installed
+    from gelslim_core.extras import installed
 
     if not installed("cadquery"):
-        return None, "not compared: cadquery is missing; run: pip install 'gelslim-cad[cad]'"
+        return None, f"not compared: cadquery is missing; run: {install_command('cad')}"
     from gelslim_cad.compare.part_change import part_changes
     from gelslim_cad.solids.shapes import SolidError
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gelslim.cli.options import AsJson, DrawPictures, SpecFile
+from gelslim_core.extras import install_command
 
 if TYPE_CHECKING:
     from gelslim_cad.explore.study import Exploration
@@ -93,21 +94,21 @@ def write_exploration(folder: Path, found: Exploration, *, pictures: bool) -> li
     import sys
 
     from gelslim.cli.output import replace_file
-    from gelslim.extras import installed
     from gelslim_cad.explore.table import csv_bytes, parquet_bytes
+    from gelslim_core.extras import installed
 
     made = {"designs.csv": csv_bytes(found.columns)}
     notes = []
     if installed("pyarrow"):
         made["designs.parquet"] = parquet_bytes(found.columns)
     else:
-        notes.append("no Parquet table: pip install 'gelslim-cad[record]'")
+        notes.append(f"no Parquet table: {install_command('record')}")
     if pictures and installed("matplotlib"):
         from gelslim_cad.explore.figures import feasibility_png, pareto_png
 
         made |= {"pareto.png": pareto_png(found), "feasibility.png": feasibility_png(found)}
     elif pictures:
-        notes.append("no pictures: pip install 'gelslim-cad[cad]'")
+        notes.append(f"no pictures: {install_command('plot')}")
     for name, data in made.items():
         replace_file(folder / name, data)
     for note in notes:

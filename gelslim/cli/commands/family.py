@@ -35,8 +35,8 @@ def family(
     """
     from gelslim.cli.answer import print_json
     from gelslim.cli.status import OK, RULE_FAILED
-    from gelslim.extras import require
     from gelslim_cad.spec.reader import read_spec
+    from gelslim_core.extras import require
 
     started = time.monotonic()
     require("cadquery", "trimesh")

@@ -13,26 +13,50 @@ def new(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="File to write; NAME.yaml if left out.")
     ] = None,
+    source: Annotated[
+        str,
+        typer.Option("--from", help="Copy this example in place; `gelslim examples` lists them."),
+    ] = "",
     length: Annotated[float, typer.Option(help="Gel length along the finger, mm.")] = 24.0,
     width: Annotated[float, typer.Option(help="Gel width across the finger, mm.")] = 22.0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> int:
-    """Write a commented spec to start from.
+    """Write a commented spec to start from, or copy an example.
 
-    The Raspberry Pi spy camera is filled in and every default shown.
+    A new spec has the Raspberry Pi spy camera filled in and shows every default. With --from, a
+    design or a scene that comes with the program is copied under the new name.
     """
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import replace_file
-    from gelslim_cad.spec.starter import starter_text
 
-    text = starter_text(name, gel_length_mm=length, gel_width_mm=width)
     target = out or Path(f"{name}.yaml")
     if target.is_dir():
         target = target / f"{name}.yaml"
-    if target.exists() and not force:
-        raise CommandError(
-            f"gelslim new: {target} exists and is left as it is; give another -o, or --force"
-        )
-    replace_file(target, text.encode())
-    print(f"Wrote {target}. Next: gelslim check {target}")
+    texts, following = _texts(name, source, length, width)
+    files = {target: texts.pop(f"{name}.yaml")}
+    files |= {target.parent / other: text for other, text in texts.items()}
+    for path, text in files.items():
+        same = path != target and path.is_file() and path.read_text(encoding="utf-8") == text
+        if path.exists() and not (force or same):
+            raise CommandError(
+                f"gelslim new: {path} exists and is left as it is; give another -o, or --force"
+            )
+    for path, text in files.items():
+        replace_file(path, text.encode())
+    others = "".join(f" and {path.name}" for path in files if path != target)
+    print(f"Wrote {target}{others}. Next: gelslim {following} {target}")
     return 0
+
+
+def _texts(name: str, source: str, length: float, width: float) -> tuple[dict[str, str], str]:
+    """Return the texts by file name, and the command that goes on with the first."""
+    from gelslim_cad.spec.starter import require_name, starter_text
+
+    if not source:
+        text = starter_text(name, gel_length_mm=length, gel_width_mm=width)
+        return {f"{name}.yaml": text}, "check"
+    from gelslim.examples import example
+
+    require_name(name)
+    found = example(source)
+    return found.files(name), "check" if found.kind == "design" else "plan"

@@ -28,14 +28,10 @@ def plan(
     time predicted for it. Nothing is simulated.
     """
     from gelslim.cli.scene_budget import budgeted_scene
-    from gelslim.scene_sensor import require_within_gel, sensor_figures
-    from gelslim_twin.scene.question import plan_scene
+    from gelslim.contacts import plan as planned
     from gelslim_twin.scene.reader import read_scene
 
-    loaded = budgeted_scene(read_scene(scene), error, within)
-    figures = sensor_figures(loaded)
-    require_within_gel(loaded, figures.thickness_mm)
-    made = plan_scene(loaded, figures)
+    made = planned(budgeted_scene(read_scene(scene), error, within))
     if as_json:
         print(made.to_json(), end="")
     else:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,12 +13,8 @@ from gelslim.cli.budget import FieldError, FrameTime
 from gelslim.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
-    from gelslim_core.budget.budget import Budget
     from gelslim_twin.simulation.twin_sensor import TwinSensor
     from gelslim_twin.validation.validation import Validation
-    from ifem_export.bundle.bundle import Bundle
-    from ifem_export.operators.ladder import Progress
-    from ifem_export.operators.operator_ladder import OperatorLadder
 
 RECORD = "validation.json"
 PLOTS = ("resultants.png", "fields.png", "error_budget.png")
@@ -48,24 +44,23 @@ def validate(
     from gelslim.cli.output import replace_file, spare_strangers_in
     from gelslim.cli.progress import progress_bar
     from gelslim.cli.validate_tables import print_validation
+    from gelslim.contacts import validate as validated
     from gelslim.scene_sensor import spec_sensor
     from gelslim_cad.spec.reader import read_spec
     from gelslim_core.files.atomic_file import json_bytes
     from gelslim_force.outputs.packed_frame import plain
-    from gelslim_twin.validation.validate import validate as validated
 
     started = time.monotonic()
     budget = budget_of(error, within)
     name = read_spec(spec).spec.name
     folder = out or Path("out") / f"{name}-validation"
     with progress_bar(quiet=as_json) as tell:
-        made = spec_sensor(spec)
-        names = [RECORD, *(picture_names(made) if pictures else [])]
+        names = [RECORD, *(picture_names(spec_sensor(spec)) if pictures else [])]
         spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
-        kept = folder / "sensor"
-        sensor, operator = _stored(spec, made, budget, kept, tell)
-        found = validated(sensor, kept, seed, tell, budget)
-    record = plain(found.to_record()) | operator
+        found = validated(spec, folder / "sensor", budget, seed=seed, progress=tell)
+    for remark in found.remarks:
+        print(f"gelslim: {remark}", file=sys.stderr)
+    record = plain(found.to_record())
     replace_file(folder / RECORD, json_bytes(record))
     written = [RECORD, *(_draw(found, folder) if pictures else [])]
     if as_json:
@@ -74,38 +69,6 @@ def validate(
     print_validation(found)
     print(f"\nIn {folder}/: {', '.join(written)} ({time.monotonic() - started:.0f} s).")
     return 0
-
-
-def _stored(
-    spec: Path, made: TwinSensor, budget: Budget, kept: Path, tell: Progress | None
-) -> tuple[TwinSensor, dict[str, str]]:
-    """The sensor by way of the folder `kept`; and, where a budget picked one, its operator."""
-    from gelslim.cli.commands.bundle import chosen_label
-    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
-
-    # A budget that no operator keeps is refused before anything is written.
-    ladder = None if budget.unlimited else _ladder(spec, made.bundle, tell)
-    label = "" if ladder is None else chosen_label(ladder, budget)
-    store_sensor(made, kept, True)
-    sensor = stored_sensor(kept)
-    if not label:
-        return sensor, {}
-    # The pipeline starts with its bundle's choice wherever a chain names no other.
-    chosen = replace(sensor.bundle, ladder=ladder, operator=label)
-    return replace(sensor, bundle=chosen), {"operator": label}
-
-
-def _ladder(spec: Path, bundle: Bundle, tell: Progress | None) -> OperatorLadder:
-    """The operators of the sensor, measured here and now."""
-    from gelslim_cad.dimensions import derive
-    from gelslim_cad.sensor.pad import reference_mesh
-    from gelslim_cad.spec.reader import read_spec
-    from ifem_export.operators.ladder import measure_ladder
-
-    fine = reference_mesh(derive(read_spec(spec).spec), bundle.mesh)
-    return measure_ladder(
-        bundle.mesh, bundle.material, bundle.formulation, progress=tell, reference=fine
-    )
 
 
 def _draw(found: Validation, folder: Path) -> list[str]:

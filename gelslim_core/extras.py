@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
+import re
+import shlex
 from dataclasses import dataclass
+from importlib import metadata
 
 
 @dataclass(frozen=True)
@@ -20,23 +23,47 @@ class Extra:
 
     @property
     def command(self) -> str:
-        """How to install it."""
-        return f"pip install 'gelslim-cad[{self.name}]'"
+        """How to install it, whether the program came from a checkout or from a wheel."""
+        return install_command(self.name)
 
 
 EXTRAS = (
     Extra(
         "cad",
         ("cadquery", "trimesh", "manifold3d", "lxml", "networkx", "ezdxf", "reportlab",
-         "gerber_writer", "matplotlib"),
-        "build, family, parts in diff, marker print files, pictures of light and explore",
+         "gerber_writer"),
+        "build, family, parts in diff, marker print files",
     ),
+    Extra("plot", ("matplotlib",), "pictures of light, explore and validate"),
     Extra("view", ("pyvista",), "pictures of the finger in the report and in family"),
     Extra("vision", ("cv2", "PIL"), "videos, cameras and image files for force and simulate"),
     Extra("record", ("pyarrow", "mcap", "mcap_ros2"), "Parquet tables and ROS 2 recordings"),
     Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
 )  # fmt: skip
+
+
+DISTRIBUTION = "gelslim-cad"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra, such as `pip install 'pyvista>=0.44'`."""
+    return "pip install " + " ".join(map(shlex.quote, requirements(extra)))
+
+
+def requirements(extra: str) -> tuple[str, ...]:
+    """Return what pip is to install for an extra, such as `cadquery>=2.5`.
+
+    Read from the metadata of the installed program; where it has none, as when it runs from
+    sources that were never installed, the extra itself by its name.
+    """
+    try:
+        lines = metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        lines = []
+    marker = re.compile(rf"extra\s*==\s*[\"']{re.escape(extra)}[\"']")
+    found = [line.partition(";")[0].strip() for line in lines if marker.search(line)]
+    return tuple(found) or (f"{DISTRIBUTION}[{extra}]",)
 
 
 INNER = {"OCP": "cad", "vtk": "view", "vtkmodules": "view"}

@@ -1,0 +1,268 @@
+"""Simulated contacts of a sensor: plan, frames with true forces, validation."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gelslim.design import Progress
+    from gelslim_core.budget.budget import Budget
+    from gelslim_core.budget.ladder import Choice
+    from gelslim_twin.effects.circumstances import SensorFigures
+    from gelslim_twin.plan import Plan
+    from gelslim_twin.scene.reader import LoadedScene
+    from gelslim_twin.validation.validation import Validation
+
+    SceneLike = LoadedScene | str | os.PathLike[str]
+
+
+def scene_of(scene: SceneLike) -> LoadedScene:
+    """Return what was read of a scene, reading it first where a file is named.
+
+    Raises:
+        InputError: The file has faults.
+    """
+    from gelslim_twin.scene.reader import LoadedScene, read_scene
+
+    return scene if isinstance(scene, LoadedScene) else read_scene(scene)
+
+
+def plan(scene: SceneLike, budget: Budget | None = None) -> Plan:
+    """Plan which physical effects a contact scene needs. Nothing is simulated.
+
+    Args:
+        scene: The result of `read_scene`, or the path of a YAML file.
+        budget: Error and time allowed; replaces the tolerance of the scene.
+
+    Returns:
+        Each effect with the reason why it is kept or left out, the bound of the error of leaving
+        it out, and the time predicted.
+
+    Raises:
+        InputError: The scene or its sensor has faults.
+        BudgetError: No plan keeps the budget.
+    """
+    from gelslim.scene_sensor import require_within_gel, sensor_figures
+    from gelslim_twin.scene.question import plan_scene
+
+    loaded, _ = with_budget(scene_of(scene), budget)
+    figures = sensor_figures(loaded)
+    require_within_gel(loaded, figures.thickness_mm)
+    return plan_scene(loaded, figures)
+
+
+def simulate(
+    scene: SceneLike,
+    out: str | os.PathLike[str] | None = None,
+    budget: Budget | None = None,
+    *,
+    count: int | None = None,
+    jobs: int = 1,
+    scheduler: str = "",
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Simulate a contact scene: frames, true surface motion and true forces.
+
+    Only the effects that the tolerance calls for are simulated. A run that was interrupted goes on
+    where it stopped.
+
+    Args:
+        scene: The result of `read_scene`, or the path of a YAML file.
+        out: Folder of the results; `out/NAME` by default.
+        budget: Error and time allowed; replaces the tolerance of the scene.
+        count: Number of scenes of the data set that the scene's `vary` block describes; None for
+            the scene as it stands.
+        jobs: Number of processes for a data set.
+        scheduler: Address of a Dask scheduler, in place of processes.
+        overwrite: Replace another simulation in the folder.
+        progress: Called as the work goes on.
+
+    Returns:
+        The folder, counts of scenes, poses and frames, and the largest residuals of the solver.
+
+    Raises:
+        InputError: The scene or its sensor has faults.
+        BudgetError: No plan keeps the budget.
+        SimulationError: The folder holds something else or cannot be written.
+        ContactError: A contact was not solved.
+    """
+    from gelslim.scene_sensor import require_within_gel, twin_sensor
+    from gelslim_twin.simulation.stored_sensor import store_sensor
+
+    loaded, _ = with_budget(scene_of(scene), budget)
+    folder = Path("out") / loaded.scene.name if out is None else Path(out)
+    if progress:
+        progress("sensor", 0, 1)
+    sensor = twin_sensor(loaded)
+    mesh = sensor.bundle.mesh
+    require_within_gel(loaded, mesh.layers * mesh.cell_size_mm[2])
+    with contextlib.suppress(FileNotFoundError):
+        folder.stat()  # A name that is too long is refused before anything is written.
+    store_sensor(sensor, _sensor_folder(folder), "image" in loaded.scene.observe)
+    if count is None:
+        return _one(loaded, folder, overwrite, progress)
+    return _data_set(loaded, folder, count, (jobs, scheduler), overwrite, progress)
+
+
+def validate(
+    spec: str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None = None,
+    budget: Budget | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Validation:
+    """Compare the force pipeline of a sensor with simulated contacts of known force.
+
+    Args:
+        spec: Path of the finger's YAML file.
+        folder: Keeps the sensor and its compliance for the next validation; None keeps nothing.
+        budget: Error and time allowed for the force operator.
+        seed: Seed of noise, dirt and print faults.
+        progress: Called as the work goes on.
+
+    Returns:
+        The contacts, the errors of each chain of estimation, and the error budget.
+
+    Raises:
+        InputError: The spec has faults.
+        BudgetError: No operator keeps the budget.
+        ContactError: A contact was not solved.
+        CalibrationError: The sensor's own reference picture was refused.
+    """
+    from dataclasses import replace
+
+    from gelslim.design import chosen_operator, measured_ladder, spec_of
+    from gelslim.scene_sensor import spec_sensor
+    from gelslim_cad.dimensions import derive
+    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
+    from gelslim_twin.validation.validate import validate as validated
+
+    sensor = spec_sensor(Path(spec))
+    ladder, label = None, ""
+    remarks: tuple[str, ...] = ()
+    if budget is not None and not budget.unlimited:
+        # A budget that no operator keeps is refused before anything is written.
+        design = spec_of(spec)
+        ladder = measured_ladder(design, derive(design), sensor.bundle.mesh, progress=progress)
+        label, remarks = chosen_operator(ladder, budget)
+    if folder is not None:
+        store_sensor(sensor, Path(folder), True)
+        sensor = stored_sensor(Path(folder))
+    if label:
+        sensor = replace(sensor, bundle=replace(sensor.bundle, ladder=ladder, operator=label))
+    place = None if folder is None else Path(folder)
+    found = validated(sensor, place, seed, progress, budget)
+    return replace(found, operator=label, remarks=remarks)
+
+
+def with_budget(
+    loaded: LoadedScene, budget: Budget | None
+) -> tuple[LoadedScene, tuple[Choice, bool] | None]:
+    """Give a scene the tolerance that a budget comes to.
+
+    Returns:
+        The scene, unchanged without a budget; and the choice that was made with whether the times
+        are those of this machine, or None.
+
+    Raises:
+        BudgetError: No plan keeps the budget.
+    """
+    if budget is None or budget.unlimited:
+        return loaded, None
+    from gelslim.scene_sensor import sensor_figures
+    from gelslim_twin.scene.question import question
+    from gelslim_twin.tolerance_ladder import choose_tolerance
+
+    figures = sensor_figures(loaded)
+    paces = machine_paces(figures)
+    choice, allowed = choose_tolerance(question(loaded, figures), budget, paces)
+    return loaded.with_tolerance(allowed.force_n, allowed.image_px), (choice, bool(paces))
+
+
+def twin_key(figures: SensorFigures) -> str:
+    """Return the key of a sensor's simulation among the times of a machine.
+
+    It hashes what the cost of a simulation depends on.
+    """
+    parts = (figures.surface_nodes, figures.layers, figures.markers, figures.frame_px)
+    return f"twin-{hashlib.sha256(repr(parts).encode()).hexdigest()[:32]}"
+
+
+def machine_paces(figures: SensorFigures) -> Mapping[str, float]:
+    """Return this machine's times over the declared ones by group of effects.
+
+    Empty where `gelslim bench` has not measured them.
+    """
+    from gelslim_core.budget.machine_times import read_times
+
+    return read_times(twin_key(figures))
+
+
+def _sensor_folder(folder: Path) -> Path:
+    """Return where the sensor of a simulation is kept, so that the next one finds it."""
+    return folder.parent / ".sensor" if folder.parent != folder else folder / ".sensor"
+
+
+def _one(
+    loaded: LoadedScene, folder: Path, overwrite: bool, progress: Progress | None
+) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
+    from gelslim_twin.simulation.scene_task import job_of
+    from gelslim_twin.simulation.simulate import simulate as simulated
+    from gelslim_twin.simulation.stored_sensor import stored_sensor
+
+    place = _sensor_folder(folder)
+    job = job_of(loaded, stored_sensor(place), place)
+    # As in the workers of a data set: threads that wait for each other cost more than they save.
+    with threadpool_limits(limits=1, user_api="blas"):
+        ledger = simulated(job, folder, overwrite=overwrite, progress=progress)
+    return {"folder": str(folder), "scenes": 1, "poses": len(loaded.poses), **ledger.to_record()}
+
+
+def _data_set(
+    loaded: LoadedScene,
+    folder: Path,
+    count: int,
+    engine: tuple[int, str],
+    overwrite: bool,
+    progress: Progress | None,
+) -> dict[str, Any]:
+    from gelslim_core.jobs.engine import Engine
+    from gelslim_twin.simulation.scene_task import SceneTask, perform
+
+    for number in range(count):
+        loaded.numbered(number)
+    allowed = loaded.scene.tolerance
+    tasks = [
+        SceneTask(
+            str(Path(loaded.path).resolve()),
+            str(_sensor_folder(folder).resolve()),
+            str((folder / f"scene_{number:05d}").resolve()),
+            number,
+            overwrite,
+            (allowed.force_n, allowed.image_px),
+        )
+        for number in range(count)
+    ]
+    done: list[dict[str, Any]] = []
+    for _, result in Engine(*engine).run(perform, tasks):
+        done.append(result)
+        if progress:
+            progress("scenes", len(done), count)
+    worst: dict[str, float] = {}
+    for result in done:
+        for name, value in result["solver_worst"].items():
+            worst[name] = max(worst.get(name, 0.0), value)
+    counts = {
+        name: sum(result[name] for result in done)
+        for name in ("poses_solved", "frames_drawn", "frames_kept")
+    }
+    return {"folder": str(folder), "scenes": count, **counts, "solver_worst": worst}
