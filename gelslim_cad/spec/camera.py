@@ -7,6 +7,7 @@ import math
 from pydantic import Field, model_validator
 
 from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 FOV_TOLERANCE = 0.05
 
@@ -84,28 +85,38 @@ class Camera(Block):
     @model_validator(mode="after")
     def _consistent(self) -> Camera:
         if self.image_height_px > self.image_width_px:
-            raise ValueError(
-                "image_height_px is larger than image_width_px; the wider axis lies across the "
-                "finger, so swap the two (and the sensor sides)"
+            raise FieldError(
+                "image_height_px",
+                f"must be at most image_width_px ({self.image_width_px})",
+                "the wider axis lies across the finger: swap the two, and the sensor sides",
             )
         if self.lens_diameter_mm > self.module_width_mm:
-            raise ValueError("lens_diameter_mm is larger than module_width_mm")
+            raise FieldError(
+                "lens_diameter_mm",
+                f"must be at most module_width_mm ({self.module_width_mm:g} mm)",
+                "change lens_diameter_mm or module_width_mm",
+                ("module_width_mm",),
+            )
         for axis, side_mm, given in (
             ("horizontal", self.sensor_width_mm, self.horizontal_fov_deg),
             ("vertical", self.sensor_height_mm, self.vertical_fov_deg),
         ):
             implied = math.degrees(2 * math.atan(side_mm / 2 / self.focal_length_mm))
             if given is not None and abs(given - implied) > FOV_TOLERANCE * implied:
-                raise ValueError(
-                    f"{axis}_fov_deg = {given:g} disagrees with sensor size and focal length, "
-                    f"which give {implied:.2f} degrees; correct one or leave the field of view out"
+                raise FieldError(
+                    f"{axis}_fov_deg",
+                    "disagrees with sensor size and focal length, "
+                    f"which give {implied:.2f} degrees",
+                    "correct one of them or leave the field of view out",
                 )
         square = (self.image_width_px / self.image_height_px) / (
             self.sensor_width_mm / self.sensor_height_mm
         )
         if not 0.98 < square < 1.02:
-            raise ValueError(
+            raise FieldError(
+                "image_width_px",
                 "pixels are not square: image_width_px / image_height_px and sensor_width_mm / "
-                "sensor_height_mm differ by more than 2 %; give the sensor area the image covers"
+                "sensor_height_mm differ by more than 2 %",
+                "give the area of the sensor that the image covers",
             )
         return self

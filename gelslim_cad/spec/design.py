@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 
 class Gel(Block):
@@ -29,9 +30,11 @@ class Gel(Block):
     def _corners_fit(self) -> Gel:
         half = min(self.length_mm, self.width_mm) / 2
         if self.corner_radius_mm > half:
-            raise ValueError(
-                f"corner_radius_mm = {self.corner_radius_mm:g} must be at most half of the "
-                f"shorter side ({half:g} mm)"
+            raise FieldError(
+                "corner_radius_mm",
+                f"must be at most half of the shorter side ({half:g} mm)",
+                "change corner_radius_mm, length_mm or width_mm",
+                ("length_mm",),
             )
         return self
 
@@ -106,15 +109,24 @@ class Leds(Block):
             return self
         angles, values = self.emission_angle_deg, self.emission_intensity
         if len(angles) < 2 or len(angles) != len(values):
-            raise ValueError(
-                "emission: table needs emission_angle_deg and emission_intensity, two or more "
-                f"values each and as many; they hold {len(angles)} and {len(values)}"
+            raise FieldError(
+                "emission_angle_deg",
+                "emission: table needs as many angles as intensities, two or more of each; "
+                f"there are {len(angles)} angles and {len(values)} intensities",
+                "change emission_angle_deg or emission_intensity",
+                ("emission_intensity", "emission"),
             )
         rising = all(a < b for a, b in itertools.pairwise(angles))
         if angles[0] != 0 or angles[-1] > 90 or not rising:
-            raise ValueError("emission_angle_deg must start at 0, rise, and end at 90 or below")
+            raise FieldError(
+                "emission_angle_deg",
+                "must start at 0, rise, and end at 90 degrees or below",
+                "correct the angles",
+            )
         if min(values) < 0 or max(values) <= 0:
-            raise ValueError("emission_intensity must be >= 0 and not all zero")
+            raise FieldError(
+                "emission_intensity", "must be >= 0 and not all zero", "correct the intensities"
+            )
         return self
 
 
@@ -266,13 +278,18 @@ class Design(Block):
                 continue
             span = (count - 1) * self.markers.pitch_mm + self.markers.diameter_mm
             if span > side:
-                raise ValueError(
-                    f"markers.{axis} = {count} at {self.markers.pitch_mm:g} mm pitch spans "
-                    f"{span:.2f} mm, more than the gel's {side:g} mm; use fewer or a smaller pitch"
+                raise FieldError(
+                    f"markers.{axis}",
+                    f"at {self.markers.pitch_mm:g} mm pitch they span {span:.2f} mm, "
+                    f"more than the gel's {side:g} mm",
+                    "use fewer or a smaller pitch",
                 )
         if self.markers.diameter_mm >= self.markers.pitch_mm:
-            raise ValueError(
-                f"markers.diameter_mm = {self.markers.diameter_mm:g} must be smaller than "
-                f"markers.pitch_mm = {self.markers.pitch_mm:g}, else the dots merge"
+            raise FieldError(
+                "markers.diameter_mm",
+                f"{self.markers.diameter_mm:g} mm must be smaller than the pitch, "
+                f"{self.markers.pitch_mm:g} mm, or else the dots merge",
+                "change markers.diameter_mm or markers.pitch_mm",
+                ("markers.pitch_mm",),
             )
         return self

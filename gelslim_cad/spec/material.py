@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field, model_validator
 
 from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 STIFF_GEL_MPA = 5.0
 
@@ -46,9 +47,10 @@ class Material(Block):
     def _soft(self) -> Material:
         modulus = self.gel.youngs_modulus_mpa
         if modulus > STIFF_GEL_MPA and not self.allow_stiff_gel:
-            raise ValueError(
-                f"gel.youngs_modulus_mpa = {modulus:g}: must be <= {STIFF_GEL_MPA:g}; a tactile "
-                f"gel has about 0.05 to 1 MPa (did you mean {modulus / 1000:g}, that is "
-                f"{modulus:g} kPa?); set material.allow_stiff_gel: true to insist"
+            raise FieldError(
+                "gel.youngs_modulus_mpa",
+                f"must be <= {STIFF_GEL_MPA:g} MPa",
+                f"did you mean {modulus / 1000:g}, that is {modulus:g} kPa? Tactile gels have "
+                "about 0.05 to 1 MPa; set material.allow_stiff_gel: true for a stiffer one",
             )
         return self

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.errors import FieldError
 
 Count = Annotated[int, Field(ge=1, le=400)]
 
@@ -52,7 +53,10 @@ class Mesh(Block):
     @model_validator(mode="after")
     def _both(self) -> Mesh:
         if (self.cells_along is None) != (self.cells_across is None):
-            raise ValueError(
-                "give cells_along and cells_across together, or neither; add the other or delete it"
+            raise FieldError(
+                "cells_along",
+                "must be given together with cells_across, or neither",
+                "add the other or delete it",
+                ("cells_across",),
             )
         return self

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-
-from gelslim_cad.spec.schema import schema_text
-from gelslim_core.yaml.reference import reference_markdown
+from gelslim_cad.spec.spec import Spec
+from gelslim_core.yaml.schema import reference_markdown
 
 RULES = (
     (
@@ -49,4 +47,4 @@ Checked when the file is read. Whether the finger can be *built* is another ques
 def reference_text() -> str:
     """The whole page in Markdown, the same for the same program."""
     rules = "".join(f"- `{block}`: {rule}.\n" for block, rule in RULES)
-    return f"{_HEAD}\n{reference_markdown(json.loads(schema_text()))}{_BETWEEN}{rules}"
+    return f"{_HEAD}\n{reference_markdown(Spec)}{_BETWEEN}{rules}"

@@ -11,8 +11,7 @@ from gelslim_cad.spec.design import Design
 from gelslim_cad.spec.manufacturing import Manufacturing
 from gelslim_cad.spec.material import Material
 from gelslim_cad.spec.mesh import Mesh
-from gelslim_core.yaml.base import Block
-from gelslim_core.yaml.folder_name import require_folder_name
+from gelslim_core.yaml.base import Block, require_folder_name
 
 
 class Spec(Block):

@@ -12,8 +12,7 @@ from pydantic import BaseModel
 
 from gelslim_cad.spec.spec import Spec
 from gelslim_core.yaml.errors import InputError
-from gelslim_core.yaml.fields import Field, children
-from gelslim_core.yaml.phrases import range_phrase
+from gelslim_core.yaml.fields import Field, children, range_text
 from gelslim_core.yaml.reader import load_bytes
 from gelslim_core.yaml.scalars import RefusedScalarError, resolve
 from gelslim_core.yaml.suggest import one_of
@@ -97,7 +96,9 @@ def _below(
 
 def _line(field: Field, values: Mapping[str, Any], depth: int) -> str:
     value = values.get(field.path, field.default)
-    limits = range_phrase(field) or (one_of(field.choices) if len(field.choices) > 1 else "")
+    limits = range_text(field, field.unit) or (
+        one_of(field.choices) if len(field.choices) > 1 else ""
+    )
     remark = field.description + (f" ({limits})" if limits else "")
     text = f"{'  ' * depth}{field.name}: {_yaml(value)}" + (f"  # {remark}" if remark else "")
     return text if field.path in values else _commented(text, depth)

@@ -1,4 +1,4 @@
-"""What every block of an input file shares: frozen, strict, no unknown keys, no NaN."""
+"""The base class of every block of an input file, and a check that such blocks share."""
 
 from __future__ import annotations
 
@@ -6,12 +6,19 @@ from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
+from gelslim_core.yaml.errors import FieldError
+
+_DEVICES = {"con", "prn", "aux", "nul"} | {f"{p}{k}" for p in ("com", "lpt") for k in range(1, 10)}
+
 
 class Block(BaseModel):
-    """A frozen block of an input file; units live in the field names."""
+    """A frozen block of an input file: strict types, no unknown keys, no NaN.
+
+    Units are the last part of the field names.
+    """
 
     starting_point: ClassVar[str] = "start from an example of this kind of file"
-    """Remedy for a file that holds nothing of the model."""
+    """Remedy for a file that is empty or of another kind."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -21,3 +28,14 @@ class Block(BaseModel):
         use_attribute_docstrings=False,
         validate_default=True,
     )
+
+
+def require_folder_name(field: str, name: str) -> None:
+    """Raise `FieldError` for a name that Windows cannot use for a folder or a file.
+
+    Windows reserves the names of devices, with any ending too, and drops a dot at the end.
+    """
+    if name.partition(".")[0].lower() in _DEVICES:
+        raise FieldError(field, f"{name} is the name of a device on Windows", "choose another name")
+    if name.endswith("."):
+        raise FieldError(field, f"{name} ends with a dot, which Windows drops", "leave the dot out")

@@ -1,49 +1,63 @@
-"""Read a YAML file into a frozen model; every fault is named with its line and its remedy."""
+"""Read a YAML file into a frozen model; every fault is reported with its line and its remedy."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from gelslim_core.yaml.base import Block
-from gelslim_core.yaml.complaints import Translator
-from gelslim_core.yaml.errors import MAX_PROBLEMS, Problem, listed
-from gelslim_core.yaml.fields import children, field_at
-from gelslim_core.yaml.formats import check_format
-from gelslim_core.yaml.nodes import MappingNode, join_path, plain, positions
-from gelslim_core.yaml.phrases import give
-from gelslim_core.yaml.place import Complaint, locate
-from gelslim_core.yaml.source import Source, SourceMap, decode_source, read_source
-from gelslim_core.yaml.tree import NUMBER_REMEDY, parse_tree
-from gelslim_core.yaml.unions import settle_unions
+from gelslim_core.yaml.document import CORRECT_VALUE, Document, Path, join_path, parse_document
+from gelslim_core.yaml.errors import MAX_PROBLEMS, InputError, Problem, listed
+from gelslim_core.yaml.fields import field_at
+from gelslim_core.yaml.messages import Complaint, Translator, settle_unions
+from gelslim_core.yaml.source import Position, Source, decode_source, read_source
 
 M = TypeVar("M", bound=BaseModel)
+
+_FORMAT = re.compile(r"([A-Za-z0-9-]+)/([0-9]{1,9})\Z")
 
 
 @dataclass(frozen=True)
 class Loaded(Generic[M]):
-    """A model read from a file."""
+    """A model read from a file.
+
+    Attributes:
+        model: The model.
+        source_map: Each field that the file gives, by its dotted path, with its place: a plain
+            value where the value stands, a block or a list where its key stands.
+        sha256: Hash of the file's bytes, in hexadecimal.
+        text: The file's text.
+        path: The file, as the caller named it.
+        defaulted: Dotted paths of the fields that the file leaves to their defaults.
+    """
 
     model: M
-    source_map: SourceMap
-    """Each field that the file gives, with its place."""
+    source_map: Mapping[str, Position]
     sha256: str
-    """Of the file's bytes."""
     text: str
-    """The file's text."""
     path: str
-    """The file, as the caller named it."""
     defaulted: tuple[str, ...]
-    """Dotted paths of the fields that the file leaves to their defaults."""
 
 
 def read_model(path: str | os.PathLike[str], model: type[M]) -> Loaded[M]:
-    """The `model` in the YAML file at `path`. Raises `InputError`."""
+    """Read a model from a YAML file.
+
+    Args:
+        path: The file.
+        model: The class of the model.
+
+    Returns:
+        The model with the places of its fields in the file.
+
+    Raises:
+        InputError: The file cannot be read or breaks a rule of the model; all problems are listed.
+    """
     return load_source(read_source(path), model)
 
 
@@ -54,116 +68,100 @@ def load_bytes(name: str, data: bytes, model: type[M]) -> Loaded[M]:
 
 def load_source(source: Source, model: type[M]) -> Loaded[M]:
     """The `model` in the YAML text of `source`. Raises `InputError`."""
-    start = getattr(model, "starting_point", Block.starting_point)
-    root, refused = parse_tree(source, start)
-    check_format(source, root, model, start)
-    problems = tuple(_with_remedy(problem, model) for problem in refused)
-    instance = _validated(source, root, model, problems)
-    return Loaded(
-        instance,
-        SourceMap(dict(positions(root))),
-        source.sha256,
-        source.text,
-        source.path,
-        tuple(_defaulted(instance)),
-    )
+    starting_point = getattr(model, "starting_point", Block.starting_point)
+    document = parse_document(source, starting_point)
+    _check_format(document, model, starting_point)
+    instance = _validated(document, model)
+    source_map = {join_path(path): mark.position for path, mark in document.marks.items() if path}
+    defaulted = tuple(_defaulted(instance.model_dump(), document.marks))
+    return Loaded(instance, source_map, source.sha256, source.text, source.path, defaulted)
 
 
-def _with_remedy(problem: Problem, model: type[BaseModel]) -> Problem:
-    if problem.remedy != NUMBER_REMEDY:
-        return problem
-    path, is_item = problem.field, problem.field.endswith("]")
-    field = field_at(model, path.rpartition("[")[0] if is_item else path)
-    return replace(problem, remedy=give(field, is_item))
+def _check_format(document: Document, model: type[BaseModel], starting_point: str) -> None:
+    """Refuse a file of another format before its fields, which would all be different.
 
-
-def _validated(
-    source: Source, root: MappingNode, model: type[M], refused: tuple[Problem, ...]
-) -> M:
-    # Through JSON, because strict models take a list for a tuple there and nowhere else.
-    try:
-        instance = model.model_validate_json(json.dumps(plain(root)), strict=True)
-    except ValidationError as error:
-        problems, unread = _problems(source, root, model, error, refused)
+    A missing `format:` line, or one that is no text, is left to the model. Raises `InputError`.
+    """
+    field, given = field_at(model, "format"), document.data.get("format")
+    if field is None or not isinstance(given, str) or not field.choices or given in field.choices:
+        return
+    newest = str(field.choices[-1])
+    name, version = newest.rsplit("/", 1)
+    found = _FORMAT.match(given)
+    if not found or found.group(1) != name:
+        message = "not a format of this kind of file"
+        remedy = f"give a file that has `format: {newest}`, or correct this line to it"
+    elif int(found.group(2)) > int(version):
+        message, remedy = "newer than this program", "update gelslim-cad"
     else:
-        problems, unread = [], 0
-        if not refused:
-            return instance
-    raise listed((*refused, *problems), unread)
+        message = "no longer supported"
+        remedy = f"{starting_point}, and write `format: {newest}`"
+    message += f", this program reads {', '.join(map(str, field.choices))}"
+    mark = document.marks[("format",)]
+    path = document.source.path
+    raise InputError((Problem(path, *mark.position, "format", mark.raw, message, remedy),))
+
+
+def _validated(document: Document, model: type[M]) -> M:
+    translator = Translator(document, model)
+    refused = [
+        replace(p, remedy=translator.value_remedy(p.field)) if p.remedy == CORRECT_VALUE else p
+        for p in document.problems
+    ]
+    # Through JSON, because strict models accept a list for a tuple there and nowhere else.
+    try:
+        instance = model.model_validate_json(json.dumps(document.data), strict=True)
+    except ValidationError as error:
+        problems, uncounted = _problems(translator, error, refused)
+        raise listed((*refused, *problems), uncounted) from None
+    if refused:
+        raise listed(refused)
+    return instance
 
 
 def _problems(
-    source: Source,
-    root: MappingNode,
-    model: type[BaseModel],
-    error: ValidationError,
-    refused: tuple[Problem, ...],
+    translator: Translator, error: ValidationError, refused: list[Problem]
 ) -> tuple[list[Problem], int]:
     """The problems behind `error`, the first of them in file order, and how many more there are."""
-    complaints = [_complaint(root, item) for item in error.errors(include_url=False)]
-    fields = {p.field for p in refused}
-    heard = [c for c in complaints if not _answered(c, fields)]
-    blamed = fields | {c.place.path for c in heard}
-    heard = [c for c in heard if not _follows(c, blamed)]
-    translator = Translator(source.path, root, model)
-    ordered = sorted(settle_unions(heard), key=lambda complaint: complaint.place.position)
-    # Suggestions compare a key with every field: a file of nonsense pays for the listed ones only.
-    translated = [translator.problem(complaint) for complaint in ordered[:MAX_PROBLEMS]]
-    meant = {s.paths[0] for _, s in translated if len(s.paths) == 1}
-    problems = [
-        problem
-        for problem, _ in translated
-        if problem.message != "missing" or problem.field not in meant
+    document = translator.document
+    complaints = [
+        Complaint(e["type"], e.get("ctx", {}), e["msg"], *document.locate(e["loc"]))
+        for e in error.errors(include_url=False)
     ]
-    return problems, len(ordered) - len(translated)
+    fields = {problem.field for problem in refused}
+    open_ = [c for c in complaints if not _explained(c, fields)]
+    reported = fields | {join_path(c.path) for c in open_}
+    open_ = [c for c in open_ if not _follows(c, reported)]
+    ordered = sorted(settle_unions(open_), key=lambda c: document.marks[c.path].position)
+    # Suggestions compare a key with every field, so only the listed problems are worded.
+    worded = [translator.problem(complaint) for complaint in ordered[:MAX_PROBLEMS]]
+    meant = {suggestion.paths[0] for _, suggestion in worded if len(suggestion.paths) == 1}
+    problems = [p for p, _ in worded if p.message != "missing" or p.field not in meant]
+    return problems, len(ordered) - len(worded)
 
 
-def _complaint(root: MappingNode, item: Any) -> Complaint:
-    place = locate(root, item["loc"])
-    return Complaint(item["type"], item.get("ctx", {}), item["msg"], place)
+def _explained(complaint: Complaint, refused: set[str]) -> bool:
+    """Whether a value that was refused while parsing is the cause of this complaint."""
+    path = join_path(complaint.path)
+    if path and any(path == f or path.startswith((f"{f}.", f"{f}[")) for f in refused):
+        return True
+    below = (f"{path}.", f"{path}[")
+    return complaint.is_rule and any(not path or f.startswith(below) for f in refused)
 
 
-def _answered(complaint: Complaint, refused: set[str]) -> bool:
-    """Whether a value that was refused earlier is behind this complaint."""
-    path = complaint.place.path
-    if any(path == field or path.startswith((f"{field}.", f"{field}[")) for field in refused):
-        return bool(path)
-    if complaint.kind in ("value_error", "assertion_error"):
-        return any(not path or field.startswith((f"{path}.", f"{path}[")) for field in refused)
-    return False
-
-
-def _follows(complaint: Complaint, blamed: set[str]) -> bool:
+def _follows(complaint: Complaint, reported: set[str]) -> bool:
     """Whether a list is only called too short because its items were refused."""
-    items = f"{complaint.place.path}["
-    return complaint.kind == "too_short" and any(path.startswith(items) for path in blamed)
+    items = f"{join_path(complaint.path)}["
+    return complaint.kind == "too_short" and any(path.startswith(items) for path in reported)
 
 
-def _defaulted(model: BaseModel, prefix: tuple[str | int, ...] = ()) -> Iterator[str]:
-    for name in type(model).model_fields:
-        path = (*prefix, name)
-        value = getattr(model, name)
-        if name in model.model_fields_set:
-            yield from _defaulted_below(value, path)
-        elif isinstance(value, BaseModel):
-            yield from _leaves(value, join_path(path))
-        else:
-            yield join_path(path)
-
-
-def _defaulted_below(value: Any, path: tuple[str | int, ...]) -> Iterator[str]:
-    if isinstance(value, BaseModel):
-        yield from _defaulted(value, path)
+def _defaulted(value: Any, given: Mapping[Path, Any], path: Path = ()) -> Iterator[str]:
+    """Paths of the plain values in the dumped model `value` that are not `given` in the file."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            yield from _defaulted(item, given, (*path, name))
+    elif path not in given:
+        yield join_path(path)
     elif isinstance(value, tuple | list):
         for index, item in enumerate(value):
-            yield from _defaulted_below(item, (*path, index))
-
-
-def _leaves(model: BaseModel, path: str) -> Iterator[str]:
-    for field in children(type(model), ""):
-        value = getattr(model, field.name)
-        name = f"{path}.{field.name}"
-        if isinstance(value, BaseModel):
-            yield from _leaves(value, name)
-        else:
-            yield name
+            yield from _defaulted(item, given, (*path, index))

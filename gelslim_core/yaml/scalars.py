@@ -14,16 +14,18 @@ MAX_INT = 2**53
 
 ScalarValue = str | int | float | bool | None
 
-_NULL = frozenset(("", "~", "null", "Null", "NULL"))
-_TRUE = frozenset(("true", "True", "TRUE"))
-_FALSE = frozenset(("false", "False", "FALSE"))
-_INT = re.compile(r"[-+]?[0-9]+\Z")
-_OCTAL = re.compile(r"0o[0-7]+\Z")
-_HEX = re.compile(r"0x[0-9a-fA-F]+\Z")
+_WORDS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_INTEGERS = {
+    10: re.compile(r"([-+]?[0-9]+)\Z"),
+    8: re.compile(r"0o([0-7]+)\Z"),
+    16: re.compile(r"0x([0-9a-fA-F]+)\Z"),
+}
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
-_INF = re.compile(r"[-+]?\.(inf|Inf|INF)\Z")
-_NAN = frozenset((".nan", ".NaN", ".NAN"))
-_NUMBER_START = frozenset("+-.0123456789")
+_NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z")
 
 
 class RefusedScalarError(ValueError):
@@ -36,36 +38,23 @@ def resolve(text: str) -> ScalarValue:
     Raises `RefusedScalarError` for NaN, infinities and numbers beyond the range of a double or,
     for whole numbers, beyond `MAX_INT`.
     """
-    if text in _NULL:
-        return None
-    if text in _TRUE:
-        return True
-    if text in _FALSE:
-        return False
-    if text[0] not in _NUMBER_START:
-        return text
-    return _resolve_number(text)
-
-
-def _resolve_number(text: str) -> str | int | float:
-    if _INT.match(text):
-        return _bounded_int(text, 10)
-    if _OCTAL.match(text):
-        return _bounded_int(text[2:], 8)
-    if _HEX.match(text):
-        return _bounded_int(text[2:], 16)
-    if _INF.match(text) or text in _NAN:
+    if text in _WORDS:
+        return _WORDS[text]
+    for base, integer in _INTEGERS.items():
+        if found := integer.match(text):
+            return _bounded_int(found.group(1), base)
+    if _NOT_FINITE.match(text):
         raise RefusedScalarError("must be a finite number")
-    if _FLOAT.match(text):
-        value = float(text)
-        if not math.isfinite(value):
-            raise RefusedScalarError("must be a finite number, at most about 1.8e308")
-        return value
-    return text
+    if not _FLOAT.match(text):
+        return text
+    value = float(text)
+    if not math.isfinite(value):
+        raise RefusedScalarError("must be a finite number, at most about 1.8e308")
+    return value
 
 
 def _bounded_int(digits: str, base: int) -> int:
-    # Python refuses to convert very long digit strings, so their length is looked at first.
+    # Python refuses to convert very long digit strings, so their length is checked first.
     value = int(digits, base) if len(digits.lstrip("+-0")) < 40 and len(digits) < 400 else None
     if value is None or abs(value) > MAX_INT:
         raise RefusedScalarError("is too large a whole number, the limit is 2^53")

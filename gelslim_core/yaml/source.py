@@ -1,4 +1,4 @@
-"""The bytes of an input file as checked text, and where each field stands in it."""
+"""The bytes of an input file as checked text."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import codecs
 import hashlib
 import os
 import re
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +14,7 @@ from gelslim_core.yaml.errors import InputError, Problem, shown
 
 MAX_BYTES = 1_000_000
 MAX_LINE = 20_000
-"""Characters in a line: longer ones are no input of ours, and slow the scanner down."""
+"""Characters in a line; longer lines slow the parser down and no input file needs them."""
 
 _WIDE_MARKS = {
     codecs.BOM_UTF32_LE: "UTF-32",
@@ -32,29 +31,10 @@ _SAVE_UTF8 = "save the file as UTF-8"
 
 
 class Position(NamedTuple):
-    """A place in a text file, both 1-based."""
+    """A place in a text file; line and column are counted from 1."""
 
     line: int
     column: int
-
-
-@dataclass(frozen=True)
-class SourceMap(Mapping[str, Position]):
-    """Dotted field path (`design.gel.thickness_mm`, `loads[0].force_n`) to its place in the file.
-
-    A field with a plain value stands where its value does, a block where its key does.
-    """
-
-    entries: Mapping[str, Position]
-
-    def __getitem__(self, field: str) -> Position:
-        return self.entries[field]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.entries)
-
-    def __len__(self) -> int:
-        return len(self.entries)
 
 
 @dataclass(frozen=True)
@@ -71,24 +51,20 @@ class Source:
 def refusal(
     path: str, message: str, remedy: str, position: Position | None = None, value: str | None = None
 ) -> InputError:
-    """A `InputError` about the file as a whole."""
+    """An `InputError` about the file as a whole."""
     line, column = position or (None, None)
     return InputError((Problem(path, line, column, "", value, message, remedy),))
 
 
 def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_BYTES) -> Source:
-    """The text of the UTF-8 file at `path`, at most `max_bytes` long; never reads further.
+    """The text of the UTF-8 file at `path`; at most `max_bytes` are read.
 
     Raises `InputError` where the file cannot be read, is too long or is not UTF-8 text.
     """
     name = os.fspath(path)
-    return decode_source(name, _read_bytes(name, max_bytes), max_bytes)
-
-
-def _read_bytes(name: str, max_bytes: int) -> bytes:
     try:
         with Path(name).open("rb") as stream:
-            return stream.read(max_bytes + 1)
+            data = stream.read(max_bytes + 1)
     except FileNotFoundError:
         raise refusal(name, "no such file", "check the path") from None
     except IsADirectoryError:
@@ -99,20 +75,18 @@ def _read_bytes(name: str, max_bytes: int) -> bytes:
         reason = (error.strerror or type(error).__name__).lower()
         raise refusal(name, f"cannot be read ({reason})", "check the path") from None
     except ValueError:
-        raise refusal(name, "is no valid file name", "check the path") from None
+        raise refusal(name, "is not a valid file name", "check the path") from None
+    return decode_source(name, data, max_bytes)
 
 
 def decode_source(name: str, data: bytes, max_bytes: int = MAX_BYTES) -> Source:
-    """`data` as text, checked: UTF-8, printable, no endless line, at most `max_bytes`.
+    """`data` as text: UTF-8, printable, at most `max_bytes` long, no line above `MAX_LINE`.
 
     Raises `InputError`.
     """
     if len(data) > max_bytes:
-        raise refusal(
-            name,
-            f"larger than {max_bytes / 1e6:g} MB, the limit for such a file",
-            "check that this is the right file",
-        )
+        limit = f"larger than {max_bytes / 1e6:g} MB, the limit for such a file"
+        raise refusal(name, limit, "check that this is the right file")
     for mark, encoding in _WIDE_MARKS.items():
         if data.startswith(mark):
             raise refusal(name, f"is {encoding} text, not UTF-8", _SAVE_UTF8, Position(1, 1))
@@ -121,34 +95,17 @@ def decode_source(name: str, data: bytes, max_bytes: int = MAX_BYTES) -> Source:
     except UnicodeDecodeError as error:
         offset = error.start + (len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0)
         before = data[:offset].decode("utf-8", "replace")
-        raise refusal(
-            name,
-            f"is not UTF-8 text: byte 0x{data[offset]:02x} at byte offset {offset}",
-            _SAVE_UTF8,
-            _position(before, len(before)),
-        ) from None
-    _check_text(name, text)
-    return Source(name, text, hashlib.sha256(data).hexdigest())
-
-
-def _check_text(name: str, text: str) -> None:
+        message = f"is not UTF-8 text: byte 0x{data[offset]:02x} at byte offset {offset}"
+        raise refusal(name, message, _SAVE_UTF8, _position(before, len(before))) from None
     if found := _UNPRINTABLE.search(text):
-        character = ord(found.group())
-        remedy = _SAVE_UTF8 + " (it looks like UTF-16)" if character == 0 else "delete it"
-        raise refusal(
-            name,
-            f"holds the control character U+{character:04X}",
-            remedy,
-            _position(text, found.start()),
-        )
+        message = f"holds the control character U+{ord(found.group()):04X}"
+        remedy = f"{_SAVE_UTF8} (it looks like UTF-16)" if found.group() == "\0" else "delete it"
+        raise refusal(name, message, remedy, _position(text, found.start()))
     if found := _LONG_LINE.search(text):
-        raise refusal(
-            name,
-            f"has a line of more than {MAX_LINE} characters",
-            "break the line",
-            _position(text, found.start()),
-            shown(found.group(), 20),
-        )
+        message, place = f"has a line of more than {MAX_LINE} characters", found.start()
+        value = shown(found.group(), 20)
+        raise refusal(name, message, "break the line", _position(text, place), value)
+    return Source(name, text, hashlib.sha256(data).hexdigest())
 
 
 def _position(text: str, offset: int) -> Position:

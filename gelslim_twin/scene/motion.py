@@ -102,8 +102,10 @@ class Motion(Block):
         if self.waypoints is not None and self.csv is not None:
             raise FieldError("csv", "given beside waypoints", "delete one of the two")
         if self.waypoints is None and self.csv is None:
-            raise ValueError(
-                "has neither waypoints nor csv; add `waypoints:` with a line `- move: press` below"
+            raise FieldError(
+                "",
+                "has neither waypoints nor csv",
+                "add `waypoints:` with a line `- move: press` below",
             )
         if self.csv is not None and (self.start_x_mm or self.start_y_mm):
             name = "start_x_mm" if self.start_x_mm else "start_y_mm"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-
-from gelslim_core.yaml.reference import reference_markdown
-from gelslim_twin.scene.reader import scene_schema_text
+from gelslim_core.yaml.schema import reference_markdown
+from gelslim_twin.scene.scene import Scene
 
 RULES = (
     ("sensor", "names `spec` or `bundle`, not both"),
@@ -42,4 +40,4 @@ Checked when the file is read.
 def reference_text() -> str:
     """The whole page in Markdown, the same for the same program."""
     rules = "".join(f"- `{block}`: {rule}.\n" for block, rule in RULES)
-    return f"{_HEAD}\n{reference_markdown(json.loads(scene_schema_text()))}{_BETWEEN}{rules}"
+    return f"{_HEAD}\n{reference_markdown(Scene)}{_BETWEEN}{rules}"

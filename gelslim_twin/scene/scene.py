@@ -6,9 +6,8 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from gelslim_core.yaml.base import Block
+from gelslim_core.yaml.base import Block, require_folder_name
 from gelslim_core.yaml.errors import FieldError
-from gelslim_core.yaml.folder_name import require_folder_name
 from gelslim_twin.scene.effects import Effects
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.motion import Motion

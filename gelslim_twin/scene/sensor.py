@@ -23,5 +23,7 @@ class Sensor(Block):
         if self.spec is not None and self.bundle is not None:
             raise FieldError("bundle", "given beside spec, a scene has one sensor", "delete one")
         if self.spec is None and self.bundle is None:
-            raise ValueError("names neither spec nor bundle; add `spec: ../gelslim2.yaml` below it")
+            raise FieldError(
+                "", "names neither spec nor bundle", "add `spec: ../gelslim2.yaml` below it"
+            )
         return self

@@ -33,7 +33,7 @@ def _scene(folder: Path, *changes: tuple[str, str]) -> Path:
         ("duration_s: 0.8", "duration_s: 0", "must be > 0"),
         (str(SENSOR), "nowhere.yaml", "sensor.spec = nowhere.yaml: no such file"),
         ("effects:\n", "effects:\n  normal_contact: off\n", "it alone provides the force"),
-        ("[displacement, force, markers, image]", "[]", "must have at least 1 item"),
+        ("[displacement, force, markers, image]", "[]", "at least 1"),
     ],
 )
 @pytest.mark.parametrize("command", ["plan", "simulate"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gelslim_core.yaml.reference import heading_anchor
+from gelslim_core.yaml.schema import heading_anchor
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

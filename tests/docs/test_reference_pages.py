@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
+from pydantic import BaseModel
+from pydantic import Field as Range
 
 from gelslim.cli import main
 from gelslim_cad.spec import Spec
@@ -16,7 +18,7 @@ from gelslim_cad.spec.reference import reference_text as spec_page
 from gelslim_core.yaml.errors import InputError
 from gelslim_core.yaml.fields import Field, field_table
 from gelslim_core.yaml.reader import load_bytes
-from gelslim_core.yaml.reference import heading_anchor, reference_markdown
+from gelslim_core.yaml.schema import heading_anchor, reference_markdown
 from gelslim_twin.scene.reference import RULES as SCENE_RULES
 from gelslim_twin.scene.reference import reference_text as scene_page
 from gelslim_twin.scene.scene import Scene
@@ -181,22 +183,21 @@ def test_rules_between_fields_are_enforced(
     assert len(raised.value.problems) == 1, "the fault must break this rule only"
 
 
-def test_a_small_schema_as_a_page() -> None:
-    schema = {
-        "description": "A thing.",
-        "properties": {
-            "size_mm": {"type": "number", "exclusiveMinimum": 0, "maximum": 2.5},
-            "parts": {"type": "array", "items": {"$ref": "#/$defs/Part"}, "minItems": 1},
-        },
-        "required": ["size_mm"],
-        "$defs": {
-            "Part": {
-                "description": "One | part",
-                "properties": {"kind": {"enum": ["a", "b"], "default": "a"}},
-            }
-        },
-    }
-    assert reference_markdown(schema).split("\n") == [
+class _Part(BaseModel):
+    """One | part."""
+
+    kind: Literal["a", "b"] = "a"
+
+
+class _Thing(BaseModel):
+    """A thing."""
+
+    size_mm: float = Range(gt=0, le=2.5)
+    parts: tuple[_Part, ...] | None = Range(default=None, min_length=1)
+
+
+def test_a_small_model_as_a_page() -> None:
+    assert reference_markdown(_Thing).split("\n") == [
         "## Top",
         "",
         "A thing.",

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from gelslim.cli import main
+from gelslim_core.yaml.base import require_folder_name
 from gelslim_core.yaml.errors import FieldError
-from gelslim_core.yaml.folder_name import require_folder_name
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = (

@@ -3,12 +3,17 @@
 import re
 
 import pytest
-from spec_samples import load
 
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
 from gelslim_core.yaml.errors import InputError
 from gelslim_core.yaml.fields import field_table
+from gelslim_core.yaml.reader import Loaded, load_bytes
+
+
+def load(text: str) -> Loaded[Spec]:
+    return load_bytes("starter.yaml", text.encode(), Spec)
+
 
 MARK = re.compile(r"^( *)# (?=[ a-z])", re.MULTILINE)
 

@@ -8,8 +8,8 @@ import string
 
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from reader_cases import MINIMAL, NAME, load
 from ruamel.yaml import YAML
-from spec_samples import MINIMAL, NAME, load
 
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text

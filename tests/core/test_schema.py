@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
+from reader_cases import MINIMAL, load, with_length
 from ruamel.yaml import YAML
-from spec_samples import MINIMAL, load, with_length
 
 from gelslim_cad.spec.schema import schema_text
 from gelslim_cad.spec.spec import Spec

@@ -1,7 +1,13 @@
 """Keys that are misspelt, misplaced, missing, repeated or no names."""
 
+import re
+
 import pytest
-from spec_samples import MINIMAL, load, problems, the_problem
+from reader_cases import MINIMAL, load, problems, the_problem
+
+
+def numbers(text: str) -> list[int]:
+    return [int(digits) for digits in re.findall(r"\d+", text)]
 
 
 @pytest.mark.parametrize(
@@ -11,72 +17,71 @@ from spec_samples import MINIMAL, load, problems, the_problem
             "    thicknes_mm: 2",
             14,
             "design.gel.thicknes_mm",
-            "did you mean design.gel.thickness_mm?",
+            "design.gel.thickness_mm?",
         ),
         (
             "    thickness: 2",
             14,
             "design.gel.thickness",
-            "did you mean design.gel.thickness_mm (in mm)?",
+            "design.gel.thickness_mm (in mm)?",
         ),
         (
             "    thickness_cm: 0.2",
             14,
             "design.gel.thickness_cm",
-            "did you mean design.gel.thickness_mm: 2?",
+            "design.gel.thickness_mm: 2?",
         ),
         (
             "    thicknessMm: 2",
             14,
             "design.gel.thicknessMm",
-            "did you mean design.gel.thickness_mm?",
+            "design.gel.thickness_mm?",
         ),
         (
             "    Thickness-mm: 2",
             14,
             "design.gel.Thickness-mm",
-            "did you mean design.gel.thickness_mm?",
+            "design.gel.thickness_mm?",
         ),
-        ("    f_number: 2", 14, "design.gel.f_number", "did you mean camera.f_number?"),
+        ("    f_number: 2", 14, "design.gel.f_number", "camera.f_number?"),
         (
             "    bend_radius_ratio: 2",
             14,
             None,
-            "did you mean design.light_guide.bend_radius_ratio?",
+            "design.light_guide.bend_radius_ratio?",
         ),
-        ("design.gel.thickness_mm: 2", 14, None, "nest it, one level per line: design: gel: "),
-        ("materials:\n  gel: {}", 14, "materials", "did you mean material?"),
+        ("design.gel.thickness_mm: 2", 14, None, "design: gel: thickness_mm: "),
+        ("materials:\n  gel: {}", 14, "materials", "material?"),
         (
             "material:\n  gel:\n    youngs_modulus_kpa: 147",
             16,
             "material.gel.youngs_modulus_kpa",
-            "did you mean material.gel.youngs_modulus_mpa: 0.147?",
+            "material.gel.youngs_modulus_mpa: 0.147?",
         ),
         (
             "material:\n  gel:\n    density_g_cm3: 1.02",
             16,
             None,
-            "did you mean material.gel.density_kg_m3: 1020?",
+            "material.gel.density_kg_m3: 1020?",
         ),
         (
             "  thickness_mm: 3",
             14,
             "design.thickness_mm",
-            "did you mean design.gel.thickness_mm or design.light_guide.thickness_mm or "
+            "design.gel.thickness_mm or design.light_guide.thickness_mm or "
             "design.mirror.thickness_mm?",
         ),
         (
             "    qqq: 3",
             14,
             "design.gel.qqq",
-            "design.gel has the fields length_mm, width_mm, thickness_mm, corner_radius_mm",
+            "length_mm, width_mm, thickness_mm, corner_radius_mm",
         ),
     ],
 )
 def test_an_unknown_key_is_refused_with_the_field_that_was_meant(added, line, field, remedy):
     problem = the_problem(MINIMAL + added + "\n")
     assert problem.line == line
-    assert problem.message == "unknown field"
     assert remedy in problem.remedy
     if field:
         assert problem.field == field
@@ -86,66 +91,53 @@ def test_an_unknown_key_is_refused_with_the_field_that_was_meant(added, line, fi
 def test_a_misspelt_required_field_is_one_problem_not_two(key):
     problem = the_problem(MINIMAL.replace("    length_mm", f"    {key}"))
     assert problem.line == 12
-    assert "did you mean design.gel.length_mm" in problem.remedy
+    assert "design.gel.length_mm" in problem.remedy
 
 
 def test_a_missing_field_is_described_on_the_line_of_its_block():
     problem = the_problem(MINIMAL.replace("    length_mm: 24\n", ""))
     assert (problem.line, problem.column, problem.field) == (11, 3, "design.gel.length_mm")
-    assert problem.message == "missing"
-    assert problem.remedy == (
-        "add `length_mm: ...` under design.gel (gel size along the finger, from 5 to 120 mm)"
-    )
+    assert "`length_mm: ...` under design.gel" in problem.remedy
+    assert "from 5 to 120 mm" in problem.remedy
 
 
 def test_a_missing_block_names_its_required_fields():
     problem = the_problem(MINIMAL[: MINIMAL.index("design:")])
-    assert (problem.line, problem.field, problem.message) == (1, "design", "missing")
-    assert "add the block `design:` with at least gel" in problem.remedy
+    assert (problem.line, problem.field) == (1, "design")
+    assert "`design:` with at least gel" in problem.remedy
 
 
 @pytest.mark.parametrize("tail", ["design:\n", "design:\n  gel:\n"])
 def test_an_empty_block_is_refused_on_its_own_line(tail):
     problem = the_problem(MINIMAL[: MINIMAL.index("design:")] + tail)
     assert problem.line == 9 + len(tail.splitlines())
-    assert problem.message == "is empty, must be a block of fields"
-    assert "at least" in problem.remedy
+    assert problem.remedy.endswith(": gel" if tail == "design:\n" else ": length_mm, width_mm")
 
 
 def test_a_repeated_key_names_both_lines():
     problem = the_problem(MINIMAL + "    length_mm: 25\n")
     assert (problem.line, problem.field) == (14, "design.gel.length_mm")
-    assert problem.message == "given twice, first on line 12 and again on line 14"
-    assert problem.remedy == "delete one of the two lines"
+    assert numbers(problem.message) == [12, 14]
 
 
 def test_a_repeated_block_names_both_lines():
     problem = the_problem(MINIMAL + "camera:\n  f_number: 2\n")
-    assert problem.message == "given twice, first on line 3 and again on line 14"
+    assert (problem.line, problem.field) == (14, "camera")
+    assert numbers(problem.message) == [3, 14]
 
 
 @pytest.mark.parametrize(
-    ("key", "message"),
-    [
-        ("12", "a key must be a name"),
-        ("true", "a key must be a name"),
-        ("null", "a key must be a name"),
-        ("1.5", "a key must be a name"),
-        (".nan", "a key must be a name"),
-        ("? [a, b]\n", "a key must be a plain name, not a collection"),
-        ("? {a: b}\n", "a key must be a plain name, not a collection"),
-    ],
+    "key", ["12", "true", "null", "1.5", ".nan", "? [a, b]\n", "? {a: b}\n", "? *a\n"]
 )
-def test_a_key_must_be_a_name(key, message):
+def test_a_key_must_be_a_name(key):
     problem = the_problem(f"{MINIMAL}{key}: 1\n")
-    assert (problem.line, problem.message) == (14, message)
-    assert problem.remedy == "write `name: value`"
+    assert (problem.line, problem.field) == (14, "")
+    assert "`name: value`" in problem.remedy
 
 
 def test_merge_keys_are_refused():
     problem = the_problem(MINIMAL + "<<: {name: b}\n")
-    assert (problem.line, problem.message) == (14, "merge keys are not read")
-    assert problem.remedy == "write the fields out"
+    assert (problem.line, problem.field, problem.value) == (14, "", "<<")
 
 
 def test_the_alias_bomb_is_refused_line_by_line():
@@ -153,43 +145,42 @@ def test_the_alias_bomb_is_refused_line_by_line():
         f"{b}: &{b} [{', '.join(['*' + a] * 9)}]\n"
         for a, b in zip("abcdefgh", "bcdefghi", strict=True)
     )
-    found = [p for p in problems(MINIMAL + bomb) if "not read" in p.message]
+    found = [p for p in problems(MINIMAL + bomb) if p.value and p.value[0] in "&*"]
     assert len(found) == 9 + 8 * 9
     assert {p.line for p in found} == set(range(14, 23))
 
 
 def test_words_that_yaml_1_1_reads_as_booleans_are_names():
-    problem = the_problem(MINIMAL + "no: 3\n")
-    assert (problem.field, problem.message) == ("no", "unknown field")
+    assert the_problem(MINIMAL + "no: 3\n").field == "no"
 
 
 @pytest.mark.parametrize(
-    ("written", "message", "remedy"),
+    ("written", "remedy"),
     [
-        ("gelslim-spec/2", "newer than this program", "update gelslim-cad"),
-        ("gelslim-spec/0", "no longer supported", "`format: gelslim-spec/1`"),
-        ("gelslim-scene/1", "not a format of this kind of file", "`format: gelslim-spec/1`"),
-        ("1", "must be gelslim-spec/1", "write gelslim-spec/1"),
-        ("", "is empty, must be gelslim-spec/1", "gelslim-spec/1"),
-        ("[1]", "must be gelslim-spec/1, not a list", "gelslim-spec/1"),
+        ("gelslim-spec/2", "update"),
+        ("gelslim-spec/0", "`format: gelslim-spec/1`"),
+        ("gelslim-scene/1", "`format: gelslim-spec/1`"),
+        ("1", "gelslim-spec/1"),
+        ("", "gelslim-spec/1"),
+        ("[1]", "gelslim-spec/1"),
     ],
 )
-def test_the_format_is_looked_at_first(written, message, remedy):
+def test_the_format_is_looked_at_first(written, remedy):
     problem = the_problem(MINIMAL.replace("format: gelslim-spec/1", f"format: {written}"))
     assert (problem.line, problem.field) == (1, "format")
-    assert message in problem.message
     assert "gelslim-spec/1" in problem.message
     assert remedy in problem.remedy
 
 
 def test_a_file_of_another_format_is_not_blamed_for_its_fields():
-    assert "newer" in the_problem("# next\nformat: gelslim-spec/2\nother: 1\n").message
+    problem = the_problem("# next\nformat: gelslim-spec/2\nother: 1\n")
+    assert (problem.line, problem.field) == (2, "format")
 
 
 def test_a_missing_format_line():
     problem = the_problem(MINIMAL.replace("format: gelslim-spec/1\n", ""))
-    assert (problem.line, problem.message) == (1, "missing")
-    assert problem.remedy == "write `format: gelslim-spec/1` as the first line"
+    assert (problem.line, problem.field) == (1, "format")
+    assert "`format: gelslim-spec/1`" in problem.remedy
 
 
 def test_the_source_map_points_at_values_and_at_block_keys():
