@@ -72,7 +72,7 @@ def test_planning_and_records_cost_no_more_than_a_hundredth(data: dict[str, Any]
     """By what they take on their own: whole runs of one second differ by more on a busy machine.
 
     Pairs of whole runs must not tell otherwise either; nothing is hidden between the stages
-    (`tests/twin/test_simulate_overhead.py` counts calls).
+    (`tests/twin/simulation/test_simulate_overhead.py` counts calls).
     """
     part = data["overhead"]
     assert 0 < part["plan_ms"] <= part["bookkeeping_ms"]

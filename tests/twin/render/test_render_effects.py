@@ -26,7 +26,7 @@ from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.specular import Specular
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 NULL = {
     "shading": Shading(ambient_share=1.0),
     "defocus": Defocus(0.0, 30.0, 0.0),
