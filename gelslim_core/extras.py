@@ -28,13 +28,13 @@ class Extra:
 
 
 EXTRAS = (
+    Extra("plot", ("matplotlib",), "pictures of light, explore and validate"),
     Extra(
         "cad",
         ("cadquery", "trimesh", "manifold3d", "lxml", "networkx", "ezdxf", "reportlab",
-         "gerber_writer"),
+         "gerber_writer", "matplotlib"),
         "build, family, parts in diff, marker print files",
     ),
-    Extra("plot", ("matplotlib",), "pictures of light, explore and validate"),
     Extra("view", ("pyvista",), "pictures of the finger in the report and in family"),
     Extra("vision", ("cv2", "PIL"), "videos, cameras and image files for force and simulate"),
     Extra("record", ("pyarrow", "mcap", "mcap_ros2"), "Parquet tables and ROS 2 recordings"),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+
 
 WIDEST = 110
 
@@ -81,3 +83,41 @@ def console() -> Console:
 def say(text: str, style: str = "") -> None:
     """Print words, wrapped at the console's width."""
     console().print(text, style=style or None)
+
+
+OK = 0
+RULE_FAILED = 1
+BAD_INPUT = 2
+FAULT = 3
+INTERRUPTED = 130
+CLOSED_PIPE = 141
+
+
+@contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[str, int, int], None] | None]:
+    """A progress bar on a terminal's standard error, nothing elsewhere."""
+    from rich.console import Console
+
+    screen = Console(stderr=True, highlight=False)
+    if quiet or not screen.is_terminal:
+        yield None
+        return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
+    # No refreshing thread: the build forks its workers.
+    with Progress(
+        *columns, TimeElapsedColumn(), console=screen, transient=True, auto_refresh=False
+    ) as bar:
+        task = bar.add_task("starting", total=1)
+
+        def tell(text: str, done: int, total: int) -> None:
+            bar.update(task, description=text, completed=done, total=total, refresh=True)
+
+        yield tell

@@ -12,7 +12,7 @@ from typing import Any
 
 import typer
 
-from gelslim.cli.status import BAD_INPUT, FAULT, RULE_FAILED
+from gelslim.cli.answer import BAD_INPUT, FAULT, RULE_FAILED
 from gelslim.ending import SAID, asked_to_end
 from gelslim_core.errors import GelslimError
 from gelslim_core.extras import extra_of, install_command

@@ -1,20 +1,64 @@
-"""Entry point: runs a command and turns whatever goes wrong into a message and an exit status."""
+"""Entry point: runs a command and turns every failure into a message and an exit status."""
 
 from __future__ import annotations
 
+import codecs
 import contextlib
+import functools
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextvars import ContextVar
 from io import TextIOWrapper
+from typing import ParamSpec
+
+P = ParamSpec("P")
+
+SPELLED = "gelslim-spelled"
+"""Name of the error handler that writes signs which a terminal lacks in ASCII."""
+_SPELLING = {
+    "≥": ">=", "≤": "<=", "°": " deg", "²": "^2", "³": "^3", "·": "*", "×": "x", "π": "pi",
+    "α": "alpha", "γ": "gamma", "θ": "theta", "ψ": "psi", "Φ": "Phi", "Δ": "delta ",
+    "⌈": "ceil(", "⌉": ")", "⌊": "floor(", "⌋": ")",
+}  # fmt: skip
+
+command_starts: ContextVar[Callable[[], None]] = ContextVar("command_starts")
+"""Called when typer has parsed the arguments and the command itself starts."""
+
+
+class CarriedError(Exception):
+    """Carries what a command raised past typer, which would turn some errors into a status."""
+
+    def __init__(self, cause: BaseException) -> None:
+        super().__init__(str(cause))
+        self.cause = cause
+
+
+def carried(command: Callable[P, int]) -> Callable[P, int]:
+    """Return the command, with the same signature, so that it raises only CarriedError."""
+
+    @functools.wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> int:
+        try:
+            command_starts.get(_nothing)()
+            return command(*args, **kwargs)
+        except BaseException as error:
+            raise CarriedError(error) from error
+
+    return run
 
 
 def main(argv: Sequence[str] | None = None, begun: Callable[[], None] = lambda: None) -> int:
-    """Run `gelslim` with `argv` (default: the process's) and return its exit status.
+    """Run the command line.
 
-    0: done. 1: a design rule fails. 2: bad input. 3: a fault of gelslim itself. As shells have it,
-    130 after an interrupt, 141 when the reader of a pipe has gone and 143 after SIGTERM.
-    `begun` is called as a command begins; until then there is nothing to clear away.
+    Args:
+        argv: Arguments; those of the process by default.
+        begun: Called when the command itself starts. Until then there is nothing to clean up.
+
+    Returns:
+        The exit status. 0: done. 1: a design rule fails. 2: bad input. 3: a fault of the program
+        itself. As in shells 130 after an interrupt, 141 when the reader of a pipe has gone, and
+        143 after SIGTERM.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
@@ -28,26 +72,23 @@ def main(argv: Sequence[str] | None = None, begun: Callable[[], None] = lambda: 
 
 def _run(arguments: list[str], begun: Callable[[], None]) -> int:
     _open_streams()
-    # Loaded here, so that an interrupt meanwhile is caught too.
+    # Imported here, so that an interrupt during the import is caught too.
+    from gelslim.cli.answer import INTERRUPTED
     from gelslim.cli.app import app
-    from gelslim.cli.carry import beginning
-    from gelslim.cli.status import INTERRUPTED
 
-    beginning.set(begun)
+    command_starts.set(begun)
     status = app(args=arguments, prog_name="gelslim", standalone_mode=False)
     if status == INTERRUPTED:
-        # It fell into typer, which turns it into a status.
+        # typer caught the interrupt itself and turned it into a status.
         raise KeyboardInterrupt
     sys.stdout.flush()
     return int(status or 0)
 
 
 def _open_streams() -> None:
-    from gelslim.cli.spelling import SPELLED
-
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
-            # Closed by the caller, as with `>&-`: what is said goes nowhere.
+            # The caller closed it, as with `>&-`: what is printed is dropped.
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
         stream = getattr(sys, name)
         if isinstance(stream, TextIOWrapper):
@@ -55,25 +96,38 @@ def _open_streams() -> None:
 
 
 def _failed(raised: BaseException, as_json: bool) -> int:
-    from gelslim.cli.carry import CarriedError
+    from gelslim.cli.answer import CLOSED_PIPE
     from gelslim.cli.failure import explain_failure
-    from gelslim.cli.status import CLOSED_PIPE
 
     error = raised.cause if isinstance(raised, CarriedError) else raised
     if isinstance(error, BrokenPipeError):
-        _silence()
+        _drop_output()
         return CLOSED_PIPE
     try:
         status = explain_failure(error, as_json=as_json)
         sys.stdout.flush()
     except OSError:
-        # Standard output takes nothing, be it a full disk or a pipe without a reader.
-        _silence()
+        # Standard output accepts nothing: a full disk, or a pipe without a reader.
+        _drop_output()
         status = explain_failure(error, as_json=False)
     return status
 
 
-def _silence() -> None:
-    """Nobody is left to say anything to; the interpreter must not try at its exit either."""
+def _drop_output() -> None:
+    """Send the rest of standard output nowhere, so that the interpreter's exit does not fail."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _nothing() -> None:
+    """Do nothing, where no caller asked to be told."""
+
+
+def _spell(error: UnicodeError) -> tuple[str | bytes, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    missing = error.object[error.start : error.end]
+    return "".join(_SPELLING.get(sign, "?") for sign in missing), error.end
+
+
+codecs.register_error(SPELLED, _spell)

@@ -66,8 +66,8 @@ def written(folder: Path, files: Sized) -> str:
 
 def require_pad_rules(d: Dimensions, command: str, force: bool) -> None:
     """Raise CommandError (status 1) where a rule on gel, mesh or markers fails."""
+    from gelslim.cli.answer import RULE_FAILED
     from gelslim.cli.failure import CommandError
-    from gelslim.cli.status import RULE_FAILED
     from gelslim_cad.checks import check
 
     failed = [c for c in check(d) if c.status == "fail" and c.id.startswith(PAD_RULES)]

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from cli_samples import ROOT, fresh
 
-from gelslim import extras as extras_module
+from gelslim_core import extras as extras_module
 from gelslim.cli import main
 from gelslim.doctor import libraries
 from gelslim.doctor.realtime import RealTime, Timed
-from gelslim_core.extras import EXTRAS, extra_of, installed
+from gelslim_core.extras import EXTRAS, extra_of, install_command, installed
 
 
 def answered(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
@@ -57,8 +57,8 @@ def test_a_missing_extra_is_named_with_its_command(
     assert states["cluster"]["ready"] is False
     assert main(["doctor", "--quick"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert "lacks cadquery; pip install 'gelslim-cad[cad]'" in shown
-    assert "lacks distributed; pip install 'gelslim-cad[cluster]'" in shown
+    assert f"lacks cadquery; {install_command('cad')}" in shown
+    assert f"lacks distributed; {install_command('cluster')}" in shown
 
 
 def test_a_library_that_does_not_load_or_ends_its_process_is_told(
@@ -75,7 +75,8 @@ def test_a_library_that_does_not_load_or_ends_its_process_is_told(
 
 
 def test_modules_lead_to_their_extra() -> None:
-    assert extra_of("OCP") == extra_of("cadquery") == extra_of("matplotlib") == "cad"
+    assert extra_of("OCP") == extra_of("cadquery") == "cad"
+    assert extra_of("matplotlib") == "plot"
     assert extra_of("vtkmodules") == "view"
     assert extra_of("pyarrow") == "record"
     assert extra_of("json") == ""

@@ -12,6 +12,7 @@ from cli_samples import MINI20, altered, fresh, too_long
 
 from gelslim.cli import main
 from gelslim_cad.spec import reader
+from gelslim_core.extras import install_command
 
 TAKES_SPEC = ("check", "derive", "build", "bundle", "markers", "light")
 
@@ -119,8 +120,12 @@ def test_a_fault_of_the_program_is_one_line_and_a_hint(
         (MemoryError(), 2, "memory"),
         (PermissionError(13, "Permission denied", "/x/y"), 2, "/x/y: permission denied"),
         (OSError(28, "No space left on device", "/x"), 2, "no space left"),
-        (ModuleNotFoundError("No module named 'ezdxf'", name="ezdxf"), 2, "gelslim-cad[cad]"),
-        (ModuleNotFoundError("No module named 'pyvista'", name="pyvista"), 2, "gelslim-cad[view]"),
+        (ModuleNotFoundError("No module named 'ezdxf'", name="ezdxf"), 2, install_command("cad")),
+        (
+            ModuleNotFoundError("No module named 'pyvista'", name="pyvista"),
+            2,
+            install_command("view"),
+        ),
         (ImportError("libGL.so.1: cannot open shared object file", name="OCP"), 2, "libgl1"),
         (ModuleNotFoundError("No module named 'x'", name="x"), 3, "install gelslim again"),
     ],
@@ -154,7 +159,7 @@ def test_a_missing_extra_is_named(
     status, _, err = run(capsys, "markers", str(MINI20), "-o", str(tmp_path / "m"))
     assert status == 2
     assert "ezdxf" in err
-    assert "pip install 'gelslim-cad[cad]'" in err
+    assert install_command("cad") in err
     assert not (tmp_path / "m").exists()
 
 

@@ -123,8 +123,7 @@ def test_help_lists_every_command_once_under_a_heading_in_whole_words(
 ) -> None:
     from typer.main import get_command
 
-    from gelslim.cli.app import app
-    from gelslim.cli.command_list import GROUPS
+    from gelslim.cli.app import GROUPS, app
 
     named = [name for names in GROUPS.values() for name in names]
     known = set(get_command(app).commands)  # type: ignore[attr-defined]

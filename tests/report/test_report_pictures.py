@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 import report_sample
 
+from gelslim_core.extras import install_command
+
 pytest.importorskip("vtkmodules", reason="VTK is not installed: no still pictures")
 from PIL import Image
 
@@ -128,4 +130,4 @@ def test_without_any_opengl_the_report_gets_the_reason_not_a_crash():
 def test_a_missing_library_is_named_with_its_debian_package():
     told = pictures._missing("libXrender.so.1: cannot open shared object file")
     assert "libxrender1" in told
-    assert "pip install 'gelslim-cad[view]'" in pictures._missing("No module named 'vtkmodules'")
+    assert install_command("view") in pictures._missing("No module named 'vtkmodules'")

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import sensor_bundle
 from shaded_frames import pressed_heights, shaded
 
-from gelslim.cli.force_sinks import RunOutputs, result_sinks
+from gelslim.cli.force_run import RunOutputs, result_sinks
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.contact.indenter import parse_indenter
 from gelslim_force.contact.indenter_source import indenter_source

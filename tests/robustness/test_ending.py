@@ -186,7 +186,7 @@ def test_the_impatient_get_their_cursor_back() -> None:
 
     work = """
 from gelslim import ending
-from gelslim.cli.progress import progress_bar
+from gelslim.cli.answer import progress_bar
 ending.PATIENCE_S = -1.0
 with progress_bar(False) as tell:
     tell("work", 0, 1)

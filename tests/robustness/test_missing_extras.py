@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from sweep_commands import MINI20, finished, prepare
 
+from gelslim_core.extras import install_command
+
 BLOCKER = """
 import sys
 class Blocked:
@@ -23,6 +25,7 @@ sys.exit(main(sys.argv[1:]))
 CAD = ("cadquery", "OCP", "trimesh", "manifold3d", "lxml", "networkx", "ezdxf", "reportlab",
        "gerber_writer", "matplotlib")  # fmt: skip
 MISSING = {
+    "plot": ("matplotlib",),
     "cad": CAD,
     "view": ("pyvista", "vtk", "vtkmodules"),
     "vision": ("cv2", "PIL"),
@@ -45,7 +48,7 @@ REFUSED = [
     ("cad", "build {spec} -o {out}"),
     ("cad", "family {spec} -o {out}"),
     ("cad", "markers {spec} -o {out}"),
-    ("cad", "light {spec} --rays 1024 -o {out}"),
+    ("plot", "light {spec} --rays 1024 -o {out}"),
     ("vision", "track {place}/dots -o {out}"),
     ("vision", "simulate {place}/scene.yaml -o {out}"),
     ("cluster", "explore {spec} --vary gel.length_mm=18,20 --scheduler tcp://127.0.0.1:1 -o {out}"),
@@ -62,7 +65,7 @@ def test_a_command_that_needs_an_extra_names_it(
     text = words.replace("{spec}", str(MINI20)).replace("{place}", str(place))
     done = without(MISSING[extra], text.replace("{out}", str(out)).split(), tmp_path / "tmp")
     assert done.returncode == 2, (done.returncode, done.stderr)
-    assert f"gelslim-cad[{extra}]" in done.stderr
+    assert install_command(extra) in done.stderr
     assert "Traceback" not in done.stderr
     assert not [p for p in out.rglob("*") if p.is_file() and p.name != "explore.json"]
 
@@ -101,11 +104,11 @@ def test_doctor_lists_what_is_missing_and_how_to_get_it(tmp_path: Path) -> None:
     assert not any(lib["version"] for e in listed.values() for lib in e["libraries"])
     shown = without(EVERYTHING, ["doctor", "--quick"], tmp_path)
     for extra in MISSING:
-        assert f"gelslim-cad[{extra}]" in " ".join(shown.stdout.split())
+        assert install_command(extra) in " ".join(shown.stdout.split())
 
 
 def test_markers_name_the_extra(tmp_path: Path) -> None:
     done = without(CAD, ["markers", str(MINI20), "-o", str(tmp_path / "out")], tmp_path / "tmp")
     assert done.returncode == 2
-    assert "gelslim-cad[cad]" in done.stderr
+    assert install_command("cad") in done.stderr
     assert not (tmp_path / "out").exists()

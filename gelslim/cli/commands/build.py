@@ -38,10 +38,8 @@ def build(
     CAD, print, mould, laser, markers, bundle, report. Only what changed is made again. Nothing is
     written when a design rule fails (status 1).
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import RULE_FAILED, print_json, progress_bar
     from gelslim.cli.commands.check import print_checks
-    from gelslim.cli.progress import progress_bar
-    from gelslim.cli.status import RULE_FAILED
     from gelslim_cad.build import BuildRefusedError, build_variant
     from gelslim_cad.spec.reader import read_spec
 

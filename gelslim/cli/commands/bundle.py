@@ -40,11 +40,10 @@ def bundle(
     Pad mesh, element recipe, markers, camera, and the ladder of surface operators with the error
     and time measured for this sensor. A budget chooses the operator that the pipeline starts with.
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budget_of
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import require_pad_rules, written
-    from gelslim.cli.progress import progress_bar
     from gelslim.design import derive, make_bundle
     from gelslim_cad.spec.reader import read_spec
     from ifem_export.bundle.files import write_bundle

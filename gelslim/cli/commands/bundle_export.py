@@ -25,9 +25,9 @@ def bundle_export(
     The ending chooses the format: Matrix Market (.mtx), MATLAB (.mat, counting from 1) or
     safetensors. The bundle is verified first.
     """
+    from gelslim.cli.answer import BAD_INPUT
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import spare_strangers
-    from gelslim.cli.status import BAD_INPUT
     from ifem_export.bundle import export_matrix
     from ifem_export.bundle.files import load_bundle
 

@@ -19,8 +19,7 @@ def bundle_info(
     Every file's hash, all values and the stored pair of displacement and force are checked
     (status 2 where something is wrong).
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.status import BAD_INPUT
+    from gelslim.cli.answer import BAD_INPUT, print_json
     from ifem_export.bundle.summary import summarise_bundle
 
     found = summarise_bundle(path)

@@ -29,8 +29,7 @@ def check(
 
     Makes no CAD and takes about a second. Exit status 1 when a rule fails.
     """
-    from gelslim.cli.answer import print_json, say
-    from gelslim.cli.status import OK, RULE_FAILED
+    from gelslim.cli.answer import OK, RULE_FAILED, print_json, say
     from gelslim_cad.checks import check as apply_rules
     from gelslim_cad.checks.binding import binding_sentences
     from gelslim_cad.dimensions import derive

@@ -26,8 +26,7 @@ def doctor(
     Says what each missing extra would enable. Loads every library, draws a test picture and times
     a small force operator: about ten seconds. Exit status 0 whatever is missing.
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.progress import progress_bar
+    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.doctor.libraries import extras, required
     from gelslim.doctor.machine import drawing, kernels, missing_graphics, system, threads
     from gelslim_core import __version__

@@ -59,9 +59,8 @@ def explore(
     (CSV, and Parquet where pyarrow is installed), Pareto plots and a map of what is feasible and
     what binds. Run again after an interrupt, it goes on where it stopped.
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.failure import CommandError
-    from gelslim.cli.progress import progress_bar
     from gelslim_cad.explore.axis import parse_axis
     from gelslim_cad.explore.engine import Engine, processors
     from gelslim_cad.explore.error import ExploreError

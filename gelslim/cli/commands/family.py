@@ -33,8 +33,7 @@ def family(
     Each goes to a folder of its own, where what has not changed is taken over. Exit status 1 when
     a finger breaks a design rule; the others are built and drawn all the same.
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.status import OK, RULE_FAILED
+    from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim_cad.spec.reader import read_spec
     from gelslim_core.extras import require
 
@@ -78,7 +77,7 @@ class _Built:
 
 def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: bool) -> _Built:
     """Every finger built into a folder of its own, those that break a design rule apart."""
-    from gelslim.cli.progress import progress_bar
+    from gelslim.cli.answer import progress_bar
     from gelslim_cad.build import build_variant
     from gelslim_cad.build.variant import BuildRefusedError
     from gelslim_cad.dimensions import derive

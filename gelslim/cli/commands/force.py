@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gelslim.cli import force_options as option
+from gelslim.cli import force_run as option
 from gelslim.cli.budget import FieldError, FrameTime
 from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, SensorBundle
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from gelslim.cli.force_sinks import RunOutputs
+    from gelslim.cli.force_run import RunOutputs
     from gelslim_core.budget.budget import Budget
     from gelslim_force.calibration.sensor_calibration import SensorCalibration
     from gelslim_force.frames.frame import FrameSource
@@ -58,10 +58,9 @@ def force(
     or depth maps the normal force stays unknown. Writes a run folder: wrenches.csv, fields,
     overlay pictures.
     """
+    from gelslim.cli.answer import BAD_INPUT
     from gelslim.cli.budget import budget_of
-    from gelslim.cli.force_report import answer_json, report
-    from gelslim.cli.force_sinks import RunOutputs
-    from gelslim.cli.status import BAD_INPUT
+    from gelslim.cli.force_run import RunOutputs, answer_json, report
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
     from ifem_export.bundle.files import load_bundle
@@ -132,8 +131,8 @@ def _run(
     """Put the frames through the pipeline; what came of it, and the pictures drawn."""
     from itertools import islice
 
-    from gelslim.cli.force_sinks import result_sinks
-    from gelslim.cli.progress import progress_bar
+    from gelslim.cli.answer import progress_bar
+    from gelslim.cli.force_run import result_sinks
     from gelslim_force.run import run_frames
 
     frames_per_s = source.frames_per_s or 30.0

@@ -67,11 +67,10 @@ def light(
     Certificate of total internal reflection, where the light goes, brightness against straight
     guides with 45° mirrors, exposure and frame rate.
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budget_of
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import spare_strangers_in
-    from gelslim.cli.progress import progress_bar
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.record import study_record
     from gelslim_cad.light.study import RAYS, study_light

@@ -122,8 +122,8 @@ def _best(
     spec: Spec, vary: list[str], aim: Aim, folder: Path, effort: _Effort, *, quiet: bool
 ) -> Optimum:
     """The best feasible design. Raises CommandError where the axes are no good or none is."""
+    from gelslim.cli.answer import progress_bar
     from gelslim.cli.failure import CommandError
-    from gelslim.cli.progress import progress_bar
     from gelslim_cad.explore.axis import parse_axis
     from gelslim_cad.explore.engine import Engine, processors
     from gelslim_cad.explore.error import ExploreError
@@ -142,7 +142,7 @@ def _best(
 
 
 def _status(error: Exception) -> int:
-    from gelslim.cli.status import BAD_INPUT, RULE_FAILED
+    from gelslim.cli.answer import BAD_INPUT, RULE_FAILED
 
     return RULE_FAILED if "is feasible" in str(error) else BAD_INPUT
 

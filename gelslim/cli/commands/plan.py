@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gelslim.cli.budget import PoseTime, SceneError
 from gelslim.cli.options import AsJson
-from gelslim.cli.scene_budget import PoseTime, SceneError
 
 if TYPE_CHECKING:
     from gelslim_twin.plan import Choice, Plan
@@ -27,7 +27,7 @@ def plan(
     Each effect, in or out and why, the largest error of leaving it out, the rung chosen and the
     time predicted for it. Nothing is simulated.
     """
-    from gelslim.cli.scene_budget import budgeted_scene
+    from gelslim.cli.budget import budgeted_scene
     from gelslim.contacts import plan as planned
     from gelslim_twin.scene.reader import read_scene
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.budget import PoseTime, SceneError
 from gelslim.cli.commands.plan import SceneFile
 from gelslim.cli.options import AsJson
-from gelslim.cli.scene_budget import PoseTime, SceneError
 
 if TYPE_CHECKING:
     pass
@@ -43,9 +43,8 @@ def simulate(
     where it stopped. With --count, every scene is drawn anew from the scene's `vary` block, all
     with the tolerance that a budget gives the scene as it stands.
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.progress import progress_bar
-    from gelslim.cli.scene_budget import budgeted_scene
+    from gelslim.cli.answer import print_json, progress_bar
+    from gelslim.cli.budget import budgeted_scene
     from gelslim.contacts import simulate as simulated
     from gelslim_twin.scene.reader import read_scene
 

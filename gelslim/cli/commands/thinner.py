@@ -30,9 +30,8 @@ def thinner(
     keystone, blur, brightness, exposure, force error and stiffness in per cent. Exit status 1
     where no field alone reaches the thickness.
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim.cli.failure import CommandError
-    from gelslim.cli.status import OK, RULE_FAILED
     from gelslim_cad.explore.error import ExploreError
     from gelslim_cad.explore.thinner import thinner as run
     from gelslim_cad.spec.reader import read_spec

@@ -64,9 +64,8 @@ def track(
     tracks.npz (places, displacements and status of every marker), frames.csv with the coverage
     per frame, summary.json, and overlay pictures. Ctrl-C ends a live camera and keeps the run.
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.output import spare_strangers_in
-    from gelslim.cli.progress import progress_bar
     from gelslim_force.frames.source import open_frames
     from gelslim_force.outputs.track_record import TrackRecord
 

@@ -39,11 +39,10 @@ def validate(
     and rods and a punch. --error and --time pick the pipeline's operator from a ladder measured
     first.
     """
-    from gelslim.cli.answer import print_json
+    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budget_of
     from gelslim.cli.output import replace_file, spare_strangers_in
-    from gelslim.cli.progress import progress_bar
-    from gelslim.cli.validate_tables import print_validation
+    from gelslim.cli.validate_report import print_validation
     from gelslim.contacts import validate as validated
     from gelslim.scene_sensor import spec_sensor
     from gelslim_cad.spec.reader import read_spec
@@ -74,7 +73,7 @@ def validate(
 def _draw(found: Validation, folder: Path) -> list[str]:
     """Plots, and the last frame of some contacts with what our pipeline finds in it."""
     from gelslim.cli.output import replace_file
-    from gelslim.cli.validate_figures import budget_png, fields_png, resultants_png
+    from gelslim.cli.validate_report import budget_png, fields_png, resultants_png
     from gelslim_force.outputs.arrow_scale import scale_of_run
     from gelslim_force.outputs.overlay import Overlay, write_overlay
     from gelslim_twin.validation.validation import PAPER_N, PAPER_RELATIVE

@@ -1,0 +1,209 @@
+"""What takes the results of `gelslim force`: run folder, recording, video, view, pictures."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from gelslim_force.outputs.overlay import Overlay
+    from gelslim_force.outputs.overlay_sink import PictureSink
+    from gelslim_force.pipeline import ForcePipeline
+    from gelslim_force.run import RunSummary
+
+
+@dataclass(frozen=True)
+class RunOutputs:
+    """What a run is to write, and where."""
+
+    folder: Path
+    fields: str
+    """Format of the force fields: npz, parquet or none."""
+    pictures: int
+    """Overlay pictures, spread over the run."""
+    video: Path | None
+    mcap: Path | None
+    view: bool
+    """Show the run in a browser meanwhile."""
+    overwrite: bool
+    quiet: bool
+
+
+def result_sinks(
+    stack: ExitStack,
+    pipeline: ForcePipeline,
+    outputs: RunOutputs,
+    chosen: dict[str, Any],
+    frames_per_s: float,
+) -> tuple[list[Any], PictureSink | None]:
+    """What takes the results; and the picture sink, which writes at the end.
+
+    `chosen` goes into the run's manifest. Raises CommandError for files that are not to be
+    replaced.
+    """
+    from gelslim_force.outputs.result_sinks import RecorderSink
+    from gelslim_force.outputs.run_manifest import bundle_identity
+    from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
+
+    identity = bundle_identity(pipeline.bundle)
+    overlay = _overlay(pipeline)
+    sinks: list[Any] = []
+    if outputs.mcap is not None:
+        sinks.append(_recording(stack, outputs.mcap, identity, outputs.overwrite))
+    if outputs.video is not None:
+        sinks.append(_video(stack, outputs.video, overlay, frames_per_s, outputs.overwrite))
+    fields = None if outputs.fields == "none" else outputs.fields
+    keep = RecorderSettings(fields=fields)  # type: ignore[arg-type]
+    recorder = RunRecorder(outputs.folder, identity, chosen, keep, outputs.overwrite)
+    sinks.insert(0, RecorderSink(stack.enter_context(recorder)))
+    if outputs.view:
+        sinks.append(_view_sink(stack, overlay, outputs.quiet))
+    if not outputs.pictures:
+        return sinks, None
+    from gelslim_force.outputs.overlay_sink import PictureSink
+
+    kept = PictureSink(overlay, outputs.folder / "pictures", outputs.pictures)
+    return [*sinks, kept], kept
+
+
+def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -> Any:
+    from gelslim.cli.output import spare_strangers
+    from gelslim_force.outputs.mcap_recording import McapRecording
+    from gelslim_force.outputs.result_sinks import RecorderSink
+
+    if overwrite:
+        spare_strangers(target, b"gelslim", "recording of gelslim")
+        target.unlink(missing_ok=True)
+    return RecorderSink(stack.enter_context(McapRecording(target, about=identity)))
+
+
+def _video(
+    stack: ExitStack, target: Path, overlay: Overlay, frames_per_s: float, overwrite: bool
+) -> Any:
+    from gelslim.cli.failure import CommandError
+    from gelslim_force.outputs.arrow_scale import Extent, LiveScale
+    from gelslim_force.outputs.overlay_sink import VideoSink
+    from gelslim_force.outputs.overlay_video import OverlayVideo
+
+    if target.exists() and not overwrite:
+        raise CommandError(f"{target} exists; give another --video, or --force to replace it")
+    made = stack.enter_context(OverlayVideo(target, overlay.size_px, frames_per_s))
+    return VideoSink(overlay, made, LiveScale(Extent()))
+
+
+def _view_sink(stack: ExitStack, overlay: Overlay, quiet: bool) -> Any:
+    from gelslim_force.outputs.arrow_scale import Extent, LiveScale
+    from gelslim_force.outputs.live_view import LiveView
+    from gelslim_force.outputs.overlay_sink import ViewSink
+
+    live = stack.enter_context(LiveView())
+    if not quiet:
+        print(f"Watch at {live.url}", flush=True)
+    return ViewSink(overlay, live.show, LiveScale(Extent()))
+
+
+def _overlay(pipeline: ForcePipeline) -> Overlay:
+    from gelslim_force.outputs.overlay import Overlay
+
+    camera = pipeline.calibration.camera
+    return Overlay(
+        (camera.image_height_px, camera.image_width_px),
+        camera.project,
+        pipeline.calibration.reference.positions_px,
+    )
+
+
+Frames = Annotated[
+    str,
+    typer.Argument(
+        metavar="FRAMES", help="Folder of pictures, video, .npy array, or camera:0 for live."
+    ),
+]
+Reference = Annotated[
+    Path | None, typer.Option("-r", "--reference", help="Picture without contact.")
+]
+Calibration = Annotated[
+    Path | None,
+    typer.Option("-c", "--calibration", help="File of `gelslim calibrate`, in its place."),
+]
+RunFolder = Annotated[
+    Path | None, typer.Option("-o", "--out", help="Run folder; out/NAME-force if left out.")
+]
+KnownIndenter = Annotated[
+    str | None,
+    typer.Option(help="Known indenter: sphere:10, cylinder:6, flat:5, flat:4x8 (mm)."),
+]
+KnownDepth = Annotated[
+    float | None, typer.Option(min=0, help="Known depth of the indenter; a flat one needs it.")
+]
+DepthMaps = Annotated[
+    Path | None,
+    typer.Option(help=".npy of heights (frames, h, w) in mm, registered to the pictures."),
+]
+OperatorName = Annotated[str | None, typer.Option(help="Operator by name, such as fft.")]
+Method = Annotated[str, typer.Option(help="auto, direct, low_pass or masked; see the guide.")]
+Compensation = Annotated[str, typer.Option(help="Projection: exact, arctan, printed or none.")]
+Interpolation = Annotated[str, typer.Option(help="sparse or thin_plate.")]
+GelLaw = Annotated[str, typer.Option(help="linear or neo_hookean.")]
+Friction = Annotated[float, typer.Option(min=0, help="Coulomb coefficient.")]
+FieldFormat = Annotated[str, typer.Option(help="Force fields as npz, parquet or none.")]
+OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video, .mp4 or .avi.")]
+Recording = Annotated[Path | None, typer.Option(help="Recording with ROS 2 messages.")]
+LiveView = Annotated[bool, typer.Option("--view", help="Watch in a browser meanwhile.")]
+ReplaceRun = Annotated[bool, typer.Option("--force", help="Replace an earlier run.")]
+
+
+def answer_json(
+    folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]
+) -> None:
+    """Print the run's folder, counts, last wrench (N, N mm) and median times (ms) as JSON."""
+    from gelslim.cli.answer import print_json
+    from gelslim_force.outputs.packed_frame import plain
+
+    wrench = summary.last.wrench if summary.last is not None else None
+    print_json(
+        {
+            "folder": str(folder),
+            "operator": pipeline.operator_name,
+            "frames": summary.frames,
+            "frames_with_forces": summary.with_forces,
+            "problems": summary.problems,
+            "least_coverage": summary.least_coverage,
+            "last_wrench": None if wrench is None else plain(wrench.vector),
+            "last_sigma": None if wrench is None else plain(wrench.standard_deviation),
+            "stages_ms": {t.stage: t.median_ms for t in summary.stages},
+            "pictures": pictures,
+        }
+    )
+
+
+def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]) -> None:
+    """Say how many frames got forces, the last wrench, problems, times and where all is."""
+    from gelslim.cli.answer import say
+
+    say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")
+    wrench = summary.last.wrench if summary.last is not None else None
+    if wrench is not None:
+        names = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+        units = ("N",) * 3 + ("N mm",) * 3
+        parts = [
+            f"{n} unknown" if v != v else f"{n} {v:+.3f} ± {s:.3f} {u}"
+            for n, v, s, u in zip(
+                names, wrench.vector, wrench.standard_deviation, units, strict=True
+            )
+        ]
+        say("Last frame: " + ", ".join(parts) + ".")
+    for problem, count in sorted(summary.problems.items(), key=lambda item: -item[1])[:5]:
+        say(f"{count} frames: {problem}.", style="yellow")
+    total = next((t for t in summary.stages if t.stage == "total"), None)
+    if total is not None:
+        stages = ", ".join(
+            f"{t.stage} {t.median_ms:.1f}" for t in summary.stages if t.stage != "total"
+        )
+        say(f"Median {total.median_ms:.1f} ms per frame ({stages}).")
+    say(f"Run in {folder}/" + (f", {len(pictures)} pictures in {folder}/pictures/" if pictures
+                               else ""))  # fmt: skip

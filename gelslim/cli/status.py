@@ -1,8 +1,0 @@
-"""Exit statuses."""
-
-OK = 0
-RULE_FAILED = 1
-BAD_INPUT = 2
-FAULT = 3
-INTERRUPTED = 130
-CLOSED_PIPE = 141
