@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from cli_samples import ROOT, fresh
 
-from gelslim_core import extras as extras_module
 from gelslim.cli import main
 from gelslim.doctor import libraries
 from gelslim.doctor.realtime import RealTime, Timed
+from gelslim_core import extras as extras_module
 from gelslim_core.extras import EXTRAS, extra_of, install_command, installed
 
 
