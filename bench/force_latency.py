@@ -30,9 +30,10 @@ from numpy.typing import NDArray
 
 from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
-from gelslim_force.calibration.sensor_calibration import SensorCalibration
-from gelslim_force.contact.indenter_source import indenter_source
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.contact.normal_source import NormalSource
 from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.sensor import indenter_source
 from gelslim_force.settings import PipelineSettings
 
 Array = NDArray[np.float64]
@@ -99,21 +100,24 @@ def measured(rig: Rig, timed: int) -> list[dict[str, Any]]:
 
 
 def all_chains(
-    rig: Rig, frames: list[NDArray[np.uint8]], calibration: SensorCalibration
+    rig: Rig, frames: list[NDArray[np.uint8]], calibration: Calibration
 ) -> Iterator[tuple[str, Chain]]:
     """The chains compared, by name."""
     known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
     loose = PipelineSettings(budget=Budget(error=LOOSE))
     for suffix, settings in (("", None), (f", {LOOSE:.0%}", loose)):
 
-        def chain(settings: PipelineSettings | None = settings) -> ForcePipeline:
-            return ForcePipeline(rig.bundle, calibration, settings)
+        def chain(
+            settings: PipelineSettings | None = settings, normal: NormalSource | None = None
+        ) -> ForcePipeline:
+            return ForcePipeline(rig.bundle, calibration, settings, normal)
 
         yield f"tangential{suffix}", pipeline_chain(chain(), frames)
         yield f"depth given{suffix}", pipeline_chain(chain(), frames, known)
-        seen = chain()
-        seen.normal = indenter_source(seen, frames[0], rig.press.sphere)
-        yield f"sphere seen{suffix}", pipeline_chain(seen, frames)
+        sphere = indenter_source(
+            rig.bundle, calibration, frames[0], rig.press.sphere, settings=settings
+        )
+        yield f"sphere seen{suffix}", pipeline_chain(chain(normal=sphere), frames)
     yield "paper's choices", paper_chain(rig, calibration, frames, known)
 
 
@@ -135,7 +139,7 @@ def pipeline_chain(
 
 def paper_chain(
     rig: Rig,
-    calibration: SensorCalibration,
+    calibration: Calibration,
     frames: list[NDArray[np.uint8]],
     normal_mm: list[Array],
 ) -> Chain:

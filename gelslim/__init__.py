@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
+    from gelslim_force.sensor import open_sensor
     from gelslim_twin.scene.reader import read_scene
     from ifem_export.bundle.files import load_bundle, write_bundle
 
@@ -37,6 +38,7 @@ __all__ = [
     "load_bundle",
     "make_bundle",
     "open_frames",
+    "open_sensor",
     "plan",
     "read_scene",
     "read_spec",
@@ -59,6 +61,7 @@ __getattr__, __dir__ = lazy_exports(
         "load_bundle": "ifem_export.bundle.files",
         "make_bundle": "gelslim.design",
         "open_frames": "gelslim_force.frames.source",
+        "open_sensor": "gelslim_force.sensor",
         "plan": "gelslim.contacts",
         "read_scene": "gelslim_twin.scene.reader",
         "read_spec": "gelslim_cad.spec.reader",

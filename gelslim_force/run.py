@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.forces.stage_clock import StageClock, StageTimes
+from gelslim_force.forces.stage_clock import StageSummary, StageTimes
 from gelslim_force.pipeline import ForcePipeline
 
 Progress = Callable[[str, int, int], None]
@@ -84,7 +84,7 @@ def run_frames(
     when a later frame or sink raises.
     """
     tell = progress or (lambda text, done, total: None)
-    clock = StageClock(warm_up=1)
+    clock = StageSummary()
     summary = RunSummary()
     for frame in frames:
         if frame.image is None:
@@ -96,5 +96,5 @@ def run_frames(
         for sink in sinks:
             sink.take(frame.image, result)
         tell("frames", summary.frames, count or summary.frames + 1)
-    summary.stages = clock.summary()
+    summary.stages = clock.times()
     return summary

@@ -13,17 +13,30 @@ from ifem_export.errors import IfemError
 from ifem_export.operators.operator_ladder import OperatorLadder, operator_label
 from ifem_export.operators.surface_operator import RUNGS, Rung, SurfaceOperator
 
-QUICK = operator_label("fft", {"lumped": 1})
+_FAST = operator_label("fft", {"lumped": 1})
 Interpolation = Literal["sparse", "thin_plate"]
 Gel = Literal["linear", "neo_hookean"]
 
 
 @dataclass(frozen=True)
 class PipelineSettings:
-    """Choices of the pipeline. Raises ValueError for impossible ones.
+    """Choices of the force pipeline.
 
-    Operator: a rung by name, or a budget (error of the force field, time of the operator per
-    frame) that picks from the bundle's measured ladder; else the bundle's own choice.
+    Attributes:
+        rung: Surface operator by name; None lets `budget` or the bundle choose.
+        budget: Largest error of the force field, or longest time of the operator per frame, by
+            which the operator is chosen from the ladder measured in the bundle.
+        compensation: How the apparent motion of pressed markers is corrected, see `marker_motion`.
+        interpolation: From markers to surface nodes.
+        gel: Law of the gel.
+        force: How forces are estimated from the motion.
+        noise_px: Standard deviation of a marker's position; None estimates it in each frame.
+        unknown_normal_mm: Depth in mm that may remain unnoticed without a normal source. Its
+            apparent motion enters the covariance of the wrench.
+        least_coverage: Smallest share of the markers seen with which a frame gives forces.
+
+    Raises:
+        ValueError: A value is impossible.
     """
 
     rung: Rung | None = None
@@ -33,12 +46,8 @@ class PipelineSettings:
     gel: Gel = "linear"
     force: ForceSettings = field(default_factory=ForceSettings)
     noise_px: float | None = None
-    """Standard deviation of a marker's place; estimated on each frame where None."""
     unknown_normal_mm: float = 0.3
-    """Depth that may go unseen without a normal source: what projection makes of it enters the
-    covariance of the wrench."""
     least_coverage: float = 0.3
-    """Share of the markers seen under which a frame gives no forces."""
 
     def __post_init__(self) -> None:
         if self.rung is not None and self.rung not in RUNGS:
@@ -66,10 +75,10 @@ class PipelineSettings:
         return bundle.surface_operator(self.rung, budget=self.budget)
 
     def compliance(self, bundle: Bundle) -> SurfaceOperator:
-        """The operator that a masked fit asks many times per frame.
+        """The operator that a masked fit evaluates many times per frame.
 
-        A quick one, unless a budget asks for less error than that has: then the one chosen, at
-        many times the time. Raises as `operator`.
+        It is the fast one, unless a budget asks for a smaller error than that has. Then it is the
+        chosen one, which takes many times as long. Raises as `operator`.
         """
         if self._too_coarse(bundle.ladder):
             return self.operator(bundle)
@@ -81,5 +90,5 @@ class PipelineSettings:
     def _too_coarse(self, ladder: OperatorLadder | None) -> bool:
         if ladder is None or self.budget is None:
             return False
-        quick = ladder.named(QUICK)
-        return quick is not None and not self.budget.allows_error(quick.error_field)
+        fast = ladder.named(_FAST)
+        return fast is not None and not self.budget.allows_error(fast.error_field)

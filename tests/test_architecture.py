@@ -45,7 +45,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",
-        "forces", "dot_tracking", "outputs", "settings", "pipeline", "run",
+        "forces", "dot_tracking", "outputs", "settings", "pipeline", "sensor", "run",
     ),
     "gelslim_twin": (
         "effects", "plan", "planner", "scene", "sensor_figures", "tolerance_ladder",

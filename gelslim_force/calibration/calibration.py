@@ -9,19 +9,18 @@ from numpy.typing import NDArray
 
 from gelslim_force.calibration import checks
 from gelslim_force.calibration.built_deviation import built_deviation
-from gelslim_force.calibration.bundle_camera import bundle_camera
 from gelslim_force.calibration.camera_deviation import CameraTolerance
+from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.calibration.fit import CameraFit, fit_camera
 from gelslim_force.calibration.report import diagnosis_lines, warning_lines
 from gelslim_force.calibration.residual_bump import ResidualField, split_residuals
-from gelslim_force.calibration.sensor_calibration import SensorCalibration, expected_dots
+from gelslim_force.calibration.sensor_calibration import Calibration, expected_dots
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import BORDER, Detections
 from gelslim_force.lattice.bundle_grid import bundle_grid
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.registration import Registration, register
-from gelslim_force.motion.marker_heights import marker_heights_mm
 from gelslim_optics.camera.back_projection import pixel_slopes
 from gelslim_optics.camera.rays import points_along
 from ifem_export.operators.single_thread import single_threaded
@@ -44,7 +43,7 @@ def calibrate(
     detector: Detector | None = None,
     tolerance: CameraTolerance | None = None,
     allow_contact: bool = False,
-) -> SensorCalibration:
+) -> Calibration:
     """Find the built camera and every marker's place on the gel.
 
     Args:
@@ -92,7 +91,7 @@ def calibrate(
     in_view = checks.markers_in_view(fit.camera, grid)
     missing = np.setdiff1d(np.flatnonzero(in_view), found)
     aside = found[~fit.used]
-    return SensorCalibration(
+    return Calibration(
         camera=fit.camera,
         grid=grid,
         markers=found,

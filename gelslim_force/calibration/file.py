@@ -16,7 +16,7 @@ from gelslim_core.files.atomic_file import json_bytes, replace_file
 from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.error import CalibrationError
-from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.detections import Detections
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.camera.virtual_camera import VirtualCamera
@@ -29,7 +29,7 @@ _DOTS = ("centres_px", "area_px", "contrast", "moments_px2", "flags")
 _ARRAYS = ("values", "sigma", "tolerance")
 
 
-def calibration_record(calibration: SensorCalibration) -> dict[str, Any]:
+def calibration_record(calibration: Calibration) -> dict[str, Any]:
     """Return plain values: numbers, text, lists and dicts."""
     c = calibration
     return {
@@ -48,7 +48,7 @@ def calibration_record(calibration: SensorCalibration) -> dict[str, Any]:
     }
 
 
-def calibration_of(record: Mapping[str, Any]) -> SensorCalibration:
+def calibration_of(record: Mapping[str, Any]) -> Calibration:
     """Return the calibration of a record.
 
     Raises ValueError, KeyError or TypeError for a record of another make; see
@@ -58,7 +58,7 @@ def calibration_of(record: Mapping[str, Any]) -> SensorCalibration:
         raise ValueError(f"its format is {record.get('format')!r}, only {FORMAT} is known")
     deviation = record["deviation"]
     grid, dots = record["grid"], record["dots"]
-    return SensorCalibration(
+    return Calibration(
         camera=VirtualCamera.from_record(record["camera"]),
         grid=MarkerGrid(
             positions_mm=_floats(grid["positions_mm"]),
@@ -88,12 +88,12 @@ def calibration_of(record: Mapping[str, Any]) -> SensorCalibration:
     )
 
 
-def write_calibration(calibration: SensorCalibration, path: str | os.PathLike[str]) -> None:
+def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> None:
     """Write the file whole or not at all. Raises OSError."""
     replace_file(path, json_bytes(calibration_record(calibration)))
 
 
-def read_calibration(path: str | os.PathLike[str]) -> SensorCalibration:
+def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read a file. Raises CalibrationError where there is none or it is not to be trusted."""
     place = Path(path)
     try:

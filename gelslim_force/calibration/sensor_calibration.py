@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration.bundle_camera import bundle_camera
+from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import Detections
@@ -17,7 +17,6 @@ from gelslim_force.detection.disc_centroid import centroid_offset_px
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.bundle_grid import bundle_grid
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.motion.marker_heights import marker_heights_mm
 from gelslim_force.tracking.tracker import Tracker, TrackerSettings
 from gelslim_optics.camera.back_projection import pixel_slopes
 from gelslim_optics.camera.rays import points_along
@@ -35,7 +34,7 @@ _REACH = 2
 
 
 @dataclass(frozen=True, eq=False)
-class SensorCalibration:
+class Calibration:
     """The built camera and the n markers found in a no-contact frame, in order of their ids.
 
     Raises ValueError where arrays disagree.
@@ -133,7 +132,7 @@ class SensorCalibration:
         registration: Registration,
         detections: Detections,
         detector: Detector | None = None,
-    ) -> SensorCalibration:
+    ) -> Calibration:
         """Take the design's camera as built, with the markers of a registered frame."""
         grid, camera = bundle_grid(bundle), bundle_camera(bundle)
         found = np.flatnonzero(registration.found)

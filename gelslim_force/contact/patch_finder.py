@@ -10,30 +10,32 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from gelslim_force.contact.gel_bins import bin_sizes, gel_places, near_surface
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.patch import ContactPatch
-from gelslim_force.contact.patch_follow import (
+from gelslim_force.contact.patch_place import rim_share, strip_covariance, strip_patch
+from gelslim_force.contact.patch_region import PatchSettings, changed_region
+from gelslim_force.contact.patch_shading import (
     AFRESH,
     STARTS,
     STEADY,
     Followed,
     Region,
-    settled,
-    values_of,
-)
-from gelslim_force.contact.patch_place import rim_share, strip_covariance, strip_patch
-from gelslim_force.contact.patch_region import changed_region
-from gelslim_force.contact.patch_settings import PatchSettings
-from gelslim_force.contact.patch_shading import (
     ShadingFit,
     Window,
     best_shading_fit,
     leaves_less,
     moved_on,
+    settled,
+    values_of,
 )
 from gelslim_force.contact.region_outline import region_patch
-from gelslim_force.contact.shading_change import ShadingChange, ShadingReference
+from gelslim_force.contact.shading_change import (
+    ShadingChange,
+    ShadingReference,
+    bin_sizes,
+    gel_places,
+    near_surface,
+)
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.optimize import least_squares
 
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.patch import ContactPatch
-from gelslim_force.contact.patch_outline import fit_circle, fit_strip
 from gelslim_force.contact.patch_place import flat_patch, strip_covariance, strip_patch
-from gelslim_force.contact.patch_settings import PatchSettings
+from gelslim_force.contact.patch_region import PatchSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -72,3 +72,70 @@ def region_patch(
     covariance[2, 2] += spread
     covariance[:2, :2] += np.eye(2) * spread / 4
     return replace(patch, covariance=covariance, method="outline")
+
+
+def circle_start(points_mm: Array) -> Array:
+    """Centre and radius (3,) by Taubin's algebraic fit (IEEE PAMI 13, 1991), which a short arc
+    does not shrink as much as the plain one.
+
+    Raises ValueError for points (n, 2) on a line, or fewer than three.
+    """
+    if len(points_mm) < 3:
+        raise ValueError("a circle needs three points")
+    middle = points_mm.mean(axis=0)
+    x, y = (points_mm - middle).T
+    z = x * x + y * y
+    mean = z.mean()
+    if mean <= 0:
+        raise ValueError("the points coincide")
+    data = np.column_stack([(z - mean) / (2 * np.sqrt(mean)), x, y])
+    a, b, c = np.linalg.svd(data, full_matrices=False)[2][2]
+    if abs(a) < 1e-9:
+        raise ValueError("the points lie on a line")
+    a = a / (2 * np.sqrt(mean))
+    centre = np.array([-b, -c]) / (2 * a)
+    radius = np.sqrt(max(centre @ centre + mean, 0.0))
+    return np.array([*(centre + middle), radius])
+
+
+def fit_circle(points_mm: Array) -> tuple[Array, Array]:
+    """Centre and radius (3,) of least squared distances, robustly, with covariance (3, 3)."""
+    start = circle_start(points_mm)
+
+    def apart(p: Array) -> Array:
+        return np.asarray(np.hypot(points_mm[:, 0] - p[0], points_mm[:, 1] - p[1]) - p[2])
+
+    scale = max(float(1.4826 * np.median(np.abs(apart(start)))), 1e-6)
+    found = least_squares(apart, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
+    return found.x, _covariance(found.jac, apart(found.x), 3)
+
+
+def fit_strip(points_mm: Array) -> tuple[Array, Array]:
+    """Offset, half-width and angle (rad) (3,) of two parallel lines, with covariance (3, 3).
+
+    The lines are {p : n·p = offset ± half-width}, n at right angles to the angle's direction.
+    """
+    if len(points_mm) < 4:
+        raise ValueError("a strip needs four points")
+    spread = points_mm - points_mm.mean(axis=0)
+    _, _, axes = np.linalg.svd(spread, full_matrices=False)
+    angle = float(np.arctan2(axes[0, 1], axes[0, 0]))
+    across = points_mm @ _normal(angle)
+    start = np.array([across.mean(), across.std(), angle])
+
+    def apart(p: Array) -> Array:
+        return np.asarray(np.abs(points_mm @ _normal(p[2]) - p[0]) - p[1])
+
+    scale = max(float(1.4826 * np.median(np.abs(apart(start)))), 1e-6)
+    found = least_squares(apart, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
+    return found.x, _covariance(found.jac, apart(found.x), 3)
+
+
+def _normal(angle: float) -> Array:
+    return np.array([-np.sin(angle), np.cos(angle)])
+
+
+def _covariance(jacobian: Array, residual: Array, unknowns: int) -> Array:
+    """Of the solution; neighbours on an outline of bins err together, by about two."""
+    variance = 2 * float(residual @ residual) / max(len(residual) - unknowns, 1)
+    return np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance)

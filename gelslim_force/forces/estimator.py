@@ -1,17 +1,18 @@
 """From the motion of the surface nodes to the forces on them.
 
-`direct` is F = S u, as in the paper. It amplifies noise; `low_pass` spreads each nodal force over
-its neighbours, as far as the frame's noise calls for, and keeps the resultant. Where the contact is
-known, `masked` fits the whole motion by forces there that push and keep Coulomb's cone.
+The method `direct` is F = S u, as in the paper. It amplifies noise. The method `low_pass` spreads
+each nodal force over its neighbours, as widely as the noise of the frame requires, and keeps the
+resultant. Where the contact region is known, `masked` fits the whole motion by forces that act
+there only, push, and stay within Coulomb's cone.
 
-Without the normal motion the tangential forces are those of S (u_x, u_y, 0). Their resultant and
-their torque about z are right all the same, because in a wide pad a normal motion calls for
-tangential forces without a resultant; normal forces are left unknown.
+Where the normal motion is unknown, the tangential forces are those of S (u_x, u_y, 0) and the
+normal forces are unknown. The tangential resultant and the torque about z are right all the same,
+because in a wide pad the tangential forces of a normal motion have no resultant.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, Protocol, get_args
 
@@ -20,10 +21,20 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from gelslim_force.forces.frame_result import ForceField
-from gelslim_force.forces.low_pass import LowPass, SmoothedForce, widths_mm
-from gelslim_force.forces.noise import ForceNoise, MotionNoise, normal_noise_mm
-from gelslim_force.forces.surface_share import surface_share_mm2
-from gelslim_force.motion.surface_lattice import curvature, neighbours, with_rim
+from gelslim_force.forces.low_pass import (
+    ForceNoise,
+    LowPass,
+    MotionNoise,
+    SmoothedForce,
+    normal_noise_mm,
+    widths_mm,
+)
+from gelslim_force.motion.surface_lattice import (
+    curvature_operator,
+    edge_distance_mm,
+    neighbour_matrix,
+    with_neighbours,
+)
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from ifem_export.inverse.contact_inverse import masked_force
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -34,30 +45,39 @@ Mask = NDArray[np.bool_]
 Method = Literal["auto", "direct", "low_pass", "masked"]
 METHODS: tuple[Method, ...] = get_args(Method)
 _CONTACT_SIGMAS = 5.0
+_EDGE_THICKNESSES = 1.5
+"""Distance from the edge, in thicknesses, within which a periodic layer errs more than noise."""
 
 
 class SurfaceForce(Protocol):
-    """What turns a surface motion (c, 3) in mm into forces (c, 3) in N, linear or not."""
+    """A law, linear or not, from the surface motion (c, 3) in mm to the forces (c, 3) in N."""
 
     def force(self, displacement_mm: ArrayLike) -> Array:
-        """Forces that hold the surface so."""
+        """Forces that hold the surface in this motion."""
 
 
 @dataclass(frozen=True)
 class ForceSettings:
-    """How forces are made from motion. Raises ValueError for impossible values."""
+    """How forces are estimated from the motion of the surface.
+
+    Attributes:
+        method: `auto` fits masked forces where the contact region is known and takes low-passed
+            ones elsewhere; `direct`, `low_pass` and `masked` are described in the module.
+        friction: Coulomb coefficient of the cone and of the slip margin.
+        low_pass_mm: Standard deviation of the low-pass in mm; None takes in each frame the one
+            with the smallest expected error, which is no low-pass at all without noise.
+        most_steps: Most steps of the masked fit per frame; it starts from the last frame's forces.
+        tolerance: Change of one step, relative to the forces, at which the masked fit stops.
+
+    Raises:
+        ValueError: A value is impossible.
+    """
 
     method: Method = "auto"
-    """`auto`: masked where the contact is known, else low-passed."""
     friction: float = 1.0
-    """Coulomb coefficient of the cone and of the slip margin."""
     low_pass_mm: float | None = None
-    """Standard deviation of the low-pass; None takes in each frame the one of the least expected
-    error, which is none at all without noise."""
     most_steps: int = 60
-    """Steps of the masked fit per frame; it starts from the last frame's forces."""
     tolerance: float = 3e-3
-    """Change of a step, relative to the forces, at which the masked fit stops."""
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -68,7 +88,7 @@ class ForceSettings:
         if width is not None and not (np.isfinite(width) and width > 0):
             raise ValueError(f"low_pass_mm = {width!r}: must be > 0")
         if self.most_steps < 1 or not 0 < self.tolerance < 1:
-            raise ValueError("most_steps must be >= 1 and tolerance in 0 ... 1")
+            raise ValueError("most_steps must be >= 1 and tolerance must be between 0 and 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +97,14 @@ class ForceEstimator:
 
     mesh: PadMesh
     operator: SurfaceOperator
-    """Linear operator of the masked fit, and of the others unless `law` is given."""
+    """Linear operator of the masked fit, and of the other methods unless `law` is given."""
     settings: ForceSettings
     law: SurfaceForce | None = None
     """Another law of the gel, such as a neo-Hookean one. A masked fit then fits the motion that
-    its forces would make of a linear gel."""
+    the forces of this law would cause in a linear gel."""
     motion: SurfaceMotion | None = None
-    """The sensor's markers, whose noise the low-pass and the contact are judged by; without them
-    the motion is taken to be free of noise."""
+    """The sensor's markers. Their noise sets the low-pass and the threshold of contact; without
+    them the motion is taken to be free of noise."""
 
     @cached_property
     def points_mm(self) -> Array:
@@ -98,7 +118,7 @@ class ForceEstimator:
 
     @cached_property
     def low_pass(self) -> LowPass:
-        """What `direct` and `low_pass` pass the forces through; of width 0 for `direct`."""
+        """The low-pass of the methods `direct` (of width 0) and `low_pass`."""
         cell_mm = np.asarray(self.mesh.cell_size_mm[:2])
         fixed_mm = 0.0 if self.settings.method == "direct" else self.settings.low_pass_mm
         if self.motion is None:
@@ -108,14 +128,14 @@ class ForceEstimator:
         return LowPass.of(self.points_mm, widths_mm(cell_mm, fixed_mm), noise)
 
     @cached_property
-    def beside(self) -> sparse.csr_array:
+    def neighbours(self) -> sparse.csr_array:
         """(c, c) neighbours on the surface, see `surface_lattice`."""
-        return neighbours(self.points_mm, self.mesh.cell_size_mm[:2])
+        return neighbour_matrix(self.points_mm, self.mesh.cell_size_mm[:2])
 
     @cached_property
     def curvature(self) -> sparse.csr_array:
-        """(i, c) by which noise of the normal motion is told, see `surface_lattice`."""
-        return curvature(self.beside)
+        """(i, c) operator by which the noise of the normal motion is estimated."""
+        return curvature_operator(self.neighbours)
 
     def estimate(
         self,
@@ -128,13 +148,13 @@ class ForceEstimator:
 
         Args:
             displacement_mm: (c, 3).
-            touched: (c,) nodes in contact, or None where that is not known.
-            start_n: (c, 3) forces of the frame before.
-            noise_px: standard deviation of a marker's place; sets the low-pass, and tells the
-                contact where `touched` is None.
+            touched: (c,) nodes in contact; None where the contact is not known.
+            start_n: (c, 3) forces of the last frame.
+            noise_px: Standard deviation of a marker's position. It sets the low-pass, and the
+                threshold of contact where `touched` is None.
 
         Raises:
-            IfemError: x or y not finite, or a wrong shape.
+            IfemError: x or y is not finite, or the shape is wrong.
         """
         normal_known = bool(np.isfinite(displacement_mm[:, 2]).all())
         u = displacement_mm if normal_known else displacement_mm * [1.0, 1.0, 0.0]
@@ -174,7 +194,7 @@ class ForceEstimator:
         fit = masked_force(
             self.operator,
             u,
-            with_rim(touched, self.beside),
+            with_neighbours(touched, self.neighbours),
             friction=self.settings.friction,
             start_n=start_n,
             most_steps=self.settings.most_steps,
@@ -196,8 +216,63 @@ class ForceEstimator:
         return float(1 - np.hypot(total[0], total[1]) / (self.settings.friction * -total[2]))
 
 
+@dataclass(frozen=True, eq=False)
+class ContactForces:
+    """Chooses between two estimators of one pad by what is known of the contact.
+
+    A fit evaluates its operator many times, so it uses the fast one. That operator takes the pad
+    for a periodic layer: within about a thickness of the edge its forces are off by a tenth or
+    more. For contacts there, `auto` computes the forces directly from the stiffness instead.
+    """
+
+    direct: ForceEstimator
+    """With the operator that the user chose."""
+    fit: ForceEstimator
+    """With an operator that is fast enough for a fit."""
+
+    def estimate(
+        self, displacement_mm: Array, touched: Mask | None, start_n: Array | None, noise_px: float
+    ) -> ForceField:
+        """Forces for a motion (c, 3); arguments and errors as in `ForceEstimator.estimate`."""
+        if touched is None or self.fit.settings.method not in ("auto", "masked"):
+            return self.direct.estimate(displacement_mm, touched, start_n, noise_px)
+        if self.fit.settings.method == "auto" and (touched & self.near_edge).any():
+            found = self.direct.estimate(displacement_mm, None, None, noise_px)
+            return replace(found, contact=touched)
+        return self.fit.estimate(displacement_mm, touched, start_n, noise_px)
+
+    def prepare(self) -> None:
+        """Compute now all that the first contact would otherwise wait for."""
+        _ = self.direct.low_pass, self.direct.curvature, self.fit.neighbours, self.near_edge
+
+    @cached_property
+    def near_edge(self) -> Mask:
+        """(c,) nodes that are too near the edge for the operator of the fit."""
+        mesh = self.fit.mesh
+        if not self.fit.operator.name.startswith("fft"):
+            return np.zeros(len(self.fit.points_mm), dtype=bool)
+        thickness_mm = mesh.layers * mesh.cell_size_mm[2]
+        distance_mm = edge_distance_mm(self.fit.points_mm, mesh.cell_size_mm[:2])
+        return np.asarray(distance_mm < _EDGE_THICKNESSES * thickness_mm)
+
+
+def surface_share_mm2(mesh: PadMesh) -> Array:
+    """Areas (c,) in mm², in the order of `PadMesh.surface`: a quarter of each cell at the node.
+
+    The areas are those of the projection onto the x-y plane. They sum to the area of the columns
+    of cells; a node on an edge has half the area of an inner one.
+    """
+    hx, hy, _ = mesh.cell_size_mm
+    plan = np.asarray(mesh.occupancy).any(axis=2).T.astype(float)
+    around = np.pad(plan, 1)
+    corners = around[:-1, :-1] + around[1:, :-1] + around[:-1, 1:] + around[1:, 1:]
+    numbering = mesh.numbering
+    _, j, i = np.unravel_index(numbering.positions[mesh.surface], numbering.shape)
+    return np.asarray(corners[j, i] * (hx * hy / 4))
+
+
 def _above_noise(smoothed: SmoothedForce, normal_known: bool) -> Mask:
-    """(c,) nodes whose force noise alone does not reach."""
+    """(c,) nodes whose force is too large to be noise."""
     parts = slice(0, 3) if normal_known else slice(0, 2)
     size = np.linalg.norm(smoothed.force_n[:, parts], axis=1)
     sigma = np.linalg.norm(smoothed.sigma_n[:, : 2 if normal_known else 1], axis=1)

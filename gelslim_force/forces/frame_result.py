@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.forces.field_picture import force_field_png
 from gelslim_force.forces.wrench import Wrench
 from gelslim_force.tracking.tracks import Tracks
 
@@ -18,48 +19,75 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ForceField:
-    """Motion and forces at the c nodes of the pad's outer surface (`PadMesh.surface` order)."""
+    """Motion and forces at the c nodes of the pad's outer surface (`PadMesh.surface` order).
+
+    In a notebook a force field shows itself as a picture, if matplotlib is installed.
+
+    Attributes:
+        points_mm: (c, 3) nodes at rest.
+        displacement_mm: (c, 3); z is NaN where the normal motion is unknown.
+        force_n: (c, 3) on the gel; z is NaN where the normal motion is unknown.
+        traction_mpa: (c, 3) force divided by the node's share of the surface; the pressure is -z.
+        contact: (c,) nodes in contact, as known or as found by their force.
+        centre_of_pressure_mm: (2,); NaN where nothing pushes.
+        slip_margin: 1 - |tangential| / (friction |normal|) of the resultant; NaN where unknown.
+        misfit: Share of the motion that the masked forces do not explain; 0 for other methods.
+        low_pass_mm: (2,) standard deviation of the low-pass, tangential and normal; None for
+            masked forces.
+    """
 
     points_mm: Array
-    """(c, 3) at rest."""
     displacement_mm: Array
-    """(c, 3); z is NaN where the normal motion is unknown."""
     force_n: Array
-    """(c, 3) on the gel; z is NaN where the normal motion is unknown."""
     traction_mpa: Array
-    """(c, 3) force over the node's share of the surface; pressure is its -z."""
     contact: NDArray[np.bool_]
-    """(c,) nodes taken to be touched."""
     centre_of_pressure_mm: Array
-    """(2,) NaN without a push."""
     slip_margin: float
-    """1 - |tangential| / (friction |normal|) of the resultant; NaN where unknown."""
     misfit: float = 0.0
-    """Share of the motion that the masked forces leave unexplained; 0 without a mask."""
     low_pass_mm: Array | None = None
-    """(2,) standard deviation of the low-pass, tangential and normal; None for masked forces."""
+
+    def _repr_png_(self) -> bytes | None:
+        """Picture for a notebook; None where matplotlib is not installed."""
+        return force_field_png(self)
 
 
 @dataclass(frozen=True, eq=False)
 class FrameResult:
-    """One frame. `problems` says in words what was wrong; a frame that could not be read, or
-    whose markers were not found, has no tracks, field and wrench."""
+    """What one frame gave.
+
+    A frame that could not be read, or whose markers were not found, has no tracks, field and
+    wrench. In a notebook a result with a force field shows the field.
+
+    Attributes:
+        index: Number of the frame, from 0.
+        time_s: When it was taken.
+        tracks: The markers in the picture.
+        marker_displacement_mm: (m, 3) of the followed markers, in the order of the tracks; NaN
+            where unknown.
+        field: Forces at the nodes of the surface.
+        wrench: Resultant force and torque.
+        normal_known: Whether the normal motion, and thus the normal force, is known.
+        stage_ms: Time in ms per stage: track, look, normal, displace, interpolate, force, wrench.
+        problems: What was wrong with the frame, one sentence each.
+        extra: Further findings, such as the fitted contact patch.
+    """
 
     index: int
     time_s: float
     tracks: Tracks | None = None
     marker_displacement_mm: Array | None = None
-    """(m, 3) of the followed markers, in the order of the tracks; NaN where unknown."""
     field: ForceField | None = None
     wrench: Wrench | None = None
     normal_known: bool = False
     stage_ms: Mapping[str, float] = default(default_factory=dict)
-    """Time per stage: detect, match, displace, normal, interpolate, force."""
     problems: tuple[str, ...] = ()
     extra: Mapping[str, Any] = default(default_factory=dict)
-    """Findings of a normal model, such as the fitted contact patch."""
 
     @property
     def coverage(self) -> float:
         """Share of the markers seen and verified; 0 without tracks."""
         return 0.0 if self.tracks is None else self.tracks.coverage
+
+    def _repr_png_(self) -> bytes | None:
+        """Picture of the force field for a notebook; None without one, or without matplotlib."""
+        return None if self.field is None else force_field_png(self.field)

@@ -1,13 +1,13 @@
-"""How long each stage of a frame takes, over a run of any length in fixed memory.
+"""How long each stage of a frame takes: measured in one frame, summarised over a run.
 
-Medians and percentiles are of the last `window` frames; count, mean and largest of the whole run.
+The summary needs fixed memory for a run of any length. Medians and percentiles are of the last
+`window` frames; count, mean and largest value are of the whole run.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,20 @@ from numpy.typing import NDArray
 
 TOTAL = "total"
 """Name of the sum of a frame's stages."""
+
+
+class FrameClock:
+    """Measures the stages of one frame in ms, one after the other."""
+
+    def __init__(self) -> None:
+        self.stages: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def stage(self, name: str) -> None:
+        """End a stage, which began at the end of the stage before."""
+        now = time.perf_counter()
+        self.stages[name] = self.stages.get(name, 0.0) + (now - self._last) * 1000
+        self._last = now
 
 
 @dataclass(frozen=True)
@@ -29,7 +43,7 @@ class StageTimes:
     median_ms: float
     p95_ms: float
     p99_ms: float
-    """The three percentiles are of the last frames that the clock remembers."""
+    """Median and percentiles are of the last frames that are kept."""
 
 
 class _Ring:
@@ -53,61 +67,24 @@ class _Ring:
         )
 
 
-class StageClock:
-    """Times the stages of one frame after another.
+class StageSummary:
+    """Collects the stage times of the frames of a run. Raises ValueError for a window below 1."""
 
-    >>> clock = StageClock()
-    >>> with clock.stage("detect"):
-    ...     pass
-    >>> list(clock.frame_done())
-    ['detect']
-    """
-
-    def __init__(
-        self,
-        window: int = 4096,
-        warm_up: int = 0,
-        now_s: Callable[[], float] = time.perf_counter,
-    ) -> None:
-        """`warm_up` first frames are timed, but do not count in the summary.
-
-        Raises ValueError for a window under 1 or a negative warm-up.
-        """
-        if window < 1 or warm_up < 0:
-            raise ValueError(f"window = {window}, warm_up = {warm_up}: need >= 1 and >= 0")
-        self._window, self._skip, self._now_s = window, warm_up, now_s
-        self._frame: dict[str, float] = {}
+    def __init__(self, window: int = 4096) -> None:
+        if window < 1:
+            raise ValueError(f"window = {window}: must be >= 1")
+        self._window = window
         self._rings: dict[str, _Ring] = {}
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time a block; a stage entered twice in one frame adds up. Raises ValueError for TOTAL."""
-        if name == TOTAL:
-            raise ValueError(f"{TOTAL!r} is the sum of all stages; choose another name")
-        start = self._now_s()
-        try:
-            yield
-        finally:
-            self._frame[name] = self._frame.get(name, 0.0) + 1e3 * (self._now_s() - start)
-
-    def frame_done(self) -> dict[str, float]:
-        """Return the frame's ms by stage, in the order they ran, and begin the next frame."""
-        frame, self._frame = self._frame, {}
-        if self._skip:
-            self._skip -= 1
-        else:
-            self.add(frame)
-        return frame
-
     def add(self, stage_ms: Mapping[str, float]) -> None:
-        """Count a frame timed elsewhere, such as one read from a recording."""
+        """Add the stages of one frame, in ms by name."""
         if not stage_ms:
             return
         for name, value in (*stage_ms.items(), (TOTAL, sum(stage_ms.values()))):
             self._rings.setdefault(name, _Ring(self._window)).add(value)
 
-    def summary(self) -> tuple[StageTimes, ...]:
-        """Return the stages in the order they first ran, and their sum at the end."""
+    def times(self) -> tuple[StageTimes, ...]:
+        """Return the stages in the order in which they first ran, and their sum at the end."""
         names = [name for name in self._rings if name != TOTAL]
         if names:
             names.append(TOTAL)

@@ -1,4 +1,11 @@
-"""Resultant of the surface forces about the sensor origin, with its noise."""
+"""Resultant of the surface forces about the sensor's origin, and its covariance.
+
+The covariance follows by linear propagation. The wrench is linear in the motion d of the markers,
+W = G S M d, with S the surface stiffness, M the interpolation from markers to nodes and G the
+resultant about the origin. S is symmetric, so the six products S Gᵀ serve every frame. A masked
+fit uses the same motion with fewer unknowns; its covariance is smaller, so that the one given here
+is an upper estimate.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +14,38 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ifem_export.markers.interpolation_matrix import MarkerInterpolation
+from ifem_export.operators.surface_operator import SurfaceOperator
+
 Array = NDArray[np.float64]
+_UNKNOWN_WITHOUT_NORMAL = [2, 3, 4]
+"""Indices of F_z, T_x and T_y in the wrench."""
+_ROWS = (
+    ("<i>F<sub>x</sub></i>", "N"),
+    ("<i>F<sub>y</sub></i>", "N"),
+    ("<i>F<sub>z</sub></i>", "N"),
+    ("<i>T<sub>x</sub></i>", "N mm"),
+    ("<i>T<sub>y</sub></i>", "N mm"),
+    ("<i>T<sub>z</sub></i>", "N mm"),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """Force and torque on the gel about the sensor origin, in the sensor frame."""
+    """Force and torque on the gel about the sensor's origin, in the sensor frame.
+
+    In a notebook a wrench shows itself as a table.
+
+    Attributes:
+        force_n: (3,) in N; z is NaN where the normal motion is unknown.
+        torque_nmm: (3,) in N mm; x and y are NaN where the normal motion is unknown.
+        covariance: (6, 6) of (force, torque) in N and N mm, from the noise of the markers and of
+            the normal motion; NaN where unknown.
+    """
 
     force_n: Array
-    """(3,); z is NaN where the normal motion is unknown."""
     torque_nmm: Array
-    """(3,); x and y are NaN where the normal motion is unknown."""
     covariance: Array
-    """(6, 6) of (force, torque) in N and N mm from marker noise; NaN where unknown."""
 
     @property
     def vector(self) -> Array:
@@ -31,8 +57,97 @@ class Wrench:
         """(6,) in N and N mm."""
         return np.sqrt(np.diag(self.covariance))
 
+    def _repr_html_(self) -> str:
+        """Table of the six components for a notebook."""
+        rows = [
+            f"<tr><td>{name}</td><td>{_shown(value)}</td><td>{_shown(sigma)}</td>"
+            f"<td>{unit}</td></tr>"
+            for (name, unit), value, sigma in zip(
+                _ROWS, self.vector, self.standard_deviation, strict=True
+            )
+        ]
+        head = "<tr><th>component</th><th>value</th><th>&sigma;</th><th>unit</th></tr>"
+        return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchNoise:
+    """Linear propagation of noise to the wrench, for one pad."""
+
+    points_mm: Array
+    """(c, 3) nodes of the surface."""
+    response: Array
+    """(6, c, 3) product G S, in N/mm and N."""
+
+    @classmethod
+    def of(cls, operator: SurfaceOperator, points_mm: Array) -> WrenchNoise:
+        """Apply the operator to the six rigid motions of the surface."""
+        rows = [operator.force(motion) for motion in rigid_motions(points_mm)]
+        return cls(points_mm, np.stack(rows))
+
+    def gains(self, interpolation: MarkerInterpolation) -> Array:
+        """Wrench (6, k, 2) per lateral motion of each marker, N/mm and N; 0 for lost ones.
+
+        W = (G S) M d needs the transpose of M: the interpolation of unit motions.
+        """
+        rows = [interpolation.transposed(self.response[:, :, i].T) for i in (0, 1)]
+        return np.stack([r.T for r in rows], axis=2)
+
+    def covariance(
+        self,
+        gains: Array,
+        marker_covariance_mm2: Array,
+        normal_sigma_mm: Array | None = None,
+        lateral_sigma_mm: Array | None = None,
+    ) -> Array:
+        """Covariance (6, 6) of the wrench in N and N mm.
+
+        Args:
+            gains: (6, k, 2) for the interpolation in use.
+            marker_covariance_mm2: (k, 2, 2) of each marker's lateral motion.
+            normal_sigma_mm: (c,) standard deviation of the normal motion. The errors of all nodes
+                are fully correlated: a depth that is too large is too large everywhere.
+            lateral_sigma_mm: (k, 2) standard deviation of the markers' lateral motion, fully
+                correlated too: the apparent motion of an unknown depth.
+        """
+        count = len(marker_covariance_mm2)
+        spread = (gains[:, :, None, :] @ marker_covariance_mm2)[:, :, 0, :]
+        total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
+        if normal_sigma_mm is not None:
+            sensitivity = self.response[:, :, 2] @ normal_sigma_mm
+            total = total + np.outer(sensitivity, sensitivity)
+        if lateral_sigma_mm is not None:
+            sensitivity = gains.reshape(6, 2 * count) @ lateral_sigma_mm.reshape(-1)
+            total = total + np.outer(sensitivity, sensitivity)
+        return np.asarray(total)
+
+    def wrench(self, force_n: Array, covariance: Array) -> Wrench:
+        """Wrench of nodal forces (c, 3); NaN for what an unknown normal motion leaves open."""
+        force, torque = resultant(self.points_mm, force_n)
+        if not np.isfinite(force[2]):
+            covariance = covariance.copy()
+            covariance[_UNKNOWN_WITHOUT_NORMAL, :] = np.nan
+            covariance[:, _UNKNOWN_WITHOUT_NORMAL] = np.nan
+            tangential = force_n.copy()
+            tangential[:, 2] = 0.0
+            force, torque = resultant(self.points_mm, tangential)
+            force[2] = torque[0] = torque[1] = np.nan
+        return Wrench(force, torque, covariance)
+
 
 def resultant(points_mm: ArrayLike, force_n: ArrayLike) -> tuple[Array, Array]:
     """Sum of forces (c, 3) and their torque about the origin, acting at points (c, 3)."""
     points, force = np.asarray(points_mm, dtype=float), np.asarray(force_n, dtype=float)
     return force.sum(axis=0), np.cross(points, force).sum(axis=0)
+
+
+def rigid_motions(points_mm: Array) -> Array:
+    """Motions (6, c, 3): unit translations, then unit rotations e × p, of points (c, 3)."""
+    count = len(points_mm)
+    motions = [np.broadcast_to(axis, (count, 3)) for axis in np.eye(3)]
+    motions += [np.cross(axis, points_mm) for axis in np.eye(3)]
+    return np.stack(motions)
+
+
+def _shown(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else "unknown"

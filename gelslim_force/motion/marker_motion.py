@@ -1,9 +1,9 @@
 """Motion of the markers in the gel's plane from their motion in the picture.
 
-A marker that is pressed down seems to move sideways
-(see `gelslim_optics.camera.projection_error`). The `exact` compensation traces the ray of its
-pixel back to the height where the marker is now; the
-others trace it to the rest plane and subtract an apparent motion, as the paper does.
+A marker that is pressed down has an apparent lateral motion (see
+`gelslim_optics.camera.projection_error`). The `exact` compensation traces the ray of its pixel
+back to the height where the marker is now. The others trace it to the rest plane and subtract the
+apparent motion, as the paper does.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ COMPENSATIONS: tuple[Compensation, ...] = get_args(Compensation)
 class MarkerView:
     """n markers as one camera saw them at rest.
 
-    Raises ValueError for places of another shape or not finite.
+    Raises ValueError for positions of another shape, or positions that are not finite.
     """
 
     camera: VirtualCamera
     reference_px: Array
     """(n, 2)."""
     rest_height_mm: Array | float = 0.0
-    """One or (n,): heights of the gel there at rest."""
+    """Scalar or (n,): heights of the gel there at rest."""
 
     def __post_init__(self) -> None:
-        places = np.array(self.reference_px, dtype=float)
-        if places.ndim != 2 or places.shape[1] != 2 or not np.isfinite(places).all():
-            raise ValueError(f"reference places {places.shape} must be (n, 2) and finite")
-        places.setflags(write=False)
-        object.__setattr__(self, "reference_px", places)
-        heights = np.array(np.broadcast_to(self.rest_height_mm, len(places)), dtype=float)
+        positions = np.array(self.reference_px, dtype=float)
+        if positions.ndim != 2 or positions.shape[1] != 2 or not np.isfinite(positions).all():
+            raise ValueError(f"reference positions {positions.shape} must be (n, 2) and finite")
+        positions.setflags(write=False)
+        object.__setattr__(self, "reference_px", positions)
+        heights = np.array(np.broadcast_to(self.rest_height_mm, len(positions)), dtype=float)
         object.__setattr__(self, "rest_height_mm", heights)
 
     def __len__(self) -> int:
@@ -63,37 +63,37 @@ class MarkerView:
 
     def lateral_motion(
         self,
-        places_px: ArrayLike,
+        positions_px: ArrayLike,
         normal_mm: ArrayLike | float = 0.0,
         compensation: Compensation = "exact",
     ) -> Array:
         """Displacements (n, 2) in mm along x and y.
 
         Args:
-            places_px: (n, 2) places now; NaN where unknown, which gives NaN.
-            normal_mm: motion along z, one or (n,), negative for a press.
+            positions_px: (n, 2) positions now; a NaN position gives a NaN motion.
+            normal_mm: scalar or (n,) motion along z, negative where the gel is pressed in.
             compensation: see the module.
 
         Raises:
             ValueError: shapes that do not fit, an unknown compensation.
         """
-        places = np.asarray(places_px, dtype=float)
-        if places.shape != self.reference_px.shape:
-            raise ValueError(f"places {places.shape} must be {self.reference_px.shape}")
+        positions = np.asarray(positions_px, dtype=float)
+        if positions.shape != self.reference_px.shape:
+            raise ValueError(f"positions {positions.shape} must be {self.reference_px.shape}")
         if compensation not in COMPENSATIONS:
             raise ValueError(f"compensation {compensation!r}: one of {', '.join(COMPENSATIONS)}")
-        w = np.broadcast_to(np.asarray(normal_mm, dtype=float), len(places))
-        known = np.isfinite(places).all(axis=1) & np.isfinite(w)
-        motion = np.full(places.shape, np.nan)
+        w = np.broadcast_to(np.asarray(normal_mm, dtype=float), len(positions))
+        known = np.isfinite(positions).all(axis=1) & np.isfinite(w)
+        motion = np.full(positions.shape, np.nan)
         if not known.any():
             return motion
         rest = self.rest_mm[known]
-        sunk = w[known] if compensation == "exact" else 0.0
-        now = self._at(places[known], rest[:, 2] + sunk)
+        height = w[known] if compensation == "exact" else 0.0
+        now = self._at(positions[known], rest[:, 2] + height)
         motion[known] = now[:, :2] - rest[:, :2]
         if compensation in ("printed", "arctan"):
             motion[known] -= projection_error_mm(self.camera, rest, w[known], compensation)
         return motion
 
-    def _at(self, places_px: Array, height_mm: Array) -> Array:
-        return points_along(self.camera, pixel_slopes(self.camera, places_px), height_mm)
+    def _at(self, positions_px: Array, height_mm: Array) -> Array:
+        return points_along(self.camera, pixel_slopes(self.camera, positions_px), height_mm)

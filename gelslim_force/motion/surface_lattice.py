@@ -10,38 +10,38 @@ from scipy.spatial import cKDTree
 Array = NDArray[np.float64]
 
 
-def neighbours(points_mm: Array, cell_mm: ArrayLike) -> sparse.csr_array:
-    """(c, c) 1 where two nodes share a cell's edge: up to four per node.
+def neighbour_matrix(points_mm: Array, cell_mm: ArrayLike) -> sparse.csr_array:
+    """(c, c) with 1 where two nodes share an edge of a cell: up to four per node.
 
-    `points_mm` is (c, 2 or 3), on a lattice of `cell_mm` (2,).
+    `points_mm` is (c, 2 or 3), on a lattice with cells of `cell_mm` (2,).
     """
-    places = points_mm[:, :2] / np.asarray(cell_mm)
-    first, second = cKDTree(places).query_pairs(1.2, output_type="ndarray").T
+    positions = points_mm[:, :2] / np.asarray(cell_mm)
+    first, second = cKDTree(positions).query_pairs(1.2, output_type="ndarray").T
     rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
-    count = len(places)
+    count = len(positions)
     return sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
 
 
-def curvature(beside: sparse.csr_array) -> sparse.csr_array:
-    """(i, c): each inner node less the mean of its four neighbours.
+def curvature_operator(neighbours: sparse.csr_array) -> sparse.csr_array:
+    """(i, c) that gives the value of each inner node minus the mean of its four neighbours.
 
     White noise has 1.25 times its variance there.
     """
-    inner = np.flatnonzero(beside.sum(axis=1) == 4)
-    each = sparse.eye_array(beside.shape[0], format="csr")
-    return sparse.csr_array((each - beside / 4)[inner])
+    inner = np.flatnonzero(neighbours.sum(axis=1) == 4)
+    identity = sparse.eye_array(neighbours.shape[0], format="csr")
+    return sparse.csr_array((identity - neighbours / 4)[inner])
 
 
 def edge_distance_mm(points_mm: Array, cell_mm: ArrayLike) -> Array:
-    """(c,) distance of each node to the nearest one on the edge of the surface."""
-    edge = neighbours(points_mm, cell_mm).sum(axis=1) < 4
+    """(c,) distance of each node from the nearest node on the edge of the surface."""
+    edge = neighbour_matrix(points_mm, cell_mm).sum(axis=1) < 4
     return np.asarray(cKDTree(points_mm[edge, :2]).query(points_mm[:, :2])[0])
 
 
-def with_rim(touched: NDArray[np.bool_], beside: sparse.csr_array) -> NDArray[np.bool_]:
-    """(c,) the nodes touched and their neighbours.
+def with_neighbours(touched: NDArray[np.bool_], neighbours: sparse.csr_array) -> NDArray[np.bool_]:
+    """(c,) the touched nodes and their neighbours.
 
     A node's force is the pressure weighted by its shape function, which reaches one cell beyond
-    the node: pressure at the rim of a contact loads nodes outside it too.
+    the node: pressure at the rim of a contact also loads nodes outside the contact.
     """
-    return touched | (beside @ touched.astype(float) > 0)
+    return touched | (neighbours @ touched.astype(float) > 0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.forces.stage_clock import StageClock, StageTimes
+from gelslim_force.forces.stage_clock import StageSummary, StageTimes
 from gelslim_force.outputs.field_chunk import FieldChunk, Format, read_chunk, stack
 from gelslim_force.outputs.frame_journal import read_journal
 from gelslim_force.outputs.packed_frame import PackedFrame
@@ -61,10 +61,10 @@ class RecordedRun:
 
     def stage_times(self, warm_up: int = 0) -> tuple[StageTimes, ...]:
         """Return the times per stage, without the first `warm_up` frames."""
-        clock = StageClock(window=max(1, len(self.stage_ms)))
+        clock = StageSummary(window=max(1, len(self.stage_ms)))
         for index in sorted(self.stage_ms)[warm_up:]:
             clock.add(self.stage_ms[index])
-        return clock.summary()
+        return clock.times()
 
 
 def read_run(folder: str | os.PathLike[str]) -> RecordedRun:

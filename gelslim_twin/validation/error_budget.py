@@ -14,8 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration.bundle_camera import bundle_camera
-from gelslim_force.motion.marker_heights import marker_heights_mm
+from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
 from gelslim_force.motion.marker_motion import Compensation, MarkerView
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.validation.score import Spread, spread

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.contact.indenter_source import NormalReading
+from gelslim_force.contact.normal_source import NormalReading
 from gelslim_twin.contact.gel_state import GelState
 
 Array = NDArray[np.float64]

@@ -7,6 +7,7 @@ a reference frame, nothing else.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 
 from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
-from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_twin.contact.gel_state import GelState
@@ -50,7 +52,7 @@ class Bench:
         self.sensor = sensor
         self.renderer = sensor_renderer(sensor, seed)
         self.reference: Image = self.renderer.frame(number=0).image
-        self.calibration: SensorCalibration = calibrate(sensor.bundle, self.reference)
+        self.calibration: Calibration = calibrate(sensor.bundle, self.reference)
         self.chains = chains_for(sensor.bundle, budget)
         self._pipelines = {c.name: self._pipeline(c) for c in self.chains}
         places = sensor.grid.positions_mm[self.calibration.reference.markers]
@@ -75,9 +77,9 @@ class Bench:
             if chain.knows in ("shape", "cap"):
                 if not known:
                     continue
-                pipeline.normal = self._source(pipeline, known, chain.knows == "cap")
+                pipeline = pipeline.with_normal(self._source(chain, known))
             if chain.knows == "contact":
-                pipeline.normal = KnownContact(states)
+                pipeline = pipeline.with_normal(KnownContact(states))
             depth = chain.knows == "depth"
             yield (
                 chain,
@@ -105,14 +107,17 @@ class Bench:
     def _pipeline(self, chain: Chain) -> ForcePipeline:
         return ForcePipeline(self.sensor.bundle, self.calibration, chain.settings)
 
-    def _source(self, pipeline: ForcePipeline, known: str, cap_only: bool) -> Any:
-        from dataclasses import replace
+    def _source(self, chain: Chain, known: str) -> IndenterSource:
+        from gelslim_force.sensor import indenter_source
 
-        from gelslim_force.contact.indenter import parse_indenter
-        from gelslim_force.contact.indenter_source import indenter_source
-
-        source = indenter_source(pipeline, self.reference, parse_indenter(known))
-        return replace(source, cap_only=True) if cap_only else source
+        source = indenter_source(
+            self.sensor.bundle,
+            self.calibration,
+            self.reference,
+            known,
+            settings=chain.settings,
+        )
+        return replace(source, cap_only=chain.knows == "cap")
 
 
 @single_threaded
@@ -181,7 +186,7 @@ def validate(
 
 def sensor_renderer(sensor: TwinSensor, seed: int) -> FrameRenderer:
     """Draws what the sensor's camera sees, with all that a used sensor shows."""
-    from gelslim_force.calibration.bundle_camera import bundle_camera
+    from gelslim_force.calibration.design import bundle_camera
 
     record = sensor.camera_record
     aperture = float(record.get("aperture_mm") or 0.0)

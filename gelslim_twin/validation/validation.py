@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.validation.experiment import FRICTION, Experiment
@@ -45,7 +45,7 @@ class Validation:
     others: Mapping[str, tuple[Score, ...]]
     samples: tuple[Sample, ...]
     points_mm: NDArray[np.float64]
-    calibration: SensorCalibration
+    calibration: Calibration
     operator: str = ""
     """Label of the force operator that a budget chose; empty without a budget."""
     remarks: tuple[str, ...] = ()

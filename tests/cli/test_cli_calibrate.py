@@ -10,8 +10,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from gelslim.cli import main
-from gelslim_force.calibration.bundle_camera import bundle_camera
 from gelslim_force.calibration.camera_deviation import PARAMETERS, deviated_camera
+from gelslim_force.calibration.design import bundle_camera
 from gelslim_force.calibration.file import read_calibration
 from gelslim_force.lattice.bundle_grid import bundle_grid
 from ifem_export.bundle.files import load_bundle

@@ -21,12 +21,10 @@ from shaded_frames import pressed_heights, shaded
 
 from gelslim.cli.force_run import RunOutputs, result_sinks
 from gelslim_force.calibration.calibration import calibrate
-from gelslim_force.contact.indenter import parse_indenter
-from gelslim_force.contact.indenter_source import indenter_source
 from gelslim_force.frames.frame import Frame
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.run import run_frames
-from gelslim_force.settings import PipelineSettings
+from gelslim_force.sensor import indenter_source
 
 FRAMES, EVERY = 1000, 10
 TOUCHED_MM = (None, 1.8, 2.4, 1.8)
@@ -60,8 +58,9 @@ def soak(out: Path) -> dict[str, object]:
     """The run; memory is looked at after the writers had the frame."""
     sensor = sensor_bundle()
     still = shaded(seed=99).image
-    pipeline = ForcePipeline(sensor, calibrate(sensor, still), PipelineSettings())
-    pipeline.normal = indenter_source(pipeline, still, parse_indenter("sphere:10"), None)
+    built = calibrate(sensor, still)
+    normal = indenter_source(sensor, built, still, "sphere:10")
+    pipeline = ForcePipeline(sensor, built, normal=normal)
     memory: list[int] = []
 
     def watch(text: str, done: int, total: int) -> None:

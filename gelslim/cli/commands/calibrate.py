@@ -10,7 +10,7 @@ import typer
 from gelslim.cli.options import AsJson, SensorBundle
 
 if TYPE_CHECKING:
-    from gelslim_force.calibration.sensor_calibration import SensorCalibration
+    from gelslim_force.calibration.sensor_calibration import Calibration
 
 
 def calibrate(
@@ -65,7 +65,7 @@ def calibrate(
     return 0
 
 
-def _describe(found: SensorCalibration) -> None:
+def _describe(found: Calibration) -> None:
     from gelslim.cli.answer import say
 
     for line in found.diagnosis:

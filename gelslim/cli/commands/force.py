@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
     from gelslim.cli.force_run import RunOutputs
     from gelslim_core.budget.budget import Budget
-    from gelslim_force.calibration.sensor_calibration import SensorCalibration
+    from gelslim_force.calibration.sensor_calibration import Calibration
+    from gelslim_force.contact.normal_source import NormalSource
     from gelslim_force.frames.frame import FrameSource
-    from gelslim_force.pipeline import ForcePipeline, NormalSource
+    from gelslim_force.pipeline import ForcePipeline
     from gelslim_force.run import RunSummary
     from gelslim_force.settings import PipelineSettings
     from ifem_export.bundle.bundle import Bundle
@@ -79,8 +80,8 @@ def force(
     folder = out or Path("out") / f"{bundle.resolve().name}-force"
     outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
     with open_frames(frames) as source:
-        pipeline = ForcePipeline(sensor, built, settings)
-        pipeline.normal = _normal_source(pipeline, picture, indenter, depth_mm, depth_maps)
+        normal = _normal_source(sensor, built, settings, picture, indenter, depth_mm, depth_maps)
+        pipeline = ForcePipeline(sensor, built, settings, normal)
         told = {
             "bundle": str(bundle), "frames": frames,
             **chosen, "operator": pipeline.operator_name, "indenter": indenter,
@@ -161,7 +162,7 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
 
 def _calibrated(
     sensor: Bundle, reference: Path | None, file: Path | None, needs_picture: bool
-) -> tuple[SensorCalibration, NDArray[np.uint8] | None]:
+) -> tuple[Calibration, NDArray[np.uint8] | None]:
     from gelslim.cli.failure import CommandError
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
@@ -178,22 +179,21 @@ def _calibrated(
 
 
 def _normal_source(
-    pipeline: ForcePipeline,
+    sensor: Bundle,
+    built: Calibration,
+    settings: PipelineSettings,
     picture: NDArray[np.uint8] | None,
     indenter: str | None,
     depth_mm: float | None,
     depth_maps: Path | None,
 ) -> NormalSource | None:
     if depth_maps is not None:
-        from gelslim_force.contact.depth_source import DepthMapSource, read_depth_maps
+        from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
 
-        return DepthMapSource(
-            pipeline.calibration.camera, pipeline.points_mm, read_depth_maps(depth_maps)
-        )
+        return DepthMapSource(built.camera, sensor.mesh.surface_mm, read_depth_maps(depth_maps))
     if indenter is None:
         return None
-    from gelslim_force.contact.indenter import parse_indenter
-    from gelslim_force.contact.indenter_source import indenter_source
+    from gelslim_force.sensor import indenter_source
 
     assert picture is not None
-    return indenter_source(pipeline, picture, parse_indenter(indenter), depth_mm)
+    return indenter_source(sensor, built, picture, indenter, depth_mm, settings)

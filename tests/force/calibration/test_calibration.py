@@ -13,7 +13,7 @@ from synthetic import Look, grid_of_dots, render
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.camera_deviation import PARAMETERS, deviated_camera
 from gelslim_force.calibration.error import CalibrationError
-from gelslim_force.calibration.sensor_calibration import SensorCalibration
+from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.detection import Detector
 from gelslim_force.lattice.registration import register
 from ifem_export.errors import IfemError
@@ -221,7 +221,7 @@ def test_nominal_calibration_keeps_the_design():
     frame = render(GRID, finger_view()).image
     dots = Detector().detect(frame)
     registration = register(dots, GRID, frame.shape)
-    nominal = SensorCalibration.nominal(BUNDLE, registration, dots)
+    nominal = Calibration.nominal(BUNDLE, registration, dots)
     assert nominal.camera.to_record() == finger_view().to_record()
     assert nominal.deviation is None
     assert np.abs(nominal.residual_px).max() < 0.08

@@ -11,9 +11,9 @@ from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded
 
 from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
 from gelslim_force.contact.patch_finder import PatchFinder
-from gelslim_force.contact.patch_follow import AFRESH
-from gelslim_force.contact.patch_outline import circle_start, fit_circle, fit_strip
-from gelslim_force.contact.patch_settings import PatchSettings
+from gelslim_force.contact.patch_region import PatchSettings
+from gelslim_force.contact.patch_shading import AFRESH
+from gelslim_force.contact.region_outline import circle_start, fit_circle, fit_strip
 from gelslim_force.frames.read_only import read_only
 
 BALL_MM = 10.0

@@ -8,14 +8,16 @@ from camera_rig import finger_view
 from pad_samples import hertz_like, small_bundle
 
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
-from gelslim_force.forces.low_pass import NORMAL, TANGENTIAL, WIDTHS_IN_CELLS, LowPass, widths_mm
-from gelslim_force.forces.noise import (
+from gelslim_force.forces.low_pass import (
+    WIDTHS_IN_CELLS,
     ForceNoise,
+    LowPass,
     MotionNoise,
     normal_noise_mm,
+    widths_mm,
 )
 from gelslim_force.motion.marker_motion import MarkerView
-from gelslim_force.motion.surface_lattice import curvature, neighbours
+from gelslim_force.motion.surface_lattice import curvature_operator, neighbour_matrix
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.tracking.marker_noise import quiet_sigma
 from ifem_export.bundle.bundle import Bundle
@@ -78,9 +80,9 @@ def test_wider_for_more_noise_of_that_part_alone(case) -> None:
     found = noisy(case, rng, 0.02, 0.0)
     quiet = case[-1].applied(found, MotionNoise(0.02, 0.0)).width_mm
     loud = case[-1].applied(noisy(case, rng, 1.5, 0.0), MotionNoise(1.5, 0.0)).width_mm
-    assert quiet[TANGENTIAL] < loud[TANGENTIAL]
+    assert quiet[0] < loud[0]
     deep = case[-1].applied(noisy(case, rng, 0.02, 0.03), MotionNoise(0.02, 0.03)).width_mm
-    assert quiet[NORMAL] < deep[NORMAL]
+    assert quiet[1] < deep[1]
 
 
 def test_no_noise_leaves_the_forces_as_they_are(case) -> None:
@@ -129,7 +131,7 @@ def test_sigma_is_the_scatter_behind_the_low_pass(case) -> None:
 
 def test_noise_of_the_normal_motion_is_told_from_a_contact(case) -> None:
     _, motion, _, moved, _ = case
-    bend = curvature(neighbours(motion.points_mm, CELL_MM))
+    bend = curvature_operator(neighbour_matrix(motion.points_mm, CELL_MM))
     smooth = moved[:, 2] * 0.3 / np.abs(moved[:, 2]).max()
     assert normal_noise_mm(bend, smooth) < 3e-4
     rng = np.random.default_rng(10)

@@ -10,8 +10,8 @@ from camera_rig import finger_view
 from synthetic import Look, grid_of_dots, render
 
 from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.forces.estimator import ForceSettings
-from gelslim_force.motion.marker_heights import marker_heights_mm
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
 from ifem_export.bundle.bundle import Bundle, build_bundle

@@ -12,7 +12,7 @@ from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, strea
 from synthetic import Look
 
 from gelslim_force.calibration.calibration import calibrate
-from gelslim_force.contact.indenter_source import NormalReading
+from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.forces.estimator import ForceSettings
 from gelslim_force.pipeline import ForcePipeline
@@ -183,8 +183,8 @@ def test_importing_the_pipeline_loads_no_cad_and_no_vtk() -> None:
 class WrongPatch:
     """A source that takes a tenth of the pad for a deep contact."""
 
-    def __init__(self, chain: ForcePipeline, depth_mm: float) -> None:
-        x, y = chain.points_mm[:, 0] + 5.0, chain.points_mm[:, 1]
+    def __init__(self, points_mm: np.ndarray, depth_mm: float) -> None:
+        x, y = points_mm[:, 0] + 5.0, points_mm[:, 1]
         self._touched = np.hypot(x, y) < 3.0
         self._w = np.where(self._touched, -depth_mm, 0.0)
 
@@ -197,8 +197,8 @@ class WrongPatch:
 
 def test_a_patch_that_the_markers_contradict_gives_no_normal_force(calibration, frames) -> None:
     """The misfit does not show it: compensating for the false depth invents a motion to fit."""
-    chain = pipeline(calibration)
-    chain.normal = WrongPatch(chain, depth_mm=1.5)
+    normal = WrongPatch(sensor_bundle().mesh.surface_mm, depth_mm=1.5)
+    chain = ForcePipeline(sensor_bundle(), calibration, normal=normal)
     result = last(chain, frames, normal=False)
     assert result.field.misfit == 0.0
     assert not result.normal_known

@@ -8,7 +8,7 @@ from render_rig import AXIS_X, AXIS_Y, CAMERA, GRID, PAD, dent, detected_error, 
 from scipy.spatial import cKDTree
 
 from gelslim_force.calibration.calibration import calibrate
-from gelslim_force.motion.marker_heights import marker_heights_mm
+from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_twin.render.domed_top import DomedTop
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.marker_motion import MarkerMotion

@@ -1,0 +1,166 @@
+"""From a bundle and one picture at rest to a force pipeline that is ready for frames."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_core.errors import GelslimError
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.file import read_calibration
+from gelslim_force.calibration.reference_picture import read_reference
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.contact.indenter import Indenter, parse_indenter
+from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_motion import NormalModel
+from gelslim_force.contact.patch_finder import PatchFinder
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.settings import PipelineSettings
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.bundle.files import load_bundle
+
+if TYPE_CHECKING:
+    from gelslim_force.contact.normal_source import NormalSource
+
+Picture = NDArray[np.uint8]
+FileName = str | os.PathLike[str]
+
+
+class SensorError(GelslimError, ValueError):
+    """A sensor that cannot be opened with these arguments.
+
+    Attributes:
+        argument: Name of the argument that is missing or cannot be used.
+    """
+
+    def __init__(self, argument: str, message: str) -> None:
+        super().__init__(message)
+        self.argument = argument
+
+
+def open_sensor(
+    bundle: Bundle | FileName,
+    *,
+    reference: Picture | FileName | None = None,
+    calibration: Calibration | FileName | None = None,
+    indenter: Indenter | str | None = None,
+    depth_mm: float | None = None,
+    normal: NormalSource | None = None,
+    settings: PipelineSettings | None = None,
+) -> ForcePipeline:
+    """Open a sensor: a force pipeline that is calibrated and ready for frames.
+
+    Args:
+        bundle: The sensor's bundle, or its folder.
+        reference: Picture without contact, (h, w) or (h, w, 3) uint8, or its file, or a folder of
+            several; the sensor is calibrated by it.
+        calibration: A calibration of this sensor, or its file, in place of the reference. With an
+            indenter both are needed: the contact patch shows in comparison with the reference.
+        indenter: The known shape that touches the gel, such as `"sphere:10"` (mm), which makes
+            the normal force known.
+        depth_mm: Known depth of the indenter in mm, which a flat punch needs.
+        normal: Another source of the normal motion, in place of an indenter.
+        settings: Choices of the pipeline; the defaults if None.
+
+    Returns:
+        The pipeline; `process` takes one frame after the other.
+
+    Raises:
+        SensorError: Arguments are missing, or contradict one another.
+        IfemError: The bundle cannot be read, or no operator keeps the budget.
+        CalibrationError: The reference does not show this sensor at rest, or the calibration
+            cannot be read or belongs to another sensor.
+        IndenterError: The indenter's description cannot be read.
+    """
+    _require_consistent(reference, calibration, indenter, depth_mm, normal)
+    sensor = bundle if isinstance(bundle, Bundle) else load_bundle(Path(bundle))
+    shape = None if indenter is None else _shape(indenter)
+    picture = reference
+    if picture is not None and not isinstance(picture, np.ndarray):
+        picture = read_reference(picture)
+    if calibration is None:
+        assert picture is not None
+        calibration = calibrate(sensor, picture)
+    elif not isinstance(calibration, Calibration):
+        calibration = read_calibration(calibration)
+    if shape is not None:
+        assert picture is not None
+        normal = indenter_source(sensor, calibration, picture, shape, depth_mm, settings)
+    return ForcePipeline(sensor, calibration, settings, normal)
+
+
+def indenter_source(
+    bundle: Bundle,
+    calibration: Calibration,
+    reference: Picture,
+    indenter: Indenter | str,
+    depth_mm: float | None = None,
+    settings: PipelineSettings | None = None,
+) -> IndenterSource:
+    """Make a normal source for a known indenter.
+
+    Args:
+        bundle: The sensor.
+        calibration: Its camera, and its markers at rest.
+        reference: (h, w, 3) uint8 picture without contact.
+        indenter: The shape that touches the gel, or its description, such as `"sphere:10"` (mm).
+        depth_mm: Known depth in mm, which a flat punch needs.
+        settings: Choose the operator of the contact model; the defaults if None.
+
+    Returns:
+        The source, for the constructor of `ForcePipeline`.
+
+    Raises:
+        CalibrationError: The calibration belongs to another bundle.
+        IndenterError: The indenter's description cannot be read.
+        ValueError: The reference cannot show a patch, because it is dark or of another size.
+    """
+    calibration.require_bundle(bundle)
+    shape = _shape(indenter)
+    points_mm = np.asarray(bundle.mesh.surface_mm)
+    followed = calibration.reference
+    radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
+    finder = PatchFinder(
+        calibration.camera,
+        reference,
+        followed.positions_px,
+        marker_radius_px=radius_px[np.searchsorted(calibration.markers, followed.markers)],
+        surface_mm=points_mm,
+        indenter=shape,
+    )
+    operator = (settings or PipelineSettings()).compliance(bundle)
+    return IndenterSource(finder, NormalModel(operator, points_mm), shape, depth_mm)
+
+
+def _shape(indenter: Indenter | str) -> Indenter:
+    return parse_indenter(indenter) if isinstance(indenter, str) else indenter
+
+
+def _require_consistent(
+    reference: object,
+    calibration: object,
+    indenter: object,
+    depth_mm: float | None,
+    normal: object,
+) -> None:
+    if indenter is not None and normal is not None:
+        raise SensorError("normal", "give an indenter or another normal source, not both")
+    if depth_mm is not None and indenter is None:
+        raise SensorError("depth_mm", "depth_mm is the depth of an indenter: give the indenter too")
+    if reference is None and calibration is None:
+        raise SensorError(
+            "reference",
+            "give a reference picture without contact, or a calibration of this sensor",
+        )
+    if reference is None and indenter is not None:
+        raise SensorError(
+            "reference",
+            "an indenter's contact patch shows in comparison with a picture without contact: give "
+            "the reference picture too",
+        )
+    if reference is not None and calibration is not None and indenter is None:
+        raise SensorError("calibration", "give a reference picture or a calibration, not both")
