@@ -19,16 +19,11 @@ if TYPE_CHECKING:
     from gelslim_force.calibration.sensor_calibration import Calibration
     from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
     from gelslim_force.contact.normal_source import NormalReading, NormalSource
-    from gelslim_force.dot_tracking import DotTracking, dots_at_rest
     from gelslim_force.forces.estimator import ForceSettings
     from gelslim_force.forces.frame_result import ForceField, FrameResult
     from gelslim_force.forces.wrench import Wrench
-    from gelslim_force.frames.frame import Frame
     from gelslim_force.frames.source import open_frames
-    from gelslim_force.outputs.recorded_run import read_run
-    from gelslim_force.outputs.run_recorder import RunRecorder
     from gelslim_force.pipeline import ForcePipeline
-    from gelslim_force.run import run_frames
     from gelslim_force.sensor import indenter_source, open_sensor
     from gelslim_force.settings import PipelineSettings
 
@@ -36,27 +31,21 @@ __all__ = [
     "Calibration",
     "CalibrationError",
     "DepthMapSource",
-    "DotTracking",
     "ForceField",
     "ForcePipeline",
     "ForceSettings",
-    "Frame",
     "FrameResult",
     "NormalReading",
     "NormalSource",
     "PipelineSettings",
-    "RunRecorder",
     "Wrench",
     "calibrate",
-    "dots_at_rest",
     "indenter_source",
     "open_frames",
     "open_sensor",
     "read_calibration",
     "read_depth_maps",
     "read_reference",
-    "read_run",
-    "run_frames",
     "write_calibration",
 ]
 
@@ -66,27 +55,21 @@ __getattr__, __dir__ = lazy_exports(
         "Calibration": "gelslim_force.calibration.sensor_calibration",
         "CalibrationError": "gelslim_force.calibration.error",
         "DepthMapSource": "gelslim_force.contact.depth_map_source",
-        "DotTracking": "gelslim_force.dot_tracking",
         "ForceField": "gelslim_force.forces.frame_result",
         "ForcePipeline": "gelslim_force.pipeline",
         "ForceSettings": "gelslim_force.forces.estimator",
-        "Frame": "gelslim_force.frames.frame",
         "FrameResult": "gelslim_force.forces.frame_result",
         "NormalReading": "gelslim_force.contact.normal_source",
         "NormalSource": "gelslim_force.contact.normal_source",
         "PipelineSettings": "gelslim_force.settings",
-        "RunRecorder": "gelslim_force.outputs.run_recorder",
         "Wrench": "gelslim_force.forces.wrench",
         "calibrate": "gelslim_force.calibration.calibration",
-        "dots_at_rest": "gelslim_force.dot_tracking",
         "indenter_source": "gelslim_force.sensor",
         "open_frames": "gelslim_force.frames.source",
         "open_sensor": "gelslim_force.sensor",
         "read_calibration": "gelslim_force.calibration.file",
         "read_depth_maps": "gelslim_force.contact.depth_map_source",
         "read_reference": "gelslim_force.calibration.reference_picture",
-        "read_run": "gelslim_force.outputs.recorded_run",
-        "run_frames": "gelslim_force.run",
         "write_calibration": "gelslim_force.calibration.file",
     },
 )

@@ -1,4 +1,4 @@
-"""How far a built sensor is from its design, in numbers."""
+"""Deviation of a built sensor from its design, in numbers."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _STEP = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class BuiltDeviation:
-    """The fitted deviations with what follows from them on the pad."""
+    """The fitted deviations, and their effects on the gel and in the picture."""
 
     values: Array
     """(13,) in the order and units of `camera_deviation.PARAMETERS`."""
     sigma: Array
     """(13,) their standard deviations."""
     tolerance: Array
-    """(13,) standard deviations expected of the build."""
+    """(13,) standard deviations that are expected of a built sensor."""
     weak: tuple[tuple[float, Array], ...]
     """See `CameraFit.weak_directions`."""
     rotation_deg: float
@@ -40,28 +40,31 @@ class BuiltDeviation:
     scale_percent: float
     """Change of the picture's mean scale (px per mm) over the print."""
     distortion_px: float
-    """Largest change of a dot's place by the change of the distortion alone."""
+    """Largest shift of a dot in the picture by the change of the distortion alone."""
     moved_px: float
-    """Median distance of the dots from where the design's camera would see them."""
+    """Median distance of the dots from where the designed camera would see them."""
     map_sigma_mm: float
-    """Root mean square uncertainty of places on the gel, each axis, from the camera's fit."""
+    """Root mean square uncertainty of positions on the gel, per axis, from the camera's fit."""
     lean_sigma_mm_per_mm: float
-    """Root mean square uncertainty of the sideways motion that a press of 1 mm seems to make."""
+    """Root mean square uncertainty of the apparent lateral motion per mm of depth."""
     noise_px: float
     """Standard deviation of one dot along one axis: detection and print."""
     own_mm: float
-    """The same on the gel, against the neighbours."""
+    """The same on the gel in mm, relative to the neighbours."""
     shared_mm: float
-    """Root mean square of what neighbours are off by together."""
+    """Root mean square of the displacement that neighbouring dots have in common."""
 
 
 def built_deviation(
     fit: CameraFit, rest_mm: Array, points_mm: Array, residuals: ResidualField
 ) -> BuiltDeviation:
-    """Return the numbers of a fit; `rest_mm` (n, 2) and `points_mm` (n, 3) are its dots."""
+    """Derive the numbers from a fit.
+
+    `rest_mm` (n, 2) are the positions of the dots as seen, `points_mm` (n, 3) those in the print.
+    """
     design, built = fit.design, fit.camera
     was, now = (np.sqrt(np.abs(np.linalg.det(c.jacobian(points_mm)))) for c in (design, built))
-    place, lean = _uncertainty(fit, points_mm)
+    position_sigma, apparent_sigma = _uncertainty(fit, points_mm)
     seen = built.project(np.column_stack([rest_mm, points_mm[:, 2]]))
     moved = seen - design.project(points_mm)
     return BuiltDeviation(
@@ -72,35 +75,39 @@ def built_deviation(
         rotation_deg=float(np.linalg.norm(fit.values[:3])),
         shift_mm=float(np.linalg.norm(fit.values[3:6])),
         scale_percent=float(100 * (np.mean(now) / np.mean(was) - 1)),
-        distortion_px=_bent_px(fit, points_mm),
+        distortion_px=_distortion_px(fit, points_mm),
         moved_px=float(np.median(np.hypot(*moved.T))),
-        map_sigma_mm=place,
-        lean_sigma_mm_per_mm=lean,
+        map_sigma_mm=position_sigma,
+        lean_sigma_mm_per_mm=apparent_sigma,
         noise_px=fit.noise_px,
         own_mm=residuals.own_mm,
         shared_mm=residuals.shared_mm,
     )
 
 
-def lean_mm_per_mm(camera: VirtualCamera, flat_mm: Array) -> Array:
-    """Return the motion (n, 2) on the rest plane that a motion of 1 mm along z looks like."""
+def apparent_motion_per_mm(camera: VirtualCamera, flat_mm: Array) -> Array:
+    """(n, 2) apparent lateral motion, in mm, of points that move by 1 mm along z."""
     motion = camera.jacobian_3d(flat_mm)
     return np.asarray(np.linalg.solve(motion[:, :, :2], motion[:, :, 2:])[:, :, 0], dtype=float)
 
 
 def _uncertainty(fit: CameraFit, flat: Array) -> tuple[float, float]:
-    """Rms standard deviation along one axis of places on the gel and of their lean."""
+    """Root mean square standard deviations of positions on the gel and of the apparent motion."""
     to_gel = np.linalg.inv(fit.camera.jacobian(flat))
-    places, leans = [], []
+    position_slopes, apparent_slopes = [], []
     for k, unit in enumerate(fit.tolerance):
         step = np.zeros(len(fit.tolerance))
         step[k] = _STEP * unit
         low, high = (deviated_camera(fit.design, fit.values + s * step) for s in (-1, 1))
         moved = (high.project(flat) - low.project(flat)) / (2 * step[k])
-        places.append((to_gel @ moved[:, :, None])[:, :, 0])
-        leans.append((lean_mm_per_mm(high, flat) - lean_mm_per_mm(low, flat)) / (2 * step[k]))
-    place, lean = (_spread(np.stack(v, axis=-1), fit.covariance) for v in (places, leans))
-    return place, lean
+        position_slopes.append((to_gel @ moved[:, :, None])[:, :, 0])
+        apparent_slopes.append(
+            (apparent_motion_per_mm(high, flat) - apparent_motion_per_mm(low, flat)) / (2 * step[k])
+        )
+    return (
+        _spread(np.stack(position_slopes, axis=-1), fit.covariance),
+        _spread(np.stack(apparent_slopes, axis=-1), fit.covariance),
+    )
 
 
 def _spread(slopes: Array, covariance: Array) -> float:
@@ -108,8 +115,8 @@ def _spread(slopes: Array, covariance: Array) -> float:
     return float(np.sqrt(np.einsum("ki,ij,kj->k", flat, covariance, flat).mean()))
 
 
-def _bent_px(fit: CameraFit, flat: Array) -> float:
-    """Largest move of a dot's place where the built lens replaces the design's."""
+def _distortion_px(fit: CameraFit, flat: Array) -> float:
+    """Largest shift of a dot if the built lens replaces the designed one."""
     straight = dataclasses.replace(fit.camera, lens=None)
     rays = (straight.project(flat) - straight.principal_px) / straight.focal_px
     was, now = ((c.lens or LensDistortion()).distort(rays) for c in (fit.design, fit.camera))

@@ -1,4 +1,4 @@
-"""From one no-contact frame and the known print to the built sensor, or a refusal."""
+"""From one reference picture and the known print to the built sensor, or a refusal."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.calibration.fit import CameraFit, fit_camera
 from gelslim_force.calibration.report import diagnosis_lines, warning_lines
 from gelslim_force.calibration.residual_bump import ResidualField, split_residuals
-from gelslim_force.calibration.sensor_calibration import Calibration, expected_dots
+from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import BORDER, Detections
+from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.bundle_grid import bundle_grid
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.registration import Registration, register
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
     from ifem_export.markers.grid import MarkerGrid
 
 Array = NDArray[np.float64]
-_TOUCHED_PITCHES = 4.5
-"""Around a contact, dots within this are not fitted by."""
+_CONTACT_PITCHES = 4.5
+"""Distance from a contact within which dots are left out of the fit."""
 
 
 @single_threaded
@@ -44,23 +45,24 @@ def calibrate(
     tolerance: CameraTolerance | None = None,
     allow_contact: bool = False,
 ) -> Calibration:
-    """Find the built camera and every marker's place on the gel.
+    """Find the built camera and the position of every marker on the gel.
 
     Args:
-        bundle: the sensor's design, with markers and camera.
+        bundle: The sensor's design, with markers and camera.
         image: (h, w) or (h, w, 3) uint8, without contact.
-        detector: finds the dots; by default set for the sizes that the design's camera sees.
-        tolerance: of the built camera about its design.
-        allow_contact: accept a place where neighbouring dots are off together, for prints that
-            are warped there.
+        detector: Finds the dots; by default set for the sizes that the design's camera sees.
+        tolerance: Standard deviations of the built camera about its design.
+        allow_contact: Accept a region in which neighbouring dots are displaced together, for
+            prints that are warped there.
 
     Returns:
         The built camera, and every marker's position at rest.
 
     Raises:
-        CalibrationError: no such sensor at rest is seen: another size of picture, too few dots,
-            another print, a turned or mirrored picture, contact, a camera far out of tolerance.
-        IfemError: the bundle has no markers or no camera.
+        CalibrationError: The picture does not show this sensor at rest: another size, too few
+            dots, another print, a turned or mirrored picture, contact, or a camera far out of
+            tolerance.
+        IfemError: The bundle has no markers or no camera.
     """
     grid, design = bundle_grid(bundle), bundle_camera(bundle)
     checks.require_size(image, design)
@@ -69,7 +71,7 @@ def calibrate(
     expected = checks.markers_in_view(design, grid)
     checks.require_dots(dots, expected)
     registration = _registered(dots, grid, image, design)
-    found = _whole(registration, dots)
+    found = _uncut(registration, dots)
     chosen = dots.take(registration.dots[found])
     points, diameter = grid.positions_mm[found], grid.diameter_mm[found]
     heights = marker_heights_mm(bundle)[found]
@@ -81,8 +83,9 @@ def calibrate(
         fit, rest, residuals = _fitted(design, flat, diameter, chosen, tolerance, grid.pitch_mm)
     except ValueError as error:
         raise CalibrationError(
-            f"no camera within reason puts the print where the dots are: {error}; use the bundle "
-            "of the sensor that took the picture"
+            "fit",
+            f"no plausible camera puts the print where the dots are: {error}; use the bundle of "
+            "the sensor that took the picture",
         ) from error
     checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     if not allow_contact:
@@ -106,8 +109,8 @@ def calibrate(
     )
 
 
-def _whole(registration: Registration, dots: Detections) -> NDArray[np.int64]:
-    """Ids of the markers found and not cut by the picture's edge."""
+def _uncut(registration: Registration, dots: Detections) -> NDArray[np.int64]:
+    """Ids of the markers that are found and not cut by the picture's edge."""
     found = np.flatnonzero(registration.found)
     cut = (dots.flags[registration.dots[found]] & BORDER) != 0
     return found[~cut]
@@ -121,15 +124,16 @@ def _fitted(
     tolerance: CameraTolerance | None,
     pitch_mm: float,
 ) -> tuple[CameraFit, Array, ResidualField]:
-    """Fit, places (n, 2) on the gel and their residuals; a touched place bends no camera.
+    """The fit, the positions (n, 2) on the gel and their residuals.
 
-    `points_mm` (n, 3) are the print on the gel at rest.
+    `points_mm` (n, 3) is the print on the gel at rest. Where the first fit finds a contact, the
+    second one leaves out the dots near it, so that the contact does not distort the camera.
     """
     points, heights = points_mm[:, :2], points_mm[:, 2]
     clean = dots.trustworthy
-    believed = clean
+    used = clean
     for last in (False, True):
-        fit = fit_camera(design, points, diameter_mm, dots.centres_px, tolerance, believed, heights)
+        fit = fit_camera(design, points, diameter_mm, dots.centres_px, tolerance, used, heights)
         slopes = pixel_slopes(fit.camera, dots.centres_px - fit.offset_px)
         rest = points_along(fit.camera, slopes, heights)[:, :2]
         residuals = split_residuals(points[clean], (rest - points)[clean], pitch_mm)
@@ -137,8 +141,8 @@ def _fitted(
         if last or bump is None:
             break
         away = np.hypot(points[:, 0] - bump.x_mm, points[:, 1] - bump.y_mm)
-        believed = clean & (away > _TOUCHED_PITCHES * pitch_mm)
-        if believed.mean() < 0.5:
+        used = clean & (away > _CONTACT_PITCHES * pitch_mm)
+        if used.mean() < 0.5:
             break
     return fit, rest, residuals
 
@@ -146,11 +150,20 @@ def _fitted(
 def _registered(
     dots: Detections, grid: MarkerGrid, image: NDArray[np.uint8], design: VirtualCamera
 ) -> Registration:
-    """Which dot is which, by the anchors alone where there are any: the picture may be turned."""
+    """Assign dots to markers; by the anchors alone where there are any, as the picture may be
+    turned."""
     camera = None if len(grid.anchor_sites) else design
     try:
         return register(dots, grid, image.shape, camera, pose_tolerance_pitch=0.8)
     except LatticeError as error:
         raise CalibrationError(
-            f"the markers cannot be told apart: {error}. Is this the frame of another sensor?"
+            "lattice",
+            f"the markers cannot be identified: {error}. Is this a picture of another sensor?",
         ) from error
+
+
+def expected_dots(camera: VirtualCamera, grid: MarkerGrid) -> DetectorSettings:
+    """Return a detector's settings for the sizes at which the camera sees the print."""
+    flat = np.column_stack([grid.positions_mm, np.zeros(len(grid))])
+    stretch = np.linalg.svd(camera.jacobian(flat), compute_uv=False)
+    return DetectorSettings.for_diameters((stretch * grid.diameter_mm[:, None]).ravel())

@@ -1,4 +1,4 @@
-"""How a built camera may differ from its design, in thirteen numbers with their tolerances."""
+"""The deviation of a built camera from its design: thirteen numbers with their tolerances."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ PARAMETERS = (
     "principal_y_px",
 )
 """Order of the values: the virtual camera's rotation vector and shift in the sensor frame, the
-change of its focal length, and what is added to the design's distortion coefficients and to the
-place where its axis meets the picture."""
+change of its focal length, and what is added to the design's distortion coefficients and to its
+principal point."""
 
 
 @dataclass(frozen=True)
 class CameraTolerance:
     """Standard deviations of a built camera about its design. Raises ValueError unless > 0.
 
-    Shift along x and y and rotation about z hold the placement of the print on the gel too: flat
-    layers look alike from everywhere, so one picture cannot tell a shifted print from a shifted
-    camera.
+    The shift along x and y and the rotation about z include the placement of the print on the gel:
+    flat layers look the same from everywhere, so that one picture cannot distinguish a shifted
+    print from a shifted camera.
     """
 
     tilt_deg: float = 1.0
@@ -55,8 +55,9 @@ class CameraTolerance:
     tangential: float = 0.004
     """p1 and p2."""
     principal_share: float = 0.002
-    """Offset of the lens from the picture's middle, as a share of the picture's width. Small, as
-    tilt does nearly the same: a larger offset is found all the same where the picture shows it."""
+    """Offset of the principal point from the picture's middle, over the picture's width. It is
+    small because a tilt has nearly the same effect; a larger offset is still found where the
+    picture shows it."""
 
     def __post_init__(self) -> None:
         for name, value in dataclasses.asdict(self).items():
@@ -76,16 +77,16 @@ class CameraTolerance:
 
 
 def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
-    """Return the design's camera changed by `values` (13,), see `PARAMETERS`.
+    """The design's camera changed by `values` (13,), see `PARAMETERS`.
 
-    The camera turns about its own pinhole. Raises ValueError for values that make no camera.
+    The camera turns about its own pinhole. Raises ValueError for values that no camera has.
     """
     v = np.asarray(values, dtype=float)
     if v.shape != (len(PARAMETERS),):
         raise ValueError(f"camera deviation of shape {v.shape}: must be ({len(PARAMETERS)},)")
     turned = Rotation.from_rotvec(np.radians(v[:3])).apply(design.axes)
     lens = design.lens or LensDistortion()
-    bent = LensDistortion(
+    distorted = LensDistortion(
         k1=lens.k1 + v[7], k2=lens.k2 + v[8], p1=lens.p1 + v[9], p2=lens.p2 + v[10], k3=lens.k3
     )
     x, y = design.principal_offset_px
@@ -97,5 +98,5 @@ def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
         down=turned[1],
         forward=turned[2],
         focal_px=design.focal_px * (1 + v[6] / 100),
-        lens=bent if any(dataclasses.astuple(bent)) else None,
+        lens=distorted if any(dataclasses.astuple(distorted)) else None,
     )

@@ -30,7 +30,7 @@ _ARRAYS = ("values", "sigma", "tolerance")
 
 
 def calibration_record(calibration: Calibration) -> dict[str, Any]:
-    """Return plain values: numbers, text, lists and dicts."""
+    """Return the calibration as numbers, strings, lists and dicts."""
     c = calibration
     return {
         "format": FORMAT,
@@ -51,8 +51,8 @@ def calibration_record(calibration: Calibration) -> dict[str, Any]:
 def calibration_of(record: Mapping[str, Any]) -> Calibration:
     """Return the calibration of a record.
 
-    Raises ValueError, KeyError or TypeError for a record of another make; see
-    `read_calibration` for a file's clear words.
+    Raises ValueError, KeyError or TypeError for a record of another format. `read_calibration`
+    turns these into errors that name the file.
     """
     if record.get("format") != FORMAT:
         raise ValueError(f"its format is {record.get('format')!r}, only {FORMAT} is known")
@@ -62,21 +62,21 @@ def calibration_of(record: Mapping[str, Any]) -> Calibration:
         camera=VirtualCamera.from_record(record["camera"]),
         grid=MarkerGrid(
             positions_mm=_floats(grid["positions_mm"]),
-            row=_whole(grid["row"]),
-            column=_whole(grid["column"]),
+            row=_integers(grid["row"]),
+            column=_integers(grid["column"]),
             diameter_mm=_floats(grid["diameter_mm"]),
-            kind=_whole(grid["kind"]),
+            kind=_integers(grid["kind"]),
             pitch_mm=float(grid["pitch_mm"]),
             lattice_shape=(int(grid["lattice_shape"][0]), int(grid["lattice_shape"][1])),
-            omitted=_whole(grid["omitted"]).reshape(-1, 2),
+            omitted=_integers(grid["omitted"]).reshape(-1, 2),
         ),
-        markers=_whole(record["markers"]),
+        markers=_integers(record["markers"]),
         dots=Detections(
             centres_px=_finite(dots["centres_px"], "centres_px"),
             area_px=_finite(dots["area_px"], "area_px"),
             contrast=_finite(dots["contrast"], "contrast"),
             moments_px2=_finite(dots["moments_px2"], "moments_px2"),
-            flags=_whole(dots["flags"]),
+            flags=_integers(dots["flags"]),
         ),
         residual_px=_floats(record["residual_px"]),
         rest_mm=_floats(record["rest_mm"]),
@@ -89,24 +89,45 @@ def calibration_of(record: Mapping[str, Any]) -> Calibration:
 
 
 def write_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> None:
-    """Write the file whole or not at all. Raises OSError."""
+    """Write a calibration to a file.
+
+    The file is replaced as a whole: if writing fails, an earlier file is kept.
+
+    Args:
+        calibration: What to write.
+        path: File to write; its folder must exist.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     replace_file(path, json_bytes(calibration_record(calibration)))
 
 
 def read_calibration(path: str | os.PathLike[str]) -> Calibration:
-    """Read a file. Raises CalibrationError where there is none or it is not to be trusted."""
+    """Read a calibration from a file.
+
+    Args:
+        path: File written by `write_calibration`, or by `gelslim calibrate`.
+
+    Returns:
+        The calibration.
+
+    Raises:
+        CalibrationError: There is no such file, or it is damaged.
+    """
     place = Path(path)
     try:
         record = json.loads(place.read_bytes().decode("utf-8"))
     except OSError as error:
         reason = error.strerror or "cannot be read"
         raise CalibrationError(
-            f"{place}: {reason.lower()}; make it with `gelslim calibrate BUNDLE REFERENCE -o FILE`"
+            "file",
+            f"{place}: {reason.lower()}; make it with `gelslim calibrate BUNDLE REFERENCE -o FILE`",
         ) from error
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise _unusable(place, f"it is no JSON ({error})") from error
+        raise _unusable(place, f"it is not JSON ({error})") from error
     if not isinstance(record, Mapping):
-        raise _unusable(place, "it holds no record")
+        raise _unusable(place, "it does not hold a JSON object")
     try:
         return calibration_of(record)
     except KeyError as error:
@@ -117,8 +138,9 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 def _unusable(place: Path, reason: str) -> CalibrationError:
     return CalibrationError(
-        f"{place} is no calibration that can be used: {reason}; calibrate again with "
-        "`gelslim calibrate BUNDLE REFERENCE -o FILE`"
+        "file",
+        f"{place} is not a calibration that can be used: {reason}; calibrate again with "
+        "`gelslim calibrate BUNDLE REFERENCE -o FILE`",
     )
 
 
@@ -163,19 +185,19 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _array(kind: type) -> Callable[[Any], NDArray[Any]]:
-    def made(values: Any) -> NDArray[Any]:
+def _converter(kind: type) -> Callable[[Any], NDArray[Any]]:
+    def converted(values: Any) -> NDArray[Any]:
         array = np.array(values)
         if array.size and array.dtype.kind not in "if":
             raise ValueError(f"a list holds {array.dtype}, not numbers")
         if kind is np.int64 and not np.array_equal(array, np.rint(array)):
-            raise ValueError("a list of ids, indices or flags holds numbers that are not whole")
+            raise ValueError("a list of ids, indices or flags holds numbers that are not integers")
         return array.astype(kind)
 
-    return made
+    return converted
 
 
-_floats, _whole = _array(np.float64), _array(np.int64)
+_floats, _integers = _converter(np.float64), _converter(np.int64)
 
 
 def _finite(values: Any, name: str) -> NDArray[np.float64]:

@@ -1,9 +1,10 @@
-"""The built camera from the dots of one no-contact frame: least squares with tolerances as prior.
+"""The built camera from the dots of one reference picture: least squares with tolerances as prior.
 
-Minimises the dots' distances from where the camera should see them, over their noise, plus each
-deviation from the design over its tolerance: the most probable camera for normal deviations.
-What one picture of a plane cannot tell (a longer lens or a nearer gel) is thus settled by the
-tolerances, and said to be so.
+The fit minimises the sum of squares of two kinds of terms: the distance of each dot from where the
+camera should see it, over the noise, and each deviation from the design, over its tolerance. This
+is the most probable camera for normally distributed deviations. One picture of a plane cannot
+determine all of them (a longer lens looks like a nearer gel). The tolerances decide these, and
+`CameraFit.weak_directions` lists them.
 """
 
 from __future__ import annotations
@@ -22,17 +23,17 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 Array = NDArray[np.float64]
 _FIRST_NOISE_PX = 0.5
 _LEAST_NOISE_PX = 2e-3
-_SOFT = 2.0
-_FAR = 4.5
+_LOSS_SCALE = 2.0
+_OUTLIER_SIGMAS = 4.5
 _STEP = 1e-4
-_WIDEST = 12.0
+_BOUND = 12.0
 _ROUNDS = 3
 _LEAST_DOTS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class CameraFit:
-    """A fitted camera, what the dots leave over, and how sure each deviation is."""
+    """A fitted camera with the residuals of the dots and the uncertainty of each deviation."""
 
     design: VirtualCamera
     camera: VirtualCamera
@@ -41,7 +42,7 @@ class CameraFit:
     covariance: Array
     """(13, 13) of the values, prior included."""
     information: Array
-    """(13, 13) inverse covariance that the picture alone gives."""
+    """(13, 13) inverse covariance from the picture alone, without the prior."""
     tolerance: Array
     """(13,) prior standard deviations."""
     offset_px: Array
@@ -49,7 +50,7 @@ class CameraFit:
     residual_px: Array
     """(n, 2) seen minus expected centroid."""
     used: NDArray[np.bool_]
-    """(n,) dots the fit rests on; the others lie too far from it."""
+    """(n,) dots that were used; the others are too far from the fit."""
     noise_px: float
     """Standard deviation of a used dot along one axis: detection and print."""
 
@@ -60,10 +61,10 @@ class CameraFit:
 
     @cached_property
     def weak_directions(self) -> list[tuple[float, Array]]:
-        """Combinations of deviations that the picture tells less of than the tolerances do.
+        """Combinations of deviations that the tolerances determine better than the picture does.
 
-        Each with the share of the prior variance that is left (1/2 ... 1) and its direction (13,)
-        in units of the tolerances, unit length, weakest first.
+        Each has the share of the prior variance that remains (1/2 ... 1), and its direction (13,),
+        a unit vector in units of the tolerances. The least determined one is first.
         """
         scaled = self.information * np.outer(self.tolerance, self.tolerance)
         strength, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
@@ -77,23 +78,23 @@ def fit_camera(
     diameter_mm: ArrayLike,
     centres_px: ArrayLike,
     tolerance: CameraTolerance | None = None,
-    believed: ArrayLike | None = None,
+    trusted: ArrayLike | None = None,
     heights_mm: ArrayLike = 0.0,
 ) -> CameraFit:
     """Fit the camera to n dots.
 
     Args:
-        design: where the fit starts.
-        points_mm: (n, 2) dots on the rest plane.
-        diameter_mm: (n,) theirs.
+        design: Where the fit starts.
+        points_mm: (n, 2) positions of the dots on the rest plane.
+        diameter_mm: (n,) diameters of the dots.
         centres_px: (n, 2) centroids seen.
-        tolerance: of the built camera.
-        believed: (n,) dots to fit by; the others get residuals only.
-        heights_mm: one or (n,), of the gel under the dots.
+        tolerance: Standard deviations of the built camera about its design.
+        trusted: (n,) dots that may be used; the others only get residuals.
+        heights_mm: Scalar or (n,) heights of the gel at the dots.
 
-    Two rounds with a robust loss find the noise and the dots that do not belong; the last one
-    is plain least squares over the others. Raises ValueError for shapes that do not fit, values
-    that are not finite or fewer than 12 dots.
+    Two rounds with a robust loss find the noise and the outliers; the last round is ordinary least
+    squares over the other dots. Raises ValueError for shapes that do not fit one another, values
+    that are not finite, or fewer than 12 dots.
     """
     points, seen = np.asarray(points_mm, dtype=float), np.asarray(centres_px, dtype=float)
     diameter = np.asarray(diameter_mm, dtype=float)
@@ -104,27 +105,27 @@ def fit_camera(
     heights = np.broadcast_to(np.asarray(heights_mm, dtype=float), len(points))
     solid = np.column_stack([points, heights])
     problem = _Problem(design, solid, (tolerance or CameraTolerance()).sigma(design))
-    trusted = np.ones(len(points), dtype=bool) if believed is None else np.array(believed, bool)
-    if trusted.sum() < _LEAST_DOTS:
-        raise ValueError(f"{int(trusted.sum())} dots to fit by: at least {_LEAST_DOTS} are needed")
+    usable = np.ones(len(points), dtype=bool) if trusted is None else np.array(trusted, bool)
+    if usable.sum() < _LEAST_DOTS:
+        raise ValueError(f"{int(usable.sum())} dots to fit by: at least {_LEAST_DOTS} are needed")
     unit = np.zeros(len(PARAMETERS))
-    used, noise = trusted, _FIRST_NOISE_PX
-    for turn in range(_ROUNDS):
+    used, noise = usable, _FIRST_NOISE_PX
+    for number in range(_ROUNDS):
         camera = problem.camera(unit)
         offset = centroid_offset_px(camera, points, diameter)
-        last = turn == _ROUNDS - 1
+        last = number == _ROUNDS - 1
         unit = problem.solved(unit, seen - offset, used, noise, robust=not last)
-        left = seen - offset - problem.image(unit)
+        residual = seen - offset - problem.image(unit)
         if not last:
-            noise = max(1.4826 * float(np.median(np.abs(left[trusted]))), _LEAST_NOISE_PX)
-            used = trusted & (np.hypot(*left.T) <= _FAR * noise)
-            used = used if used.sum() >= _LEAST_DOTS else trusted
-    return _judged(problem, unit, offset, left, used, noise)
+            noise = max(1.4826 * float(np.median(np.abs(residual[usable]))), _LEAST_NOISE_PX)
+            used = usable & (np.hypot(*residual.T) <= _OUTLIER_SIGMAS * noise)
+            used = used if used.sum() >= _LEAST_DOTS else usable
+    return _with_uncertainty(problem, unit, offset, residual, used, noise)
 
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Dots (n, 3) at rest and a camera in units of its tolerances."""
+    """The least-squares problem: dots (n, 3) at rest, and a camera in units of its tolerances."""
 
     design: VirtualCamera
     points_mm: Array
@@ -155,7 +156,7 @@ class _Problem:
             try:
                 left = (self.image(u) - target).ravel()[rows] / noise
             except ValueError:
-                # Beyond the distortion's domain: no better than the worst, so the step shrinks.
+                # Outside the distortion's domain the residuals are made huge: the step shrinks.
                 left = np.full(count, 1e6)
             return np.concatenate([left, u])
 
@@ -163,21 +164,21 @@ class _Problem:
             return np.vstack([self.jacobian(u)[rows] / noise, np.eye(len(u))])
 
         def softened(z: Array) -> Array:
-            """Soft absolute value for dots; the prior stays quadratic."""
+            """Pseudo-Huber loss for the dots; the prior stays quadratic."""
             rho = np.vstack([z, np.ones_like(z), np.zeros_like(z)])
-            t = 1 + z[:count] / _SOFT**2
+            t = 1 + z[:count] / _LOSS_SCALE**2
             rho[:, :count] = [
-                2 * _SOFT**2 * (np.sqrt(t) - 1),
+                2 * _LOSS_SCALE**2 * (np.sqrt(t) - 1),
                 1 / np.sqrt(t),
-                -0.5 / _SOFT**2 * t**-1.5,
+                -0.5 / _LOSS_SCALE**2 * t**-1.5,
             ]
             return rho
 
         found = least_squares(
             misfit,
-            np.clip(unit, -0.99 * _WIDEST, 0.99 * _WIDEST),
+            np.clip(unit, -0.99 * _BOUND, 0.99 * _BOUND),
             jac=slopes,
-            bounds=(-_WIDEST, _WIDEST),
+            bounds=(-_BOUND, _BOUND),
             loss=softened if robust else "linear",
             xtol=1e-10,
             ftol=1e-10,
@@ -187,20 +188,20 @@ class _Problem:
         return np.asarray(found.x)
 
 
-def _judged(
+def _with_uncertainty(
     problem: _Problem,
     unit: Array,
     offset: Array,
-    left: Array,
+    residual: Array,
     used: NDArray[np.bool_],
     noise: float,
 ) -> CameraFit:
     slopes = problem.jacobian(unit)[np.repeat(used, 2)]
     squared = slopes.T @ slopes
-    free = squared / noise**2
-    taken = float(np.trace(np.linalg.solve(free + np.eye(len(unit)), free)))
-    spare = max(2 * int(used.sum()) - taken, 1.0)
-    noise = max(float(np.sqrt((left[used] ** 2).sum() / spare)), _LEAST_NOISE_PX)
+    data = squared / noise**2
+    effective = float(np.trace(np.linalg.solve(data + np.eye(len(unit)), data)))
+    freedom = max(2 * int(used.sum()) - effective, 1.0)
+    noise = max(float(np.sqrt((residual[used] ** 2).sum() / freedom)), _LEAST_NOISE_PX)
     scale = np.outer(problem.tolerance, problem.tolerance)
     data = squared / noise**2
     return CameraFit(
@@ -211,7 +212,7 @@ def _judged(
         information=data / scale,
         tolerance=problem.tolerance,
         offset_px=offset,
-        residual_px=left,
+        residual_px=residual,
         used=used,
         noise_px=noise,
     )

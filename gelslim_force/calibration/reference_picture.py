@@ -1,4 +1,4 @@
-"""The no-contact picture from files: one picture, an array, or several of the same to average."""
+"""The reference picture from files: one picture, an array, or several pictures to average."""
 
 from __future__ import annotations
 
@@ -14,24 +14,32 @@ from gelslim_force.frames.frame import FrameSourceError
 from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
 
 MOST_PICTURES = 100
-"""Pictures averaged at most: a tenth of the noise is left."""
+"""Most pictures that are averaged: a tenth of the noise remains."""
 
 
 def read_reference(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """Return the picture (h, w) or (h, w, 3) uint8, channels in the order red, green, blue.
+    """Read a picture without contact.
 
-    `path` is a picture, a NumPy file (h, w[, 3]) or (n, h, w, 3), or a folder of these. Several
-    pictures of the resting gel are averaged, which takes noise away.
-    Raises CalibrationError for what cannot be read, and where OpenCV is needed and absent.
+    Args:
+        path: A picture, a NumPy file with (h, w[, 3]) or (n, h, w, 3), or a folder of these.
+            Several pictures of the gel at rest are averaged, which reduces noise.
+
+    Returns:
+        (h, w) or (h, w, 3) uint8, channels in the order red, green, blue.
+
+    Raises:
+        CalibrationError: The file cannot be read, or OpenCV is needed and not installed.
     """
     place = Path(path)
     if place.is_dir():
         files = sorted(f for f in place.iterdir() if f.suffix.lower() in PICTURE_ENDINGS)
         if not files:
-            raise CalibrationError(f"{place}: no pictures in it ({', '.join(PICTURE_ENDINGS)})")
+            raise CalibrationError(
+                "file", f"{place}: no pictures in it ({', '.join(PICTURE_ENDINGS)})"
+            )
         return _mean([_frames(f) for f in files[:MOST_PICTURES]], place)
     if not place.is_file():
-        raise CalibrationError(f"{place}: no such file; give a picture without contact")
+        raise CalibrationError("file", f"{place}: no such file; give a picture without contact")
     return _mean([_frames(place)], place)
 
 
@@ -40,8 +48,9 @@ def _frames(file: Path) -> NDArray[np.uint8]:
     frames = _array(file) if file.suffix.lower() == ".npy" else _picture(file)
     if frames.dtype != np.uint8 or frames.ndim not in (2, 3, 4) or 0 in frames.shape:
         raise CalibrationError(
-            f"{file}: an array of {frames.dtype} {frames.shape} is no picture; give uint8 "
-            "(h, w), (h, w, 3) or (n, h, w, 3)"
+            "file",
+            f"{file}: an array of {frames.dtype} {frames.shape} is not a picture; give uint8 "
+            "(h, w), (h, w, 3) or (n, h, w, 3)",
         )
     single = frames.ndim == 2 or (frames.ndim == 3 and frames.shape[2] <= 4)
     return frames[None] if single else frames[:MOST_PICTURES]
@@ -51,20 +60,24 @@ def _array(file: Path) -> NDArray[Any]:
     try:
         return np.asarray(np.load(file, allow_pickle=False, mmap_mode="r"))
     except (OSError, ValueError, EOFError) as error:
-        raise CalibrationError(f"{file} is no NumPy array that can be read: {error}") from error
+        raise CalibrationError(
+            "file", f"{file} is not a NumPy array that can be read: {error}"
+        ) from error
 
 
 def _picture(file: Path) -> NDArray[np.uint8]:
     try:
         return read_picture(file)
     except (PictureError, FrameSourceError) as error:
-        raise CalibrationError(f"{file}: {error}") from error
+        raise CalibrationError("file", f"{file}: {error}") from error
 
 
 def _mean(stacks: list[NDArray[np.uint8]], place: Path) -> NDArray[np.uint8]:
     shapes = {s.shape[1:] for s in stacks}
     if len(shapes) > 1:
-        raise CalibrationError(f"{place}: pictures of different sizes, {sorted(shapes, key=str)}")
+        raise CalibrationError(
+            "file", f"{place}: pictures of different sizes, {sorted(shapes, key=str)}"
+        )
     total = np.zeros(stacks[0].shape[1:])
     count = 0
     for stack in stacks:

@@ -1,4 +1,4 @@
-"""What a calibration found, in words."""
+"""What a calibration found, in sentences."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _WORDS = {
     "k2": ("distortion k2", "", 4),
     "p1": ("distortion p1", "", 5),
     "p2": ("distortion p2", "", 5),
-    "principal_x_px": ("lens off the picture's middle, along its rows", " px", 1),
-    "principal_y_px": ("lens off the picture's middle, along its columns", " px", 1),
+    "principal_x_px": ("lens axis from the picture's middle, along its rows", " px", 1),
+    "principal_y_px": ("lens axis from the picture's middle, along its columns", " px", 1),
 }
-_LISTED = 12
-_PART = 0.3
-_ODD_SIGMAS = 2.5
-_WARPED_MM = 0.01
-_RESTLESS_PX = 0.5
+_MOST_IDS = 12
+_LEAST_PART = 0.3
+_LARGE_RATIO = 2.5
+_LARGE_BUMP_MM = 0.01
+_LARGE_NOISE_PX = 0.5
 
 
 def diagnosis_lines(
@@ -42,22 +42,23 @@ def diagnosis_lines(
     grid: MarkerGrid,
     found: NDArray[np.int64],
     missing: NDArray[np.int64],
-    aside: NDArray[np.int64],
+    unused: NDArray[np.int64],
     in_view: NDArray[np.bool_],
 ) -> tuple[str, ...]:
-    """Lines for people: markers, camera, what is left over and what one picture cannot tell.
+    """Sentences on markers, camera, residuals, and what one picture cannot determine.
 
-    `found`, `missing` and `aside` are marker ids: seen, in view but not seen, seen but not fitted
-    by (doubtful or too far off). `in_view` (m,) are the markers the built camera sees whole.
+    `found`, `missing` and `unused` are marker ids: seen; in view but not seen; seen but not used in
+    the fit, because they are doubtful or outliers. `in_view` (m,) are the markers that the built
+    camera sees without a cut.
     """
     d = deviation
     lines = [
         f"{len(found)} of {len(grid)} markers found, {int(in_view.sum())} are in view; missing "
-        f"there: {_ids(missing)}; not fitted by: {_ids(aside)}.",
-        f"Against the design the camera is turned by {d.rotation_deg:.2f}° and shifted by "
+        f"there: {_ids(missing)}; not used in the fit: {_ids(unused)}.",
+        f"Relative to the design the camera is rotated by {d.rotation_deg:.2f}° and shifted by "
         f"{d.shift_mm:.2f} mm; the picture's scale differs by {d.scale_percent:+.2f} %, its "
-        f"distortion by up to {d.distortion_px:.2f} px; dots lie {d.moved_px:.1f} px from where "
-        "the design would have them (median).",
+        f"distortion by up to {d.distortion_px:.2f} px; the median dot is {d.moved_px:.1f} px from "
+        "where the design has it.",
     ]
     for name, value, sigma, usual in zip(PARAMETERS, d.values, d.sigma, d.tolerance, strict=True):
         words, unit, places = _WORDS[name]
@@ -66,18 +67,19 @@ def diagnosis_lines(
             f"({abs(value) / usual:.1f} of its tolerance {usual:g}{unit})"
         )
     lines.append(
-        f"A dot is off by {d.noise_px:.3f} px on each axis ({d.own_mm * 1000:.1f} µm on the gel, "
-        f"detection and print together); neighbours share {d.shared_mm * 1000:.1f} µm."
+        f"The noise of a dot is {d.noise_px:.3f} px per axis ({d.own_mm * 1000:.1f} µm on the gel, "
+        "from detection and print); neighbouring dots have a displacement of "
+        f"{d.shared_mm * 1000:.1f} µm in common."
     )
     lines.append(
-        f"The fit leaves places on the gel uncertain by {d.map_sigma_mm * 1000:.2f} µm, and the "
-        f"sideways motion that a press of 1 mm seems to make by "
+        f"The fit leaves positions on the gel uncertain by {d.map_sigma_mm * 1000:.2f} µm, and the "
+        f"apparent lateral motion of a marker pressed in by 1 mm by "
         f"{d.lean_sigma_mm_per_mm * 1000:.2f} µm."
     )
     lines.append(_weak_line(d))
     lines.append(
         "The scale of the print and the thickness of the layers are taken as designed; a shift or "
-        "turn of the print on the gel counts as the camera's."
+        "rotation of the print on the gel is attributed to the camera."
     )
     return tuple(lines)
 
@@ -87,36 +89,37 @@ def warning_lines(
     residuals: ResidualField,
     grid: MarkerGrid,
     missing: NDArray[np.int64],
-    aside: NDArray[np.int64],
+    unused: NDArray[np.int64],
     in_view: NDArray[np.bool_],
 ) -> tuple[str, ...]:
-    """Return what deserves a look before the calibration is trusted."""
+    """Sentences on what should be looked at before the calibration is trusted."""
     lines = []
     if len(missing) > 0.05 * in_view.sum():
         lines.append(
             f"{len(missing)} of {int(in_view.sum())} markers in view are missing: clean the gel "
-            "or look at the light"
+            "or check the light"
         )
     if not in_view.all():
-        lines.append(f"{int((~in_view).sum())} markers lie outside the picture or are cut by it")
-    if len(aside) > 0.05 * len(grid):
+        lines.append(f"{int((~in_view).sum())} markers are outside the picture or cut by its edge")
+    if len(unused) > 0.05 * len(grid):
         lines.append(
-            f"{len(aside)} markers are doubtful or too far from the print to fit by: dirt, or a "
-            "poor print"
+            f"{len(unused)} markers are doubtful or too far from the print to be used in the fit: "
+            "dirt, or a poor print"
         )
     for name, ratio in zip(PARAMETERS, deviation.values / deviation.tolerance, strict=True):
-        if abs(ratio) > _ODD_SIGMAS:
+        if abs(ratio) > _LARGE_RATIO:
             lines.append(f"{_WORDS[name][0]} is off by {abs(ratio):.1f} times its tolerance")
-    if deviation.noise_px > _RESTLESS_PX:
+    if deviation.noise_px > _LARGE_NOISE_PX:
         lines.append(
-            f"dots scatter by {deviation.noise_px:.2f} px: a poor print, or a picture out of focus"
+            f"the noise of the dots is {deviation.noise_px:.2f} px: a poor print, or a picture out "
+            "of focus"
         )
     bump = residuals.bump
-    if bump is not None and bump.significant and bump.shift_mm > _WARPED_MM:
+    if bump is not None and bump.significant and bump.shift_mm > _LARGE_BUMP_MM:
         lines.append(
-            f"near x = {bump.x_mm:.1f}, y = {bump.y_mm:.1f} mm the dots are off by "
+            f"near x = {bump.x_mm:.1f}, y = {bump.y_mm:.1f} mm the dots are displaced by "
             f"{bump.shift_mm * 1000:.0f} µm together: a light touch, a warped print, or a lens "
-            "that the distortion's terms do not describe"
+            "that the model of distortion does not describe"
         )
     if len(grid.anchor_sites) == 0:
         lines.append(
@@ -129,20 +132,22 @@ def warning_lines(
 def _ids(ids: NDArray[np.int64]) -> str:
     if not len(ids):
         return "none"
-    listed = ", ".join(str(k) for k in ids[:_LISTED])
-    return f"{len(ids)} ({listed}{', …' if len(ids) > _LISTED else ''})"
+    listed = ", ".join(str(k) for k in ids[:_MOST_IDS])
+    return f"{len(ids)} ({listed}{', …' if len(ids) > _MOST_IDS else ''})"
 
 
 def _weak_line(deviation: BuiltDeviation) -> str:
     if not deviation.weak:
         return "The picture determines every deviation better than the tolerances do."
-    told = []
+    lines = []
     for left, direction in deviation.weak:
         parts = [
             f"{_WORDS[name][0].removesuffix(', print included')} {share * usual:+.2g}"
             f"{_WORDS[name][1]}"
             for name, share, usual in zip(PARAMETERS, direction, deviation.tolerance, strict=True)
-            if abs(share) >= _PART
+            if abs(share) >= _LEAST_PART
         ]
-        told.append(f"{' with '.join(parts)} ({left:.0%} of the prior variance is left)")
-    return "The picture hardly tells these apart, the tolerances decide: " + "; ".join(told) + "."
+        lines.append(f"{' with '.join(parts)} ({left:.0%} of the prior variance remains)")
+    return (
+        "The picture hardly distinguishes these, the tolerances decide: " + "; ".join(lines) + "."
+    )

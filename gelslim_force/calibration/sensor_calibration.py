@@ -1,4 +1,4 @@
-"""What tracking and forces need to know about one built sensor."""
+"""What tracking and forces need to know of one built sensor."""
 
 from __future__ import annotations
 
@@ -9,57 +9,56 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import Detections
-from gelslim_force.detection.disc_centroid import centroid_offset_px
 from gelslim_force.detection.settings import DetectorSettings
-from gelslim_force.lattice.bundle_grid import bundle_grid
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.tracker import Tracker, TrackerSettings
-from gelslim_optics.camera.back_projection import pixel_slopes
-from gelslim_optics.camera.rays import points_along
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from ifem_export.markers.grid import MarkerGrid
 
 if TYPE_CHECKING:
     from gelslim_force.calibration.built_deviation import BuiltDeviation
-    from gelslim_force.lattice.registration import Registration
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-_REACH = 2
-"""Sites within which a marker needs another to be tracked."""
+_REACH_SITES = 2
+"""Lattice sites within which a marker needs another one to be tracked."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The built camera and the n markers found in a no-contact frame, in order of their ids.
+    """The built camera, and the n markers found in a reference picture, in order of their ids.
 
-    Raises ValueError where arrays disagree.
+    Attributes:
+        camera: The camera as built.
+        grid: The print as designed.
+        markers: (n,) ids in the grid, and in the bundle.
+        dots: The n markers' dots in the reference picture.
+        residual_px: (n, 2) seen minus expected centre.
+        rest_mm: (n, 2) position of each marker on the gel as seen, errors of the print included.
+        detector: Settings with which the dots were found.
+        geometry_hash: Of the bundle that this calibration belongs to.
+        deviation: Deviation of the built sensor from its design; None if it was not fitted.
+        diagnosis: What was found, in sentences.
+        warnings: What should be looked at before the calibration is trusted.
+
+    Raises:
+        ValueError: The arrays contradict one another.
     """
 
     camera: VirtualCamera
-    """As built; as designed in a nominal calibration."""
     grid: MarkerGrid
     markers: NDArray[np.int64]
-    """(n,) ids in the grid, and in the bundle."""
     dots: Detections
-    """The n markers' dots in the no-contact frame."""
     residual_px: Array
-    """(n, 2) seen minus expected centre."""
     rest_mm: Array
-    """(n, 2) where each marker is on the gel, as seen: the print's own errors included."""
     detector: DetectorSettings
     geometry_hash: str
-    """Of the bundle that this calibration belongs to."""
     deviation: BuiltDeviation | None = None
-    """None in a nominal calibration."""
     diagnosis: tuple[str, ...] = ()
-    """Lines for people."""
     warnings: tuple[str, ...] = ()
-    """What deserves a look before the calibration is trusted."""
 
     def __post_init__(self) -> None:
         count = len(self.markers)
@@ -78,7 +77,7 @@ class Calibration:
                 f"calibration: a marker id is not among the {len(self.grid)} of the print"
             )
         if np.any(np.diff(self.markers) <= 0):
-            raise ValueError("calibration: marker ids must rise")
+            raise ValueError("calibration: marker ids must increase")
 
     def __len__(self) -> int:
         """Return the number of markers found."""
@@ -86,12 +85,12 @@ class Calibration:
 
     @property
     def reference_px(self) -> Array:
-        """(n, 2) centres in the no-contact frame."""
+        """(n, 2) centres in the reference picture."""
         return self.dots.centres_px
 
     @property
     def residual_mm(self) -> Array:
-        """(n, 2) where each marker is minus where the print has it."""
+        """(n, 2) position of each marker as seen minus its position in the print."""
         return self.rest_mm - self.grid.positions_mm[self.markers]
 
     @property
@@ -101,10 +100,10 @@ class Calibration:
 
     @cached_property
     def reference(self) -> ReferenceLattice:
-        """The markers to track; one without any neighbour is left out."""
+        """The markers to track; a marker without any neighbour is left out."""
         sites = np.column_stack([self.grid.row, self.grid.column])[self.markers]
-        apart = np.abs(sites[:, None, :] - sites[None, :, :]).max(axis=2)
-        keep = (apart <= _REACH).sum(axis=1) > 1
+        distance = np.abs(sites[:, None, :] - sites[None, :, :]).max(axis=2)
+        keep = (distance <= _REACH_SITES).sum(axis=1) > 1
         return ReferenceLattice(
             sites=sites[keep], positions_px=self.reference_px[keep], markers=self.markers[keep]
         )
@@ -120,43 +119,8 @@ class Calibration:
         """Raise CalibrationError for a bundle of another geometry."""
         if bundle.geometry_hash != self.geometry_hash:
             raise CalibrationError(
+                "bundle",
                 f"the calibration belongs to a sensor of geometry {self.geometry_hash[:12]}, the "
                 f"bundle to {bundle.geometry_hash[:12]}: calibrate again with this bundle, or use "
-                "the bundle it was made with"
+                "the bundle it was made with",
             )
-
-    @classmethod
-    def nominal(
-        cls,
-        bundle: Bundle,
-        registration: Registration,
-        detections: Detections,
-        detector: Detector | None = None,
-    ) -> Calibration:
-        """Take the design's camera as built, with the markers of a registered frame."""
-        grid, camera = bundle_grid(bundle), bundle_camera(bundle)
-        found = np.flatnonzero(registration.found)
-        dots = detections.take(registration.dots[found])
-        points, diameter = grid.positions_mm[found], grid.diameter_mm[found]
-        offset = centroid_offset_px(camera, points, diameter)
-        heights = marker_heights_mm(bundle)[found]
-        at_rest = np.column_stack([points, heights])
-        slopes = pixel_slopes(camera, dots.centres_px - offset)
-        return cls(
-            camera=camera,
-            grid=grid,
-            markers=found,
-            dots=dots,
-            residual_px=dots.centres_px - offset - camera.project(at_rest),
-            rest_mm=points_along(camera, slopes, heights)[:, :2],
-            detector=(detector or Detector(expected_dots(camera, grid))).settings,
-            geometry_hash=bundle.geometry_hash,
-            diagnosis=("The design's camera, not fitted to this sensor.",),
-        )
-
-
-def expected_dots(camera: VirtualCamera, grid: MarkerGrid) -> DetectorSettings:
-    """Return a detector's settings for the sizes at which the camera sees the print."""
-    flat = np.column_stack([grid.positions_mm, np.zeros(len(grid))])
-    stretch = np.linalg.svd(camera.jacobian(flat), compute_uv=False)
-    return DetectorSettings.for_diameters((stretch * grid.diameter_mm[:, None]).ravel())

@@ -46,16 +46,16 @@ def test_bundle_tells_the_camera():
 
 def test_bundles_without_print_or_camera_are_refused():
     bundle = small_bundle(build_marker_grid(9, 9, 1.1, 0.45))
-    with pytest.raises(IfemError, match="no markers"):
+    with pytest.raises(IfemError, match="markers"):
         bundle_grid(dataclasses.replace(bundle, markers=None))
     arrays = {k: v for k, v in bundle.markers.arrays.items() if k != "kind"}
     bare = dataclasses.replace(bundle.markers, arrays=arrays)
-    with pytest.raises(IfemError, match="no kind"):
+    with pytest.raises(IfemError, match="kind"):
         bundle_grid(dataclasses.replace(bundle, markers=bare))
     moved = dataclasses.replace(bundle.markers, positions_mm=bundle.markers.positions_mm + 0.05)
-    with pytest.raises(IfemError, match="off its lattice site"):
+    with pytest.raises(IfemError, match="site"):
         bundle_grid(dataclasses.replace(bundle, markers=moved))
-    with pytest.raises(IfemError, match="no camera"):
+    with pytest.raises(IfemError, match="camera"):
         bundle_camera(dataclasses.replace(bundle, camera={}))
     with pytest.raises(IfemError, match="focal_px"):
         bundle_camera(dataclasses.replace(bundle, camera={**bundle.camera, "focal_px": -3.0}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -13,9 +14,6 @@ from synthetic import Look, grid_of_dots, render
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.camera_deviation import PARAMETERS, deviated_camera
 from gelslim_force.calibration.error import CalibrationError
-from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.detection.detection import Detector
-from gelslim_force.lattice.registration import register
 from ifem_export.errors import IfemError
 from ifem_export.markers.grid import build_marker_grid
 
@@ -99,7 +97,7 @@ def test_frames_without_colour_and_prints_without_anchors():
     assert any("no anchors" in line for line in found.warnings)
 
 
-def test_diagnosis_tells_the_deviations():
+def test_diagnosis_gives_the_deviations():
     found = calibrate(BUNDLE, seen_by(GRID, BUILD, missing=0.04))
     text = "\n".join(found.diagnosis)
     for k, name in ((0, "rotation about x"), (6, "focal length")):
@@ -107,29 +105,29 @@ def test_diagnosis_tells_the_deviations():
         assert float(line.split()[len(name.split())]) == pytest.approx(
             found.deviation.values[k], abs=0.006
         )
-    assert f"{len(found)} of {len(GRID)} markers found" in text
+    assert f"{len(found)} of {len(GRID)}" in text
     assert all(str(k) in text for k in found.missing[:5])
 
 
-def test_poor_builds_and_prints_are_told():
+def test_poor_builds_and_prints_are_warned_of():
     values = BUILD.copy()
     values[PARAMETERS.index("rotation_x_deg")] = 3.2
     tilted = calibrate(BUNDLE, seen_by(GRID, values))
-    assert any("rotation about x is off by 3." in line for line in tilted.warnings)
+    assert any("rotation about x" in line for line in tilted.warnings)
     sparse = calibrate(BUNDLE, seen_by(GRID, BUILD, missing=0.15))
-    assert any("markers in view are missing" in line for line in sparse.warnings)
+    assert any("missing" in line for line in sparse.warnings)
     wave = 0.03 * np.sin(GRID.positions_mm / 1.8)
     warped = calibrate(BUNDLE, seen_by(GRID, BUILD, moved_mm=wave))
-    assert any("warped print" in line for line in warped.warnings)
+    assert any("warped" in line for line in warped.warnings)
 
 
 @pytest.mark.parametrize("press_n", [0.25, 1.0])
 def test_contact_in_the_reference_is_noticed(press_n):
     frame = seen_by(GRID, BUILD, moved_mm=_pressed(press_n), noise=6)
-    with pytest.raises(CalibrationError, match="touches the gel near x") as said:
+    with pytest.raises(CalibrationError) as caught:
         calibrate(BUNDLE, frame)
-    words = str(said.value).replace(",", "").split()
-    x, y = (float(words[words.index(axis) + 2]) for axis in ("x", "y"))
+    assert caught.value.reason == "contact"
+    x, y = caught.value.position_mm
     assert np.hypot(x - 2.0, y + 1.5) < 1.6
     allowed = calibrate(BUNDLE, frame, allow_contact=True)
     far = np.hypot(*(GRID.positions_mm - [2.0, -1.5]).T) > 5
@@ -145,23 +143,28 @@ def _pressed(newtons):
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "reason", "value"),
     [
-        (lambda im: im[::-1], "mirrored top to bottom"),
-        (lambda im: im[:, ::-1], "mirrored left to right"),
-        (lambda im: im[::-1, ::-1], "turned by 180°"),
-        (lambda im: np.rot90(im), "lies on its side"),
-        (lambda im: im[::2, ::2], "320 x 240 px"),
-        (lambda im: im[:, :, :2], "h, w, 3"),
-        (lambda im: im.astype(float), "uint8"),
-        (lambda im: np.full_like(im, 120), "dots are seen"),
-        (lambda im: np.where(np.arange(640)[:, None] < 360, im, 5).astype(np.uint8), "anchors|are"),
+        (lambda im: im[::-1], "orientation", "top to bottom"),
+        (lambda im: im[:, ::-1], "orientation", "left to right"),
+        (lambda im: im[::-1, ::-1], "orientation", "180°"),
+        (lambda im: np.rot90(im), "size", "480 x 640 px"),
+        (lambda im: im[::2, ::2], "size", "320 x 240 px"),
+        (lambda im: im[:, :, :2], "size", "h, w, 3"),
+        (lambda im: im.astype(float), "size", "uint8"),
+        (lambda im: np.full_like(im, 120), "dots", "0 dots"),
+        (
+            lambda im: np.where(np.arange(640)[:, None] < 360, im, 5).astype(np.uint8),
+            ("dots", "print", "lattice"),
+            None,
+        ),
     ],
 )
-def test_pictures_that_are_no_reference(change, words):
+def test_pictures_that_are_no_reference(change, reason, value):
     frame = seen_by(GRID, 0.5 * BUILD)
-    with pytest.raises(CalibrationError, match=words):
+    with pytest.raises(CalibrationError, match=value) as caught:
         calibrate(BUNDLE, np.ascontiguousarray(change(frame)))
+    assert caught.value.reason in (reason if isinstance(reason, tuple) else (reason,))
 
 
 @pytest.mark.parametrize("turned", ["rot90", "transpose"])
@@ -170,9 +173,10 @@ def test_square_pictures_on_their_side(turned):
     grid = build_marker_grid(15, 13, 1.1, 0.45)
     frame = render(grid, square).image
     frame = np.rot90(frame) if turned == "rot90" else frame.transpose(1, 0, 2)
-    words = "turned by 90° anticlockwise" if turned == "rot90" else "transposed"
-    with pytest.raises(CalibrationError, match=words):
+    value = "90° anticlockwise" if turned == "rot90" else "transposed"
+    with pytest.raises(CalibrationError, match=value) as caught:
         calibrate(small_bundle(grid, square), np.ascontiguousarray(frame))
+    assert caught.value.reason == "orientation"
 
 
 def test_frames_of_another_sensor():
@@ -182,23 +186,26 @@ def test_frames_of_another_sensor():
     with pytest.raises(CalibrationError):
         calibrate(small_bundle(other), seen_by(GRID, BUILD))
     finer = build_marker_grid(19, 18, 0.95, 0.4)
-    with pytest.raises(CalibrationError, match=r"is not this design's|within reason"):
+    with pytest.raises(CalibrationError) as caught:
         calibrate(BUNDLE, seen_by(finer, np.zeros(len(BUILD))))
+    assert caught.value.reason in ("camera", "fit")
     kind = np.roll(GRID.kind, 7 * 18 + 3)
     size = np.where(kind == 1, GRID.diameter_mm.max(), GRID.diameter_mm.min())
     moved = dataclasses.replace(GRID, kind=kind, diameter_mm=size)
-    with pytest.raises(CalibrationError, match=r"anchors|told apart"):
+    with pytest.raises(CalibrationError) as caught:
         calibrate(BUNDLE, seen_by(moved, np.zeros(len(BUILD))))
+    assert caught.value.reason in ("anchors", "lattice")
 
 
 def test_another_camera_is_refused():
     steep = finger_view(tilt_deg=16.0)
-    with pytest.raises(CalibrationError, match="is not this design's"):
+    with pytest.raises(CalibrationError) as caught:
         calibrate(small_bundle(GRID, steep), seen_by(GRID, np.zeros(len(BUILD))))
+    assert caught.value.reason == "camera"
 
 
 def test_bundle_without_markers_is_refused():
-    with pytest.raises(IfemError, match="no markers"):
+    with pytest.raises(IfemError, match="markers"):
         calibrate(dataclasses.replace(BUNDLE, markers=None), seen_by(GRID, BUILD))
 
 
@@ -217,16 +224,11 @@ def test_tracker_follows_the_calibrated_markers():
     assert np.abs(now - found.rest_mm[moved.tracked] - expected).max() < 0.006
 
 
-def test_nominal_calibration_keeps_the_design():
-    frame = render(GRID, finger_view()).image
-    dots = Detector().detect(frame)
-    registration = register(dots, GRID, frame.shape)
-    nominal = Calibration.nominal(BUNDLE, registration, dots)
-    assert nominal.camera.to_record() == finger_view().to_record()
-    assert nominal.deviation is None
-    assert np.abs(nominal.residual_px).max() < 0.08
-    assert np.abs(nominal.residual_mm).max() < 0.005
-    nominal.require_bundle(BUNDLE)
-    with pytest.raises(CalibrationError, match="belongs to a sensor"):
-        nominal.require_bundle(small_bundle(build_marker_grid(14, 13, 1.5, 0.6)))
-    assert nominal.tracker().update(frame).tracks.coverage == 1.0
+def test_a_calibration_belongs_to_one_bundle():
+    found = calibrate(BUNDLE, seen_by(GRID, BUILD))
+    found.require_bundle(BUNDLE)
+    with pytest.raises(CalibrationError) as caught:
+        found.require_bundle(small_bundle(build_marker_grid(14, 13, 1.5, 0.6)))
+    assert caught.value.reason == "bundle"
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (again.reason, str(again)) == ("bundle", str(caught.value))

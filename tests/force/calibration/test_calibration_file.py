@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
@@ -62,46 +63,43 @@ def _without(name):
 
 
 @pytest.mark.parametrize(
-    ("damage", "words"),
+    ("damage", "value"),
     [
-        (_without("camera"), "camera is missing"),
-        (lambda r: r.update(format="gelslim-calibration/2"), "only gelslim-calibration/1"),
-        (lambda r: r["markers"].append(3), "must be|dots for"),
-        (lambda r: r["markers"].__setitem__(0, 4000), "rise|not among"),
+        (_without("camera"), "camera"),
+        (lambda r: r.update(format="gelslim-calibration/2"), "gelslim-calibration/1"),
+        (lambda r: r["markers"].append(3), "residual_px"),
+        (lambda r: r["markers"].__setitem__(0, 4000), "marker id"),
         (lambda r: r["rest_mm"].pop(), "rest_mm"),
-        (lambda r: r["rest_mm"].__setitem__(2, ["a", "b"]), "not numbers"),
+        (lambda r: r["rest_mm"].__setitem__(2, ["a", "b"]), "rest_mm|numbers"),
         (lambda r: r["rest_mm"].__setitem__(2, [float("nan"), 0.0]), "finite"),
-        (lambda r: r["dots"]["area_px"].pop(), "centres_px has shape"),
-        (lambda r: r["dots"]["flags"].__setitem__(0, 0.5), "whole"),
-        (lambda r: r["grid"]["row"].__setitem__(0, 7), "marker grid"),
+        (lambda r: r["dots"]["area_px"].pop(), "centres_px"),
+        (lambda r: r["dots"]["flags"].__setitem__(0, 0.5), "integers"),
+        (lambda r: r["grid"]["row"].__setitem__(0, 7), "grid"),
         (lambda r: r["camera"].update(focal_px=-1), "focal_px"),
         (lambda r: r["detector"].update(colour=1), "colour"),
-        (lambda r: r["deviation"]["values"].pop("k1"), "k1 is missing"),
-        (lambda r: r.update(grid=3), "no calibration"),
+        (lambda r: r["deviation"]["values"].pop("k1"), "k1"),
+        (lambda r: r.update(grid=3), "damaged.json"),
     ],
 )
-def test_damaged_records_are_named(found, tmp_path, damage, words):
+def test_damaged_records_are_named(found, tmp_path, damage, value):
     record = json.loads(json.dumps(calibration_record(found)))
     damage(record)
     path = tmp_path / "damaged.json"
     path.write_text(json.dumps(record), encoding="utf-8")
-    with pytest.raises(CalibrationError, match=words):
+    with pytest.raises(CalibrationError, match=value) as caught:
         read_calibration(path)
+    assert caught.value.reason == "file"
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [(b"", "no JSON"), (b"{", "no JSON"), (b"\xff\xfe", "no JSON"), (b"[1]", "no record")],
-)
-def test_rubbish_is_named(tmp_path, content, words):
-    path = tmp_path / "rubbish.json"
-    path.write_bytes(content)
-    with pytest.raises(CalibrationError, match=words):
-        read_calibration(path)
-    with pytest.raises(CalibrationError, match="no such file"):
-        read_calibration(tmp_path / "none.json")
-    with pytest.raises(CalibrationError, match="directory"):
-        read_calibration(tmp_path)
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[1]", None])
+def test_files_that_are_no_calibration(tmp_path, content):
+    path = tmp_path / "file.json"
+    if content is not None:
+        path.write_bytes(content)
+    for place in (path, tmp_path):
+        with pytest.raises(CalibrationError, match=re.escape(str(place))) as caught:
+            read_calibration(place)
+        assert caught.value.reason == "file"
 
 
 def test_reference_pictures(tmp_path):
@@ -118,7 +116,7 @@ def test_reference_pictures(tmp_path):
         np.save(folder / f"{k}.npy", frame)
     np.testing.assert_array_equal(read_reference(folder), mean)
     np.save(folder / "5.npy", frames[0, :10])
-    with pytest.raises(CalibrationError, match="different sizes"):
+    with pytest.raises(CalibrationError, match=r"\(10, 30, 3\)"):
         read_reference(folder)
 
 
@@ -138,17 +136,11 @@ def test_what_is_no_picture_is_named(tmp_path):
     np.save(tmp_path / "object.npy", np.array([{}], dtype=object), allow_pickle=True)
     (tmp_path / "none").mkdir()
     pytest.importorskip("cv2")
-    for name, words in (
-        ("empty.png", "the file is empty"),
-        ("text.png", "no picture"),
-        ("bad.npy", "no NumPy array"),
-        ("object.npy", "no NumPy array"),
-        ("float.npy", "float64"),
-        ("none", "no pictures in it"),
-        ("absent.png", "no such file"),
-    ):
-        with pytest.raises(CalibrationError, match=words):
+    names = ("empty.png", "text.png", "bad.npy", "object.npy", "float.npy", "none", "absent.png")
+    for name in names:
+        with pytest.raises(CalibrationError, match=name) as caught:
             read_reference(tmp_path / name)
+        assert caught.value.reason == "file"
 
 
 def test_half_a_picture_is_no_reference(tmp_path):
@@ -157,7 +149,7 @@ def test_half_a_picture_is_no_reference(tmp_path):
     image.fromarray(noise).save(tmp_path / "whole.jpg")
     whole = (tmp_path / "whole.jpg").read_bytes()
     (tmp_path / "half.jpg").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(CalibrationError, match=r"half.jpg: damaged"):
+    with pytest.raises(CalibrationError, match=r"half\.jpg"):
         read_reference(tmp_path / "half.jpg")
 
 
@@ -167,5 +159,5 @@ def test_missing_readers_of_pictures_name_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
     (tmp_path / "picture.png").write_bytes(b"x")
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(CalibrationError, match="gelslim-cad\\[vision\\]"):
+    with pytest.raises(CalibrationError, match="install"):
         read_reference(tmp_path / "picture.png")

@@ -129,12 +129,12 @@ def test_lens_of_the_design_is_kept_and_changed():
 
 def test_impossible_input_is_refused():
     seen = _seen(DESIGN)
-    with pytest.raises(ValueError, match="must be \\(n, 2\\)"):
+    with pytest.raises(ValueError, match="points"):
         fit_camera(DESIGN, GRID.positions_mm, GRID.diameter_mm, seen[:-1])
     seen[3] = np.nan
-    with pytest.raises(ValueError, match="all finite"):
+    with pytest.raises(ValueError, match="finite"):
         _fit(seen)
-    with pytest.raises(ValueError, match="at least 12"):
+    with pytest.raises(ValueError, match="12"):
         fit_camera(DESIGN, GRID.positions_mm[:9], GRID.diameter_mm[:9], seen[4:13])
     with pytest.raises(ValueError, match="k1"):
         CameraTolerance(k1=0.0)
