@@ -36,7 +36,8 @@ BELOW: dict[str, tuple[str, ...]] = {
 
 ROOMS: dict[str, tuple[str, ...]] = {
     "gelslim_core": (
-        "errors", "lazy", "extras", "figure", "kernel_cache", "budget", "files", "jobs", "yaml",
+        "errors", "lazy", "extras", "optional_library", "figure", "kernel_cache", "budget", "files",
+        "jobs", "yaml",
     ),
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (

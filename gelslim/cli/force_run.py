@@ -11,7 +11,7 @@ import typer
 
 if TYPE_CHECKING:
     from gelslim_force.outputs.overlay import Overlay
-    from gelslim_force.outputs.overlay_sink import PictureSink
+    from gelslim_force.outputs.sinks import PictureSink
     from gelslim_force.pipeline import ForcePipeline
     from gelslim_force.run import RunSummary
 
@@ -45,9 +45,9 @@ def result_sinks(
     `chosen` goes into the run's manifest. Raises CommandError for files that are not to be
     replaced.
     """
-    from gelslim_force.outputs.result_sinks import RecorderSink
     from gelslim_force.outputs.run_manifest import bundle_identity
     from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
+    from gelslim_force.outputs.sinks import RecorderSink
 
     identity = bundle_identity(pipeline.bundle)
     overlay = _overlay(pipeline)
@@ -64,7 +64,7 @@ def result_sinks(
         sinks.append(_view_sink(stack, overlay, outputs.quiet))
     if not outputs.pictures:
         return sinks, None
-    from gelslim_force.outputs.overlay_sink import PictureSink
+    from gelslim_force.outputs.sinks import PictureSink
 
     kept = PictureSink(overlay, outputs.folder / "pictures", outputs.pictures)
     return [*sinks, kept], kept
@@ -73,7 +73,7 @@ def result_sinks(
 def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -> Any:
     from gelslim.cli.output import spare_strangers
     from gelslim_force.outputs.mcap_recording import McapRecording
-    from gelslim_force.outputs.result_sinks import RecorderSink
+    from gelslim_force.outputs.sinks import RecorderSink
 
     if overwrite:
         spare_strangers(target, b"gelslim", "recording of gelslim")
@@ -86,8 +86,8 @@ def _video(
 ) -> Any:
     from gelslim.cli.failure import CommandError
     from gelslim_force.outputs.arrow_scale import Extent, LiveScale
-    from gelslim_force.outputs.overlay_sink import VideoSink
     from gelslim_force.outputs.overlay_video import OverlayVideo
+    from gelslim_force.outputs.sinks import VideoSink
 
     if target.exists() and not overwrite:
         raise CommandError(f"{target} exists; give another --video, or --force to replace it")
@@ -98,7 +98,7 @@ def _video(
 def _view_sink(stack: ExitStack, overlay: Overlay, quiet: bool) -> Any:
     from gelslim_force.outputs.arrow_scale import Extent, LiveScale
     from gelslim_force.outputs.live_view import LiveView
-    from gelslim_force.outputs.overlay_sink import ViewSink
+    from gelslim_force.outputs.sinks import ViewSink
 
     live = stack.enter_context(LiveView())
     if not quiet:

@@ -1,1 +1,1 @@
-"""Where frames come from: folders of pictures, videos, NumPy arrays, live cameras."""
+"""Sources of frames: folders of pictures, videos, NumPy arrays, live cameras."""

@@ -1,83 +1,80 @@
-"""One frame of a source, or the reason why there is none; and what every source offers."""
+"""A frame of a source, and the interface of all sources."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.extras import install_command
-from ifem_export.errors import IfemError
+from gelslim_core.errors import GelslimError
 
 Picture = NDArray[np.uint8]
-"""(h, w) grey or (h, w, 3) red, green, blue; contiguous."""
+"""(h, w) grey or (h, w, 3) in the order red, green, blue; contiguous."""
 
 
-class FrameSourceError(IfemError):
-    """Nothing can be read from what was named as a source; the message says why."""
+class FrameSourceError(GelslimError, ValueError):
+    """No frame can be read from a source."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A frame as it comes from a source."""
+    """A frame of a source.
+
+    Attributes:
+        index: Number in the source, from 0. A live source that is faster than its reader leaves
+            gaps.
+        time_s: Time since the first frame; the index if the source has no rate.
+        image: The picture, or None if it could not be read.
+        problem: Why it could not be read.
+        name: Name of the file, for a source of several files.
+    """
 
     index: int
-    """Number in the source, from 0; a gap is where a live source was too fast."""
     time_s: float
-    """From the first frame on; the number of the frame where the source knows no rate."""
     image: Picture | None
-    """None where the frame could not be read."""
     problem: str = ""
-    """Why it could not be read."""
     name: str = ""
-    """File, for a source of several."""
 
 
 class FrameSource(Protocol):
-    """Frames in order. Leaving its `with` block, or `close`, frees files and cameras."""
+    """Frames in order; `close`, or the end of a `with` block, frees files and cameras."""
 
     @property
     def count(self) -> int | None:
-        """Frames expected; None where that is not known."""
+        """Number of frames; None if it is not known."""
 
     @property
     def frames_per_s(self) -> float | None:
-        """Rate; None where that is not known."""
+        """Rate; None if it is not known."""
 
     @property
     def live(self) -> bool:
-        """Whether frames come at their own pace, and stale ones are worth nothing."""
+        """Whether frames arrive in real time, so that old ones may be dropped."""
 
     def __iter__(self) -> Iterator[Frame]:
-        """Yield every frame, unreadable ones too."""
+        """Yield every frame, also those that cannot be read."""
 
     def close(self) -> None:
-        """Free what is held; a second call does nothing."""
+        """Free files and cameras; a second call does nothing."""
 
 
-class SourceContext:
-    """A source's `with` block."""
+class SourceContext(AbstractContextManager[Any]):
+    """The `with` block of a source."""
 
     def close(self) -> None:
-        """Free what is held."""
+        """Free files and cameras."""
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> None:
-        """Close."""
+    def __exit__(self, *_: object) -> None:
+        """Close the source."""
         self.close()
 
 
 def size_problem(image: Picture, shape: tuple[int, ...]) -> str:
-    """Return why a picture is no frame of a source of pictures of `shape`; empty if it is one."""
+    """Return how a picture differs from the `shape` of the others; empty if it does not."""
     if image.shape == shape:
         return ""
     if image.shape[:2] == shape[:2]:
@@ -86,12 +83,4 @@ def size_problem(image: Picture, shape: tuple[int, ...]) -> str:
     return (
         f"the picture is {image.shape[1]} x {image.shape[0]} px, "
         f"the others are {shape[1]} x {shape[0]} px"
-    )
-
-
-def with_vision(purpose: str, error: ImportError) -> FrameSourceError:
-    """Return the error for an optional library that is missing."""
-    return FrameSourceError(
-        f"{purpose} needs the Python package {(error.name or 'opencv')!r} ({error}); "
-        f"install it with: {install_command('vision')}"
     )

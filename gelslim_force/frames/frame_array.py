@@ -1,4 +1,4 @@
-"""NumPy arrays as frames: in memory, `.npy` (not read as a whole) and `.npz`."""
+"""NumPy arrays as frames: in memory, from `.npy` files (mapped into memory) and `.npz` files."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class FrameArray(SourceContext):
         frames_per_s: float | None = None,
         name: str = "array",
     ) -> None:
-        """`time_s` (n,) when each frame was taken.
+        """Take the frames and, if known, the time (n,) at which each was taken.
 
-        Raises FrameSourceError for another kind of array, and for times that do not fit.
+        Raises FrameSourceError for another kind of array, and for times that do not fit it.
         """
         single = frames.ndim == 2 or (frames.ndim == 3 and frames.shape[2] <= 4)
         stack = frames[None] if single else frames
@@ -72,8 +72,9 @@ class FrameArray(SourceContext):
 def read_frame_array(path: str | os.PathLike[str], frames_per_s: float | None = None) -> FrameArray:
     """Return the frames of an `.npy` or `.npz` file.
 
-    In an `.npz`, frames are the array called frames or images, or the only one of 3 or 4 axes;
-    time_s, if there, holds their times. Raises FrameSourceError for what holds no frames.
+    In an `.npz` file the frames are the array named frames or images, or the only uint8 array of
+    3 or 4 axes; the array time_s, if present, holds their times. Raises FrameSourceError if the
+    file holds no frames.
     """
     file = Path(path)
     try:
@@ -88,7 +89,7 @@ def read_frame_array(path: str | os.PathLike[str], frames_per_s: float | None = 
         raise
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as error:
         reason = " ".join(str(getattr(error, "strerror", None) or error).split())[:200]
-        raise FrameSourceError(f"{file}: no NumPy file that can be read: {reason}") from error
+        raise FrameSourceError(f"{file}: not a readable NumPy file: {reason}") from error
 
 
 def _frames_key(archive: Any, file: Path) -> str:
@@ -99,6 +100,6 @@ def _frames_key(archive: Any, file: Path) -> str:
     if len(deep) == 1:
         return str(deep[0])
     raise FrameSourceError(
-        f"{file}: which of its arrays ({', '.join(archive.files) or 'none'}) holds the frames? "
-        "Call it 'frames'"
+        f"{file}: none of its arrays ({', '.join(archive.files) or 'none'}) is known to hold the "
+        "frames; name that array 'frames'"
     )

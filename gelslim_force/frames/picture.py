@@ -1,4 +1,4 @@
-"""Picture files decoded strictly: half a picture is none."""
+"""Picture files decoded strictly: a file that is incomplete is refused."""
 
 from __future__ import annotations
 
@@ -8,25 +8,26 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_core import optional_library
 from gelslim_core.errors import GelslimError
-from gelslim_force.frames.frame import FrameSourceError, Picture, with_vision
+from gelslim_force.frames.frame import Picture
 
 PICTURE_ENDINGS = (
     ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp", ".npy",
 )  # fmt: skip
-_MOST_PX = 100_000_000
+_MAX_PX = 100_000_000
 
 
 class PictureError(GelslimError, ValueError):
-    """A file that holds no whole picture; the message leaves out the file's name."""
+    """A file holds no complete picture; the message does not name the file."""
 
 
 def read_picture(path: Path) -> Picture:
     """Return the picture, (h, w) or (h, w, 3) uint8 in the order red, green, blue.
 
-    16-bit pictures keep their upper 8 bits, alpha is dropped, and a camera's note on how it was
-    held (EXIF) is not followed: a sensor's pixels stay where they are. Raises PictureError for
-    what is no whole picture, FrameSourceError where no library reads pictures.
+    Of 16-bit pictures the upper 8 bits are kept, and alpha is dropped. The orientation in a
+    camera's EXIF data is ignored, because the pixels of a sensor do not turn. Raises PictureError
+    if the file holds no complete picture, MissingLibraryError without Pillow.
     """
     try:
         if path.suffix.lower() == ".npy":
@@ -40,7 +41,7 @@ def read_picture(path: Path) -> Picture:
 
 
 def as_picture(array: Any) -> Picture:
-    """Return an array as a picture, without alpha. Raises PictureError for another kind."""
+    """Return an array as a picture without alpha. Raises PictureError if it is no picture."""
     found = np.asarray(array)
     if found.ndim == 3 and found.shape[2] == 1:
         found = found[:, :, 0]
@@ -55,14 +56,11 @@ def as_picture(array: Any) -> Picture:
 
 
 def _decoded(data: bytes) -> Any:
+    pillow = optional_library.load("PIL.Image", "reading pictures")
     try:
-        from PIL import Image
-    except ImportError:
-        return _decoded_by_opencv(data)
-    try:
-        with Image.open(io.BytesIO(data)) as picture:
-            if picture.width * picture.height > _MOST_PX:
-                raise PictureError(f"{picture.width} x {picture.height} px are no frame")
+        with pillow.open(io.BytesIO(data)) as picture:
+            if picture.width * picture.height > _MAX_PX:
+                raise PictureError(f"{picture.width} x {picture.height} px are too large a picture")
             picture.load()
             if picture.mode.startswith("I;16") or picture.mode in ("I", "F"):
                 return _eight_bits(np.asarray(picture))
@@ -71,7 +69,7 @@ def _decoded(data: bytes) -> Any:
     except PictureError:
         raise
     except Exception as error:
-        # Damaged files raise whatever a decoder trips over: OSError, SyntaxError, struct.error.
+        # A damaged file makes decoders raise OSError, SyntaxError, struct.error and others.
         raise PictureError(f"damaged, or no picture: {_reason(error)}") from error
 
 
@@ -81,28 +79,6 @@ def _eight_bits(deep: Any) -> Any:
     return (deep >> 8).astype(np.uint8)
 
 
-def _decoded_by_opencv(data: bytes) -> Any:
-    try:
-        import cv2
-    except ImportError as error:
-        raise with_vision("reading pictures", error) from error
-    # OpenCV fills what a cut file lacks with grey.
-    if data[:2] == b"\xff\xd8" and b"\xff\xd9" not in data[-1024:]:
-        raise PictureError("damaged: the JPEG file has no end")
-    if data[:4] == b"\x89PNG" and b"IEND" not in data[-64:]:
-        raise PictureError("damaged: the PNG file has no end")
-    flags = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    try:
-        found = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
-    except cv2.error as error:
-        raise PictureError(f"damaged, or no picture: {_reason(error)}") from error
-    if found is None:
-        raise PictureError("damaged, or no picture")
-    return found[:, :, ::-1] if found.ndim == 3 else found
-
-
 def _reason(error: BaseException) -> str:
-    if isinstance(error, FrameSourceError):
-        return str(error)
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split())[:200]

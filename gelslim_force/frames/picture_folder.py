@@ -1,28 +1,30 @@
-"""A folder of pictures as frames, in natural order of their names."""
+"""A folder of pictures as frames, in the natural order of their names."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext, size_problem
-from gelslim_force.frames.natural_order import natural_key
 from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
 
-_LOOKED_AT = 5
+_SAMPLE = 5
+"""Readable pictures from which the size of all is taken."""
+_NUMBER = re.compile(r"(\d+)")
 
 
 class PictureFolder(SourceContext):
-    """Pictures of one folder, or one picture; a file that is no whole picture is flagged."""
+    """Pictures of a folder, or one picture; a damaged file gives a frame with a problem."""
 
     live = False
 
     def __init__(self, path: str | os.PathLike[str], frames_per_s: float | None = None) -> None:
-        """List the pictures and settle their size: that of most of the first five readable.
+        """List the pictures; their size is the most frequent one of the first five readable ones.
 
-        Raises FrameSourceError where there is no picture, or none that can be read.
+        Raises FrameSourceError if there is no picture, or none that can be read.
         """
         place = Path(path)
         self.frames_per_s = frames_per_s
@@ -56,7 +58,7 @@ class PictureFolder(SourceContext):
                 shapes.append(read_picture(file).shape)
             except PictureError as error:
                 first_problem = first_problem or f"{file.name} {error}"
-            if len(shapes) == _LOOKED_AT:
+            if len(shapes) == _SAMPLE:
                 break
         if not shapes:
             raise FrameSourceError(
@@ -71,8 +73,24 @@ def _pictures(folder: Path) -> list[Path]:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise FrameSourceError(f"{folder}: {reason}; give a folder of pictures") from error
-    # Hidden files are what file managers and copying leave behind.
+    # Hidden files are left behind by file managers and copying programs.
     chosen = [n for n in names if n.lower().endswith(PICTURE_ENDINGS) and not n.startswith(".")]
     if not chosen:
-        raise FrameSourceError(f"{folder}: no pictures in it ({', '.join(PICTURE_ENDINGS)})")
+        raise FrameSourceError(
+            f"{folder}: no pictures in the folder ({', '.join(PICTURE_ENDINGS)})"
+        )
     return [folder / name for name in sorted(chosen, key=natural_key)]
+
+
+def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Return a sorting key that puts frame2 before frame10.
+
+    Digits are compared by value and letters without their case; equal keys by the text itself.
+    """
+    parts: list[tuple[int, int, str]] = []
+    for part in _NUMBER.split(name):
+        if part.isdecimal():
+            parts.append((0, int(part), ""))
+        elif part:
+            parts.append((1, 0, part.casefold()))
+    return (*parts, (-1, 0, name))

@@ -1,4 +1,4 @@
-"""Arrays that are only looked at."""
+"""Read-only views of arrays, for compiled kernels."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Kind = TypeVar("Kind", bound=np.generic)
 
 
 def read_only(array: NDArray[Kind]) -> NDArray[Kind]:
-    """Return a contiguous view of the array, or a copy, that cannot be written to.
+    """Return a contiguous view of the array, or a contiguous copy, that cannot be written to.
 
-    A compiled kernel is made anew for arrays that are strided or may be written to: given all
-    input this way, it is compiled once, whoever made the array.
+    numba compiles a kernel again for each combination of memory layout and write permission.
+    With all input prepared by this function it compiles each kernel once.
     """
     view: Any = np.ascontiguousarray(array).view()
     view.flags.writeable = False

@@ -1,4 +1,4 @@
-"""Frames by a name: a folder of pictures, a picture, a video, a NumPy file, a camera."""
+"""Frames by the name of their source: a folder, a picture, a video, a NumPy file, a camera."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError
 from gelslim_force.frames.frame_array import FrameArray, read_frame_array
-from gelslim_force.frames.live_camera import LiveCamera
+from gelslim_force.frames.opencv_frames import VIDEO_ENDINGS, LiveCamera, VideoFile
 from gelslim_force.frames.picture import PICTURE_ENDINGS
 from gelslim_force.frames.picture_folder import PictureFolder
 from gelslim_force.frames.threaded_reader import ThreadedReader
-from gelslim_force.frames.video_file import VIDEO_ENDINGS, VideoFile
 
 __all__ = ["Frame", "FrameSource", "FrameSourceError", "open_frames"]
 
@@ -25,18 +24,21 @@ _STREAMS = ("rtsp://", "rtmp://", "http://", "https://", "udp://", "tcp://")
 def open_frames(
     source: str | os.PathLike[str] | NDArray[np.uint8], frames_per_s: float | None = None
 ) -> ThreadedReader:
-    """Open a source of frames, read ahead in a thread; use it in a `with` block.
+    """Open a source of frames, which are read ahead in a thread; use it in a `with` block.
 
     Args:
-        source: A folder of pictures, a picture, a video, an `.npy` or `.npz` file, an array, or
-            for live frames `camera:0`, `camera:/dev/video0` or the address of a stream.
-        frames_per_s: Rate of sources that do not know their times; overrides that of a video.
+        source: A folder of pictures, a picture, a video, an `.npy` or `.npz` file, an array
+            (n, h, w) or (n, h, w, 3) uint8, or for live frames `camera:0`, `camera:/dev/video0`
+            or the address of a stream.
+        frames_per_s: Rate in Hz of a source that does not state one; it overrides the rate of a
+            video.
 
     Returns:
-        An iterator over the frames.
+        An iterable of `Frame`.
 
     Raises:
-        FrameSourceError: Nothing can be read there.
+        FrameSourceError: No frame can be read from the source, or the rate is out of range.
+        MissingLibraryError: The library that reads such a source is not installed.
     """
     if frames_per_s is not None and not 0.001 <= frames_per_s <= 1e5:
         raise FrameSourceError(f"{frames_per_s:g} frames per second: must be in 0.001 ... 100000")

@@ -1,4 +1,4 @@
-"""A source read ahead in a thread: live frames go stale and are dropped, recorded ones never."""
+"""A source read ahead in a thread: old live frames are dropped, recorded frames never."""
 
 from __future__ import annotations
 
@@ -14,54 +14,54 @@ _JOIN_S = 5.0
 class ThreadedReader(SourceContext):
     """Reads a source in a thread of its own, so that decoding and computing overlap.
 
-    A live source's newest frame replaces one that nobody has taken yet; a recorded source waits
-    while `ahead` frames are in store. Iterate once.
+    The latest frame of a live source replaces one that has not been taken yet; a recorded source
+    waits while `ahead` frames are in the buffer. It can be iterated once.
     """
 
     def __init__(self, source: FrameSource, ahead: int = 4) -> None:
-        """Reading starts with the first `next`. Raises ValueError for `ahead` under 1."""
+        """Reading starts with the first `next`. Raises ValueError for `ahead` < 1."""
         if ahead < 1:
             raise ValueError(f"ahead = {ahead}: must be at least 1")
         self.source = source
         self._ahead = 1 if source.live else ahead
-        self._store: deque[Frame] = deque()
+        self._buffer: deque[Frame] = deque()
         self._changed = Condition()
         self._error: BaseException | None = None
         self._ended = self._stopped = False
         self._thread: Thread | None = None
         self.dropped = 0
-        """Frames nobody took in time."""
+        """Number of frames that were dropped."""
 
     @property
     def count(self) -> int | None:
-        """Frames expected; None where that is not known."""
+        """Number of frames; None if it is not known."""
         return self.source.count
 
     @property
     def frames_per_s(self) -> float | None:
-        """Rate; None where that is not known."""
+        """Rate; None if it is not known."""
         return self.source.frames_per_s
 
     @property
     def live(self) -> bool:
-        """Whether stale frames are dropped."""
+        """Whether old frames are dropped."""
         return self.source.live
 
     def __iter__(self) -> Iterator[Frame]:
-        """Yield frames; an error of the source is raised once what came before it is taken."""
+        """Yield frames; an error of the source is raised after the frames before it."""
         if self._thread is None:
             self._thread = Thread(target=self._read, name="frames", daemon=True)
             self._thread.start()
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._store or self._ended or self._stopped)
+                self._changed.wait_for(lambda: self._buffer or self._ended or self._stopped)
                 if self._stopped:
                     return
-                if not self._store:
+                if not self._buffer:
                     if self._error is not None:
                         raise self._error
                     return
-                frame = self._store.popleft()
+                frame = self._buffer.popleft()
                 self._changed.notify_all()
             yield frame
 
@@ -77,7 +77,7 @@ class ThreadedReader(SourceContext):
     def _read(self) -> None:
         try:
             for frame in self.source:
-                if not self._stored(frame):
+                if not self._put(frame):
                     break
         except BaseException as error:
             self._error = error
@@ -86,15 +86,15 @@ class ThreadedReader(SourceContext):
                 self._ended = True
                 self._changed.notify_all()
 
-    def _stored(self, frame: Frame) -> bool:
+    def _put(self, frame: Frame) -> bool:
         with self._changed:
             if not self.live:
-                self._changed.wait_for(lambda: self._stopped or len(self._store) < self._ahead)
-            elif self._store:
-                self._store.popleft()
+                self._changed.wait_for(lambda: self._stopped or len(self._buffer) < self._ahead)
+            elif self._buffer:
+                self._buffer.popleft()
                 self.dropped += 1
             if self._stopped:
                 return False
-            self._store.append(frame)
+            self._buffer.append(frame)
             self._changed.notify_all()
             return True

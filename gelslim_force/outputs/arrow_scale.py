@@ -1,4 +1,4 @@
-"""How long arrows are drawn: one scale for a run, so that its pictures can be compared."""
+"""How long arrows are drawn: one scale per run, so that its pictures can be compared."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 @dataclass(frozen=True)
 class ArrowScale:
-    """Raises ValueError unless all are positive numbers."""
+    """Scales of one picture. Raises ValueError unless all are positive numbers."""
 
     motion_gain: float
-    """Length of a displacement arrow over the displacement in the picture."""
+    """Length of a displacement arrow divided by the displacement in the picture."""
     traction_mm_per_mpa: float
-    """Length on the gel of a traction arrow."""
+    """Length of a traction arrow, measured on the gel."""
     pressure_mpa: float
-    """Pressure with the full shade."""
+    """Pressure that is drawn with the full shade."""
     force_bar_n: float
     torque_bar_nmm: float
-    """Force and torque with a full bar in the legend."""
+    """Force and torque at which the bars of the legend are full."""
 
     def __post_init__(self) -> None:
         for name in (field.name for field in fields(self)):
@@ -37,7 +37,7 @@ class ArrowScale:
 
 @dataclass(frozen=True)
 class Extent:
-    """What the largest arrows of some frames show; 0 where there are none."""
+    """The largest values that arrows of some frames show; 0 where there are none."""
 
     motion_px: float = 0.0
     shear_mpa: float = 0.0
@@ -46,16 +46,16 @@ class Extent:
     torque_nmm: float = 0.0
 
     def joined(self, other: Extent) -> Extent:
-        """Return the larger of both."""
+        """Return the larger value of each quantity."""
         return Extent(*(max(pair) for pair in zip(astuple(self), astuple(other), strict=True)))
 
     def outgrown_by(self, other: Extent) -> bool:
-        """Whether anything in `other` is more than twice as large."""
+        """Return whether any value in `other` is more than twice as large."""
         return any(b > 2 * a for a, b in zip(astuple(self), astuple(other), strict=True))
 
 
 def extent(result: FrameResult) -> Extent:
-    """Return the 98th percentile of motion, shear and pressure; largest force and torque."""
+    """Return 98th percentiles of motion, shear and pressure, and the largest force and torque."""
     motion = shear = pressure = force = torque = 0.0
     if result.tracks is not None:
         motion = _high(np.hypot(*result.tracks.displacement_px[result.tracks.tracked].T))
@@ -72,10 +72,11 @@ def extent(result: FrameResult) -> Extent:
 def scale_for(
     largest: Extent, arrow_px: float = 24.0, arrow_mm: float = 1.6, most_gain: float = 10.0
 ) -> ArrowScale:
-    """Return round scales (1, 2, 5 times a power of ten) with the largest arrows about so long.
+    """Return round scales (1, 2 or 5 times a power of ten) for the largest values of a run.
 
-    `most_gain` keeps the noise of a run without contact from looking like motion; forces have
-    floors of 0.1 kPa, 10 mN and 0.1 N mm for the same reason.
+    The largest arrows become about `arrow_px` and `arrow_mm` long. The limit `most_gain` prevents
+    that the noise of a run without contact looks like motion; the forces have the lower limits
+    0.1 kPa, 10 mN and 0.1 N mm for the same reason.
     """
     gain = most_gain
     if largest.motion_px > 0:
@@ -90,7 +91,7 @@ def scale_for(
 
 
 def scale_of_run(results: Iterable[FrameResult], arrow_px: float = 24.0) -> ArrowScale:
-    """Return the scale for all frames of a run, such as `RecordedRun.results()`."""
+    """Return the scale for all frames of a run, such as those of `RecordedRun.results()`."""
     largest = Extent()
     for result in results:
         largest = largest.joined(extent(result))
@@ -98,10 +99,10 @@ def scale_of_run(results: Iterable[FrameResult], arrow_px: float = 24.0) -> Arro
 
 
 class LiveScale:
-    """A scale for a run whose end is not known: it starts from what is expected and only shrinks.
+    """A scale for a run whose end is not known: it starts from expected values and only shrinks.
 
-    It shrinks in steps of 1, 2, 5 when an arrow would be twice as long as it should, so arrows
-    do not flicker; the scale bars in the picture show the step.
+    It shrinks in steps of 1, 2, 5 when an arrow would become twice too long, so that arrows do
+    not flicker; the legend shows the present scale.
     """
 
     def __init__(self, expected: Extent, arrow_px: float = 24.0) -> None:

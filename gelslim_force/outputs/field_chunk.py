@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import json
 import os
+import queue
+import threading
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -14,14 +16,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core import optional_library
 from gelslim_core.files.atomic_file import replace_file
 from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.outputs import optional_library
 from gelslim_force.outputs.packed_frame import PER_MARKER, PER_NODE, PackedFrame, unpack
 
 Format = Literal["npz", "parquet"]
 FORMAT_NAME = "gelslim-fields/1"
+_MAX_WAITING = 2
+"""Chunks that wait in memory at most; `submit` waits until there is room."""
 _FILL: Mapping[str, Any] = {"status": -1, "dots": -1, "contact": False}
 
 
@@ -137,8 +141,8 @@ def parquet_bytes(chunk: FieldChunk) -> bytes:
 
     Raises OutputError without pyarrow.
     """
-    pa = optional_library.load("pyarrow", "record", "Parquet")
-    parquet = optional_library.load("pyarrow.parquet", "record", "Parquet")
+    pa = optional_library.load("pyarrow", "Parquet")
+    parquet = optional_library.load("pyarrow.parquet", "Parquet")
     columns = dict(chunk.arrays)
     columns["points_mm"] = np.repeat(chunk.points_mm[None], len(chunk), axis=0)
     fields, values = [], []
@@ -162,7 +166,7 @@ def parquet_bytes(chunk: FieldChunk) -> bytes:
 
 
 def _from_parquet(path: str | os.PathLike[str]) -> FieldChunk:
-    parquet = optional_library.load("pyarrow.parquet", "record", "Parquet")
+    parquet = optional_library.load("pyarrow.parquet", "Parquet")
     table = parquet.ParquetFile(path).read()
     if (table.schema.metadata or {}).get(b"format", b"").decode() != FORMAT_NAME:
         raise OutputError(f"{os.fspath(path)}: not of the format {FORMAT_NAME}")
@@ -179,3 +183,51 @@ def _from_parquet(path: str | os.PathLike[str]) -> FieldChunk:
     extra = tuple(arrays.pop("extra"))
     points = arrays.pop("points_mm")
     return FieldChunk(arrays, points[0] if len(points) else np.zeros((0, 3)), problems, extra)
+
+
+class ChunkWriter:
+    """Turns finished journals into chunks in a thread, so that no frame waits for the disk.
+
+    A journal is deleted once its chunk is on the disk.
+    """
+
+    def __init__(self, before: Callable[[], None]) -> None:
+        """Start the thread, which calls `before` ahead of each chunk."""
+        self._before = before
+        self._queue: queue.Queue[tuple[Path, Path, Sequence[PackedFrame]] | None] = queue.Queue(
+            _MAX_WAITING
+        )
+        self._error: OutputError | None = None
+        self._thread = threading.Thread(target=self._work, name="chunk-writer", daemon=True)
+        self._thread.start()
+
+    def submit(self, target: Path, journal: Path, frames: Sequence[PackedFrame]) -> None:
+        """Queue a closed journal and its frames. Raises OutputError if an earlier chunk failed."""
+        self.check()
+        self._queue.put((target, journal, frames))
+
+    def check(self) -> None:
+        """Raise OutputError if a chunk could not be written; its journal still exists."""
+        if self._error is not None:
+            raise self._error
+
+    def close(self) -> None:
+        """Wait until all chunks are written; `check` tells about errors."""
+        if self._thread.is_alive():
+            self._queue.put(None)
+            self._thread.join()
+
+    def _work(self) -> None:
+        while (item := self._queue.get()) is not None:
+            target, journal, frames = item
+            try:
+                if self._error is None:
+                    self._before()
+                    write_chunk(target, stack(frames))
+                    journal.unlink()
+            except OutputError as error:
+                self._error = error
+            except OSError as error:
+                self._error = disk_error(target, "writing a chunk of fields", error)
+            except Exception as error:  # an error in a thread would go unnoticed
+                self._error = OutputError(f"{target}: {type(error).__name__}: {error}")

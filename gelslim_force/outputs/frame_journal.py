@@ -1,13 +1,16 @@
-"""Frames appended one by one, so that a killed process loses none of them.
+"""Files to which frames are appended one by one, so that a killed process loses none of them.
 
-A record is the magic `GSF1`, the length of its head and of its body (two little-endian uint64), the
-CRC-32 of both (uint32), the head (JSON: names, types, shapes, texts) and the body (the arrays in
-turn, C order, little-endian). Reading stops at the first record that is torn or damaged.
+A record of the journal consists of the magic number `GSF1`, the lengths of its head and its body
+(two little-endian uint64), the CRC-32 of both (uint32), the head (JSON: names, types, shapes and
+texts) and the body (the arrays one after the other, C order, little-endian). Reading stops at the
+first record that is incomplete or damaged.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -22,8 +25,45 @@ _PREFIX = struct.Struct("<4sQQI")
 _MAGIC = b"GSF1"
 
 
+class AppendFile:
+    """A new file that survives a kill of the process up to the last block that was appended.
+
+    The operating system has the block when `append` returns; a power failure may still lose it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Create the file. Raises FileExistsError if it exists, OSError if the disk refuses."""
+        self.path = path
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | getattr(os, "O_BINARY", 0)
+        self._file = os.open(path, flags, 0o644)
+        self._length = 0
+
+    def append(self, block: bytes) -> None:
+        """Write a complete block. Raises OSError and removes the part of it that was written."""
+        rest = memoryview(block)
+        try:
+            while rest:
+                rest = rest[os.write(self._file, rest) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._length)
+            raise
+        self._length += len(block)
+
+    def sync(self) -> None:
+        """Force what was appended to the disk. Raises OSError."""
+        if self._file >= 0:
+            os.fsync(self._file)
+
+    def close(self) -> None:
+        """Close the file; a second call does nothing."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+
 def record(frame: PackedFrame, with_points: bool) -> bytes:
-    """Return the bytes of a frame; the nodes at rest need to be in one record of a file only."""
+    """Return the bytes of a frame; only one record of a file must hold the nodes at rest."""
     arrays = dict(frame.arrays)
     if with_points and frame.points_mm is not None:
         arrays["points_mm"] = frame.points_mm
@@ -38,7 +78,10 @@ def record(frame: PackedFrame, with_points: bool) -> bytes:
 
 
 def read_journal(path: Path) -> tuple[list[PackedFrame], bool]:
-    """Return the whole records of a file, and whether it ends in a torn one. Raises OSError."""
+    """Return the complete records of a file and whether its last record is incomplete.
+
+    Raises OSError.
+    """
     data = path.read_bytes()
     frames: list[PackedFrame] = []
     points: NDArray[np.float64] | None = None

@@ -1,4 +1,4 @@
-"""The column beside the picture: wrench with its noise, markers, scales, what was wrong."""
+"""The column beside the picture: the wrench and its noise, markers, scales and problems."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale, round_step
-from gelslim_force.outputs.canvas import Backend, Canvas, Colour, Image, arrow, canvas_on
+from gelslim_force.outputs.canvas import Canvas, Colour, Image, arrow
 from gelslim_force.tracking.tracks import MarkerStatus
 
 WIDTH_PX, LEAST_HEIGHT_PX = 300, 640
 YELLOW: Colour = (255, 221, 40)
 RED: Colour = (255, 40, 40)
 SHADE: Colour = (255, 150, 118)
-"""Of full pressure; paler than the arrows, so that they stand out on it."""
+"""Colour of full pressure; paler than the arrows, so that they stand out."""
 WHITE: Colour = (238, 240, 242)
 GREY: Colour = (142, 148, 156)
 ORANGE: Colour = (255, 160, 60)
@@ -32,7 +32,7 @@ _ROWS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
 def status_mark(canvas: Canvas, x: float, y: float, status: MarkerStatus, size: float) -> None:
-    """Draw the sign of a marker's status: dot, ring, grey cross or magenta cross."""
+    """Draw the symbol of a marker's status: dot, ring, grey cross or magenta cross."""
     colour = STATUS_COLOURS[status]
     if status == MarkerStatus.TRACKED:
         canvas.disc((x, y), 0.75 * size, colour)
@@ -54,17 +54,16 @@ def legend(
     height_px: int,
     zoom: float,
     px_per_mm: float | None,
-    backend: Backend = "auto",
 ) -> Image:
     """Return a picture (max(height, 640), 300, 3).
 
-    `px_per_mm` of the middle of the gel in the picture before it was enlarged by `zoom`; None
-    where no forces are drawn.
+    `px_per_mm` is the scale at the middle of the gel before the picture was enlarged by `zoom`;
+    None if no forces are drawn.
     """
     height = max(height_px, LEAST_HEIGHT_PX)
     blank = np.empty((height, WIDTH_PX, 3), dtype=np.uint8)
     blank[:] = _GROUND
-    canvas = canvas_on(blank, backend)
+    canvas = Canvas(blank)
     time = f"{result.time_s:.3f} s" if np.isfinite(result.time_s) else ""
     canvas.text((_LEFT, 32), f"frame {result.index}", WHITE, 19)
     canvas.text((_RIGHT - 9 * len(time), 32), time, GREY, 16)
@@ -81,7 +80,7 @@ def _rule(canvas: Canvas, y: float) -> None:
 
 
 def value_text(value: float, sigma: float, full: float) -> str:
-    """A value and its standard deviation to a hundredth of the full bar, or one digit of σ."""
+    """Return value ± standard deviation, rounded to 1 % of the full bar or one digit of σ."""
     decimals = max(0, min(3, 2 - int(np.floor(np.log10(full)))))
     if not np.isfinite(sigma):
         return f"{value:+.{decimals}f}"
@@ -115,7 +114,7 @@ def _range(scale: ArrowScale) -> str:
 
 
 def _bar(canvas: Canvas, value: float, sigma: float, full: float, y: float) -> None:
-    """A bar from the middle, with a whisker of one standard deviation each way."""
+    """Draw a bar from the middle, with a line of one standard deviation to either side."""
     left, right = _LEFT + 34, _RIGHT
     middle, half = (left + right) / 2, (right - left) / 2
     canvas.line((left, y), (right, y), _RULE, 3)
@@ -159,7 +158,7 @@ def _markers(canvas: Canvas, result: FrameResult, y: float) -> float:
 def _scales(
     canvas: Canvas, scale: ArrowScale, zoom: float, px_per_mm: float | None, y: float
 ) -> float:
-    """Arrows of round values, up to about 90 px long, and the shade of the pressure."""
+    """Draw sample arrows of round values, up to about 90 px long, and the shades of pressure."""
     _rule(canvas, y - 12)
     per_px = scale.motion_gain * zoom
     value = round_step(90 / per_px)
@@ -172,15 +171,15 @@ def _scales(
     for x in range(90):
         mix = shade_share(x / 89.0)
         colour = [round(g * (1 - mix) + r * mix) for g, r in zip((90, 110, 90), SHADE, strict=True)]
-        place = _LEFT + float(x)
-        canvas.line((place, y + 48), (place, y + 60), (colour[0], colour[1], colour[2]), 1)
+        left = _LEFT + float(x)
+        canvas.line((left, y + 48), (left, y + 60), (colour[0], colour[1], colour[2]), 1)
     text = f"0 to {1e3 * scale.pressure_mpa:g} kPa pressure"
     canvas.text((_LEFT + 102, y + 59), text, WHITE, 14)
     return y + 84
 
 
 def shade_share(share_of_full: float) -> float:
-    """Opacity of the red shade for a pressure over the full one, clipped to 0 ... 1."""
+    """Return the opacity of the red shade for a pressure as a share of full pressure."""
     return 0.7 * min(max(share_of_full, 0.0), 1.0) ** 0.7
 
 
@@ -190,7 +189,7 @@ def _sample(canvas: Canvas, y: float, length: float, colour: Colour, text: str) 
 
 
 def _shown(text: str) -> str:
-    """Without letters that no font has."""
+    """Text whose undecodable bytes, which no font can show, are written as escapes."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 

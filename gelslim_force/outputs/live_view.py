@@ -1,7 +1,7 @@
-"""The last picture and wrench in a browser, from this machine only and without the internet.
+"""The latest picture and wrench in a browser on this machine; no internet is needed.
 
-`/` is the page, `/stream` the pictures (multipart JPEG), `/picture.jpg` the last one and
-`/state.json` the last frame's numbers. Only the standard library serves; OpenCV or Pillow encodes.
+`/` is the page, `/stream` the sequence of pictures (multipart JPEG), `/picture.jpg` the latest
+picture and `/state.json` the numbers of the latest frame.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import json
 import math
 import threading
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
-from types import TracebackType
 from typing import Any
 
 from gelslim_core.files.output_error import OutputError, disk_error
@@ -26,7 +26,7 @@ _NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 
 class _Latest:
-    """The newest frame, for any number of readers; older ones are dropped."""
+    """The latest frame, for any number of readers; earlier frames are dropped."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -52,9 +52,9 @@ class _Latest:
             return self._state
 
     def jpeg_after(self, seen: int, wait_s: float) -> tuple[int, bytes] | None:
-        """The newest picture once there is one newer than `seen`; None on time-out or close.
+        """Wait for a picture later than `seen`; None after the time-out or on closing.
 
-        It is encoded here, so a view that nobody watches costs nothing.
+        The picture is encoded here, so that a view without a viewer costs no time.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._count > seen or self._closed, wait_s)
@@ -73,15 +73,15 @@ class _Latest:
         return self._closed
 
 
-class LiveView:
-    """Serves until closed.
+class LiveView(AbstractContextManager["LiveView"]):
+    """Serves the latest frame to browsers until it is closed.
 
     >>> with LiveView(port=8750) as view:  # doctest: +SKIP
     ...     view.show(picture, result)
     """
 
     def __init__(self, port: int = 0) -> None:
-        """Port 0 takes a free one, see `url`. Raises OutputError where the port is taken."""
+        """Serve on a port, on a free one if it is 0. Raises OutputError if it is in use."""
         self._latest = _Latest()
         latest = self._latest
 
@@ -93,7 +93,7 @@ class LiveView:
         except (OSError, OverflowError) as error:
             if isinstance(error, OSError) and error.errno:
                 raise disk_error(f"port {port}", "starting the live view", error) from error
-            raise OutputError(f"port {port}: {error}; take 0 ... 65535") from error
+            raise OutputError(f"port {port}: {error}; choose 0 ... 65535") from error
         self._server.daemon_threads = True
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(0.05,), name="live-view", daemon=True
@@ -106,29 +106,23 @@ class LiveView:
         return f"http://127.0.0.1:{self._server.server_address[1]}/"
 
     def show(self, picture: Image, result: FrameResult) -> None:
-        """Make an RGB picture and its frame the latest; the picture must not change later."""
+        """Show an RGB picture and its result; the picture must not be changed afterwards."""
         self._latest.put(picture, live_state(result))
 
     def close(self) -> None:
-        """Stop serving; again is harmless."""
+        """Stop serving; a second call does nothing."""
         self._latest.close()
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()
 
-    def __enter__(self) -> LiveView:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 
 
 def live_state(result: FrameResult) -> dict[str, Any]:
-    """Return the frame's numbers as JSON values: columns of `wrench_csv`, null where unknown."""
+    """Return the columns of `wrench_csv` as JSON values; null where a number is unknown."""
     numbers = {name: None if math.isnan(v) else v for name, v in row(result).items()}
     stages = plain(dict(result.stage_ms))
     return {"frame": numbers, "problems": list(result.problems), "stage_ms": stages}
@@ -141,10 +135,10 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer one request."""
-        # A page elsewhere that points its own name at this machine must not read the sensor.
+        # A page of another site whose name was pointed at this machine must not read the sensor.
         host = self.headers.get("Host", "").rpartition(":")
         if (host[0] or host[2]) not in _NAMES:
-            self._send(403, "text/plain", b"this view answers to localhost only\n")
+            self._send(403, "text/plain", b"this view answers requests from localhost only\n")
             return
         path = self.path.partition("?")[0]
         if path == "/":
@@ -165,7 +159,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(404, "text/plain", b"no such page\n")
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Keep quiet."""
+        """Write no log."""
 
     def _send(self, status: int, kind: str, body: bytes) -> None:
         self.send_response(status)
@@ -191,7 +185,7 @@ class _Handler(BaseHTTPRequestHandler):
                 head += f"Content-Length: {len(jpeg)}\r\n\r\n"
                 self.wfile.write(head.encode() + jpeg + b"\r\n")
         except (BrokenPipeError, ConnectionResetError):
-            return  # the browser left
+            return  # the browser has closed the connection
 
     def _pictures(self) -> Iterator[bytes]:
         seen = 0

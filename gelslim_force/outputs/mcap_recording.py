@@ -9,12 +9,12 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 
+from gelslim_core import optional_library
 from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.outputs import optional_library
 from gelslim_force.outputs.ros_messages import (
     FORCE_FIELD,
     WRENCH_STAMPED,
@@ -27,8 +27,11 @@ from gelslim_force.outputs.ros_messages import (
 _CHUNK_BYTES = 1 << 18
 
 
-class McapRecording:
-    """Appends frames; a killed process leaves all full chunks (256 KiB), for `mcap recover`."""
+class McapRecording(AbstractContextManager["McapRecording"]):
+    """Appends frames to a recording.
+
+    A process that is killed leaves all full chunks of 256 KiB; `mcap recover` reads them.
+    """
 
     def __init__(
         self,
@@ -37,55 +40,65 @@ class McapRecording:
         namespace: str = "gelslim",
         about: Mapping[str, str] | None = None,
     ) -> None:
-        """`about` goes into the file as metadata, such as `bundle_identity(...)`.
+        """Start a recording.
 
-        Raises OutputError without the package mcap, where the file exists or cannot be made.
+        Args:
+            path: The new file; its name ends in .mcap.
+            frame_id: Name of the sensor frame in the messages' headers.
+            namespace: First part of the topics' names.
+            about: Metadata of the recording, such as `bundle_identity(...)`.
+
+        Raises:
+            OutputError: The file exists or cannot be made.
+            MissingLibraryError: mcap-ros2-support is not installed.
         """
-        mcap = optional_library.load("mcap.writer", "record", "MCAP recordings")
+        writers = optional_library.load("mcap_ros2.writer", "MCAP recordings")
         self.path = Path(path)
         self._frame_id = frame_id
-        prefix = "/" + namespace.strip("/")
+        self._prefix = f"/{namespace.strip('/')}".rstrip("/")
         if self.path.suffix.lower() != ".mcap":
-            raise OutputError(f"{self.path}: a recording must end in .mcap")
+            raise OutputError(f"{self.path}: the name of a recording must end in .mcap")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = open(self.path, "xb")  # noqa: SIM115  (closed in finish)
-            self._writer = mcap.Writer(self._file, chunk_size=_CHUNK_BYTES)
-            self._writer.start(profile="ros2", library="gelslim")
+            self._writer = writers.Writer(self._file, chunk_size=_CHUNK_BYTES)
             if about:
                 self._writer.add_metadata("gelslim", dict(about))
-            self._channels = {
-                topic: self._channel(f"{prefix.rstrip('/')}/{topic}", kind)
-                for topic, kind in (("wrench", WRENCH_STAMPED), ("force_field", FORCE_FIELD))
-            }
+            self._wrench, self._field = (
+                self._writer.register_msgdef(kind, schema(kind))
+                for kind in (WRENCH_STAMPED, FORCE_FIELD)
+            )
             self._file.flush()
         except OSError as error:
             raise disk_error(self.path, "starting the recording", error) from error
         self._open = True
 
     def append(self, result: FrameResult) -> None:
-        """Add a frame's messages. Raises OutputError where the disk refuses, or after `finish`."""
+        """Add a frame's messages.
+
+        Raises OutputError if the disk refuses them or the recording is finished.
+        """
         if not self._open:
-            raise OutputError(f"{self.path}: the recording is finished")
-        stamp = nanoseconds(result.time_s)
-        messages = {
-            "wrench": wrench_stamped(result, self._frame_id),
-            "force_field": force_field(result, self._frame_id),
-        }
+            raise OutputError(f"{self.path}: the recording is already finished")
+        stamp, sequence = nanoseconds(result.time_s), int(result.index) % 2**32
+        wrench = wrench_stamped(result, self._frame_id)
+        field = force_field(result, self._frame_id)
         try:
-            for topic, data in messages.items():
-                if data is not None:
-                    self._writer.add_message(
-                        self._channels[topic], stamp, data, stamp, int(result.index) % 2**32
-                    )
+            for topic, kind, message in (
+                ("wrench", self._wrench, wrench),
+                ("force_field", self._field, field),
+            ):
+                if message is not None:
+                    name = f"{self._prefix}/{topic}"
+                    self._writer.write_message(name, kind, message, stamp, stamp, sequence)
             self._file.flush()
         except OSError as error:
             self._open = False
-            self._drop()
+            self._discard()
             raise disk_error(self.path, f"recording frame {result.index}", error) from error
 
     def finish(self) -> None:
-        """Write the index and close; again is harmless. Raises OutputError."""
+        """Write the index and close the file; a second call does nothing. Raises OutputError."""
         if not self._open:
             return
         self._open = False
@@ -95,28 +108,15 @@ class McapRecording:
             os.fsync(self._file.fileno())
             self._file.close()
         except OSError as error:
-            self._drop()
+            self._discard()
             raise disk_error(self.path, "finishing the recording", error) from error
 
-    def _channel(self, topic: str, type_name: str) -> int:
-        kind = self._writer.register_schema(type_name, "ros2msg", schema(type_name).encode())
-        return int(self._writer.register_channel(topic, "cdr", kind))
-
-    def _drop(self) -> None:
-        """Close without a second complaint about what is still buffered."""
+    def _discard(self) -> None:
+        """Close the file without a second error for what is still in its buffer."""
         with contextlib.suppress(OSError):
             self._file.close()
 
-    def __enter__(self) -> McapRecording:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> None:
-        """Finish."""
-        if kind is None:
-            self.finish()
-            return
-        with contextlib.suppress(OutputError):  # the first error is the one to tell
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Finish the recording; after an error in the block that error is the one to report."""
+        with contextlib.nullcontext() if kind is None else contextlib.suppress(OutputError):
             self.finish()

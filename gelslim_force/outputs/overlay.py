@@ -1,7 +1,7 @@
-"""A frame with what was found in it, as in the paper: displacement yellow, force red.
+"""A frame with its results drawn over it: displacement in yellow, force in red, as in the paper.
 
-Yellow arrows are the markers' motion in the picture, red ones the tangential traction along the
-gel, and the red shade is the pressure. The column at the right has the wrench and the scales.
+Yellow arrows show the motion of the markers in the picture, red arrows the tangential traction on
+the gel, and the red shade the pressure. The column at the right shows the wrench and the scales.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gelslim_core.files.atomic_file import replace_file
 from gelslim_core.files.output_error import disk_error
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale
-from gelslim_force.outputs.canvas import Backend, Canvas, Image, arrow, canvas_on
+from gelslim_force.outputs.canvas import Canvas, Image, arrow
 from gelslim_force.outputs.legend import (
     LEAST_HEIGHT_PX,
     RED,
@@ -46,13 +46,12 @@ class OverlaySettings:
     force: bool = True
     column: bool = True
     zoom: int | None = None
-    """Enlargement of the picture; None: until it is at least 640 px high."""
+    """Enlargement of the picture; None enlarges it until it is at least 640 px high."""
     cell_mm: float = 1.1
-    """Side of the square of nodes that share a force arrow."""
+    """Side of the square whose nodes share one force arrow."""
     brightness: float = 0.8
     colourfulness: float = 0.6
-    """Of the picture behind, so that the arrows stand out."""
-    backend: Backend = "auto"
+    """Share of the frame's colour that is kept, so that the arrows stand out."""
 
     def __post_init__(self) -> None:
         if self.zoom is not None and not 1 <= self.zoom <= 8:
@@ -64,7 +63,7 @@ class OverlaySettings:
 
 
 class Overlay:
-    """Draws the frames of a run, all in one scale and size."""
+    """Draws the frames of a run at one size."""
 
     def __init__(
         self,
@@ -73,10 +72,14 @@ class Overlay:
         reference_px: NDArray[np.float64] | None = None,
         settings: OverlaySettings | None = None,
     ) -> None:
-        """`shape` is (h, w) of the frames; without `project` no forces are drawn in the picture.
+        """Prepare to draw frames of one sensor.
 
-        `reference_px` (m, 2) are the markers at rest, where lost ones are shown; without it they
-        are shown once they have been seen.
+        Args:
+            shape: (h, w) of the frames.
+            project: The camera's projection; without it no forces are drawn in the picture.
+            reference_px: (m, 2) positions of the markers at rest, where lost markers are drawn.
+                Without it a marker is drawn once it has been seen.
+            settings: What is drawn.
         """
         self._shape, self._project = shape, project
         self._settings = settings or OverlaySettings()
@@ -97,8 +100,8 @@ class Overlay:
     ) -> Image:
         """Return an RGB picture of `size_px`.
 
-        `image` is RGB (h, w, 3) or grey (h, w); None, or one of another size, leaves the picture
-        dark, and the result's problems tell why. Raises OutputError without OpenCV and Pillow.
+        `image` is RGB (h, w, 3) or grey (h, w). Without one, or with one of another size, the
+        picture stays dark. Raises MissingLibraryError without OpenCV.
         """
         field = result.field if self._settings.force and self._project is not None else None
         view = None if field is None else self._view_of(field)
@@ -106,18 +109,18 @@ class Overlay:
         if field is not None and view is not None:
             ground = _shaded(ground, view, field, scale)
         large = enlarged(np.rint(ground).astype(np.uint8), self.zoom)
-        canvas = canvas_on(large, self._settings.backend)
+        canvas = Canvas(large)
         if field is not None and view is not None:
             self._draw_forces(canvas, view, field, scale)
         if result.tracks is not None:
             self._draw_markers(canvas, result.tracks, scale)
         if field is not None and view is not None:
-            self._draw_centre(canvas, view.place_px(field.centre_of_pressure_mm))
+            self._draw_centre(canvas, view.position_px(field.centre_of_pressure_mm))
         picture = canvas.picture()
         return self._with_column(picture, result, scale) if self._settings.column else picture
 
     def _ground(self, image: NDArray[np.uint8] | None) -> NDArray[np.float32]:
-        """The frame, dimmed and less colourful."""
+        """The frame, darker and with less colour."""
         if image is None or image.shape[:2] != self._shape:
             return np.full((*self._shape, 3), 30, dtype=np.float32)
         colour = image.reshape(*self._shape, -1).astype(np.float32)
@@ -136,23 +139,23 @@ class Overlay:
             self._view = view
         return view
 
-    def _at(self, place: NDArray[np.float64]) -> tuple[float, float]:
-        """Place in the enlarged picture."""
-        x, y = (place + 0.5) * self.zoom - 0.5
+    def _at(self, position: NDArray[np.float64]) -> tuple[float, float]:
+        """Position in the enlarged picture."""
+        x, y = (position + 0.5) * self.zoom - 0.5
         return float(x), float(y)
 
     def _pen(self) -> float:
-        """Width of an arrow's shaft."""
+        """Width of the shaft of an arrow."""
         return max(1.0, self._shape[0] * self.zoom / 420.0)
 
     def _arrow(
         self,
         canvas: Canvas,
-        place: NDArray[np.float64],
+        position: NDArray[np.float64],
         length: NDArray[np.float64],
         colour: tuple[int, int, int],
     ) -> None:
-        start, end, pen = self._at(place), self._at(place + length), self._pen()
+        start, end, pen = self._at(position), self._at(position + length), self._pen()
         arrow(canvas, start, end, colour, pen, _DARK)
 
     def _draw_forces(
@@ -167,19 +170,19 @@ class Overlay:
         rest = self._rest_of(tracks)
         moved = np.where(tracks.known[:, None], tracks.displacement_px, np.nan)
         size = 0.8 * self._pen() + 0.4
-        for k, place in enumerate(rest):
+        for k, position in enumerate(rest):
             status = MarkerStatus(int(tracks.status[k]))
-            if not np.isfinite(place).all():
+            if not np.isfinite(position).all():
                 continue
             arrows = self._settings.motion and status == MarkerStatus.TRACKED
             if arrows and np.isfinite(moved[k]).all():
-                self._arrow(canvas, place, scale.motion_gain * moved[k], YELLOW)
+                self._arrow(canvas, position, scale.motion_gain * moved[k], YELLOW)
             if self._settings.markers:
-                x, y = self._at(place)
+                x, y = self._at(position)
                 status_mark(canvas, x, y, status, size)
 
     def _rest_of(self, tracks: Tracks) -> NDArray[np.float64]:
-        """Places at rest (m, 2), remembered for the markers that are lost now."""
+        """Positions at rest (m, 2), kept for the markers that are lost in this frame."""
         now = tracks.positions_px - tracks.displacement_px
         if self._rest is None or len(self._rest) != len(tracks):
             self._rest = np.full((len(tracks), 2), np.nan)
@@ -187,11 +190,11 @@ class Overlay:
         self._rest[new] = now[new]
         return self._rest
 
-    def _draw_centre(self, canvas: Canvas, place: NDArray[np.float64]) -> None:
-        """A cross hair at the centre of pressure."""
-        if not np.isfinite(place).all():
+    def _draw_centre(self, canvas: Canvas, position: NDArray[np.float64]) -> None:
+        """Draw cross hairs at the centre of pressure."""
+        if not np.isfinite(position).all():
             return
-        (x, y), size = self._at(place), 5 * self._pen()
+        (x, y), size = self._at(position), 5 * self._pen()
         for colour, width in ((_DARK, self._pen() + 2), (WHITE, self._pen())):
             canvas.ring((x, y), size, colour, width)
             for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
@@ -207,14 +210,12 @@ class Overlay:
         height, width = self.size_px
         out = np.full((height, width, 3), 12, dtype=np.uint8)
         out[: picture.shape[0], : picture.shape[1]] = picture
-        out[:, picture.shape[1] :] = legend(
-            result, scale, height, self.zoom, per_mm, self._settings.backend
-        )
+        out[:, picture.shape[1] :] = legend(result, scale, height, self.zoom, per_mm)
         return out
 
 
 def write_overlay(path: str | os.PathLike[str], picture: Image) -> None:
-    """Write a picture as PNG or JPEG by its ending, whole or not at all. Raises OutputError."""
+    """Write a picture as PNG or JPEG, as its suffix says. Raises OutputError."""
     data = encoded(picture, Path(path).suffix)
     try:
         replace_file(path, data)
@@ -225,7 +226,7 @@ def write_overlay(path: str | os.PathLike[str], picture: Image) -> None:
 def _shaded(
     ground: NDArray[np.float32], view: SurfaceView, field: ForceField, scale: ArrowScale
 ) -> NDArray[np.float32]:
-    """Red over the ground, the more the higher the pressure; none where it is unknown."""
+    """Blend red over the picture, the more the higher the pressure; none where it is unknown."""
     pressure = np.maximum(-field.traction_mpa[:, 2], 0.0)
     if not np.isfinite(pressure).all() or not pressure.any():
         return ground

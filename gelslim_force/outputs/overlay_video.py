@@ -1,39 +1,47 @@
-"""Overlay pictures as a video: `.mp4` (MPEG-4) or `.avi` (motion JPEG), through OpenCV."""
+"""Overlay pictures as a video, `.mp4` (MPEG-4) or `.avi` (Motion JPEG), through OpenCV."""
 
 from __future__ import annotations
 
 import math
 import os
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
+from gelslim_core import optional_library
 from gelslim_core.files.beside import beside
 from gelslim_core.files.output_error import OutputError, disk_error
-from gelslim_force.outputs import optional_library
 from gelslim_force.outputs.picture_file import Image
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
 
 
-class OverlayVideo:
-    """Takes pictures of one size; the file is in place once `finish` has checked it.
+class OverlayVideo(AbstractContextManager["OverlayVideo"]):
+    """Takes pictures of one size; `finish` checks the video and gives it its name.
 
-    Until then it is `.NAME.part.mp4` beside it. A killed process leaves that; of an `.avi` most
-    players show the frames there are, an `.mp4` cannot be played without its end.
+    Until then its name is `.NAME.part.mp4` in the same folder. A killed process leaves this file:
+    most players show the frames of an incomplete `.avi`, but not of an incomplete `.mp4`.
     """
 
     def __init__(
         self, path: str | os.PathLike[str], size_px: tuple[int, int], frames_per_s: float
     ) -> None:
-        """`size_px` is (h, w), such as `Overlay.size_px`; an odd side is padded by a pixel.
+        """Start a video.
 
-        Raises OutputError without OpenCV, for another ending, a bad rate or an unwritable folder.
+        Args:
+            path: The video; its name ends in .mp4 or .avi.
+            size_px: (h, w) of the pictures, such as `Overlay.size_px`. An odd side is padded by
+                one pixel.
+            frames_per_s: Rate, 0.1 ... 1000.
+
+        Raises:
+            OutputError: Another suffix, a rate out of range or a folder that cannot be written.
+            MissingLibraryError: OpenCV is not installed.
         """
         self.path = Path(path)
-        self._cv: Any = optional_library.load("cv2", "vision", "writing videos")
+        self._cv: Any = optional_library.load("cv2", "writing videos")
         codec = _CODECS.get(self.path.suffix.lower())
         if codec is None:
             raise OutputError(f"{self.path}: a video must end in .mp4 or .avi")
@@ -60,13 +68,13 @@ class OverlayVideo:
             )
 
     def append(self, picture: Image) -> None:
-        """Add an RGB picture. Raises OutputError for one of another size, or after `finish`."""
+        """Add an RGB picture. Raises OutputError for another size, or after `finish`."""
         if not self._open:
-            raise OutputError(f"{self.path}: the video is finished")
+            raise OutputError(f"{self.path}: the video is already finished")
         if picture.shape != (*self._size, 3) or picture.dtype != np.uint8:
             raise OutputError(
                 f"{self.path}: a picture {picture.shape} of {picture.dtype} in a video of "
-                f"{(*self._size, 3)} uint8; all must be alike"
+                f"{(*self._size, 3)} uint8; all must have the same size"
             )
         height, width = self._padded
         if self._padded != self._size:
@@ -76,10 +84,10 @@ class OverlayVideo:
         self.frames += 1
 
     def finish(self) -> None:
-        """Close, count the frames that can be read back and move the video into place.
+        """Close the video, count the frames that can be read back, and give it its name.
 
-        Raises OutputError where frames are missing, as on a full disk; nothing is put in place
-        then. A video without frames is dropped.
+        A video without frames is deleted. Raises OutputError if frames are missing, for example
+        because the disk is full; the file keeps its provisional name then.
         """
         if not self._open:
             return
@@ -92,26 +100,17 @@ class OverlayVideo:
         if found != self.frames:
             raise OutputError(
                 f"{self.path}: only {max(found, 0)} of {self.frames} frames can be read back; is "
-                f"the disk full? What there is lies in {self._part.name}"
+                f"the disk full? The incomplete video is {self._part.name}"
             )
         try:
             os.replace(self._part, self.path)
         except OSError as error:
             raise disk_error(self.path, "putting the video in place", error) from error
 
-    def __enter__(self) -> OverlayVideo:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> None:
-        """Finish; a video cut short by an error has the frames up to it."""
-        try:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Finish the video; after an error in the block it has the frames up to that error."""
+        with nullcontext() if kind is None else suppress(OutputError):
             self.finish()
-        except OutputError:
-            if kind is None:
-                raise
 
     def _readable(self) -> int:
         capture = self._cv.VideoCapture(str(self._part))

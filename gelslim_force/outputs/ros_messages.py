@@ -1,24 +1,26 @@
-"""Results as ROS 2 messages: definitions, and their bytes in SI units."""
+"""Frame results as ROS 2 messages in SI units, and the definitions of these messages."""
 
 from __future__ import annotations
 
 import math
 from importlib import resources
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.forces.wrench import Wrench
-from gelslim_force.outputs.cdr import CdrMessage
 
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 FORCE_FIELD = "gelslim_msgs/msg/ForceField"
-_SI = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])
-_BAR = "=" * 80
-_HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
-_PARTS = {
-    "std_msgs/Header": _HEADER,
+Message = dict[str, Any]
+"""Fields of a message by name; a nested message is a dictionary too."""
+_SI_UNITS = np.array([1.0, 1.0, 1.0, 1e-3, 1e-3, 1e-3])
+"""Factors from N and N mm to N and N m."""
+_SEPARATOR = "=" * 80
+_NESTED = {
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
     "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
     "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
@@ -26,82 +28,89 @@ _PARTS = {
 
 
 def force_field_definition() -> str:
-    """Return `ForceField.msg`, to be put in a ROS 2 package named gelslim_msgs."""
+    """Return `ForceField.msg`, which belongs into a ROS 2 package named gelslim_msgs."""
     folder = resources.files("gelslim_force.outputs")
     return (folder / "ForceField.msg").read_text(encoding="utf-8")
 
 
 def schema(type_name: str) -> str:
-    """Return a definition with those it needs, as a recording holds it. Raises KeyError."""
+    """Return a definition together with the nested ones. Raises KeyError for another type."""
     own = {
         WRENCH_STAMPED: "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
         FORCE_FIELD: force_field_definition(),
     }[type_name]
-    return own + "".join(f"{_BAR}\nMSG: {name}\n{text}" for name, text in _PARTS.items())
+    return own + "".join(f"{_SEPARATOR}\nMSG: {name}\n{text}" for name, text in _NESTED.items())
 
 
 def nanoseconds(time_s: float) -> int:
-    """Return a time for a stamp; 0 for one that a stamp cannot hold (under 0, or past 2038)."""
-    held = math.isfinite(time_s) and 0 < time_s < 2**31 - 1
-    return round(time_s * 1e9) if held else 0
+    """Return a time for a stamp; 0 for one that a stamp cannot hold (below 0, or after 2038)."""
+    valid = math.isfinite(time_s) and 0 < time_s < 2**31 - 1
+    return round(time_s * 1e9) if valid else 0
 
 
-def wrench_stamped(result: FrameResult, frame_id: str) -> bytes | None:
-    """Return geometry_msgs/msg/WrenchStamped in N and N m; None without a wrench."""
+def wrench_stamped(result: FrameResult, frame_id: str) -> Message | None:
+    """Return a geometry_msgs/msg/WrenchStamped in N and N m; None without a wrench."""
     if result.wrench is None:
         return None
-    message = CdrMessage()
-    _add_header(message, result, frame_id)
-    message.array(_wrench(result.wrench), "<f8")
-    return message.data()
+    return {"header": _header(result, frame_id), "wrench": _wrench(result.wrench)}
 
 
-def force_field(result: FrameResult, frame_id: str) -> bytes:
-    """Return gelslim_msgs/msg/ForceField; what the frame lacks is NaN or empty."""
+def force_field(result: FrameResult, frame_id: str) -> Message:
+    """Return a gelslim_msgs/msg/ForceField; what the frame does not have is NaN or empty."""
     field, tracks = result.field, result.tracks
-    message = CdrMessage()
-    _add_header(message, result, frame_id)
-    message.uint32(int(result.index) % 2**32)
-    message.boolean(result.normal_known)
-    message.array(_wrench(result.wrench), "<f8")
-    message.array(_covariance(result.wrench), "<f8")
-    if field is None:
-        message.array([math.nan] * 4, "<f8")
-        for _ in range(5):
-            message.uint32(0)
-    else:
-        message.array(np.asarray(field.centre_of_pressure_mm) / 1e3, "<f8")
-        message.array([field.slip_margin, field.misfit], "<f8")
-        for values, to_si in (
-            (field.points_mm, 1e-3),
-            (field.displacement_mm, 1e-3),
-            (field.force_n, 1.0),
-            (field.traction_mpa, 1e6),
-        ):
-            message.sequence(values * to_si, "<f4")
-        message.sequence(field.contact, "u1")
-    message.uint32(0 if tracks is None else len(tracks))
-    message.uint32(0 if tracks is None else int(tracks.tracked.sum()))
-    message.uint32(len(result.problems))
-    for problem in result.problems:
-        message.string(problem)
-    return message.data()
+    message: Message = {
+        "header": _header(result, frame_id),
+        "frame_index": int(result.index) % 2**32,
+        "normal_known": result.normal_known,
+        "wrench": _wrench(result.wrench),
+        "wrench_covariance": _covariance(result.wrench),
+        "centre_of_pressure": [math.nan] * 2,
+        "slip_margin": math.nan,
+        "misfit": math.nan,
+        "markers": 0 if tracks is None else len(tracks),
+        "markers_tracked": 0 if tracks is None else int(tracks.tracked.sum()),
+        "problems": [_text(problem) for problem in result.problems],
+    }
+    if field is not None:
+        message |= {
+            "centre_of_pressure": (np.asarray(field.centre_of_pressure_mm) / 1e3).tolist(),
+            "slip_margin": field.slip_margin,
+            "misfit": field.misfit,
+            "points": _float32(field.points_mm * 1e-3),
+            "displacement": _float32(field.displacement_mm * 1e-3),
+            "force": _float32(field.force_n),
+            "traction": _float32(field.traction_mpa * 1e6),
+            "contact": field.contact.tolist(),
+        }
+    return message
 
 
-def _add_header(message: CdrMessage, result: FrameResult, frame_id: str) -> None:
+def _header(result: FrameResult, frame_id: str) -> Message:
     sec, nanosec = divmod(nanoseconds(result.time_s), 10**9)
-    message.int32(sec)
-    message.uint32(nanosec)
-    message.string(frame_id)
+    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": _text(frame_id)}
 
 
-def _wrench(wrench: Wrench | None) -> NDArray[np.float64]:
-    """(6,) in N and N m."""
-    return np.full(6, np.nan) if wrench is None else wrench.vector * _SI
+def _wrench(wrench: Wrench | None) -> Message:
+    values = np.full(6, np.nan) if wrench is None else wrench.vector * _SI_UNITS
+    force, torque = (dict(zip("xyz", part, strict=True)) for part in np.split(values, 2))
+    return {"force": force, "torque": torque}
 
 
-def _covariance(wrench: Wrench | None) -> NDArray[np.float64]:
-    """(6, 6) in N and N m."""
+def _covariance(wrench: Wrench | None) -> list[float]:
+    """36 numbers in N and N m, row by row."""
     if wrench is None:
-        return np.full((6, 6), np.nan)
-    return np.asarray(wrench.covariance * np.outer(_SI, _SI))
+        return [math.nan] * 36
+    scale = np.outer(_SI_UNITS, _SI_UNITS)
+    values: list[float] = (wrench.covariance * scale).ravel().tolist()
+    return values
+
+
+def _float32(values: ArrayLike) -> list[float]:
+    """All numbers in order; those beyond the range of single precision become infinite."""
+    rounded: list[float] = np.asarray(values).astype(np.float32).ravel().tolist()
+    return rounded
+
+
+def _text(text: str) -> str:
+    """Text that UTF-8 can hold and that has no zero byte, which would end it early."""
+    return text.encode("utf-8", "backslashreplace").decode().replace("\0", "")

@@ -22,15 +22,14 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core import optional_library
 from gelslim_core.files.file_lock import locked
 from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_core.files.replaced_file import sweep
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.outputs import optional_library, wrench_csv
-from gelslim_force.outputs.append_file import AppendFile
-from gelslim_force.outputs.chunk_writer import ChunkWriter
-from gelslim_force.outputs.field_chunk import Format, fits
-from gelslim_force.outputs.frame_journal import record
+from gelslim_force.outputs import wrench_csv
+from gelslim_force.outputs.field_chunk import ChunkWriter, Format, fits
+from gelslim_force.outputs.frame_journal import AppendFile, record
 from gelslim_force.outputs.packed_frame import PackedFrame, Precision, pack, plain
 from gelslim_force.outputs.run_manifest import (
     FORMAT_NAME,
@@ -112,7 +111,7 @@ class RunRecorder:
         self.folder = Path(folder)
         self._keep = keep or RecorderSettings()
         if self._keep.fields == "parquet":
-            optional_library.load("pyarrow.parquet", "record", "Parquet")
+            optional_library.load("pyarrow.parquet", "Parquet")
         self._about: dict[str, Any] = {
             "bundle": dict(bundle) if bundle else None,
             "versions": versions(),

@@ -1,4 +1,4 @@
-"""The pad's surface as the camera sees it: where forces and pressure go in the picture."""
+"""The surface of the pad in the picture: where arrows start and which pixels a node colours."""
 
 from __future__ import annotations
 
@@ -11,53 +11,53 @@ from scipy.spatial import Delaunay, QhullError
 
 Array = NDArray[np.float64]
 Projection = Callable[[Array], Array]
-"""Places (n, 2) in px of points (n, 3) in mm, such as `VirtualCamera.project`."""
+"""From points (n, 3) in mm to positions (n, 2) in px, such as `VirtualCamera.project`."""
 _COARSE = 4
 _STEP_MM = 0.05
 
 
 class SurfaceView:
-    """Nodes in the picture, gathered into cells for arrows and spread over pixels for shades.
+    """Nodes in the picture: averaged in cells for arrows, interpolated to pixels for shades.
 
-    Everything that the camera has to do is done here, once; a frame costs a few products.
+    The camera's projection is evaluated once, so that a frame needs only a few matrix products.
     """
 
     def __init__(
         self, points_mm: Array, project: Projection, shape: tuple[int, int], cell_mm: float
     ) -> None:
-        """`shape` is (h, w) of the picture; arrows stand for the nodes of a cell of `cell_mm`."""
+        """Project the nodes into a picture of `shape` (h, w); one arrow per cell of `cell_mm`."""
         self.points_mm = points_mm
         self._project = project
         self.shape = shape
         self._gather, centres = _cells(points_mm, cell_mm)
         self.cells_px = project(centres)
-        """(k, 2) where the arrows start."""
+        """(k, 2) positions at which the arrows start."""
         steps = [np.array([_STEP_MM, 0, 0]), np.array([0, _STEP_MM, 0])]
         columns = [(project(centres + s) - project(centres - s)) / (2 * _STEP_MM) for s in steps]
         self.px_per_mm = np.stack(columns, axis=-1)
-        """(k, 2, 2) motion in the picture per motion along the gel at each cell."""
+        """(k, 2, 2) Jacobian of the projection along the gel at each cell."""
         self._spread = _spreading(project(points_mm), shape)
 
     def arrows_px(self, traction_mpa: Array, mm_per_mpa: float) -> Array:
-        """(k, 2) arrows of the mean tangential traction of each cell's nodes (c, 2 or 3)."""
+        """Return the arrows (k, 2) of the mean tangential traction in each cell."""
         mean = self._gather @ traction_mpa[:, :2]
         return np.einsum("kij,kj->ki", self.px_per_mm, mean * mm_per_mpa)
 
     def spread(self, values: Array) -> Array:
-        """Picture (h, w) of values (c,) at the nodes, linear between them, 0 beside the pad."""
+        """Interpolate values (c,) at the nodes linearly to a picture (h, w), 0 outside the pad."""
         height, width = _coarse(self.shape)
         coarse = (self._spread @ values).reshape(height, width)
         return _enlarged(coarse, self.shape)
 
-    def place_px(self, point_mm: Array) -> Array:
-        """(2,) of a point (2,) on the surface; NaN for NaN."""
+    def position_px(self, point_mm: Array) -> Array:
+        """Return the position (2,) of a point (2,) on the surface; NaN for NaN."""
         if not np.isfinite(point_mm).all():
             return np.full(2, np.nan)
         return np.asarray(self._project(np.array([[point_mm[0], point_mm[1], 0.0]]))[0])
 
 
 def _cells(points_mm: Array, cell_mm: float) -> tuple[sparse.csr_array, Array]:
-    """Means (k, c) over the nodes of a cell, and the cells' centroids (k, 3)."""
+    """Matrix (k, c) that averages over the nodes of a cell, and the centroids (k, 3)."""
     box = np.floor(points_mm[:, :2] / cell_mm + 0.5).astype(np.int64)
     _, cell = np.unique(box, axis=0, return_inverse=True)
     cell = cell.reshape(-1)
@@ -79,7 +79,7 @@ def _spreading(nodes_px: Array, shape: tuple[int, int]) -> sparse.csr_array:
     size = (height * width, len(nodes_px))
     try:
         net = Delaunay(nodes_px)
-    except (QhullError, ValueError):  # too few nodes, or all in a line: no area to shade
+    except (QhullError, ValueError):  # too few nodes, or all on one line: there is no area
         return sparse.csr_array(size)
     triangle = net.find_simplex(pixels)
     inside = np.flatnonzero(triangle >= 0)
@@ -91,7 +91,7 @@ def _spreading(nodes_px: Array, shape: tuple[int, int]) -> sparse.csr_array:
 
 
 def _enlarged(coarse: Array, shape: tuple[int, int]) -> Array:
-    """Linear between coarse pixels; their centres are at (i + 1/2) of the coarse grid."""
+    """Interpolate linearly between coarse pixels, whose centres are at i + 1/2."""
     for axis, count in enumerate(shape):
         at = np.clip((np.arange(count) + 0.5) / _COARSE - 0.5, 0, coarse.shape[axis] - 1)
         low = np.minimum(at.astype(int), max(coarse.shape[axis] - 2, 0))

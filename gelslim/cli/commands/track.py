@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from gelslim_force.dot_tracking import DotsAtRest
     from gelslim_force.frames.frame import FrameSource
-    from gelslim_force.outputs.overlay_sink import PictureSink
+    from gelslim_force.outputs.sinks import PictureSink
     from gelslim_force.outputs.track_record import TrackRecord
 
 
@@ -194,7 +194,7 @@ def _name(frames: str) -> str:
 
 def _picture_sink(rest: DotsAtRest, folder: Path, most: int) -> PictureSink | None:
     from gelslim_force.outputs.overlay import Overlay
-    from gelslim_force.outputs.overlay_sink import PictureSink
+    from gelslim_force.outputs.sinks import PictureSink
 
     if not most:
         return None

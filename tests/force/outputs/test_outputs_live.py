@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import sys
 import threading
 import urllib.error
 import urllib.request
@@ -18,7 +17,6 @@ import pytest
 
 from gelslim_core.files.output_error import OutputError
 from gelslim_force.outputs.live_view import LiveView, live_state
-from gelslim_force.outputs.live_window import LiveWindow, windows_possible
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -104,29 +102,16 @@ def test_closing_ends_threads_and_frees_the_port() -> None:
     view = LiveView()
     port = urlparse(view.url).port
     assert port is not None
-    with pytest.raises(OutputError, match=f"port {port}: .* starting the live view"):
+    with pytest.raises(OutputError, match=str(port)):
         LiveView(port)
     view.close()
     view.close()
     assert threading.active_count() == before
     LiveView(port).close()
-    with pytest.raises(OutputError, match="65535"):
+    with pytest.raises(OutputError, match="700000"):
         LiveView(700_000)
 
 
 def test_state_is_strict_json() -> None:
     text = json.dumps(live_state(samples.unreadable(3)), allow_nan=False)
     assert json.loads(text)["frame"]["coverage"] == 0
-
-
-def test_no_window_is_a_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    cv2 = pytest.importorskip("cv2")
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    if sys.platform.startswith("linux"):
-        assert not windows_possible(cv2)
-        with pytest.raises(OutputError, match="browser view"):
-            LiveWindow()
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(OutputError, match=r"gelslim-cad\[vision\]"):
-        LiveWindow()

@@ -14,6 +14,7 @@ from camera_rig import finger_view
 from scipy.interpolate import LinearNDInterpolator
 
 from gelslim_core.files.output_error import OutputError
+from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import (
     ArrowScale,
@@ -31,12 +32,7 @@ from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 BLACK = np.zeros((480, 640, 3), dtype=np.uint8)
 SCALE = ArrowScale(2.0, 20.0, 0.2, 5.0, 5.0)
-BACKENDS = ("opencv", "pillow")
-
-
-def settings(backend: str, **more: object) -> OverlaySettings:
-    pytest.importorskip({"opencv": "cv2", "pillow": "PIL"}[backend])
-    return OverlaySettings(backend=backend, **more)  # type: ignore[arg-type]
+pytest.importorskip("cv2")
 
 
 def coloured(picture: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
@@ -45,15 +41,14 @@ def coloured(picture: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
     return np.argwhere(near)[:, ::-1]
 
 
-def one_marker(place: tuple[float, float], motion: tuple[float, float]) -> FrameResult:
+def one_marker(position: tuple[float, float], motion: tuple[float, float]) -> FrameResult:
     moved = np.array([motion])
-    tracks = Tracks(np.array([place]) + moved, moved, np.zeros(1, int), np.zeros(1, int))
+    tracks = Tracks(np.array([position]) + moved, moved, np.zeros(1, int), np.zeros(1, int))
     return FrameResult(index=0, time_s=0.0, tracks=tracks)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_a_motion_arrow_spans_gain_times_motion(backend: str) -> None:
-    overlay = Overlay((480, 640), settings=settings(backend, column=False, markers=False, zoom=2))
+def test_a_motion_arrow_spans_gain_times_motion() -> None:
+    overlay = Overlay((480, 640), settings=OverlaySettings(column=False, markers=False, zoom=2))
     picture = overlay.draw(BLACK, one_marker((200.0, 150.0), (30.0, -20.0)), SCALE)
     yellow = coloured(picture, YELLOW)
     # From (200, 150) by gain 2: to (260, 110); pixel p of the frame is at 2 p + 1/2.
@@ -62,8 +57,7 @@ def test_a_motion_arrow_spans_gain_times_motion(backend: str) -> None:
     np.testing.assert_allclose(tip, [520.5, 220.5], atol=3)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_a_force_arrow_follows_the_camera(backend: str) -> None:
+def test_a_force_arrow_follows_the_camera() -> None:
     """One node alone carries shear; its arrow ends where the camera sees its end on the gel."""
     camera = finger_view()
     field = samples.force_field(0.0, (0.0, 0.0))
@@ -73,7 +67,7 @@ def test_a_force_arrow_follows_the_camera(backend: str) -> None:
     field = dataclasses.replace(field, traction_mpa=traction)
     result = FrameResult(index=0, time_s=0.0, field=field)
     overlay = Overlay(
-        (480, 640), camera.project, settings=settings(backend, column=False, cell_mm=0.3)
+        (480, 640), camera.project, settings=OverlaySettings(column=False, cell_mm=0.3)
     )
     red = coloured(overlay.draw(BLACK, result, SCALE), RED)
     ends = np.array([field.points_mm[node], field.points_mm[node] + 20.0 * traction[node]])
@@ -105,21 +99,16 @@ def test_arrow_and_shade_against_the_camera_and_scipy() -> None:
     assert picture[470, 5] == 0.0
 
 
-def test_backends_agree() -> None:
-    pictures = []
-    for backend in BACKENDS:
-        overlay = Overlay((480, 640), finger_view().project, settings=settings(backend))
-        pictures.append(overlay.draw(np.full_like(BLACK, 120), samples.frame(3), SCALE))
-    assert pictures[0].shape == pictures[1].shape == (960, 1280 + WIDTH_PX, 3)
+def test_arrows_cover_what_the_field_needs() -> None:
+    overlay = Overlay((480, 640), finger_view().project)
+    picture = overlay.draw(np.full_like(BLACK, 120), samples.frame(3), SCALE)
+    assert picture.shape == (960, 1280 + WIDTH_PX, 3)
     for colour in (YELLOW, RED):
-        counts = [len(coloured(p[:, :1280], colour)) for p in pictures]
-        assert min(counts) > 2000
-        assert max(counts) < 2 * min(counts), "widths are rounded differently, no more"
-    assert np.abs(pictures[0].astype(float) - pictures[1]).mean() < 4.0
+        assert len(coloured(picture[:, :1280], colour)) > 2000
 
 
 def test_unknown_normal_draws_shear_without_shade() -> None:
-    overlay = Overlay((480, 640), finger_view().project, settings=settings("opencv", motion=False))
+    overlay = Overlay((480, 640), finger_view().project, settings=OverlaySettings(motion=False))
     shaded = overlay.draw(np.full_like(BLACK, 120), samples.frame(1), SCALE)
     plain = overlay.draw(np.full_like(BLACK, 120), samples.frame(1, normal_known=False), SCALE)
     grey = (np.ptp(plain[:, :1280].astype(int), axis=2) < 6).sum()
@@ -129,7 +118,7 @@ def test_unknown_normal_draws_shear_without_shade() -> None:
 
 
 def test_no_contact_draws_no_arrows() -> None:
-    overlay = Overlay((480, 640), finger_view().project, settings=settings("opencv", column=False))
+    overlay = Overlay((480, 640), finger_view().project, settings=OverlaySettings(column=False))
     result = samples.frame(0, depth_mm=0.0, shear_mm=(0.0, 0.0))
     picture = overlay.draw(BLACK, result, scale_of_run([result]))
     assert len(coloured(picture, YELLOW)) == 0
@@ -137,7 +126,7 @@ def test_no_contact_draws_no_arrows() -> None:
 
 
 def test_lost_markers_stay_where_they_were_seen() -> None:
-    overlay = Overlay((480, 640), settings=settings("opencv", column=False, zoom=1))
+    overlay = Overlay((480, 640), settings=OverlaySettings(column=False, zoom=1))
     seen = one_marker((100.0, 80.0), (0.0, 0.0))
     nowhere = np.full((1, 2), np.nan)
     lost = Tracks(nowhere, nowhere, np.array([int(MarkerStatus.LOST)]), np.array([-1]))
@@ -148,9 +137,8 @@ def test_lost_markers_stay_where_they_were_seen() -> None:
     np.testing.assert_allclose(bright.mean(axis=0), [80, 100], atol=1)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_a_frame_that_could_not_be_read_has_its_problem_in_the_column(backend: str) -> None:
-    overlay = Overlay((200, 300), settings=settings(backend))
+def test_a_frame_that_could_not_be_read_has_its_problem_in_the_column() -> None:
+    overlay = Overlay((200, 300), settings=OverlaySettings())
     picture = overlay.draw(None, samples.unreadable(5), SCALE)
     assert picture.shape == (*overlay.size_px, 3) == (800, 1200 + WIDTH_PX, 3)
     assert len(coloured(picture, ORANGE)) > 100
@@ -160,7 +148,7 @@ def test_a_frame_that_could_not_be_read_has_its_problem_in_the_column(backend: s
 
 
 def test_grey_frames_and_low_ones() -> None:
-    overlay = Overlay((100, 120), settings=settings("opencv", zoom=1))
+    overlay = Overlay((100, 120), settings=OverlaySettings(zoom=1))
     picture = overlay.draw(np.full((100, 120), 200, np.uint8), samples.unreadable(0), SCALE)
     assert picture.shape == (LEAST_HEIGHT_PX, 120 + WIDTH_PX, 3)
     np.testing.assert_array_equal(picture[50, 60], [160, 160, 160])
@@ -169,7 +157,7 @@ def test_grey_frames_and_low_ones() -> None:
 def test_the_given_frame_is_left_alone() -> None:
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8)
     before = image.copy()
-    overlay = Overlay((480, 640), finger_view().project, settings=settings("opencv", zoom=1))
+    overlay = Overlay((480, 640), finger_view().project, settings=OverlaySettings(zoom=1))
     overlay.draw(image, samples.frame(1), SCALE)
     np.testing.assert_array_equal(image, before)
 
@@ -200,7 +188,7 @@ def test_live_scale_steps_once_and_does_not_flicker() -> None:
 
 def test_files(tmp_path: Path) -> None:
     pillow = pytest.importorskip("PIL.Image")
-    overlay = Overlay((480, 640), settings=settings("opencv", zoom=1))
+    overlay = Overlay((480, 640), settings=OverlaySettings(zoom=1))
     picture = overlay.draw(BLACK, samples.frame(1), SCALE)
     path = tmp_path / "ein Bild, größer.png"
     write_overlay(path, picture)
@@ -208,41 +196,44 @@ def test_files(tmp_path: Path) -> None:
     write_overlay(tmp_path / "a.jpg", picture)
     back = np.asarray(pillow.open(tmp_path / "a.jpg")).astype(float)
     assert np.abs(back - picture).mean() < 3
-    with pytest.raises(OutputError, match=r"'.bmp': must be .png"):
+    with pytest.raises(OutputError, match=r"\.bmp"):
         write_overlay(tmp_path / "a.bmp", picture)
-    with pytest.raises(OutputError, match="writing the picture; the folder is gone"):
+    with pytest.raises(OutputError, match=r"a\.png"):
         write_overlay(tmp_path / "none" / "a.png", picture)
 
 
 def test_without_libraries_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cv2", None)
-    monkeypatch.setitem(sys.modules, "PIL.Image", None)
     overlay = Overlay((480, 640), settings=OverlaySettings(zoom=1))
-    with pytest.raises(OutputError, match=r"gelslim-cad\[vision\]"):
+    with pytest.raises(MissingLibraryError) as refused:
         overlay.draw(BLACK, samples.frame(1), SCALE)
-    for bad in ({"zoom": 9}, {"cell_mm": 0.0}, {"brightness": 2.0}):
-        with pytest.raises(ValueError, match="must be"):
-            OverlaySettings(**bad)  # type: ignore[arg-type]
+    assert (refused.value.name, refused.value.extra) == ("cv2", "vision")
+
+
+@pytest.mark.parametrize("bad", [{"zoom": 9}, {"cell_mm": 0.0}, {"brightness": 2.0}])
+def test_impossible_settings_are_refused(bad: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        OverlaySettings(**bad)  # type: ignore[arg-type]
 
 
 def test_words_of_the_scales_are_of_what_is_drawn() -> None:
     """Arrows as long as their words say, and the pressure of the full shade, in kPa."""
     from gelslim_force.outputs.legend import _scales
 
-    class Told:
+    class RecordedText:
         words: ClassVar[list[str]] = []
 
-        def text(self, place: object, text: str, *_: object) -> None:
+        def text(self, position: object, text: str, *_: object) -> None:
             self.words.append(text)
 
         def line(self, *_: object) -> None: ...
 
         def polygon(self, *_: object) -> None: ...
 
-    _scales(Told(), SCALE, 1.0, 10.0, 50.0)  # type: ignore[arg-type]
-    assert "0 to 200 kPa pressure" in Told.words
+    _scales(RecordedText(), SCALE, 1.0, 10.0, 50.0)  # type: ignore[arg-type]
+    assert "0 to 200 kPa pressure" in RecordedText.words
     # 20 mm per MPa at 10 px/mm: an arrow of 90 px is 450 kPa, and a round value is below it.
-    (shear,) = (w for w in Told.words if w.endswith("kPa shear"))
+    (shear,) = (w for w in RecordedText.words if w.endswith("kPa shear"))
     assert 0.3 * 450 < float(shear.split()[0]) <= 450
 
 

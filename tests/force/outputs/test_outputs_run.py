@@ -15,8 +15,8 @@ import output_samples as samples
 import pytest
 
 from gelslim_core.files.output_error import OutputError
+from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.outputs import optional_library
 from gelslim_force.outputs.recorded_run import read_run
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
 
@@ -293,10 +293,10 @@ def test_parquet_without_pyarrow_names_the_extra(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(OutputError, match=r"gelslim-cad\[record\]"):
+    with pytest.raises(MissingLibraryError) as refused:
         RunRecorder(tmp_path / "x", keep=RecorderSettings("parquet"))
+    assert (refused.value.name, refused.value.extra) == ("pyarrow", "record")
     assert not (tmp_path / "x").exists()
-    assert not optional_library.available("pyarrow")
 
 
 def test_manifest_is_strict_json(tmp_path: Path) -> None:

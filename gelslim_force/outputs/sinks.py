@@ -1,7 +1,7 @@
-"""Overlay pictures and video of a run, drawn in one scale once the run is known.
+"""Where the results of a run go: recorders, overlay pictures, a video, a live view.
 
-Drawing takes longer than estimating; frames to draw are kept as they came and drawn at the end,
-or one by one where the run has no end.
+Pictures of a run are drawn at its end, because drawing takes longer than estimating and because
+all of them share one scale. A video and a live view are drawn frame by frame.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.outputs.arrow_scale import ArrowScale, LiveScale, extent, scale_for
+from gelslim_force.outputs.arrow_scale import LiveScale, scale_of_run
 from gelslim_force.outputs.overlay import Overlay, write_overlay
 from gelslim_force.outputs.overlay_video import OverlayVideo
 
@@ -24,20 +25,38 @@ _PICTURE = re.compile(r"frame_\d{6,}\.png")
 Show = Callable[[NDArray[np.uint8], FrameResult], None]
 
 
+class Recorder(Protocol):
+    """A run folder or a recording."""
+
+    def append(self, result: FrameResult) -> None:
+        """Keep a result."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecorderSink:
+    """Passes results on to a recorder, without their pictures."""
+
+    recorder: Recorder
+
+    def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
+        """Record the result."""
+        self.recorder.append(result)
+
+
 @dataclass(eq=False)
 class PictureSink:
-    """Keeps up to `most` frames spread over the run, and writes them to a folder at the end."""
+    """Keeps frames that are spread evenly over the run and draws them into a folder at its end."""
 
     overlay: Overlay
     folder: str | os.PathLike[str]
     most: int
+    """Largest number of pictures."""
     _kept: list[tuple[NDArray[np.uint8] | None, FrameResult]] = field(default_factory=list)
     _every: int = 1
     _count: int = 0
 
     def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
-        """Keep the frame if its turn has come; every other one is dropped when there are twice
-        as many as wanted."""
+        """Keep every n-th frame; n doubles when there are twice as many frames as wanted."""
         if self._count % self._every == 0:
             self._kept.append((image, result))
             if len(self._kept) > 2 * self.most:
@@ -45,12 +64,17 @@ class PictureSink:
         self._count += 1
 
     def write(self) -> list[Path]:
-        """Draw and write what was kept; returns the files."""
+        """Draw and write the frames that were kept.
+
+        Returns the files. Raises OutputError, and ValueError if the run had no frame.
+        """
         chosen = self._kept
         if len(chosen) > self.most:
             places = np.linspace(0, len(chosen) - 1, self.most).round().astype(int)
             chosen = [chosen[i] for i in places]
-        scale = _common_scale([r for _, r in chosen])
+        if not chosen:
+            raise ValueError("the run has no frame to draw")
+        scale = scale_of_run(result for _, result in chosen)
         files = []
         for image, result in chosen:
             path = Path(self.folder) / f"frame_{result.index:06d}.png"
@@ -59,26 +83,26 @@ class PictureSink:
             files.append(path)
         for old in Path(self.folder).glob("frame_*.png"):
             if old not in files and _PICTURE.fullmatch(old.name):
-                old.unlink()  # of an earlier, other run
+                old.unlink()  # left by an earlier run into this folder
         return files
 
 
 @dataclass(eq=False)
 class VideoSink:
-    """Draws every frame into a video as it comes."""
+    """Draws every frame into a video."""
 
     overlay: Overlay
     video: OverlayVideo
     scale: LiveScale
 
     def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
-        """Draw and append."""
+        """Draw the frame and append it to the video."""
         self.video.append(self.overlay.draw(image, result, self.scale.scale(result)))
 
 
 @dataclass(eq=False)
 class ViewSink:
-    """Shows every n-th frame, such as in a `LiveView`."""
+    """Shows every n-th frame, for example in a `LiveView`."""
 
     overlay: Overlay
     show: Show
@@ -87,18 +111,7 @@ class ViewSink:
     _count: int = 0
 
     def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
-        """Draw and show, if its turn has come."""
+        """Draw and show the frame if it is an n-th one."""
         if self._count % self.every == 0:
             self.show(self.overlay.draw(image, result, self.scale.scale(result)), result)
         self._count += 1
-
-
-def _common_scale(results: list[FrameResult]) -> ArrowScale:
-    sizes = [extent(r) for r in results]
-    largest = sizes[0] if sizes else None
-    for size in sizes[1:]:
-        assert largest is not None
-        largest = largest.joined(size)
-    if largest is None:
-        raise ValueError("no frame to draw")
-    return scale_for(largest)
