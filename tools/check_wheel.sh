@@ -26,7 +26,7 @@ gelslim bundle gelslim2.yaml --no-ladder -o sensor
 reference=$(find press/frames -name '*.png' | sort | head -n 1)
 gelslim calibrate sensor "$reference" -o calibration.json
 gelslim force sensor press/frames -c calibration.json -r "$reference" --indenter sphere:10 -o run
-tail -n 1 run/wrench.csv
+tail -n 1 run/wrenches.csv
 python - "$here" <<'EOF'
 import csv
 import sys
@@ -35,7 +35,7 @@ import gelslim
 
 if gelslim.__file__.startswith(sys.argv[1]):
     sys.exit("the checkout was imported, not the wheel")
-with open("run/wrench.csv", newline="") as stream:
+with open("run/wrenches.csv", newline="") as stream:
     rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
 with open("press/truth.csv", newline="") as stream:
     truth = list(csv.DictReader(line for line in stream if not line.startswith("#")))
