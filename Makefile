@@ -8,7 +8,7 @@ PINS := requirements/constraints.txt
 
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: variant test test-slow lint stability designs bench docs pins clean
+.PHONY: variant test test-slow site lint stability designs bench docs pins clean
 
 variant: $(VENV)/.installed
 	$(BIN)/gelslim build "$(SPEC)" -o "$(OUT)"
@@ -41,6 +41,11 @@ docs: $(VENV)/.installed-dev
 	$(BIN)/python bench/accuracy_page.py
 	$(BIN)/python tools/sensitivities.py
 	$(BIN)/python tools/gallery.py
+	$(MAKE) site
+
+site: $(VENV)/.installed-docs
+	$(BIN)/python tools/api_pages.py docs/api
+	$(BIN)/sphinx-build -q -b html docs out/site
 
 designs: $(VENV)/.installed
 	for spec in designs/*.yaml; do $(BIN)/gelslim build "$$spec" -o "out/$$(basename "$$spec" .yaml)" || exit $$?; done
@@ -52,6 +57,10 @@ $(VENV)/.installed: pyproject.toml $(PINS)
 $(VENV)/.installed-dev: pyproject.toml $(PINS)
 	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev"
 	touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-docs: pyproject.toml $(PINS)
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev,docs"
+	touch $@ $(VENV)/.installed-dev $(VENV)/.installed
 
 $(VENV)/.installed-peers: pyproject.toml $(PINS)
 	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev,peers"
