@@ -1,3 +1,66 @@
-"""What the other packages stand on and what knows nothing of fingers."""
+"""What the other packages build on: errors, budgets, input files, output files and parallel jobs.
+
+Nothing in it knows what a tactile finger is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gelslim_core.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from gelslim_core.budget.budget import Budget, BudgetError
+    from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
+    from gelslim_core.errors import GelslimError
+    from gelslim_core.jobs.engine import Engine, EngineError
+    from gelslim_core.yaml.base import Block
+    from gelslim_core.yaml.errors import FieldError, InputError, Problem
+    from gelslim_core.yaml.reader import Loaded, read_model
+    from gelslim_core.yaml.schema import reference_markdown, schema_text
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Block",
+    "Budget",
+    "BudgetError",
+    "Choice",
+    "Engine",
+    "EngineError",
+    "FieldError",
+    "GelslimError",
+    "InputError",
+    "Ladder",
+    "Loaded",
+    "Problem",
+    "Rung",
+    "Wording",
+    "__version__",
+    "read_model",
+    "reference_markdown",
+    "schema_text",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__,
+    {
+        "Block": "gelslim_core.yaml.base",
+        "Budget": "gelslim_core.budget.budget",
+        "BudgetError": "gelslim_core.budget.budget",
+        "Choice": "gelslim_core.budget.ladder",
+        "Engine": "gelslim_core.jobs.engine",
+        "EngineError": "gelslim_core.jobs.engine",
+        "FieldError": "gelslim_core.yaml.errors",
+        "GelslimError": "gelslim_core.errors",
+        "InputError": "gelslim_core.yaml.errors",
+        "Ladder": "gelslim_core.budget.ladder",
+        "Loaded": "gelslim_core.yaml.reader",
+        "Problem": "gelslim_core.yaml.errors",
+        "Rung": "gelslim_core.budget.ladder",
+        "Wording": "gelslim_core.budget.ladder",
+        "read_model": "gelslim_core.yaml.reader",
+        "reference_markdown": "gelslim_core.yaml.schema",
+        "schema_text": "gelslim_core.yaml.schema",
+    },
+)

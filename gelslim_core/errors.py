@@ -1,4 +1,4 @@
-"""The base of all errors that the program reports to its user in words of its own."""
+"""The base class of all errors that the program reports to its user."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 class GelslimError(Exception):
     """An error whose message says what is wrong, why, and what to do.
 
-    Whatever else the program raises is a fault of the program itself.
+    Any other exception is a fault of the program itself.
 
     Attributes:
         exit_status: Exit status of the command line: 1 for a design rule that fails, 2 for

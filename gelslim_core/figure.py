@@ -1,4 +1,4 @@
-"""Figures without a display and without a date: the same content gives the same bytes."""
+"""Figures made without a display; the same content gives the same bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def new_figure(
 
 
 def as_png(figure: Any, title: str | None = None) -> bytes:
-    """The figure as PNG; a `title` is kept in its text, to be known again."""
+    """The figure as PNG; a `title` is stored in its metadata."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None, "Title": title})
     return stream.getvalue()

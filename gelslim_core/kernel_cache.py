@@ -1,7 +1,7 @@
-"""Compiled kernels whose helpers changed are compiled again.
+"""Removal of cached kernels whose helpers have changed.
 
-numba renews a cached kernel when its own file changes, not when a helper that was compiled into it
-does: after an update an old kernel would run on.
+numba compiles a cached kernel again when the kernel's own file changes, but not when a helper that
+was compiled into it changes. After an update the old kernel would still be used.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from pathlib import Path
 
 
 def drop_stale(kernels: Iterable[str], helpers: Iterable[str], folder: Path) -> int:
-    """Remove cached code of `kernels` older than any of `helpers`; returns how many files.
+    """Remove cached code of `kernels` that is older than any of `helpers`.
 
-    Both are module names within `folder`. A cache that cannot be written is left alone: it was
-    made by whoever can.
+    Both are names of modules in `folder`. Files that cannot be removed are left. Returns the number
+    of files removed.
     """
     newest = max((folder / f"{name}.py").stat().st_mtime for name in helpers)
     places = [folder / "__pycache__"]

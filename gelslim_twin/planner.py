@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from gelslim_core.budget.budget import Budget
 from gelslim_core.budget.ladder import Ladder
-from gelslim_core.budget.rung import Rung as BudgetRung
+from gelslim_core.budget.ladder import Rung as BudgetRung
 from gelslim_core.errors import GelslimError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of

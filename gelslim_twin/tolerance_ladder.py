@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from gelslim_core.budget.budget import Budget, shown_share
-from gelslim_core.budget.errors import BudgetError
-from gelslim_core.budget.ladder import Choice, Ladder, Wording
-from gelslim_core.budget.rung import Rung
+from gelslim_core.budget.budget import Budget, BudgetError, shown_share
+from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import unit_of
 from gelslim_twin.plan import Plan

@@ -34,8 +34,7 @@ FrameTime = Annotated[
 def budget_of(error: str | None, time: str | None) -> Budget:
     """The budget of both options. Raises CommandError for words that are no error or time."""
     from gelslim.cli.failure import CommandError
-    from gelslim_core.budget.budget import Budget
-    from gelslim_core.budget.errors import BudgetError
+    from gelslim_core.budget.budget import Budget, BudgetError
 
     try:
         return Budget.parse(error, time)

@@ -19,8 +19,7 @@ from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import COLOURS, RATIOS, study_light
-from gelslim_core.budget.ladder import Ladder, Wording
-from gelslim_core.budget.rung import Rung
+from gelslim_core.budget.ladder import Ladder, Rung, Wording
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.trace import trace_light
 

@@ -1,4 +1,4 @@
-"""A budget: how much a result may err, and how long it may take."""
+"""A budget: limits on the error of a result and on the time that it takes."""
 
 from __future__ import annotations
 
@@ -7,19 +7,23 @@ import re
 from dataclasses import InitVar, dataclass
 from numbers import Real
 
-from gelslim_core.budget.errors import BudgetError
+from gelslim_core.errors import GelslimError
 
-MOST_ERROR = 10.0
-"""A result that errs by more than ten times itself is no result."""
+MAX_ERROR = 10.0
+"""Largest relative error that may be asked for."""
 TIME_UNITS_MS = {"": 1.0, "us": 1e-3, "µs": 1e-3, "ms": 1.0, "s": 1e3, "min": 6e4}
 _TIME = re.compile(r"([-+0-9.eE]+?)\s*([a-zµ]*)")
+
+
+class BudgetError(GelslimError, ValueError):
+    """A budget that cannot be read, or that no rung of a ladder keeps."""
 
 
 @dataclass(frozen=True)
 class Budget:
     """Limits on error and time; None is no limit.
 
-    `Budget(error=0.03, time="2s")` reads the time from words, `parse` both.
+    `Budget(error=0.03, time="2s")` reads the time from text with a unit, `parse` reads both.
 
     Attributes:
         error: Relative error, 0.03 for 3 %.
@@ -38,19 +42,26 @@ class Budget:
             if self.time_ms is not None:
                 raise BudgetError("give time or time_ms, not both")
             object.__setattr__(self, "time_ms", parse_time_ms(time))
-        if self.error is not None and not 0 < _number("error", self.error) <= MOST_ERROR:
+        if self.error is not None and not 0 < _number("error", self.error) <= MAX_ERROR:
             raise BudgetError(
-                f"error {self.error:g}: must be a share above 0 and at most {MOST_ERROR:g}, "
-                "as 3% or 0.03"
+                f"error {self.error:g}: must be above 0 and at most {MAX_ERROR:g}, as 3% or 0.03"
             )
         if self.time_ms is not None and not 0 < _number("time_ms", self.time_ms) < math.inf:
             raise BudgetError(f"time {self.time_ms:g} ms: must be above 0, as 5ms or 2s")
 
     @classmethod
     def parse(cls, error: str | None = None, time: str | None = None) -> Budget:
-        """From words: `3%` or `0.03`, and `5ms`, `2s`, `1min` or a bare number of ms.
+        """Read a budget from text.
 
-        Raises BudgetError for anything else.
+        Args:
+            error: `3%` or `0.03`; None for no limit.
+            time: `5ms`, `2s`, `1min` or a number of milliseconds; None for no limit.
+
+        Returns:
+            The budget.
+
+        Raises:
+            BudgetError: The text is none of these.
         """
         return cls(
             None if error is None else parse_share(error),
@@ -59,41 +70,41 @@ class Budget:
 
     @property
     def unlimited(self) -> bool:
-        """Whether it asks for nothing."""
+        """Whether it has no limit."""
         return self.error is None and self.time_ms is None
 
     def allows(self, error: float, time_ms: float) -> bool:
-        """Whether an error and a time are within it."""
+        """Whether a relative error and a time in ms are within the budget."""
         return self.allows_error(error) and self.allows_time(time_ms)
 
     def allows_error(self, error: float) -> bool:
-        """Whether an error is within it."""
+        """Whether a relative error is within the budget."""
         return self.error is None or error <= self.error
 
     def allows_time(self, time_ms: float) -> bool:
-        """Whether a time is within it."""
+        """Whether a time in ms is within the budget."""
         return self.time_ms is None or time_ms <= self.time_ms
 
 
 def parse_share(text: str) -> float:
-    """`3%` or `0.03` as 0.03; more than 1 only in per cent. Raises BudgetError."""
-    bare = text.strip()
-    number = bare.removesuffix("%")
-    most, size = (MOST_ERROR, 100) if number != bare else (1.0, 1)
+    """`3%` or `0.03` as 0.03; values above 1 only in per cent. Raises BudgetError."""
+    stripped = text.strip()
+    number = stripped.removesuffix("%")
+    limit, divisor = (MAX_ERROR, 100) if number != stripped else (1.0, 1)
     try:
-        value = float(number) / size
+        value = float(number) / divisor
     except ValueError:
         value = math.nan
-    if not 0 < value <= most:
-        meant = f"; for {number} per cent write {number}%" if most < value <= 100 * most else ""
+    if not 0 < value <= limit:
+        meant = f"; for {number} per cent write {number}%" if limit < value <= 100 * limit else ""
         raise BudgetError(
-            f"error {text!r}: must be above 0, in per cent as 3% or a share as 0.03{meant}"
+            f"error {text!r}: must be above 0, in per cent as 3% or a number as 0.03{meant}"
         )
     return value
 
 
 def parse_time_ms(text: str) -> float:
-    """`5ms`, `2s`, `1min` or a bare number of milliseconds, in ms. Raises BudgetError."""
+    """`5ms`, `2s`, `1min` or a number of milliseconds as milliseconds. Raises BudgetError."""
     if not isinstance(text, str):
         raise BudgetError(f"time {text!r}: give its unit, as '5ms' or '2s', or use time_ms")
     found = _TIME.fullmatch(text.strip())
@@ -108,19 +119,19 @@ def parse_time_ms(text: str) -> float:
 
 
 def shown_share(share: float) -> str:
-    """A share in per cent, three digits that count."""
+    """A relative error in per cent, with three significant digits."""
     return f"{100 * share:.3g} %"
 
 
 def shown_time(time_ms: float) -> str:
-    """A time in the unit that reads best, three digits that count."""
+    """A time in seconds or milliseconds, with three significant digits."""
     if time_ms >= 1000:
         return f"{time_ms / 1000:.3g} s"
     return f"{time_ms:.3g} ms"
 
 
 def _number(name: str, value: object) -> float:
-    """The value if it is a number; words and yes or no are refused with BudgetError."""
+    """`value` as a float; BudgetError where it is not a number."""
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise BudgetError(f"{name} {value!r}: must be a number; Budget.parse reads words")
+        raise BudgetError(f"{name} {value!r}: must be a number; Budget.parse reads text")
     return float(value)

@@ -1,8 +1,9 @@
-"""Rungs to choose from, and the choice a budget makes among them.
+"""Ladders of rungs with known error and cost, and the choice of a rung for a budget.
 
-An error alone picks the rung of least work that keeps it: work is counted, so every machine picks
-the same one, however busy it is. A time picks the most accurate rung that keeps it, and depends on
-the machine, as it must. With both, the rung of least work that keeps both.
+A limit on the error picks the rung of least work that keeps it. Work is counted, not timed, so that
+every machine picks the same rung. A limit on the time picks the most accurate rung that keeps it;
+this choice depends on the machine. With both limits, the rung of least work that keeps both is
+picked.
 """
 
 from __future__ import annotations
@@ -10,28 +11,57 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from gelslim_core.budget.budget import Budget, shown_share, shown_time
-from gelslim_core.budget.errors import BudgetError
-from gelslim_core.budget.rung import Rung
+from gelslim_core.budget.budget import Budget, BudgetError, shown_share, shown_time
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One way to compute a result, with its error and its cost.
+
+    Attributes:
+        name: Name of the rung.
+        error: Relative error.
+        time_ms: Time in milliseconds.
+        work: Counted cost, which orders the rungs of a ladder: bytes read, rays, or predicted
+            operations. It is the same on every machine and in every run.
+        measured: Whether error and time were measured; False where they are extrapolated.
+    """
+
+    name: str
+    error: float
+    time_ms: float
+    work: float
+    measured: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.name} ({shown_share(self.error)}, {shown_time(self.time_ms)})"
 
 
 @dataclass(frozen=True)
 class Wording:
-    """How a ladder is spoken of."""
+    """The terms that the messages about a ladder use.
+
+    Attributes:
+        rung: What a rung is, such as `operator`.
+        error: Which error a rung has, such as `field error`.
+        per: What its time is measured for, such as `per frame`.
+        remedy: What makes smaller errors possible, such as `use more layers`.
+    """
 
     rung: str = "rung"
-    """What a rung is, such as `operator`."""
     error: str = "error"
-    """Which error it has, such as `field error`."""
     per: str = ""
-    """What its time is for, such as `per frame`."""
     remedy: str = ""
-    """What makes smaller errors possible, such as `use more layers`."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The rung chosen, and what its user should know about it."""
+    """The rung that was chosen.
+
+    Attributes:
+        rung: The rung.
+        remarks: Where the budget or the rung lies outside the range that was measured.
+    """
 
     rung: Rung
     remarks: tuple[str, ...] = ()
@@ -39,52 +69,68 @@ class Choice:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Rungs; the order given decides between rungs of equal work. Raises BudgetError if empty."""
+    """The rungs of one approximation.
+
+    Attributes:
+        rungs: At least one rung; between rungs of equal work the first one is preferred.
+        wording: The terms that messages use.
+
+    Raises:
+        BudgetError: There is no rung.
+    """
 
     rungs: tuple[Rung, ...]
     wording: Wording = Wording()
 
     def __post_init__(self) -> None:
         if not self.rungs:
-            raise BudgetError(f"a ladder without a single {self.wording.rung} has nothing to offer")
+            raise BudgetError(f"a ladder needs at least one {self.wording.rung}")
 
     @property
     def by_work(self) -> tuple[Rung, ...]:
-        """Least work first."""
+        """The rungs, least work first."""
         return tuple(sorted(self.rungs, key=lambda rung: rung.work))
 
     def choose(self, budget: Budget) -> Choice:
-        """The rung for a budget; one without limits picks the most accurate.
+        """Choose the rung for a budget.
 
-        Raises BudgetError where no rung keeps it, naming the nearest on both sides.
+        Args:
+            budget: The limits; without any the most accurate rung is chosen.
+
+        Returns:
+            The rung with remarks.
+
+        Raises:
+            BudgetError: No rung keeps the budget; the message names the nearest rungs.
         """
-        able = [r for r in self.by_work if budget.allows(r.error, r.time_ms)]
-        if not able:
+        allowed = [r for r in self.by_work if budget.allows(r.error, r.time_ms)]
+        if not allowed:
             raise BudgetError(self._refusal(budget))
-        rung = able[0] if budget.error is not None else min(able, key=lambda r: r.error)
+        rung = allowed[0] if budget.error is not None else min(allowed, key=lambda r: r.error)
         return Choice(rung, self._remarks(budget, rung))
 
     def nearest(self, budget: Budget) -> tuple[Rung, Rung]:
-        """For a budget that no rung keeps, the nearest on the side of time and that of error.
+        """The two rungs nearest to a budget that no rung keeps.
 
-        The first keeps the time and errs as little as it can, or is the quickest of all where none
-        keeps it; the second keeps the error in as little time as it can, or is the most accurate.
+        Returns:
+            The most accurate rung that keeps the limit on time (the fastest rung where none does),
+            and the fastest rung that keeps the limit on error (the most accurate where none does).
         """
         in_time = [r for r in self.by_work if budget.allows_time(r.time_ms)]
         in_error = [r for r in self.by_work if budget.allows_error(r.error)]
-        quick = min(in_time, key=lambda r: r.error) if in_time else self._quickest(self.by_work)
-        good = self._quickest(in_error) if in_error else min(self.by_work, key=lambda r: r.error)
-        return quick, good
+        fast = min(in_time, key=lambda r: r.error) if in_time else self._fastest(self.by_work)
+        accurate = self._fastest(in_error or [min(self.by_work, key=lambda r: r.error)])
+        return fast, accurate
 
     def timed(self, times_ms: Mapping[str, float]) -> Ladder:
-        """The same rungs with other times, by name; rungs that are not named keep theirs."""
+        """The ladder with other times in ms, by name of the rung; other rungs keep theirs."""
         return replace(
             self,
             rungs=tuple(replace(r, time_ms=times_ms.get(r.name, r.time_ms)) for r in self.rungs),
         )
 
     @staticmethod
-    def _quickest(rungs: tuple[Rung, ...] | list[Rung]) -> Rung:
+    def _fastest(rungs: tuple[Rung, ...] | list[Rung]) -> Rung:
         return min(rungs, key=lambda r: r.time_ms)
 
     def _refusal(self, budget: Budget) -> str:
@@ -94,22 +140,21 @@ class Ladder:
             wanted.append(f"{w.error} of {shown_share(budget.error)}")
         if budget.time_ms is not None:
             wanted.append(f"{shown_time(budget.time_ms)} {w.per}".rstrip())
-        quick, good = self.nearest(budget)
-        told = f"no {w.rung} keeps the budget, {' in '.join(wanted)}; the nearest: "
-        if quick == good:
-            told += str(good)
-        else:
-            told += f"{quick} on the side of time, {good} on the side of error"
-        if w.remedy and not budget.allows_error(good.error):
-            told += f"; {w.remedy}"
-        return told
+        fast, accurate = self.nearest(budget)
+        nearest = str(fast)
+        if fast != accurate:
+            nearest = f"{fast} in time, {accurate} in error"
+        message = f"no {w.rung} keeps the budget, {' in '.join(wanted)}; the nearest: {nearest}"
+        if w.remedy and not budget.allows_error(accurate.error):
+            message += f"; {w.remedy}"
+        return message
 
     def _remarks(self, budget: Budget, rung: Rung) -> tuple[str, ...]:
-        """What lies outside the range that was measured."""
-        w, known = self.wording, [r for r in self.rungs if r.measured]
-        if not known:
+        """Where the budget or the rung lies outside the range that was measured."""
+        w, measured = self.wording, [r for r in self.rungs if r.measured]
+        if not measured:
             return ()
-        errors, times = [r.error for r in known], [r.time_ms for r in known]
+        errors, times = [r.error for r in measured], [r.time_ms for r in measured]
         if not rung.measured:
             return (
                 f"{rung.name} is outside the calibrated range ({_span(errors, shown_share)}): "

@@ -1,7 +1,7 @@
-"""Times measured on this machine, kept in the user's cache; never inside a bundle or a result.
+"""Times measured on this machine, kept in the user's cache, never inside a bundle or a result.
 
-One small file per machine and ladder, so that a home directory shared by many machines serves each
-its own. A file that cannot be read is as good as none: times are measured again at will.
+There is one small file per machine and ladder, so that several machines can share a home folder. A
+file that cannot be read is ignored: the times can be measured again.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FOLDER_VARIABLE = "GELSLIM_CACHE_DIR"
 
 @dataclass(frozen=True)
 class Machine:
-    """What the times of a ladder depend on."""
+    """The machine on which times were measured."""
 
     name: str
     processor: str
@@ -35,7 +35,7 @@ class Machine:
 
     @property
     def key(self) -> str:
-        """Tells machines apart, in a file's name."""
+        """Identifies the machine in the name of a folder."""
         parts = (self.name, self.processor, str(self.cores), self.system)
         return hashlib.sha256("|".join(parts).encode()).hexdigest()[:16]
 
@@ -45,26 +45,26 @@ class Machine:
 
 @cache
 def this_machine() -> Machine:
-    """The machine that this runs on."""
+    """The machine that runs this program."""
     return Machine(platform.node(), _processor(), os.cpu_count() or 1, platform.system())
 
 
 def cache_folder() -> Path:
-    """Where the times are kept.
+    """The folder of the cache.
 
-    `GELSLIM_CACHE_DIR` where set; else `gelslim` in the system's folder for caches:
+    `GELSLIM_CACHE_DIR` where it is set; otherwise `gelslim` in the system's folder for caches:
     `$XDG_CACHE_HOME` or `~/.cache`, `~/Library/Caches` on macOS, `%LOCALAPPDATA%` on Windows.
     """
-    asked = os.environ.get(FOLDER_VARIABLE)
-    if asked:
-        return Path(asked)
+    given = os.environ.get(FOLDER_VARIABLE)
+    if given:
+        return Path(given)
     if sys.platform == "win32":
         place = os.environ.get("LOCALAPPDATA")
         return Path(place or Path.home() / "AppData" / "Local") / "gelslim" / "cache"
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "gelslim"
     place = os.environ.get("XDG_CACHE_HOME")
-    # A relative XDG path is to be ignored by its specification.
+    # The XDG specification says that a relative path must be ignored.
     base = Path(place) if place and Path(place).is_absolute() else Path.home() / ".cache"
     return base / "gelslim"
 
@@ -75,7 +75,7 @@ def times_path(ladder_key: str) -> Path:
 
 
 def require_keeping() -> None:
-    """Raises OSError where times cannot be kept: to be asked before measuring them."""
+    """Raise OSError where times cannot be stored. To be called before measuring them."""
     folder = times_path("any").parent
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder):
@@ -83,9 +83,9 @@ def require_keeping() -> None:
 
 
 def read_times(ladder_key: str) -> dict[str, float]:
-    """Times in ms by rung, measured on this machine; empty where there are none.
+    """Times in ms by name of the rung, measured on this machine; empty where there are none.
 
-    A file that was carried here from another machine or another sensor is as good as none.
+    A file that was copied here from another machine or another sensor is ignored.
     """
     try:
         found = json.loads(times_path(ladder_key).read_bytes())
@@ -102,7 +102,7 @@ def read_times(ladder_key: str) -> dict[str, float]:
 
 
 def write_times(ladder_key: str, times_ms: Mapping[str, float]) -> Path:
-    """Keep the times of a ladder, in one step; returns the file. Raises OSError."""
+    """Store the times in ms of a ladder atomically; returns the file. Raises OSError."""
     path = times_path(ladder_key)
     record: dict[str, Any] = {
         "format": FORMAT,
@@ -124,7 +124,7 @@ def write_times(ladder_key: str, times_ms: Mapping[str, float]) -> Path:
 
 
 def _processor() -> str:
-    """The processor's model, as far as the system tells it."""
+    """The model of the processor, as far as the system reports it."""
     with contextlib.suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):

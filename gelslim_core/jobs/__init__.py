@@ -1,1 +1,1 @@
-"""Independent tasks on this machine's processors or on a cluster; knows nothing of what they do."""
+"""Independent tasks on the processors of this machine or on a cluster."""

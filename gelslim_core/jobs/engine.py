@@ -1,4 +1,4 @@
-"""Where tasks are done: here, in processes of this machine, or on a Dask cluster."""
+"""Run independent tasks in this process, in other processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -19,19 +19,24 @@ from gelslim_core.jobs.workers import worker_pool
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 CONNECT_S = 10
-AHEAD = 4
-"""Tasks handed out per worker: results are taken as they come, the rest can still be dropped."""
-MOST_DEATHS = 3
-"""Times that a worker may die over the same task before the task is given up."""
+TASKS_PER_WORKER = 4
+"""Tasks submitted at one time, per worker; tasks that are not yet submitted can be dropped."""
+MAX_CRASHES = 3
+"""Crashes of a worker during the same task after which the task is given up."""
 
 
 class EngineError(GelslimError, ValueError):
-    """Tasks cannot be handed out, or one of them kills its workers; the message says why."""
+    """Tasks cannot be started, or one of them crashes its workers; the message says why."""
 
 
 @dataclass(frozen=True)
 class Engine:
-    """`jobs` processes here, or the workers behind the Dask scheduler at `scheduler`."""
+    """Runs tasks in `jobs` processes of this machine, or on the workers of a Dask scheduler.
+
+    Attributes:
+        jobs: Number of processes; 1 runs the tasks in this process.
+        scheduler: Address of the Dask scheduler; empty for this machine.
+    """
 
     jobs: int = 1
     scheduler: str = ""
@@ -39,11 +44,19 @@ class Engine:
     def run(
         self, perform: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Result]]:
-        """Number of each task with its result, in the order they finish.
+        """Run all tasks. A task whose worker crashes is run again.
 
-        `perform` is a function of a module; its argument and result can be pickled. A task whose
-        worker dies is done again. Raises EngineError where no cluster answers or a task has
-        killed three workers, and what a task raises.
+        Args:
+            perform: Function at the top level of a module; its argument and its result can be
+                pickled.
+            tasks: Its arguments.
+
+        Yields:
+            The number of each task with its result, in the order in which they finish.
+
+        Raises:
+            EngineError: No cluster answers, or a task has crashed its worker three times.
+                Exceptions that a task raises are raised as they are.
         """
         if self.scheduler:
             yield from _on_cluster(perform, tasks, self.scheduler)
@@ -55,7 +68,7 @@ class Engine:
 
 
 def processors() -> int:
-    """Processors this process may use."""
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -64,24 +77,24 @@ def processors() -> int:
 def _in_pools(
     perform: Callable[[Task], Result], tasks: Sequence[Task], workers: int
 ) -> Iterator[tuple[int, Result]]:
-    """A pool, and another one for what is left whenever a worker dies."""
+    """Run the tasks in a pool; after a crash run those that are left in a new pool."""
     left = list(range(len(tasks)))
-    deaths: dict[int, int] = {}
+    crashes: dict[int, int] = {}
     while left:
         suspects: list[int] = []
-        # Fresh processes, not forks: numeric libraries have started threads by now.
+        # New processes, not forks, because numerical libraries have started threads by now.
         with worker_pool(workers, "spawn") as pool:
             for number, result in _in_pool(pool, perform, tasks, left, workers, suspects):
                 yield number, result
         for number in suspects:
-            deaths[number] = deaths.get(number, 0) + 1
-            if deaths[number] >= MOST_DEATHS:
+            crashes[number] = crashes.get(number, 0) + 1
+            if crashes[number] >= MAX_CRASHES:
                 raise EngineError(
-                    f"task {number} was in hand each of the {MOST_DEATHS} times that a worker "
-                    "died: too little memory, perhaps; use fewer jobs"
+                    f"task {number} was running each of the {MAX_CRASHES} times that a worker "
+                    "crashed, perhaps for lack of memory; use fewer jobs"
                 )
         if suspects:
-            # Next time one by one: only the task that kills is then blamed again.
+            # One worker from now on, so that only the task that crashes is suspected again.
             workers = 1
 
 
@@ -93,12 +106,12 @@ def _in_pool(
     workers: int,
     suspects: list[int],
 ) -> Iterator[tuple[int, Result]]:
-    """Do what is `left`, taking off what is done; what was in hand as a worker died is suspect."""
+    """Run the tasks that are `left`; those that were running at a crash become `suspects`."""
     waiting = list(reversed(left))
     running: dict[Future[Result], int] = {}
     try:
         while waiting or running:
-            while waiting and len(running) < AHEAD * workers:
+            while waiting and len(running) < TASKS_PER_WORKER * workers:
                 number = waiting.pop()
                 running[pool.submit(perform, tasks[number])] = number
             done = next(as_completed(running))
@@ -107,8 +120,7 @@ def _in_pool(
             left.remove(number)
             yield number, result
     except BrokenProcessPool:
-        in_hand = sorted(running.values())
-        suspects.extend(in_hand[:workers])
+        suspects.extend(sorted(running.values())[:workers])
     finally:
         for future in running:
             future.cancel()
@@ -139,7 +151,7 @@ def _on_cluster(
                 f"`dask worker {address}` where gelslim-cad is installed"
             )
         futures = {
-            client.submit(perform, task, pure=False, retries=MOST_DEATHS): number
+            client.submit(perform, task, pure=False, retries=MAX_CRASHES): number
             for number, task in enumerate(tasks)
         }
         for future in as_finished(list(futures)):

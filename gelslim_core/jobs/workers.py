@@ -1,4 +1,4 @@
-"""Worker processes that end with their parent, and at once when it is interrupted."""
+"""Worker processes that end with their parent, and at once when the parent is interrupted."""
 
 from __future__ import annotations
 
@@ -17,22 +17,24 @@ from typing import Any, Literal
 from gelslim_core.files.held_interrupt import interrupts_held
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
-PATIENCE_S = 2
-"""Given to workers that are told to end, before they are killed."""
-TOLD = 128 + signal.SIGTERM
-_at_work = False
-"""Whether this worker is in the middle of a task."""
+GRACE_S = 2
+"""Time for workers to end after SIGTERM, before they are killed."""
+TERMINATED = 128 + signal.SIGTERM
+"""Exit status of a worker that SIGTERM ended."""
+_is_busy = False
+"""Whether this worker is running a task."""
 
 
-class _ToldToEnd(BaseException):
-    """Closes what a worker has open; handlers of errors leave it alone."""
+class _Terminated(BaseException):
+    """Unwinds a task so that its files are closed; no `except Exception` catches it."""
 
 
 @contextlib.contextmanager
 def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[ProcessPoolExecutor]:
-    """A pool whose workers are gone when the block is left by an error, Ctrl-C included.
+    """A pool of processes whose workers are ended when an exception leaves the block.
 
-    Left without one it waits for what is still to do. Workers of a killed parent end too.
+    Ctrl-C is such an exception. Without an exception the end of the block waits for the tasks
+    that are left. Workers also end when their parent is killed.
     """
     context = multiprocessing.get_context(method)
     with interrupts_held() as let_through:
@@ -47,13 +49,14 @@ def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[Proc
 
 
 class _Pool(ProcessPoolExecutor):
-    """Its workers start with Ctrl-C and SIGTERM blocked, until `begin_worker` says what they do.
+    """Starts its workers with SIGINT and SIGTERM blocked until `begin_worker` handles them.
 
-    A new interpreter would print a traceback until then, and a fork do what its parent does.
+    Before that a new interpreter would print a traceback, and a fork would run the handler of
+    its parent.
     """
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """As of any executor; no interrupt falls into the start of a worker."""
+        """Submit a task; no interrupt reaches a worker while it starts."""
         with interrupts_held(), _blocked():
             return super().submit(_perform, fn, *args, **kwargs)
 
@@ -71,32 +74,33 @@ def _blocked() -> Iterator[None]:
 
 
 def _perform(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
-    """A task in a worker, which ends by SIGTERM once what the task has open is closed."""
-    global _at_work
+    """Run a task in a worker, which ends on SIGTERM after the task has closed its files."""
+    global _is_busy
     try:
-        _at_work = True
+        _is_busy = True
         return fn(*args, **kwargs)
-    except _ToldToEnd:
-        os._exit(TOLD)
+    except _Terminated:
+        os._exit(TERMINATED)
     finally:
-        _at_work = False
+        _is_busy = False
 
 
-def _told(number: int, frame: FrameType | None) -> None:
-    if not _at_work:
-        os._exit(TOLD)
+def _terminate(number: int, frame: FrameType | None) -> None:
+    if not _is_busy:
+        os._exit(TERMINATED)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise _ToldToEnd
+    raise _Terminated
 
 
 def begin_worker() -> None:
-    """Make this process end with its parent, and leave Ctrl-C to it: the parent ends its workers.
+    """Make this process end with its parent, and ignore Ctrl-C.
 
-    Otherwise workers of a killed parent wait for work for ever, as each holds the queue open.
+    On Ctrl-C the parent ends its workers. Without this the workers of a killed parent would wait
+    for ever, as each of them holds the queue open.
     """
-    with contextlib.suppress(ValueError):  # not in the main thread
+    with contextlib.suppress(ValueError):  # raised outside the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, _told)
+        signal.signal(signal.SIGTERM, _terminate)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     parent = multiprocessing.parent_process()
@@ -116,11 +120,11 @@ def _stop(pool: ProcessPoolExecutor) -> None:
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             process.terminate()
-    deadline = time.monotonic() + PATIENCE_S
+    deadline = time.monotonic() + GRACE_S
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AssertionError):
             process.join(max(0.0, deadline - time.monotonic()))
-            # In compiled code, which hears nothing until it returns.
+            # A worker in compiled code handles no signal until that code returns.
             process.kill()
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AssertionError):

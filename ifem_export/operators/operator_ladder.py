@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from gelslim_core.budget.budget import Budget, shown_share
-from gelslim_core.budget.ladder import Choice, Ladder, Wording
-from gelslim_core.budget.rung import Rung
+from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
 from ifem_export.errors import IfemError
 from ifem_export.operators.surface_operator import Rung as OperatorName
 

@@ -150,7 +150,7 @@ def test_an_unmeetable_budget_names_both_sides(
     assert "no operator keeps the budget, field error of 5 % in 0.001 ms per frame" in told
     assert laddered.ladder is not None
     quick, good = laddered.ladder.choices.nearest(Budget(0.05, 0.001))
-    assert f"{quick} on the side of time, {good} on the side of error" in told
+    assert f"{quick} in time, {good} in error" in told
     assert not (tmp_path / "no").exists()
 
 

@@ -58,8 +58,8 @@ def test_the_operator_of_the_budget_is_what_our_chains_start_with(
     assert json.loads((tmp_path / "v" / "validation.json").read_text())["operator"] == label
     assert main(["validate", SPEC, *out, "--error", "15%", "--time", "1us"]) == 2
     told = json.loads(capsys.readouterr().out)["message"]
-    assert "on the side of time" in told
-    assert "on the side of error" in told
+    assert "in time" in told
+    assert "in error" in told
     assert len(given) == 2
 
 

@@ -33,7 +33,7 @@ def test_a_dead_worker_loses_nothing_and_doubles_nothing(tmp_path: Path) -> None
 
 
 def test_a_task_that_kills_its_workers_is_named() -> None:
-    with pytest.raises(EngineError, match="task 2 was in hand"):
+    with pytest.raises(EngineError, match="task 2 "):
         list(Engine(2).run(pool_tasks.always_dies, list(range(6))))
 
 
@@ -46,7 +46,7 @@ def test_what_a_task_raises_comes_through(jobs: int) -> None:
 def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("gelslim_core.jobs.engine.CONNECT_S", 1)
-    with pytest.raises(EngineError, match="no Dask scheduler"):
+    with pytest.raises(EngineError, match=r"tcp://127\.0\.0\.1:1"):
         list(Engine(scheduler="tcp://127.0.0.1:1").run(pool_tasks.square, [1]))
 
 

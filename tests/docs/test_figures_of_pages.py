@@ -222,7 +222,7 @@ def test_the_refusal_that_the_budget_page_quotes(capsys: pytest.CaptureFixture[s
     """Word for word, but for the times of a machine."""
     page = flat("budget.md")
     line = re.search(r"\(`gelslim (plan [^`]*)`\)", page)
-    quoted = re.search(r"> (no tolerance .*? on the side of error)", page)
+    quoted = re.search(r"> (no tolerance .*? in error)", page)
     assert line is not None
     assert quoted is not None
     words = line.group(1).replace("designs/", f"{ROOT}/designs/").split()

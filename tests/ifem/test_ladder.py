@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from ifem_bundles import MARKERS
 
-from gelslim_core.budget.budget import Budget
-from gelslim_core.budget.errors import BudgetError
+from gelslim_core.budget.budget import Budget, BudgetError
 from ifem_export.bundle.bundle import build_bundle
 from ifem_export.bundle.files import load_bundle, write_bundle
 from ifem_export.elements.hex8 import Formulation
