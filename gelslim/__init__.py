@@ -62,7 +62,6 @@ __getattr__, __dir__ = lazy_exports(
         "make_bundle": "gelslim.design",
         "open_frames": "gelslim_force.frames.source",
         "open_sensor": "gelslim_force.sensor",
-        "open_sensor": "gelslim_force.sensor",
         "plan": "gelslim.contacts",
         "read_scene": "gelslim_twin.scene.reader",
         "read_spec": "gelslim_cad.spec.reader",
