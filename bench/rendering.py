@@ -27,10 +27,10 @@ from scipy.spatial import cKDTree
 
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
+from gelslim_optics.light.light_map import LED_COLOURS, LightMap, red_green_sides
 from gelslim_twin.render.compression import Compression
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer
-from gelslim_twin.render.light_map import LED_COLOURS, LightMap, red_green_sides
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.rendered_frame import RenderedFrame
 from gelslim_twin.render.sensor_look import sensor_look

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
 
     from gelslim_cad.dimensions import Dimensions
     from gelslim_core.yaml.errors import InputError
+    from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.effects.circumstances import SensorFigures
-    from gelslim_twin.render.light_map import LightMap
     from gelslim_twin.scene.reader import LoadedScene
     from gelslim_twin.simulation.twin_sensor import TwinSensor
     from ifem_export.bundle.bundle import Bundle
@@ -96,8 +96,8 @@ def _traced(d: Dimensions) -> LightMap:
 
     from gelslim_cad.geometry.guide_section import guide_profile
     from gelslim_cad.light.scene import light_scene
+    from gelslim_optics.light.light_map import LED_COLOURS, LightMap
     from gelslim_optics.light.trace import trace_light
-    from gelslim_twin.render.light_map import LED_COLOURS, LightMap
 
     traced = trace_light(light_scene(d, guide_profile(d)), RAYS, seed=0)
     return LightMap.from_bins(

@@ -20,9 +20,9 @@ from gelslim_twin.render.surroundings import Pad, still_irradiance
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
+    from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.defocus import BlurField
     from gelslim_twin.render.domed_top import DomedTop
-    from gelslim_twin.render.light_map import LightMap
     from gelslim_twin.render.marker_motion import MarkerMotion
     from ifem_export.markers.grid import MarkerGrid
 

@@ -18,7 +18,7 @@ from gelslim_twin.render.sight import Sight
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
-    from gelslim_twin.render.light_map import LightMap
+    from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]

@@ -96,7 +96,7 @@ def stored_sensor(folder: Path) -> TwinSensor:
         ) from error
 
     def lit():  # type: ignore[no-untyped-def]
-        from gelslim_twin.render.light_map import LightMap
+        from gelslim_optics.light.light_map import LightMap
 
         with np.load(folder / LIGHT, allow_pickle=False) as held:
             return LightMap(**{name: held[name] for name in LIGHT_FIELDS})

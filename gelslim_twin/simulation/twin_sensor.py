@@ -12,7 +12,7 @@ import numpy as np
 from ifem_export.bundle.bundle import Bundle
 
 if TYPE_CHECKING:
-    from gelslim_twin.render.light_map import LightMap
+    from gelslim_optics.light.light_map import LightMap
     from ifem_export.markers.grid import MarkerGrid
 
 
@@ -58,7 +58,7 @@ class TwinSensor:
         """The light on the pad."""
         if self.lit is not None:
             return self.lit()
-        from gelslim_twin.render.light_map import red_green_sides
+        from gelslim_optics.light.light_map import red_green_sides
 
         length, width = self.size_mm
         return red_green_sides(length, width, decay_mm=0.8 * width)

@@ -11,9 +11,9 @@ from synthetic import Look, grid_of_dots, render
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import BORDER, FAINT, LARGE, SMALL
 from gelslim_force.detection.settings import DetectorSettings
+from gelslim_optics.light.light_map import red_green_sides
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer
-from gelslim_twin.render.light_map import red_green_sides
 from gelslim_twin.render.look import Look as RenderLook
 from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading

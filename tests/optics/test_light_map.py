@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from render_rig import AXIS_X, AXIS_Y, CAMERA, PAD, dent, light, moved, renderer
 
+from gelslim_optics.light.light_map import LED_COLOURS, LightMap, red_green_sides
 from gelslim_twin.render.defocus import Defocus
-from gelslim_twin.render.light_map import LED_COLOURS, LightMap, red_green_sides
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.sight import Sight
