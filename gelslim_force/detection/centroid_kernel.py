@@ -1,9 +1,10 @@
-"""Compiled sub-pixel centres of dots near given places. Import only where they run: numba.
+"""Compiled sub-pixel centres of dots near given positions.
 
-Each dot is weighed on the picture itself, in an elliptic window around the present estimate,
-against a plane of light fitted to a ring around it. The weight of a pixel rises from 0 to 1
-between two shares of the dot's own darkness, so that noise on the bare gel and inside the dot
-does not move the centre; the window follows the centre until it rests, which keeps it unbiased.
+Import it only where it runs, because it loads numba. The centre of a dot is a weighted centroid
+of the picture in an elliptic window around the present estimate. Darkness is measured against the
+light on the bare gel, a plane fitted to a ring around the window. The weight of a pixel rises from
+0 to 1 between two shares of the dot's darkness, so that noise on the bare gel and inside the dot
+does not move the centre. The window follows the centre until it converges, which avoids a bias.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-CX, CY, AREA, CONTRAST, MXX, MXY, MYY, STEPS, INSIDE, SKEW = range(10)
-"""Columns of a weighed dot; INSIDE is the share of the window within the picture, SKEW the last
-move of the window in px."""
+CX, CY, AREA, CONTRAST, MXX, MXY, MYY, STEPS, INSIDE, SHIFT = range(10)
+"""Columns of a dot; INSIDE is 1 if the window is inside the picture, SHIFT is the last shift of the
+window in px."""
 
-# No reordering of sums: compiled here or taken from the cache, their order was not the same one.
+# Sums are not reordered: with full fastmath, cached code had another order than new code.
 COMPILED: dict[str, Any] = {
     "cache": True,
     "nogil": True,
@@ -26,11 +27,11 @@ COMPILED: dict[str, Any] = {
     "fastmath": {"contract", "nsz"},
 }
 _FITS = 2
-"""Windows for which the light is fitted anew; later ones have hardly moved."""
-_SPARE = 3
-_REST2 = 4e-6
-_SETTLED = 0.04
-"""Share by which a window's second moments may still change when it has come to rest."""
+"""Number of windows for which the light is fitted; later windows have hardly moved."""
+_MARGIN_PX = 3
+_CONVERGED_PX2 = 4e-6
+_CONVERGED_SHAPE = 0.04
+"""Relative change of the second moments of a converged window."""
 
 
 @njit(**COMPILED)
@@ -54,7 +55,7 @@ def _ellipse(mxx: Any, mxy: Any, myy: Any, factor: Any, margin: Any) -> Any:
 
 @njit(**COMPILED)
 def _chord(shape: Any, v: Any) -> Any:
-    """First and last u (float) of the ellipse at height v; first > last where it has none."""
+    """First and last u (float) of the ellipse at height v; first > last if it has none there."""
     b = shape[1] * v
     root = b * b - shape[0] * (shape[2] * v * v - 1.0)
     if root < 0:
@@ -65,7 +66,7 @@ def _chord(shape: Any, v: Any) -> Any:
 
 @njit(**COMPILED)
 def _copy(image: Any, left: Any, top: Any, patch: Any) -> None:
-    """Sum the channels of the box at (left, top), inside the picture, into `patch` (h, w)."""
+    """Sum the channels of the box at (left, top) of the picture into `patch` (h, w)."""
     if image.shape[2] == 3:
         for y in range(patch.shape[0]):
             for x in range(patch.shape[1]):
@@ -84,7 +85,7 @@ def _copy(image: Any, left: Any, top: Any, patch: Any) -> None:
 def _ring_part(
     row: Any, first: Any, last: Any, start: Any, level: Any, slope: Any, low: Any, high: Any
 ) -> Any:
-    """Sums over pixels first ... last of a row whose value lies low ... high off the light."""
+    """Sums over pixels first ... last of a row that deviate by low ... high from the light."""
     one, zero = np.float32(1), np.float32(0)
     n = su = suu = sv = suv = svv = zero
     rise, base = np.float32(slope), np.float32(level)
@@ -105,10 +106,11 @@ def _ring_part(
 def _light_plane(
     patch: Any, x0: Any, y0: Any, inner: Any, outer: Any, plane: Any, rounds: Any, limits: Any
 ) -> Any:
-    """Fit level and slopes of the light to the ring between two ellipses; False if too few.
+    """Fit level and slopes of the light to the ring between two ellipses.
 
-    (x0, y0) is the centre in the patch. Each round drops what is far from the last fit: other
-    dots, glare. `limits` carries the bounds on to the next call.
+    Returns False if the ring has too few pixels. (x0, y0) is the centre in the patch. Each round
+    leaves out pixels far from the last fit, such as other dots and glare. `limits` holds the
+    bounds for the next call.
     """
     height, width = patch.shape
     top = max(0, math.ceil(y0 - outer[4]))
@@ -149,7 +151,7 @@ def _light_plane(
         if n < 8:
             return False
         if limits[1] > 1e29:
-            # Level first: slopes fitted through a neighbour's dark rim would tilt the plane.
+            # First the level only: the dark edge of a neighbour would tilt the plane.
             plane[0] += sv / n
             scatter = math.sqrt(max(svv / n - (sv / n) ** 2, 1e-6))
             limits[0], limits[1] = -0.7 * scatter, 1.5 * scatter
@@ -227,10 +229,10 @@ def _window_sums(dark: Any, x0: Any, y0: Any, window: Any, low: Any, high: Any, 
 
 
 @njit(**COMPILED)
-def _weigh_one(
+def _measure_one(
     image: Any, start: Any, moment: Any, low: Any, high: Any, most: Any, out: Any
 ) -> Any:
-    """Write one dot; returns whether it was found."""
+    """Write one dot and return whether it was found."""
     height, width, _ = image.shape
     x0, y0 = start[0], start[1]
     mxx, mxy, myy = moment[0], moment[1], moment[2]
@@ -250,10 +252,10 @@ def _weigh_one(
             or min(height - 1, math.ceil(y0 + outer[4])) > bottom
             or step == 0
         ):
-            left = max(0, math.floor(x0 - outer[3]) - _SPARE)
-            top = max(0, math.floor(y0 - outer[4]) - _SPARE)
-            right = min(width - 1, math.ceil(x0 + outer[3]) + _SPARE)
-            bottom = min(height - 1, math.ceil(y0 + outer[4]) + _SPARE)
+            left = max(0, math.floor(x0 - outer[3]) - _MARGIN_PX)
+            top = max(0, math.floor(y0 - outer[4]) - _MARGIN_PX)
+            right = min(width - 1, math.ceil(x0 + outer[3]) + _MARGIN_PX)
+            bottom = min(height - 1, math.ceil(y0 + outer[4]) + _MARGIN_PX)
             patch = np.empty((bottom - top + 1, right - left + 1), dtype=np.float32)
             dark = np.empty_like(patch)
             _copy(image, left, top, patch)
@@ -295,21 +297,24 @@ def _weigh_one(
             grown = abs(mxx + myy - grown) / grown
         out[CX], out[CY], out[AREA], out[CONTRAST] = x0, y0, area, contrast
         out[MXX], out[MXY], out[MYY] = mxx, mxy, myy
-        out[STEPS], out[SKEW] = step + 1, math.sqrt(dx * dx + dy * dy)
-        if step >= _FITS and dx * dx + dy * dy < _REST2 and grown < _SETTLED:
+        out[STEPS], out[SHIFT] = step + 1, math.sqrt(dx * dx + dy * dy)
+        if step >= _FITS and dx * dx + dy * dy < _CONVERGED_PX2 and grown < _CONVERGED_SHAPE:
             break
     return True
 
 
 @njit(**COMPILED)
-def weigh(image: Any, starts: Any, moments: Any, low: Any, high: Any, most: Any, out: Any) -> None:
+def measure(
+    image: Any, starts: Any, moments: Any, low: Any, high: Any, most: Any, out: Any
+) -> None:
     """Write the dots (n, 10) found from `starts` (n, 2) px with `moments` (n, 3) px².
 
-    `image` (h, w, c) uint8; `low` and `high` are the shares of a dot's darkness between which
-    the weight rises; at most `most` moves of the window. A dot that is not found has area 0.
+    `image` is (h, w, c) uint8; `low` and `high` are the shares of a dot's darkness between which
+    the weight rises; the window is shifted `most` times at most. A dot that is not found has
+    area 0.
     """
     for i in range(starts.shape[0]):
         out[i] = 0.0
         out[i, CX], out[i, CY] = starts[i, 0], starts[i, 1]
-        if not _weigh_one(image, starts[i], moments[i], low, high, most, out[i]):
+        if not _measure_one(image, starts[i], moments[i], low, high, most, out[i]):
             out[i, AREA] = 0.0

@@ -1,4 +1,4 @@
-"""Compiled connected components of a darkness picture. Import only where they run: numba."""
+"""Compiled connected components of a picture of darkness; import it only where it runs (numba)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba import njit
 from gelslim_force.detection.darkness_kernel import COMPILED
 
 AREA, X, Y, XX, XY, YY, PEAK, LEFT, RIGHT, TOP, BOTTOM = range(11)
-"""Columns of a component: pixels, centroid, second moments, largest darkness, bounding box."""
+"""Columns: number of pixels, centroid, second moments, largest darkness, bounding box."""
 COLUMNS = 11
 
 
@@ -24,10 +24,10 @@ def _root(parent: Any, label: Any) -> Any:
 
 @njit(**COMPILED)
 def components(dark: Any, left: Any, top: Any, right: Any, bottom: Any, least: Any) -> Any:
-    """Return the components (n, 11) of pixels with darkness over `least`.
+    """Return the components (n, 11) of pixels whose darkness exceeds `least`.
 
-    Searched are columns left <= x < right and rows top <= y < bottom. Pixels touching by an edge
-    or a corner belong together. Centroids and second moments are weighted by darkness.
+    Only columns left <= x < right and rows top <= y < bottom are searched. Pixels that share an
+    edge or a corner belong together. Centroids and second moments are weighted by darkness.
     """
     most = (bottom - top) * ((right - left) // 2 + 1)
     begin = np.empty(most, dtype=np.int32)

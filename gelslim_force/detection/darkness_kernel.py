@@ -1,7 +1,6 @@
-"""Compiled image passes: channel sums, background, darkness. Import only where they run: numba.
+"""Compiled loops over pixels: sums of channels, means of cells, darkness.
 
-The background is the grey-scale closing (max, then min) of cell means: it keeps every ramp of
-light and every dark region larger than the window, and fills whatever dark is smaller.
+Import it only where it runs, because it loads numba.
 """
 
 from __future__ import annotations
@@ -50,62 +49,12 @@ def cell_means(sums: Any, cell: Any, means: Any) -> None:
 
 
 @njit(**COMPILED)
-def _extreme_rows(values: Any, half: Any, sign: Any, out: Any) -> None:
-    """Maximum (sign 1) or minimum (-1) over 2 half + 1 rows, windows cut at the edge."""
-    rows, columns = values.shape
-    for i in range(rows):
-        first, last = max(0, i - half), min(rows - 1, i + half)
-        for j in range(columns):
-            out[i, j] = values[first, j]
-        for k in range(first + 1, last + 1):
-            if sign > 0:
-                for j in range(columns):
-                    out[i, j] = max(out[i, j], values[k, j])
-            else:
-                for j in range(columns):
-                    out[i, j] = min(out[i, j], values[k, j])
-
-
-@njit(**COMPILED)
-def _transposed(values: Any) -> Any:
-    out = np.empty((values.shape[1], values.shape[0]), dtype=values.dtype)
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            out[j, i] = values[i, j]
-    return out
-
-
-@njit(**COMPILED)
-def closed(means: Any, half: Any) -> Any:
-    """Return the closing of `means` (r, c) by a square of 2 half + 1 cells, lightly smoothed."""
-    a = means.copy()
-    b = np.empty_like(means)
-    _extreme_rows(a, half, 1, b)
-    at = _transposed(b)
-    bt = np.empty_like(at)
-    _extreme_rows(at, half, 1, bt)
-    _extreme_rows(bt, half, -1, at)
-    b = _transposed(at)
-    _extreme_rows(b, half, -1, a)
-    rows, columns = a.shape
-    for i in range(rows):
-        up, down = max(0, i - 1), min(rows - 1, i + 1)
-        for j in range(columns):
-            b[i, j] = (a[up, j] + 2 * a[i, j] + a[down, j]) * np.float32(0.25)
-    for i in range(rows):
-        for j in range(columns):
-            left, right = max(0, j - 1), min(columns - 1, j + 1)
-            a[i, j] = (b[i, left] + 2 * b[i, j] + b[i, right]) * np.float32(0.25)
-    return a
-
-
-@njit(**COMPILED)
 def darkness(sums: Any, background: Any, cell: Any, floor: Any, slack: Any, dark: Any) -> None:
     """Write 1 - (smoothed + slack) / background to `dark` (h, w) float32.
 
-    Smoothed is the 3 x 3 binomial mean of `sums`; `background` (r, c) lies at cell centres and is
-    interpolated bilinearly, at least `floor`, below which the picture is black and tells nothing;
-    `slack` allows for noise, which weighs more where the light is weak.
+    Smoothed is the 3 x 3 binomial mean of `sums`. `background` (r, c) is given at the centres of
+    the cells and interpolated bilinearly; it is at least `floor`, because a black picture holds no
+    information. `slack` allows for noise, which matters more where the light is weak.
     """
     height, width = sums.shape
     rows, columns = background.shape

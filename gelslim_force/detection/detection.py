@@ -1,8 +1,9 @@
-"""Sub-pixel centres of printed dots: background ratio, connected components, weighed centres.
+"""Sub-pixel centres of printed dots: ratio to the background, connected components, centroids.
 
-Light falls off and changes colour across the gel, and dots far from the camera are half the size
-of near ones. The sum of the colour channels over its closing is free of the light; its dark
-components give place and shape, and each dot is then weighed on the untouched picture.
+The light varies in brightness and colour across the gel, and dots far from the camera are half as
+large as near ones. The sum of the colour channels divided by its grey-scale closing does not
+depend on the light. Its dark components give position and shape; the centroid of each dot is then
+measured in the original picture.
 """
 
 from __future__ import annotations
@@ -12,46 +13,47 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import grey_closing
 from scipy.spatial import cKDTree
 
 from gelslim_force.detection.detections import (
     BORDER,
     FAINT,
     LARGE,
+    NOT_CONVERGED,
     ODD_SHAPE,
-    RESTLESS,
     SMALL,
     Detections,
 )
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.frames.read_only import read_only
 
-_NOISE_SHARE = 1.5
-_MOST_ASPECT = 3.0
+_NOISE_FACTOR = 1.5
+_MAX_ASPECT = 3.0
 _NEIGHBOURS = 8
-_STEPS = 16
-_REST_PX = 0.01
+_MAX_STEPS = 16
+_CONVERGED_PX = 0.01
 _FLOOR = 8.0
 _FIRST_LEVEL, _NEXT_LEVEL = 0.7, 1.6
-"""The lowest cut through the darkness, of the least contrast, and the factor to the next."""
+"""Lowest threshold of darkness as a share of the least contrast, and the factor to the next."""
 
 
 @dataclass(frozen=True)
 class Detector:
-    """Finds dots in frames of one sensor; stateless, safe to share between threads."""
+    """Finds dots in frames; it has no state and can be shared between threads."""
 
     settings: DetectorSettings = field(default_factory=DetectorSettings)
 
     def detect(self, image: NDArray[np.uint8]) -> Detections:
-        """Return all dots of a frame (h, w) or (h, w, 3) uint8, in order of components.
+        """Return all dots of a frame (h, w) or (h, w, 3) uint8.
 
-        Raises ValueError for an image of another kind.
+        Raises ValueError if the array is no such frame.
         """
         planes = as_planes(image)
         starts, moments = _candidates(planes, self.settings)
-        dots = _weighed(planes, starts, moments, self.settings)
-        dots = dots[_believable(dots, self.settings)]
-        found = _judged(_without_repeats(dots))
+        dots = _measured(planes, starts, moments, self.settings)
+        dots = dots[_plausible(dots, self.settings)]
+        found = _flagged(_without_duplicates(dots))
         if self.settings.shape == "double":
             return found
         return found.take(np.flatnonzero(~_dark_corners(found.flags)))
@@ -64,39 +66,47 @@ class Detector:
         *,
         compare: bool = True,
     ) -> Detections:
-        """Return the dots near predicted places (n, 2), in that order: the fast path.
+        """Return the dots near predicted positions (n, 2), in that order; faster than `detect`.
 
-        `moments_px2` (n, 3) are the shapes last seen. A dot is found when the place is less than
-        about its radius off; `found` is false elsewhere, and where two places lead to one dot
-        only the nearer one has it. Centres equal those of `detect` where both find the dot.
-        Without `compare` no dot is flagged against its neighbours, which saves a tenth of a frame.
-        Raises ValueError for an image of another kind or arrays of other shapes.
+        A dot is found if the predicted position is less than about its radius away; otherwise
+        `found` is false. If two predictions lead to one dot, the nearer one has it. Centres equal
+        those of `detect` where both find the dot.
+
+        Args:
+            image: The frame, (h, w) or (h, w, 3) uint8.
+            positions_px: (n, 2) predicted positions.
+            moments_px2: (n, 3) second moments that the dots had before.
+            compare: Whether dots are flagged by comparison with their neighbours; without it a
+                frame takes a tenth less time.
+
+        Raises:
+            ValueError: The image is no such frame, or an array has another shape.
         """
         planes = as_planes(image)
         starts = np.array(positions_px, dtype=float)
         moments = np.array(moments_px2, dtype=float)
         if starts.ndim != 2 or starts.shape[1] != 2 or moments.shape != (len(starts), 3):
             raise ValueError(
-                f"places {starts.shape} and moments {moments.shape} must be (n, 2) and (n, 3)"
+                f"positions {starts.shape} and moments {moments.shape} must be (n, 2) and (n, 3)"
             )
         height, width = planes.shape[:2]
         inside = np.all((starts >= 0) & (starts <= [width - 1, height - 1]), axis=1)
         inside &= np.isfinite(moments).all(axis=1)
         dots = np.zeros((len(starts), 10))
-        dots[inside] = _weighed(planes, starts[inside], moments[inside], self.settings)
+        dots[inside] = _measured(planes, starts[inside], moments[inside], self.settings)
         dots[~inside, :2] = starts[~inside]
         moved = np.hypot(*(dots[:, :2] - starts).T)
         reach = 2.0 * np.sqrt(np.abs(moments).max(axis=1)) + 1.5
-        lost = ~_believable(dots, self.settings) | ~(moved <= reach)
-        lost |= _taken_twice(dots, moved, lost)
+        lost = ~_plausible(dots, self.settings) | ~(moved <= reach)
+        lost |= _duplicates(dots, moved, lost)
         dots[lost, 2:] = 0.0
-        return _judged(dots, compare)
+        return _flagged(dots, compare)
 
 
 def as_planes(image: Any) -> NDArray[np.uint8]:
     """Return the frame as (h, w, c) with c 1 or 3.
 
-    Raises ValueError for what is no uint8 picture of at least 16 x 16 px.
+    Raises ValueError if it is no uint8 picture of at least 16 x 16 px.
     """
     if not isinstance(image, np.ndarray) or image.dtype != np.uint8:
         kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
@@ -108,14 +118,16 @@ def as_planes(image: Any) -> NDArray[np.uint8]:
             f"a frame must be (h, w) or (h, w, 3), not {image.shape}; drop an alpha channel"
         )
     if min(image.shape[:2]) < 16:
-        raise ValueError(f"a frame of {image.shape[1]} x {image.shape[0]} px is too small; min. 16")
+        raise ValueError(
+            f"a frame of {image.shape[1]} x {image.shape[0]} px is too small; at least 16 x 16"
+        )
     return read_only(image)
 
 
 def _candidates(
     planes: NDArray[np.uint8], settings: DetectorSettings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places (n, 2) and second moments (n, 3) of dark components of a dot's size."""
+    """Positions (n, 2) and second moments (n, 3) of dark components of the size of a dot."""
     from gelslim_force.detection import component_kernel as ck
 
     least, limit = settings.least_contrast, settings.largest_diameter_px
@@ -131,9 +143,9 @@ def _candidates(
 
 
 def _components(dark: NDArray[np.float32], least: float, limit: float) -> NDArray[np.float64]:
-    """Rows of `component_kernel` for what is darker than `least` and narrower than `limit`.
+    """Rows of `component_kernel` for regions darker than `least` and narrower than `limit`.
 
-    What is wide, as a dot in a shadow or two that touch, is cut anew at rising levels.
+    A wider region, such as a dot in a shadow or two dots that touch, is divided at rising levels.
     """
     from gelslim_force.detection import component_kernel as ck
 
@@ -155,7 +167,7 @@ def _components(dark: NDArray[np.float32], least: float, limit: float) -> NDArra
 
 
 def _new(table: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Components that do not lie in the box of one kept at a lower level."""
+    """Components that are not in the bounding box of one that was kept at a lower level."""
     from gelslim_force.detection import component_kernel as ck
 
     if len(table) == 0 or len(kept) == 0:
@@ -168,7 +180,12 @@ def _new(table: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def darkness_of(planes: NDArray[np.uint8], settings: DetectorSettings) -> NDArray[np.float32]:
-    """Return the share of light missing at each pixel (h, w) against what lies around."""
+    """Return the share of light that is missing at each pixel (h, w).
+
+    The light is the grey-scale closing of the means of small cells, lightly smoothed. A closing
+    keeps every gradient of light and every dark region that is larger than its window, and fills
+    smaller dark regions.
+    """
     from gelslim_force.detection import darkness_kernel as dk
 
     height, width, channels = planes.shape
@@ -178,15 +195,22 @@ def darkness_of(planes: NDArray[np.uint8], settings: DetectorSettings) -> NDArra
     means = np.empty((height // cell, width // cell), dtype=np.float32)
     dk.cell_means(sums, cell, means)
     half = int(np.ceil(0.65 * settings.largest_diameter_px / cell)) + 1
-    background = dk.closed(means, half)
+    background = _smoothed(grey_closing(means, 2 * half + 1, mode="nearest"))
     dark = np.empty((height, width), dtype=np.float32)
-    slack = _NOISE_SHARE * noise_of(sums)
+    slack = _NOISE_FACTOR * noise_of(sums)
     dk.darkness(sums, background, cell, _FLOOR * channels, slack, dark)
     return dark
 
 
+def _smoothed(means: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Binomial mean of 3 x 3 cells; the border is repeated."""
+    padded = np.pad(means, 1, mode="edge").astype(float)
+    rows = ((padded[:-2] + 2 * padded[1:-1] + padded[2:]) / 4).astype(np.float32).astype(float)
+    return ((rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:]) / 4).astype(np.float32)
+
+
 def noise_of(sums: NDArray[np.uint16]) -> float:
-    """Return the standard deviation of the pixel noise, from second differences along rows.
+    """Return the standard deviation of the noise of a pixel, from second differences along rows.
 
     The median of |a - 2b + c| is 0.6745 sqrt(6) standard deviations for white noise.
     """
@@ -195,7 +219,7 @@ def noise_of(sums: NDArray[np.uint16]) -> float:
     return float(np.median(second)) / (0.6745 * np.sqrt(6.0))
 
 
-def _weighed(
+def _measured(
     planes: NDArray[np.uint8],
     starts: NDArray[np.float64],
     moments: NDArray[np.float64],
@@ -204,8 +228,8 @@ def _weighed(
     from gelslim_force.detection import centroid_kernel
 
     dots = np.zeros((len(starts), 10))
-    centroid_kernel.weigh(
-        planes, starts, moments, settings.weight_from, settings.weight_to, _STEPS, dots
+    centroid_kernel.measure(
+        planes, starts, moments, settings.weight_from, settings.weight_to, _MAX_STEPS, dots
     )
     return dots
 
@@ -218,21 +242,21 @@ def _axes(dots: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.fl
     return 2 * np.sqrt(middle + spread), 2 * np.sqrt(np.maximum(middle - spread, 0.0))
 
 
-def _believable(dots: NDArray[np.float64], settings: DetectorSettings) -> NDArray[np.bool_]:
+def _plausible(dots: NDArray[np.float64], settings: DetectorSettings) -> NDArray[np.bool_]:
     long, short = _axes(dots)
     area = dots[:, 2]
     keep = (area > 0) & (dots[:, 3] >= settings.least_contrast)
     keep &= area >= 0.6 * np.pi / 4 * settings.smallest_diameter_px**2
     keep &= 2 * long <= 1.3 * settings.largest_diameter_px
-    aspect = _MOST_ASPECT * (1.5 if settings.shape == "double" else 1.0)
+    aspect = _MAX_ASPECT * (1.5 if settings.shape == "double" else 1.0)
     keep &= long <= aspect * np.maximum(short, 0.5)
     return keep & (area >= 0.55 * np.pi * long * short)
 
 
-def _taken_twice(
+def _duplicates(
     dots: NDArray[np.float64], moved: NDArray[np.float64], lost: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(n,) whether a dot was also reached from a nearer place."""
+    """(n,) whether the same dot was also found from a nearer prediction."""
     twice = np.zeros(len(dots), dtype=bool)
     live = np.flatnonzero(~lost)
     if len(live) < 2:
@@ -243,8 +267,8 @@ def _taken_twice(
     return twice
 
 
-def _without_repeats(dots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Drop dots reached from two components, and specks in the window of a larger dot."""
+def _without_duplicates(dots: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Remove dots that were found from two components, and specks near a larger dot."""
     if len(dots) < 2:
         return dots
     long, _ = _axes(dots)
@@ -257,13 +281,15 @@ def _without_repeats(dots: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _dark_corners(flags: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(n,) what the picture's border cuts that is no ellipse and too faint or too large for a dot:
-    the dark wedge between the pad's corner and the border. A double dot cut by it looks so too."""
+    """(n,) whether a region is the dark wedge between a corner of the pad and the border.
+
+    It is cut by the border of the picture, is no ellipse, and is too faint or too large for a
+    dot. A double dot that the border cuts looks the same."""
     cut = (flags & BORDER > 0) & (flags & ODD_SHAPE > 0)
     return np.asarray(cut & (flags & (FAINT | LARGE) > 0))
 
 
-def _judged(dots: NDArray[np.float64], compare: bool = True) -> Detections:
+def _flagged(dots: NDArray[np.float64], compare: bool = True) -> Detections:
     area, contrast = dots[:, 2], dots[:, 3]
     flags = np.zeros(len(dots), dtype=np.int64)
     seen = np.flatnonzero(area > 0)
@@ -278,7 +304,7 @@ def _judged(dots: NDArray[np.float64], compare: bool = True) -> Detections:
     with np.errstate(invalid="ignore"):
         flags |= np.where((area > 0) & (area < 0.85 * np.pi * long * short), ODD_SHAPE, 0)
     flags |= np.where((area > 0) & (dots[:, 8] < 1.0), BORDER, 0)
-    flags |= np.where((area > 0) & (dots[:, 9] > _REST_PX), RESTLESS, 0)
+    flags |= np.where((area > 0) & (dots[:, 9] > _CONVERGED_PX), NOT_CONVERGED, 0)
     return Detections(
         centres_px=dots[:, :2],
         area_px=area,

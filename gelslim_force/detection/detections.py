@@ -1,42 +1,42 @@
-"""Dots found in one frame: centres, sizes, contrasts and what is doubtful about each."""
+"""The dots found in a frame: centres, sizes, contrasts, and what is doubtful about each."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-GOOD, BORDER, FAINT, ODD_SHAPE, SMALL, LARGE, RESTLESS = 0, 1, 2, 4, 8, 16, 32
-"""Bits of `Detections.flags`: the window leaves the picture; under half of the neighbours'
-contrast; not an ellipse; under half or over 1.6 times the neighbours' area (an odd-sized anchor
-is LARGE); the centre had not come to rest."""
-DOUBTFUL = BORDER | FAINT | ODD_SHAPE | RESTLESS
+BORDER, FAINT, ODD_SHAPE, SMALL, LARGE, NOT_CONVERGED = 1, 2, 4, 8, 16, 32
+"""Bits of `Detections.flags`: the window of the dot leaves the picture; less than half of the
+contrast of its neighbours; not an ellipse; less than half, or more than 1.6 times, the area of its
+neighbours (a large anchor is LARGE); the iteration for the centre did not converge."""
+DOUBTFUL = BORDER | FAINT | ODD_SHAPE | NOT_CONVERGED
 
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """Dots of a frame, n of them; arrays are read-only copies.
+    """The n dots of a frame; arrays are read-only copies.
 
-    Pixel centres are at integer coordinates, x to the right and y down.
-    Raises ValueError where arrays disagree in length.
+    Pixel centres are at integer coordinates, x to the right and y down. Raises ValueError if the
+    arrays have different lengths.
     """
 
     centres_px: NDArray[np.float64]
     """(n, 2) sub-pixel centres (x, y)."""
     area_px: NDArray[np.float64]
-    """(n,) dark area; 0 where a dot asked for by place was not found."""
+    """(n,) dark area; 0 if no dot was found near a given position."""
     contrast: NDArray[np.float64]
-    """(n,) darkness against the light around: 0 none, 1 black."""
+    """(n,) darkness relative to the light around the dot: 0 none, 1 black."""
     moments_px2: NDArray[np.float64]
     """(n, 3) second moments (xx, xy, yy) of the dark area."""
     flags: NDArray[np.int64]
-    """(n,) bits, 0 for a dot without blemish."""
+    """(n,) bits; 0 for a dot with nothing unusual."""
 
     def __post_init__(self) -> None:
         count = len(self.area_px)
         shapes = {"centres_px": (count, 2), "moments_px2": (count, 3)}
-        for name in ("centres_px", "area_px", "contrast", "moments_px2", "flags"):
+        for name in _ARRAYS:
             dtype = np.int64 if name == "flags" else np.float64
             array = np.array(getattr(self, name), dtype=dtype)
             if array.shape != shapes.get(name, (count,)):
@@ -58,26 +58,18 @@ class Detections:
 
     @property
     def trustworthy(self) -> NDArray[np.bool_]:
-        """(n,) found, and nothing is doubtful about the centre."""
+        """(n,) whether a dot was found and nothing is doubtful about its centre."""
         return self.found & ((self.flags & DOUBTFUL) == 0)
 
     def take(self, which: ArrayLike) -> Detections:
         """Return the dots chosen by indices or by (n,) booleans."""
         chosen = np.asarray(which)
-        return Detections(
-            centres_px=self.centres_px[chosen],
-            area_px=self.area_px[chosen],
-            contrast=self.contrast[chosen],
-            moments_px2=self.moments_px2[chosen],
-            flags=self.flags[chosen],
-        )
+        return Detections(**{name: getattr(self, name)[chosen] for name in _ARRAYS})
 
     def joined(self, more: Detections) -> Detections:
-        """Return these dots with others after them."""
-        return Detections(
-            centres_px=np.vstack([self.centres_px, more.centres_px]),
-            area_px=np.concatenate([self.area_px, more.area_px]),
-            contrast=np.concatenate([self.contrast, more.contrast]),
-            moments_px2=np.vstack([self.moments_px2, more.moments_px2]),
-            flags=np.concatenate([self.flags, more.flags]),
-        )
+        """Return these dots followed by others."""
+        both = {n: np.concatenate([getattr(self, n), getattr(more, n)]) for n in _ARRAYS}
+        return Detections(**both)
+
+
+_ARRAYS = tuple(field.name for field in fields(Detections))

@@ -1,4 +1,4 @@
-"""What a detector must know about the dots: their range of sizes, their shape, their contrast."""
+"""What the detector must know about the dots: their sizes, shape and contrast."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 DotShape = Literal["round", "double"]
-"""One dot per marker, or two dots side by side that count as one."""
+"""One dot per marker, or two dots side by side that count as one marker."""
 
 
 @dataclass(frozen=True)
 class DetectorSettings:
-    """Sizes in px of the picture as given. Raises ValueError for values that find nothing."""
+    """Settings of the detector. Raises ValueError for values with which no dot can be found."""
 
     smallest_diameter_px: float = 3.0
     largest_diameter_px: float = 24.0
-    """Extent of the largest dot, both halves of a double one included."""
+    """Extent of the largest dot, with both halves of a double one."""
     least_contrast: float = 0.12
-    """Darkness against the light around under which nothing is a dot."""
+    """Least darkness of a dot relative to the light around it."""
     shape: DotShape = "round"
     weight_from: float = 0.25
     weight_to: float = 1.0
-    """Shares of a dot's darkness between which a pixel's weight rises from 0 to 1."""
+    """Shares of a dot's darkness between which the weight of a pixel rises from 0 to 1."""
 
     def __post_init__(self) -> None:
         if not 1.0 <= self.smallest_diameter_px < self.largest_diameter_px <= 400.0:
@@ -46,9 +46,9 @@ class DetectorSettings:
     def for_diameters(
         cls, diameters_px: NDArray[np.float64], shape: DotShape = "round"
     ) -> DetectorSettings:
-        """Return settings for dots expected with these extents (n,): a third less to a third more.
+        """Return settings for dots of these extents (n,), from a third less to a third more.
 
-        Raises ValueError without a finite diameter.
+        Raises ValueError if no diameter is finite.
         """
         sizes = np.asarray(diameters_px, dtype=float)
         sizes = sizes[np.isfinite(sizes)]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gelslim_force.motion.surface_motion import SurfaceMotion
-from gelslim_force.tracking.marker_noise import quiet_sigma
+from gelslim_force.tracking.marker_noise import robust_sigma
 from ifem_export.inverse.contact_inverse import smoothing
 from ifem_export.operators.surface_operator import SurfaceOperator
 
@@ -129,7 +129,7 @@ def normal_noise_mm(curvature: sparse.csr_array, w_mm: Array) -> float:
 
     The lower quartile is not affected by the nodes that curve around a contact.
     """
-    return quiet_sigma(curvature @ w_mm) / np.sqrt(1.25)
+    return robust_sigma(curvature @ w_mm) / np.sqrt(1.25)
 
 
 def widths_mm(cell_mm: Array, fixed_mm: float | None) -> Array:

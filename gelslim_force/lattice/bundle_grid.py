@@ -1,4 +1,4 @@
-"""The printed marker lattice, as a bundle's marker arrays tell it."""
+"""The printed marker lattice, restored from the marker arrays of a bundle."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _ARRAYS = ("row", "column", "diameter_mm", "kind")
 
 
 def bundle_grid(bundle: Bundle) -> MarkerGrid:
-    """Return the print of a bundle; marker ids are the bundle's marker indices.
+    """Return the print of a bundle, with the markers in the order of the bundle.
 
-    A bundle lists dots only: pitch and extent of the lattice follow from the positions, and the
-    sites left out on purpose are those without a dot inside the dots' convex hull.
-    Raises IfemError for a bundle without markers, or whose markers form no square lattice.
+    A bundle lists dots only. Pitch and extent of the lattice follow from their positions, and the
+    sites that are omitted on purpose are those without a dot inside the convex hull of the dots.
+    Raises IfemError if the bundle has no markers, or if they form no square lattice.
     """
     field = bundle.markers
     if field is None:
@@ -32,39 +32,39 @@ def bundle_grid(bundle: Bundle) -> MarkerGrid:
             f"the bundle's markers have no {', '.join(absent)}: rebuild it with "
             "`gelslim bundle SPEC -o BUNDLE`"
         )
-    places = np.asarray(field.positions_mm, dtype=float)[:, :2]
+    positions = np.asarray(field.positions_mm, dtype=float)[:, :2]
     sites = np.column_stack([field.arrays["row"], field.arrays["column"]]).astype(np.int64)
-    pitch = _pitch_mm(places, sites)
-    # The lattice is centred on the origin: site 0 lies (count - 1) / 2 pitches below it.
-    counts = 2 * np.mean(sites - places / pitch, axis=0) + 1
+    pitch = _pitch_mm(positions, sites)
+    # The lattice is centred on the origin: site 0 is (count - 1) / 2 pitches below it.
+    counts = 2 * np.mean(sites - positions / pitch, axis=0) + 1
     rows, columns = (int(n) for n in np.rint(counts))
     try:
         return MarkerGrid(
-            positions_mm=places,
+            positions_mm=positions,
             row=sites[:, 0],
             column=sites[:, 1],
             diameter_mm=field.arrays["diameter_mm"],
             kind=field.arrays["kind"],
             pitch_mm=pitch,
             lattice_shape=(rows, columns),
-            omitted=_left_out(sites, (rows, columns)),
+            omitted=_omitted_sites(sites, (rows, columns)),
         )
     except ValueError as error:
-        raise IfemError(f"the bundle's markers are no printed lattice: {error}") from error
+        raise IfemError(f"the markers of the bundle are not a printed lattice: {error}") from error
 
 
-def _pitch_mm(places_mm: NDArray[np.float64], sites: NDArray[np.int64]) -> float:
+def _pitch_mm(positions_mm: NDArray[np.float64], sites: NDArray[np.int64]) -> float:
     apart = sites - sites.mean(axis=0)
     spread = float((apart**2).sum())
     if spread == 0:
-        raise IfemError("the bundle has a single marker: a lattice needs neighbours")
-    return float((apart * (places_mm - places_mm.mean(axis=0))).sum() / spread)
+        raise IfemError("the bundle has a single marker, which makes no lattice")
+    return float((apart * (positions_mm - positions_mm.mean(axis=0))).sum() / spread)
 
 
-def _left_out(sites: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.int64]:
-    """Sites (k, 2) without a dot within the dots' convex hull, row-major.
+def _omitted_sites(sites: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.int64]:
+    """Sites (k, 2) without a dot within the convex hull of the dots, row by row.
 
-    Dots clipped by the gel's outline lie outside the hull.
+    Dots that the outline of the gel cuts off lie outside the hull.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -77,7 +77,9 @@ def _left_out(sites: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.in
     try:
         hull = ConvexHull(sites.astype(float))
     except QhullError as error:
-        raise IfemError("the bundle's markers stand in one line: no lattice to register") from error
+        raise IfemError(
+            "the markers of the bundle are on one line, which makes no lattice"
+        ) from error
     beyond = empty @ hull.equations[:, :2].T + hull.equations[:, 2]
-    left_out: NDArray[np.int64] = empty[np.all(beyond <= 1e-9, axis=1)]
-    return left_out
+    omitted: NDArray[np.int64] = empty[np.all(beyond <= 1e-9, axis=1)]
+    return omitted

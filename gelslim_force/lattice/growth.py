@@ -1,8 +1,8 @@
-"""Dots put on a lattice without knowing the print: grown from a seed by local affine prediction.
+"""The lattice of the dots, found without knowledge of the print by growth from a seed.
 
-A lattice seen through a tilted camera is nowhere regular, but locally it is affine. Growth
-starts where a dot and its neighbours form the cleanest cross and takes one ring after the other;
-a missing dot leaves a hole, a spurious one fits no site.
+Perspective makes the image of a lattice irregular, but locally it is affine. Growth starts at the
+dot whose neighbours form the most regular cross and adds one ring of sites after the other. A
+missing dot leaves a hole; a spurious dot fits no site.
 """
 
 from __future__ import annotations
@@ -15,51 +15,51 @@ from scipy.spatial import cKDTree
 
 from gelslim_core.errors import GelslimError
 from gelslim_force.detection.detections import Detections
-from gelslim_force.lattice.bridge import bridged
+from gelslim_force.lattice.homography import dots_across_gaps
 
 _REACH = 2
-_GATE = 0.28
-_MISFIT = 0.22
-_SEEDS = 12
+_TOLERANCE = 0.28
+_MAX_MISFIT = 0.22
+_MAX_SEEDS = 12
 _ENOUGH = 0.8
-_SMALLEST = 12
-_RINGS = 200
-_BRIDGES, _WHOLE = 6, 0.9
+_MIN_DOTS = 12
+_MAX_RINGS = 200
+_MAX_BRIDGES, _NEARLY_ALL = 6, 0.9
 
 
 class LatticeError(GelslimError, ValueError):
-    """The dots found form no lattice, or one that cannot be told from another."""
+    """The dots form no lattice, or one that fits the print in more than one way."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """k of a frame's dots on a lattice whose origin, turn and handedness are arbitrary."""
+    """k dots of a frame on a lattice whose origin, orientation and handedness are arbitrary."""
 
     sites: NDArray[np.int64]
-    """(k, 2) lattice indices, smallest 0 along each axis."""
+    """(k, 2) row and column; the smallest of each is 0."""
     dots: NDArray[np.int64]
     """(k,) indices into the detections."""
     residual_px: NDArray[np.float64]
-    """(k,) distance of each dot from the place its neighbours predict; NaN with too few."""
+    """(k,) distance of each dot from the position its neighbours predict; NaN with too few."""
     pitch_px: float
     """Median distance between neighbours."""
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Lattice extent (rows, columns), holes included."""
+        """Extent (rows, columns) of the lattice, including holes."""
         rows, columns = self.sites.max(axis=0) + 1
         return int(rows), int(columns)
 
 
 def grow_lattice(detections: Detections) -> Lattice:
-    """Return the largest lattice among the dots.
+    """Return the largest lattice that the dots form.
 
-    Raises LatticeError where fewer than 12 dots, or no cross of five, form one.
+    Raises LatticeError if it has fewer than 12 dots, or if no dot has four regular neighbours.
     """
     points = detections.centres_px
-    if len(points) < _SMALLEST:
+    if len(points) < _MIN_DOTS:
         raise LatticeError(
-            f"only {len(points)} dots found, a lattice needs {_SMALLEST}: check the dots' "
+            f"only {len(points)} dots found, a lattice needs {_MIN_DOTS}: check the dots' "
             "diameters in the detector's settings, the light and the focus"
         )
     tree = cKDTree(points)
@@ -74,16 +74,16 @@ def grow_lattice(detections: Detections) -> Lattice:
             best = placed
         if len(best) >= _ENOUGH * len(points):
             break
-    if len(best) < _SMALLEST:
+    if len(best) < _MIN_DOTS:
         raise LatticeError(
             f"the {len(points)} dots found form no lattice: the largest piece has {len(best)}; "
             "check the dots' diameters in the detector's settings"
         )
-    return _finished(points, best)
+    return _lattice_of(points, best)
 
 
 def _seeds(points: NDArray[np.float64], tree: cKDTree) -> list[tuple[int, NDArray[np.float64]]]:
-    """Dots with two pairs of opposite neighbours, cleanest first, and their steps (2, 2)."""
+    """Dots with two pairs of opposite neighbours, most regular first, and their steps (2, 2)."""
     _, near = tree.query(points, min(9, len(points)))
     found: list[tuple[float, int, NDArray[np.float64]]] = []
     for i, neighbours in enumerate(near):
@@ -103,8 +103,8 @@ def _seeds(points: NDArray[np.float64], tree: cKDTree) -> list[tuple[int, NDArra
                 found.append((pairs[0][1] + second[1], i, np.array([u, v])))
                 break
     found.sort(key=lambda item: item[0])
-    spread = found[:: max(1, len(found) // (4 * _SEEDS))]
-    return [(i, basis) for _, i, basis in found[:_SEEDS] + spread]
+    spread = found[:: max(1, len(found) // (4 * _MAX_SEEDS))]
+    return [(i, basis) for _, i, basis in found[:_MAX_SEEDS] + spread]
 
 
 def _grown(
@@ -115,23 +115,23 @@ def _grown(
     for step, vector in (((1, 0), basis[0]), ((0, 1), basis[1])):
         for sign in (1, -1):
             gap, dot = tree.query(points[seed] + sign * vector)
-            if gap < _GATE * np.hypot(*vector) and int(dot) not in used:
+            if gap < _TOLERANCE * np.hypot(*vector) and int(dot) not in used:
                 placed[sign * step[0], sign * step[1]] = int(dot)
                 used.add(int(dot))
     if len(placed) < 5:
         return placed
-    for _ in range(_BRIDGES):
+    for _ in range(_MAX_BRIDGES):
         _rings(points, tree, placed, used)
-        if len(placed) > _WHOLE * len(points):
+        if len(placed) > _NEARLY_ALL * len(points):
             break
-        more = bridged(points, placed)
+        more = dots_across_gaps(points, placed)
         if not more:
             break
         placed.update(more)
         used.update(more.values())
     for _ in range(3):
         _rings(points, tree, placed, used)
-        wrong = [site for site, gap in _misfits(points, placed).items() if gap > _MISFIT]
+        wrong = [site for site, gap in _misfits(points, placed).items() if gap > _MAX_MISFIT]
         if not wrong:
             break
         for site in wrong:
@@ -145,17 +145,17 @@ def _rings(
     placed: dict[tuple[int, int], int],
     used: set[int],
 ) -> None:
-    """Add ring after ring of sites, the surest dot of each ring first."""
+    """Add ring after ring of sites; in each ring the dot nearest to its prediction comes first."""
     barren: set[tuple[int, int]] = set()
     reach = 1
-    for _ in range(_RINGS):
+    for _ in range(_MAX_RINGS):
         offers: list[tuple[float, tuple[int, int], int]] = []
         for site in sorted(_rim(placed, reach) - barren):
-            place, pitch, support = _predicted(points, placed, site)
+            position, pitch, support = _predicted(points, placed, site)
             if support < 4:
                 continue
-            gap, dot = tree.query(place)
-            if gap < _GATE * pitch and int(dot) not in used:
+            gap, dot = tree.query(position)
+            if gap < _TOLERANCE * pitch and int(dot) not in used:
                 offers.append((float(gap / pitch), site, int(dot)))
             elif support >= 8:
                 barren.add(site)
@@ -179,22 +179,27 @@ def _rim(placed: dict[tuple[int, int], int], reach: int) -> set[tuple[int, int]]
     return rim - placed.keys()
 
 
-def _predicted(
-    points: NDArray[np.float64], placed: dict[tuple[int, int], int], site: tuple[int, int]
-) -> tuple[NDArray[np.float64], float, int]:
-    """Place (2,) of a site by the affine fit to its neighbours, pitch there, and their number."""
+def _neighbours(placed: dict[tuple[int, int], int], site: tuple[int, int]) -> NDArray[np.int64]:
+    """Row and column offset and dot (n, 3) of the sites up to two rows and columns away."""
     around = range(-_REACH, _REACH + 1)
-    offsets = [
+    near = [
         (a, b, placed[site[0] + a, site[1] + b])
         for a in around
         for b in around
         if (a or b) and (site[0] + a, site[1] + b) in placed
     ]
-    if len(offsets) < 4:
+    return np.array(near, dtype=np.int64).reshape(-1, 3)
+
+
+def _predicted(
+    points: NDArray[np.float64], placed: dict[tuple[int, int], int], site: tuple[int, int]
+) -> tuple[NDArray[np.float64], float, int]:
+    """Position (2,) of a site by an affine fit to its neighbours, local pitch, and their number."""
+    table = _neighbours(placed, site)
+    if len(table) < 4:
         return np.zeros(2), 1.0, 0
-    table = np.array(offsets)
     design = np.column_stack([np.ones(len(table)), table[:, :2]])
-    # Near neighbours weigh more: the fit leaves out the keystone's curvature.
+    # Near neighbours have a larger weight, because an affine fit ignores perspective.
     weight = 1.0 / np.hypot(table[:, 0], table[:, 1])
     normal = design.T @ (design * weight[:, None])
     if np.linalg.cond(normal) > 1e4:
@@ -207,21 +212,21 @@ def _predicted(
 def _misfits(
     points: NDArray[np.float64], placed: dict[tuple[int, int], int]
 ) -> dict[tuple[int, int], float]:
-    """Distance of every dot with enough neighbours from their prediction, in pitches."""
+    """Distance in pitches of every dot with enough neighbours from their prediction."""
     gaps = {}
     for site, dot in placed.items():
-        place, pitch, support = _predicted(points, placed, site)
+        position, pitch, support = _predicted(points, placed, site)
         if support >= 4:
-            gaps[site] = float(np.hypot(*(points[dot] - place))) / pitch
+            gaps[site] = float(np.hypot(*(points[dot] - position))) / pitch
     return gaps
 
 
-def _finished(points: NDArray[np.float64], placed: dict[tuple[int, int], int]) -> Lattice:
-    placed = _without_lone_rims(_upright(points, placed))
+def _lattice_of(points: NDArray[np.float64], placed: dict[tuple[int, int], int]) -> Lattice:
+    placed = _without_single_dots(_upright(points, placed))
     order = sorted(placed)
     sites = np.array(order, dtype=np.int64)
     dots = np.array([placed[site] for site in order], dtype=np.int64)
-    residual = np.array([_even_residual(points, placed, site) for site in order])
+    residual = np.array([_quadratic_residual(points, placed, site) for site in order])
     steps = np.vstack([_steps(points, placed, 1, 0), _steps(points, placed, 0, 1)])
     return Lattice(
         sites=sites - sites.min(axis=0),
@@ -231,8 +236,8 @@ def _finished(points: NDArray[np.float64], placed: dict[tuple[int, int], int]) -
     )
 
 
-def _without_lone_rims(placed: dict[tuple[int, int], int]) -> dict[tuple[int, int], int]:
-    """Take off outermost rows and columns of a single dot: dirt beside the print fits as well."""
+def _without_single_dots(placed: dict[tuple[int, int], int]) -> dict[tuple[int, int], int]:
+    """Remove outermost rows and columns that have a single dot, which may be dirt."""
     while True:
         sites = np.array(list(placed))
         lone: set[tuple[int, int]] = set()
@@ -249,7 +254,7 @@ def _without_lone_rims(placed: dict[tuple[int, int], int]) -> dict[tuple[int, in
 def _steps(
     points: NDArray[np.float64], placed: dict[tuple[int, int], int], rows: int, columns: int
 ) -> NDArray[np.float64]:
-    """Vectors (n, 2) in px from every dot to the one so many rows and columns on."""
+    """Vectors (n, 2) in px from every dot to the dot that is so many rows and columns away."""
     pairs = [
         (dot, placed[i + rows, j + columns])
         for (i, j), dot in placed.items()
@@ -262,9 +267,9 @@ def _steps(
 def _upright(
     points: NDArray[np.float64], placed: dict[tuple[int, int], int]
 ) -> dict[tuple[int, int], int]:
-    """Undo a seed's choice of diagonals for axes: the two shortest steps become the axes.
+    """Make the two shortest steps the axes, by Lagrange's reduction of the median steps.
 
-    Lagrange's reduction of the median steps; a missing neighbour at the seed makes it needed.
+    A seed with a missing neighbour may have taken a diagonal for an axis.
     """
     u, v = (np.median(_steps(points, placed, *axis), axis=0) for axis in ((1, 0), (0, 1)))
     # Rows: the new axes in terms of the old ones.
@@ -284,20 +289,13 @@ def _upright(
     }
 
 
-def _even_residual(
+def _quadratic_residual(
     points: NDArray[np.float64], placed: dict[tuple[int, int], int], site: tuple[int, int]
 ) -> float:
-    """Distance from the quadratic surface through the 5 x 5 neighbours, in px; NaN if too few."""
-    around = range(-_REACH, _REACH + 1)
-    near = [
-        (a, b, placed[site[0] + a, site[1] + b])
-        for a in around
-        for b in around
-        if (a or b) and (site[0] + a, site[1] + b) in placed
-    ]
-    if len(near) < 9:
+    """Distance in px from a quadratic fit to the 5 x 5 neighbours; NaN if they are too few."""
+    table = _neighbours(placed, site)
+    if len(table) < 9:
         return float("nan")
-    table = np.array(near)
     a, b = table[:, 0], table[:, 1]
     design = np.column_stack([np.ones(len(table)), a, b, a * a, a * b, b * b])
     fit, _, rank, _ = np.linalg.lstsq(design, points[table[:, 2]], rcond=None)

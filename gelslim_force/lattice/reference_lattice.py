@@ -1,4 +1,4 @@
-"""The markers at rest: where each is seen without contact, and which are its neighbours."""
+"""The markers at rest: their positions without contact, and the neighbours of each."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _REACH = 2
 
 @dataclass(frozen=True, eq=False)
 class ReferenceLattice:
-    """n markers by lattice site, with their places in the no-contact frame.
+    """n markers by lattice site, with their positions in the frame without contact.
 
-    Raises ValueError where arrays disagree, a place is not finite, a site is used twice or a
-    marker has no neighbour.
+    Raises ValueError if the arrays disagree, a position is not finite, two markers have the same
+    site, or a marker has no neighbour.
     """
 
     sites: NDArray[np.int64]
@@ -29,7 +29,7 @@ class ReferenceLattice:
     positions_px: NDArray[np.float64]
     """(n, 2)."""
     markers: NDArray[np.int64]
-    """(n,) id of each in the grid; 0 ... n - 1 where no grid is known."""
+    """(n,) index of each marker in the grid; 0 ... n - 1 if no grid is known."""
 
     def __post_init__(self) -> None:
         for name, dtype in (
@@ -43,13 +43,14 @@ class ReferenceLattice:
         count = len(self.markers)
         if self.sites.shape != (count, 2) or self.positions_px.shape != (count, 2):
             raise ValueError(
-                f"reference lattice: sites {self.sites.shape} and places {self.positions_px.shape} "
+                f"reference lattice: sites {self.sites.shape} and positions "
+                f"{self.positions_px.shape} "
                 f"must be ({count}, 2)"
             )
         if count < 9:
             raise ValueError(f"reference lattice: {count} markers are too few to track; min. 9")
         if not np.isfinite(self.positions_px).all():
-            raise ValueError("reference lattice: a place is not finite; leave lost markers out")
+            raise ValueError("reference lattice: a position is not finite; leave lost markers out")
         if len(np.unique(self.sites, axis=0)) != count:
             raise ValueError("reference lattice: a site is used twice")
         if np.any((self.neighbours < 0).all(axis=1)):
@@ -61,7 +62,10 @@ class ReferenceLattice:
 
     @cached_property
     def neighbours(self) -> NDArray[np.int64]:
-        """(n, 24) indices of the markers up to two sites away, -1 where there is none."""
+        """(n, 24) indices of the markers up to two sites away, -1 for a site without a marker.
+
+        The nearest come first, so that the first four are one site away along an axis.
+        """
         low = self.sites.min(axis=0) - _REACH
         table = np.full(tuple(self.sites.max(axis=0) - low + 1 + _REACH), -1, dtype=np.int64)
         table[tuple((self.sites - low).T)] = np.arange(len(self.sites))
@@ -74,10 +78,7 @@ class ReferenceLattice:
 
     @cached_property
     def pitch_px(self) -> NDArray[np.float64]:
-        """(n,) distance between neighbours there: the smallest to those one site away.
-
-        Markers without such a neighbour get the median.
-        """
+        """(n,) smallest distance to the neighbours one site away; the median without such a one."""
         pitch = np.full(len(self), np.inf)
         for k in range(4):
             j = self.neighbours[:, k]
@@ -90,21 +91,21 @@ class ReferenceLattice:
 
     @classmethod
     def from_registration(cls, registration: Registration, grid: MarkerGrid) -> ReferenceLattice:
-        """Take the grid's markers that were found."""
+        """Return the markers of the grid that were found."""
         found = np.flatnonzero(registration.found)
         sites = np.column_stack([grid.row, grid.column])[found]
         return _connected(sites, registration.centres_px[found], found)
 
     @classmethod
     def from_lattice(cls, lattice: Lattice, detections: Detections) -> ReferenceLattice:
-        """Take a grown lattice as it is, when no print is known."""
-        places = detections.centres_px[lattice.dots]
-        return _connected(lattice.sites, places, np.arange(len(places)))
+        """Return the dots of a lattice whose print is not known."""
+        positions = detections.centres_px[lattice.dots]
+        return _connected(lattice.sites, positions, np.arange(len(positions)))
 
 
-def _connected(sites: ArrayLike, places: ArrayLike, markers: ArrayLike) -> ReferenceLattice:
-    """Leave out markers without any neighbour."""
-    at, where, ids = np.asarray(sites), np.asarray(places), np.asarray(markers)
+def _connected(sites: ArrayLike, positions: ArrayLike, markers: ArrayLike) -> ReferenceLattice:
+    """Leave out markers without a neighbour."""
+    at, where, ids = np.asarray(sites), np.asarray(positions), np.asarray(markers)
     gap = np.abs(at[:, None, :] - at[None, :, :]).max(axis=2)
     keep = ((gap <= _REACH).sum(axis=1)) > 1
     return ReferenceLattice(sites=at[keep], positions_px=where[keep], markers=ids[keep])

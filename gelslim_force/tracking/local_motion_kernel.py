@@ -1,7 +1,8 @@
-"""Compiled prediction of a marker's place from its neighbours' motion. Import only where it runs.
+"""Compiled prediction of a marker's position from the motion of its neighbours.
 
-Arrays as in `matching_kernel`. An affine motion needs few neighbours and extrapolates safely;
-beside a contact the motion bends within a pitch, and only a quadratic one follows it.
+Import it only where it runs, because it loads numba. Arrays as in `matching_kernel`. An affine
+motion needs few neighbours and extrapolates safely; near a contact the motion changes so fast
+that only a quadratic one follows it.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from numba import njit
 from gelslim_force.detection.darkness_kernel import COMPILED
 
 FOR_QUADRATIC = 12
-"""Neighbours from which on a quadratic motion is fitted; it has 6 coefficients per axis."""
+"""Least number of neighbours for a quadratic motion, which has 6 coefficients per axis."""
 _PIVOT = 1e-3
 
 
 @njit(**COMPILED)
 def local_affine(i: Any, reference: Any, near: Any, points: Any, match: Any, trusted: Any) -> Any:
-    """Place of marker i by the affine motion of its trusted neighbours, and their number.
+    """Return where the affine motion of its trusted neighbours puts marker i, and their number.
 
-    The number is 0 where fewer than 3 stand off one line.
+    The number is 0 if they are fewer than 3 or on one line.
     """
     n = 0
     su = sv = suu = suv = svv = sx = sy = sux = svx = suy = svy = total = 0.0
@@ -66,9 +67,9 @@ def local_affine(i: Any, reference: Any, near: Any, points: Any, match: Any, tru
 def local_quadratic(
     i: Any, reference: Any, near: Any, pitch: Any, points: Any, match: Any, trusted: Any
 ) -> Any:
-    """Place of marker i by the quadratic motion of its trusted neighbours, and their number.
+    """Return where the quadratic motion of its trusted neighbours puts marker i, and their number.
 
-    The number is 0 where they are too few or too much on one conic for six coefficients.
+    The number is 0 if they are too few, or too near to one conic, for six coefficients.
     """
     normal = np.zeros((6, 8))
     row = np.empty(8)
@@ -89,7 +90,7 @@ def local_quadratic(
         n += 1
     if n < FOR_QUADRATIC:
         return 0.0, 0.0, 0
-    # Elimination from the last unknown up leaves the motion at the marker itself to the end.
+    # Elimination from the last unknown upwards: the first one is the motion at the marker itself.
     for a in range(6):
         for b in range(a):
             normal[a, b] = normal[b, a]
@@ -113,10 +114,10 @@ def local_quadratic(
 
 
 @njit(**COMPILED)
-def local_place(
+def local_position(
     i: Any, reference: Any, near: Any, pitch: Any, points: Any, match: Any, trusted: Any
 ) -> Any:
-    """Place of marker i by its trusted neighbours' motion and their number, 0 for too few."""
+    """Return where the motion of its trusted neighbours puts marker i, and their number or 0."""
     x, y, n = local_quadratic(i, reference, near, pitch, points, match, trusted)
     if n > 0:
         return x, y, n

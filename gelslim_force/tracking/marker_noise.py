@@ -1,4 +1,4 @@
-"""How restless the markers are."""
+"""Standard deviation of the noise of marker positions, estimated from a frame."""
 
 from __future__ import annotations
 
@@ -8,28 +8,31 @@ from numpy.typing import NDArray
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 
 Array = NDArray[np.float64]
-_FEWEST = 8
-_QUARTER = 0.31864
-"""Lower quartile of the absolute value of a standard normal number."""
+_MIN_VALUES = 8
+_QUARTILE = 0.31864
+"""Lower quartile of the absolute value of a standard normal variable."""
 
 
 def noise_px(reference: ReferenceLattice, displacement_px: Array) -> float:
-    """Standard deviation in px of one marker coordinate, from one frame's displacements (n, 2).
+    """Return the standard deviation of one coordinate from a frame's displacements (n, 2) in px.
 
-    A marker's displacement less the mean of its four lattice neighbours' has 1.25 times the
-    variance of one. The lower quartile does not see those that curve around a contact. NaN
-    displacements are left out; 0 where fewer than eight markers have four neighbours.
+    The displacement of a marker minus the mean of its four lattice neighbours has 1.25 times the
+    variance of one displacement. The lower quartile ignores the markers around a contact, whose
+    displacement varies. Unknown displacements (NaN) are ignored. The result is 0 if fewer than
+    eight markers have four neighbours.
     """
     near = reference.neighbours[:, :4]
-    whole = (near >= 0).all(axis=1)
-    around = displacement_px[near[whole]].mean(axis=1)
-    off = displacement_px[whole] - around
-    return quiet_sigma(off[np.isfinite(off).all(axis=1)]) / np.sqrt(1.25)
+    complete = (near >= 0).all(axis=1)
+    around = displacement_px[near[complete]].mean(axis=1)
+    off = displacement_px[complete] - around
+    return robust_sigma(off[np.isfinite(off).all(axis=1)]) / np.sqrt(1.25)
 
 
-def quiet_sigma(values: Array) -> float:
-    """Standard deviation of numbers about 0 of which up to three quarters may hold more than
-    noise, from their lower quartile; 0 for fewer than eight rows."""
-    if len(values) < _FEWEST:
+def robust_sigma(values: Array) -> float:
+    """Return the standard deviation about 0 from the lower quartile; 0 for fewer than 8 rows.
+
+    Up to three quarters of the values may contain more than noise.
+    """
+    if len(values) < _MIN_VALUES:
         return 0.0
-    return float(np.quantile(np.abs(values), 0.25) / _QUARTER)
+    return float(np.quantile(np.abs(values), 0.25) / _QUARTILE)

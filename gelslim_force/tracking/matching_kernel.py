@@ -1,8 +1,9 @@
-"""Compiled matching of markers to dots. Import only where it runs: numba.
+"""Compiled matching of markers to dots. Import it only where it runs, because it loads numba.
 
-Arrays: `reference` (n, 2) and `places` (n, 2) px, `near` (n, k) neighbours of each marker on the
-lattice or -1, `pitch` (n,) distance to the nearest of them, `points` (m, 2) dots of the frame,
-`match` (n,) dot of each marker or -1, `trusted` (n,) whether the match may be built upon.
+Arrays: `reference` (n, 2) and `expected` (n, 2) positions of the markers in px, `near` (n, k)
+neighbours of each marker on the lattice or -1, `pitch` (n,) distance to the nearest of them,
+`points` (m, 2) dots of the frame, `match` (n,) dot of each marker or -1, `trusted` (n,) whether
+the match is verified by its neighbours.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from numba import njit
 
 from gelslim_core.kernel_cache import drop_stale
 from gelslim_force.detection.darkness_kernel import COMPILED
-from gelslim_force.tracking.local_motion_kernel import local_affine, local_place, local_quadratic
+from gelslim_force.tracking.local_motion_kernel import local_affine, local_position, local_quadratic
 
 drop_stale(["matching_kernel"], ["local_motion_kernel"], Path(__file__).parent)
 
-_LEVELS = 12
+_MAX_LEVEL = 12
 
 
 @njit(**COMPILED)
@@ -36,15 +37,15 @@ def nearest(points: Any, x: Any, y: Any) -> Any:
 
 
 @njit(**COMPILED)
-def mutual(places: Any, points: Any, pitch: Any, gate: Any, match: Any) -> None:
-    """Match markers and dots that are each other's nearest, within `gate` pitches."""
+def mutual(expected: Any, points: Any, pitch: Any, gate: Any, match: Any) -> None:
+    """Match markers and dots that are mutual nearest neighbours, within `gate` pitches."""
     owner = np.full(points.shape[0], -1, dtype=np.int64)
     least = np.full(points.shape[0], 1e300)
-    for i in range(places.shape[0]):
+    for i in range(expected.shape[0]):
         match[i] = -1
-        if not math.isfinite(places[i, 0] + places[i, 1]):
+        if not math.isfinite(expected[i, 0] + expected[i, 1]):
             continue
-        k, gap = nearest(points, places[i, 0], places[i, 1])
+        k, gap = nearest(points, expected[i, 0], expected[i, 1])
         if k >= 0 and gap < (gate * pitch[i]) ** 2 and gap < least[k]:
             owner[k], least[k] = i, gap
     for k in range(points.shape[0]):
@@ -63,7 +64,7 @@ def verify(
     gate: Any,
     rounds: Any,
 ) -> Any:
-    """Trust matches whose neighbours' affine motion leads to them; returns how many are."""
+    """Trust the matches that the motion of their neighbours predicts; return their number."""
     agrees = np.zeros(reference.shape[0], dtype=np.bool_)
     count = 0
     for _ in range(rounds):
@@ -93,9 +94,10 @@ def verify(
 def patches(
     reference: Any, near: Any, pitch: Any, points: Any, match: Any, trusted: Any, gate: Any
 ) -> Any:
-    """Return the patch (n,) of each trusted marker, -1 for others; a patch moves alike.
+    """Return the number (n,) of the patch of each trusted marker, -1 for the others.
 
-    Markers off by a pitch agree among themselves, but a step in motion surrounds them.
+    The motion within a patch is smooth. Markers that are wrong by a pitch agree among themselves,
+    but the motion has a step where they meet the others.
     """
     patch = np.full(reference.shape[0], -1, dtype=np.int64)
     todo = np.empty(reference.shape[0], dtype=np.int64)
@@ -130,7 +132,7 @@ def patches(
 def grow(
     reference: Any, near: Any, pitch: Any, points: Any, match: Any, trusted: Any, gate: Any
 ) -> Any:
-    """Extend the trusted patch ring by ring, best-supported markers first; returns its size."""
+    """Extend the trusted patch, markers with many trusted neighbours first; return its size."""
     n, m = reference.shape[0], points.shape[0]
     owner = np.full(m, -1, dtype=np.int64)
     offer = np.empty(n, dtype=np.int64)
@@ -143,15 +145,15 @@ def grow(
         else:
             match[i] = -1
     level = 0
-    while level < _LEVELS:
-        # Surest first: small gaps before large ones, many neighbours before few.
+    while level < _MAX_LEVEL:
+        # Most certain first: small gaps before large ones, many neighbours before few.
         fewest, reach = 12 - 3 * (level % 4), gate * (1 + level // 4) / 3
         added = 0
         for i in range(n):
             offer[i] = -1
             if trusted[i]:
                 continue
-            x, y, support = local_place(i, reference, near, pitch, points, match, trusted)
+            x, y, support = local_position(i, reference, near, pitch, points, match, trusted)
             if support < max(fewest, 4):
                 continue
             k, gap = nearest(points, x, y)

@@ -1,9 +1,9 @@
-"""Compiled last word on markers beside a steep contact. Import only where it runs: numba.
+"""Compiled matching of markers at the edge of a contact, by elimination.
 
-At the rim of a contact the motion changes by a third of a pitch from marker to marker, and no
-fit to the neighbours leads to the dot within the gate that keeps slips out. The lattice itself
-still tells: the only free dot near is this marker's if it keeps its place among the neighbours.
-Arrays as in `matching_kernel`.
+Import it only where it runs, because it loads numba. At the edge of a contact the motion changes
+by a third of a pitch from marker to marker. A fit to the neighbours then predicts no dot within
+the tolerance that excludes errors of a whole pitch. But the only free dot near a marker belongs
+to it if the vectors to its neighbours have changed little. Arrays as in `matching_kernel`.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from numba import njit
 
 from gelslim_core.kernel_cache import drop_stale
 from gelslim_force.detection.darkness_kernel import COMPILED
-from gelslim_force.tracking.local_motion_kernel import local_place
+from gelslim_force.tracking.local_motion_kernel import local_position
 
 drop_stale(["steep_kernel"], ["local_motion_kernel"], Path(__file__).parent)
 
 _DIRECT = 4
 """The first four neighbours are one site away along an axis."""
-_RIVAL = 1.8
-_STEEP = 1.5
+_DISTANCE_RATIO = 1.8
+_VARIATION_FACTOR = 1.5
 _ROUNDS = 6
 
 
 @njit(**COMPILED)
-def settle(
+def match_by_elimination(
     reference: Any,
     near: Any,
     pitch: Any,
@@ -39,18 +39,18 @@ def settle(
     gate: Any,
     strain: Any,
 ) -> Any:
-    """Match markers to the only free dot near their place; returns how many.
+    """Match markers to the only free dot near their predicted position; return their number.
 
-    Near is within `gate` pitches and 1.5 times what the neighbours' motions differ, and another
-    free dot must be 1.8 times as far. The vector to each trusted direct neighbour, two at least,
-    may change by the share `strain` of its length.
+    The dot must be within `gate` pitches and within 1.5 times the variation of the neighbours'
+    motion, and the next free dot must be 1.8 times as far away. At least two direct neighbours
+    must be trusted, and the vector to each may change by the share `strain` of its length.
     """
     n, m = reference.shape[0], points.shape[0]
     free = np.ones(m, dtype=np.bool_)
     for i in range(n):
         if trusted[i]:
             free[match[i]] = False
-    settled = 0
+    matched = 0
     for _ in range(_ROUNDS):
         added = 0
         offer = np.full(n, -1, dtype=np.int64)
@@ -58,15 +58,15 @@ def settle(
         for i in range(n):
             if trusted[i]:
                 continue
-            x, y, support = local_place(i, reference, near, pitch, points, match, trusted)
+            x, y, support = local_position(i, reference, near, pitch, points, match, trusted)
             if support < 4:
                 continue
             k, gap, other = _nearest_free(points, free, x, y)
-            if k < 0 or gap > gate * pitch[i] or other < _RIVAL * gap:
+            if k < 0 or gap > gate * pitch[i] or other < _DISTANCE_RATIO * gap:
                 continue
-            if gap > _STEEP * _variation(i, reference, near, points, match, trusted):
+            if gap > _VARIATION_FACTOR * _variation(i, reference, near, points, match, trusted):
                 continue
-            if _keeps_its_place(i, k, reference, near, points, match, trusted, strain):
+            if _keeps_vectors(i, k, reference, near, points, match, trusted, strain):
                 offer[i], gaps[i] = k, gap / pitch[i]
         for i in range(n):
             if offer[i] < 0:
@@ -82,15 +82,15 @@ def settle(
             if offer[i] >= 0 and match[i] == offer[i] and not trusted[i] and free[match[i]]:
                 trusted[i] = True
                 free[match[i]] = False
-        settled += added
+        matched += added
         if added == 0:
             break
-    return settled
+    return matched
 
 
 @njit(**COMPILED)
 def _variation(i: Any, reference: Any, near: Any, points: Any, match: Any, trusted: Any) -> Any:
-    """Largest difference in px of a trusted neighbour's motion from their mean."""
+    """Return the largest difference in px of a trusted neighbour's motion from their mean."""
     n = 0
     mx = my = 0.0
     for k in range(near.shape[1]):
@@ -111,7 +111,7 @@ def _variation(i: Any, reference: Any, near: Any, points: Any, match: Any, trust
 
 @njit(**COMPILED)
 def _nearest_free(points: Any, free: Any, x: Any, y: Any) -> Any:
-    """Nearest free dot, its distance, and the distance of the next."""
+    """Return the nearest free dot, its distance, and the distance of the next one."""
     best, least, second = -1, 1e300, 1e300
     for k in range(points.shape[0]):
         if not free[k]:
@@ -125,10 +125,10 @@ def _nearest_free(points: Any, free: Any, x: Any, y: Any) -> Any:
 
 
 @njit(**COMPILED)
-def _keeps_its_place(
+def _keeps_vectors(
     i: Any, k: Any, reference: Any, near: Any, points: Any, match: Any, trusted: Any, strain: Any
 ) -> Any:
-    """Whether dot k stands to marker i's direct neighbours about as the marker did at rest."""
+    """Return whether dot k changes the vectors from marker i to its neighbours only a little."""
     seen = 0
     for side in range(_DIRECT):
         j = near[i, side]

@@ -1,8 +1,8 @@
-"""Markers followed from frame to frame: the one place with a memory.
+"""Markers followed from frame to frame; the tracker is the only part of detection with a state.
 
-Each frame is first searched only where the markers should be. When too few are verified, or a
-check is due, the whole frame is searched and matched anew; when the anchors contradict, the
-lattice is registered from scratch.
+A frame is first searched only near the predicted positions. If too few markers are verified, or
+at regular intervals, the whole frame is searched and matched again; if the anchors contradict the
+result, the lattice is registered again.
 """
 
 from __future__ import annotations
@@ -19,26 +19,27 @@ from gelslim_force.detection.detections import Detections
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.lattice.registration import Registration, register
-from gelslim_force.tracking.anchor_check import anchors_slipped
 from gelslim_force.tracking.matching import match
 from gelslim_force.tracking.tracks import Tracks
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 _SAME_PX = 1.0
-_LEAST_TO_FOLLOW = 0.25
-"""Share of the markers that a full search must find for the next frame to go on from it."""
+_MIN_COVERAGE = 0.25
+"""Share of the markers that a full search must find before the next frame starts from it."""
+_AREA_STEP = 0.45
+"""Change of the logarithm of a dot's area that shows another kind of dot: a factor of 1.6."""
 Route = Literal["near", "full", "registered"]
-"""How a frame's markers were found: near predictions, in the whole frame, or by the anchors."""
+"""How markers were found: near predictions, in the whole frame, or by registration."""
 
 
 @dataclass(frozen=True)
 class TrackerSettings:
-    """When the tracker leaves its fast path. Raises ValueError for shares outside 0 ... 1."""
+    """When the tracker searches the whole frame. Raises ValueError for impossible values."""
 
     least_coverage: float = 0.97
-    """Share of the markers tracked in the last full search that the fast path must find."""
+    """Share of the markers of the last full search that a search near predictions must find."""
     full_every: int = 30
-    """Frames after which the whole frame is searched again in any case."""
+    """Number of frames after which the whole frame is searched in any case."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.least_coverage <= 1.0:
@@ -49,19 +50,20 @@ class TrackerSettings:
 
 @dataclass(frozen=True, eq=False)
 class TrackedFrame:
-    """One frame's tracks, with the dots they refer to."""
+    """The tracks of a frame and the dots they refer to."""
 
     tracks: Tracks
     detections: Detections
     route: Route
     slipped: bool
-    """The anchors contradict the tracks, and registration could not set it right."""
+    """The anchors contradict the tracks, and registration did not help."""
 
 
 class Tracker:
-    """Follows the markers of one reference; feed frames in order.
+    """Follows the markers of a reference lattice through frames in order.
 
-    With a `grid` whose anchors are large dots, a slip of the whole lattice is noticed and undone.
+    With a `grid` whose anchors are large dots it detects and corrects a shift of all markers by
+    whole pitches.
     """
 
     def __init__(
@@ -72,7 +74,7 @@ class Tracker:
         grid: MarkerGrid | None = None,
         settings: TrackerSettings | None = None,
     ) -> None:
-        """`reference_dots` are the reference's markers, in its order."""
+        """`reference_dots` are the dots of the reference, in its order."""
         if len(reference_dots) != len(reference):
             raise ValueError(
                 f"{len(reference_dots)} reference dots for {len(reference)} markers: "
@@ -96,7 +98,7 @@ class Tracker:
         grid: MarkerGrid,
         settings: TrackerSettings | None = None,
     ) -> Tracker:
-        """Return a tracker for the markers registered in a no-contact frame."""
+        """Return a tracker for the markers registered in a frame without contact."""
         reference = ReferenceLattice.from_registration(registration, grid)
         dots = detections.take(registration.dots[reference.markers])
         return cls(detector, reference, dots, grid, settings)
@@ -107,24 +109,24 @@ class Tracker:
         return self._reference
 
     def reset(self) -> None:
-        """Forget all motion; the next frame is searched whole."""
-        self._places = self._reference.positions_px.copy()
-        self._velocity = np.zeros_like(self._places)
+        """Forget all motion; the whole of the next frame is searched."""
+        self._positions = self._reference.positions_px.copy()
+        self._velocity = np.zeros_like(self._positions)
         self._moments = self._rest_moments.copy()
         self._usual = 0
         self._age = self._settings.full_every
 
     def update(self, image: NDArray[np.uint8]) -> TrackedFrame:
-        """Return the markers of the next frame. Raises ValueError for what is no frame."""
+        """Return the markers of the next frame. Raises ValueError if the array is no picture."""
         as_planes(image)
-        expected = self._places + self._velocity
+        expected = self._positions + self._velocity
         result = None
         if self._age < self._settings.full_every:
             result = self._near(image, expected)
         if result is None:
             result = self._full(image, expected)
-            # A frame that shows next to nothing says nothing about where to look in the next one.
-            blind = result.tracks.coverage < _LEAST_TO_FOLLOW
+            # A frame with hardly any markers does not tell where they are in the next one.
+            blind = result.tracks.coverage < _MIN_COVERAGE
             self._age = self._settings.full_every if blind else 0
             self._usual = int(result.tracks.tracked.sum())
         self._age += 1
@@ -133,24 +135,24 @@ class Tracker:
 
     def _near(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame | None:
         known = np.isfinite(expected).all(axis=1, keepdims=True)
-        places = np.where(known, expected, -1.0)
-        dots = self._detector.detect_near(image, places, self._moments, compare=False)
+        positions = np.where(known, expected, -1.0)
+        dots = self._detector.detect_near(image, positions, self._moments, compare=False)
         dots = dots.take(dots.found)
         tracks = match(self._reference, dots.centres_px, expected)
         if tracks.tracked.sum() < self._usual:
-            dots, tracks = self._looked_again(image, dots, tracks, expected)
+            dots, tracks = self._search_lost(image, dots, tracks, expected)
         if tracks.tracked.sum() < self._settings.least_coverage * self._usual:
             return None
         return TrackedFrame(tracks, dots, "near", False)
 
-    def _looked_again(
+    def _search_lost(
         self,
         image: NDArray[np.uint8],
         dots: Detections,
         tracks: Tracks,
         expected: NDArray[np.float64],
     ) -> tuple[Detections, Tracks]:
-        """Look for lost markers where their neighbours' motion puts them: it changed at once."""
+        """Search lost markers where the motion of their neighbours predicts them."""
         lost = np.flatnonzero(~tracks.tracked & tracks.known)
         more = self._detector.detect_near(
             image, tracks.positions_px[lost], self._rest_moments[lost]
@@ -167,7 +169,7 @@ class Tracker:
     def _full(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame:
         dots = self._detector.detect(image)
         tracks = match(self._reference, dots.centres_px, expected)
-        if not anchors_slipped(tracks, dots.area_px, self._area, self._large):
+        if not _anchors_slipped(tracks, dots.area_px, self._area, self._large):
             return TrackedFrame(tracks, dots, "full", False)
         registered = self._registered(dots, image.shape)
         if registered is None:
@@ -182,15 +184,36 @@ class Tracker:
         except LatticeError:
             return None
         tracks = match(self._reference, dots.centres_px, found.centres_px[self._reference.markers])
-        slipped = anchors_slipped(tracks, dots.area_px, self._area, self._large)
+        slipped = _anchors_slipped(tracks, dots.area_px, self._area, self._large)
         return None if slipped else tracks
 
     def _remember(self, result: TrackedFrame) -> None:
         tracks = result.tracks
-        step = tracks.positions_px - self._places
+        step = tracks.positions_px - self._positions
         moved = np.isfinite(step).all(axis=1, keepdims=True)
         self._velocity = np.where(moved, step, 0.0)
-        # A lost marker is next looked for where it was last seen.
-        self._places = np.where(tracks.known[:, None], tracks.positions_px, self._places)
+        # A lost marker is searched in the next frame where it was last seen.
+        self._positions = np.where(tracks.known[:, None], tracks.positions_px, self._positions)
         seen = tracks.tracked
         self._moments[seen] = result.detections.moments_px2[tracks.dots[seen]]
+
+
+def _anchors_slipped(
+    tracks: Tracks,
+    area_px: NDArray[np.float64],
+    reference_area_px: NDArray[np.float64],
+    large: NDArray[np.bool_],
+) -> bool:
+    """Return whether most of the tracked large anchors lie on regular dots now.
+
+    `area_px` (m,) are the areas of the dots of the frame, `reference_area_px` (n,) those of the
+    markers, and `large` (n,) tells which of them are large anchors. A change that is common to
+    all areas, due to exposure or focus, has no effect.
+    """
+    seen = np.flatnonzero(tracks.tracked)
+    if len(seen) == 0:
+        return False
+    change = np.log(area_px[tracks.dots[seen]] / reference_area_px[seen])
+    change -= np.median(change)
+    shrunk = change[large[seen]] < -_AREA_STEP
+    return len(shrunk) >= 2 and bool(shrunk.mean() > 0.5)

