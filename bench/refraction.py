@@ -76,12 +76,13 @@ def projections(points: int, runs: int) -> list[dict[str, object]]:
     gel = np.column_stack([rng.uniform(-14, 14, (points, 2)), rng.uniform(-1, 0, points)])
     ideal, bent = camera(), camera(LensDistortion(k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4))
     stack = ideal.stack
+    view = ideal.position_mm, stack, ideal.axes
     facts = ideal.position_mm, ideal.axes, np.array(stack.tops_mm), np.array(stack.indices)
     rays = {
         "what": "rays to points on the gel",
-        "plain_million_per_s": million_per_s(lambda: newton_rays(ideal, gel), points, runs),
+        "plain_million_per_s": million_per_s(lambda: newton_rays(*view, gel), points, runs),
         "compiled_million_per_s": million_per_s(lambda: solve_rays(gel, *facts), points, runs),
-        "apart_rad": float(np.abs(newton_rays(ideal, gel) - solve_rays(gel, *facts)).max()),
+        "apart_rad": float(np.abs(newton_rays(*view, gel) - solve_rays(gel, *facts)).max()),
     }
     rows: list[dict[str, object]] = [rays]
     for name, view in (("project", ideal), ("project, distorted lens", bent)):

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
-from gelslim_optics.camera.refraction import lateral_reach, ray_slope
+from gelslim_optics.camera.rays import ray_slope
+from gelslim_optics.camera.refraction import lateral_reach
 
 LEAST_AIR_MM = 1.0
 """Candidates with less air are laid out with this much, so that the closed forms hold."""

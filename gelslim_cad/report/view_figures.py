@@ -9,8 +9,8 @@ import numpy as np
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_core.figure import as_png, new_figure
-from gelslim_optics.camera.homography import fit_homography
 from gelslim_optics.camera.projection_error import ErrorMap, ErrorModel, error_map
+from gelslim_optics.camera.view_quality import fit_homography
 
 PRESS_MM = -0.5
 STEPS = 41
@@ -57,7 +57,7 @@ def projection_sentence(d: Lookup) -> str:
     errors, camera = pad_errors(d), virtual_camera(d)
     x, y = _axes(d)
     size = float(np.linalg.norm(errors.delta_mm["exact"], axis=2).max())
-    worst = {m: float(errors.off_mm(m).max()) * 1000 for m in SHOWN}
+    worst = {m: float(errors.deviation_mm(m).max()) * 1000 for m in SHOWN}
     fitted = fit_homography(camera, x, y)
     return (
         f"A marker pressed {-PRESS_MM:g} mm straight down seems to move sideways by up to "
@@ -72,11 +72,11 @@ def projection_png(d: Lookup) -> bytes:
     """Map of each model's error over the pad, µm, one scale for all."""
     errors = pad_errors(d)
     figure, axes = new_figure(10.0, 3.4, columns=len(SHOWN))
-    most = max(float(errors.off_mm(m).max()) for m in SHOWN) * 1000
+    most = max(float(errors.deviation_mm(m).max()) for m in SHOWN) * 1000
     half_x, half_y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
     for panel, model in zip(axes, SHOWN, strict=True):
         shown = panel.imshow(
-            errors.off_mm(model).T * 1000,
+            errors.deviation_mm(model).T * 1000,
             extent=(-half_y, half_y, half_x, -half_x),
             cmap="viridis",
             vmin=0,

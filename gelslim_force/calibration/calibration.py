@@ -22,8 +22,6 @@ from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.bundle_grid import bundle_grid
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.registration import Registration, register
-from gelslim_optics.camera.back_projection import pixel_slopes
-from gelslim_optics.camera.rays import points_along
 from ifem_export.operators.single_thread import single_threaded
 
 if TYPE_CHECKING:
@@ -134,8 +132,8 @@ def _fitted(
     used = clean
     for last in (False, True):
         fit = fit_camera(design, points, diameter_mm, dots.centres_px, tolerance, used, heights)
-        slopes = pixel_slopes(fit.camera, dots.centres_px - fit.offset_px)
-        rest = points_along(fit.camera, slopes, heights)[:, :2]
+        slopes = fit.camera.pixel_slopes(dots.centres_px - fit.offset_px)
+        rest = fit.camera.points_along(slopes, heights)[:, :2]
         residuals = split_residuals(points[clean], (rest - points)[clean], pitch_mm)
         bump = checks.contact_of(residuals)
         if last or bump is None:

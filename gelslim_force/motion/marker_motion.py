@@ -15,9 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_optics.camera.back_projection import pixel_slopes
 from gelslim_optics.camera.projection_error import projection_error_mm
-from gelslim_optics.camera.rays import points_along
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
@@ -96,4 +94,4 @@ class MarkerView:
         return motion
 
     def _at(self, positions_px: Array, height_mm: Array) -> Array:
-        return points_along(self.camera, pixel_slopes(self.camera, positions_px), height_mm)
+        return self.camera.points_along(self.camera.pixel_slopes(positions_px), height_mm)

@@ -1,17 +1,14 @@
-"""The virtual camera as plain values, as a bundle carries it."""
+"""The values of a virtual camera from the record that a bundle holds."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from gelslim_optics.camera.layer import Layer
 from gelslim_optics.camera.lens_distortion import LensDistortion
-
-if TYPE_CHECKING:
-    from gelslim_optics.camera.virtual_camera import VirtualCamera
+from gelslim_optics.camera.refraction import Layer
 
 MODEL = "folded pinhole behind flat layers"
 VECTORS = ("position_mm", "right", "down", "forward")
@@ -19,33 +16,14 @@ LENGTHS = ("focal_px", "window_bottom_z_mm")
 COUNTS = ("image_width_px", "image_height_px")
 
 
-def camera_to_record(camera: VirtualCamera) -> dict[str, object]:
-    """Numbers, lists and dicts; `lens_distortion` and `principal_offset_px` only where any."""
-    record: dict[str, object] = {"model": MODEL}
-    record |= {name: getattr(camera, name).tolist() for name in VECTORS}
-    record |= {"focal_px": float(camera.focal_px)}
-    record |= {name: getattr(camera, name) for name in COUNTS}
-    record |= {
-        "window_bottom_z_mm": float(camera.window_bottom_z_mm),
-        "layers": [
-            {"thickness_mm": float(v.thickness_mm), "index": float(v.index)} for v in camera.layers
-        ],
-    }
-    if camera.lens is not None:
-        record["lens_distortion"] = camera.lens.to_record()
-    if any(camera.principal_offset_px):
-        record["principal_offset_px"] = list(camera.principal_offset_px)
-    return record
-
-
 def camera_from_record(record: Mapping[str, object]) -> dict[str, Any]:
-    """Arguments of the camera that `record` describes.
+    """The arguments of the `VirtualCamera` that `record` describes.
 
-    Raises ValueError for another model, or for values that are missing or of the wrong kind.
+    Raises ValueError for another model, or for values that are missing or of the wrong type.
     """
     if record.get("model") != MODEL:
         raise ValueError(
-            f'the camera record is of the model {record.get("model")!r}: only "{MODEL}" is known'
+            f'the camera record has the model {record.get("model")!r}, must be "{MODEL}"'
         )
     values: dict[str, Any] = {name: _vector(record, name) for name in VECTORS}
     values |= {name: _number(record, name) for name in LENGTHS}

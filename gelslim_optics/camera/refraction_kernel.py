@@ -1,6 +1,6 @@
-"""Compiled Newton loop for many rays. Import this module only for long arrays: it loads numba.
+"""Compiled Newton's method for the slopes of many rays. Importing this module loads numba.
 
-Every ray goes through the same operations in the same order as in `refraction.newton_slope`.
+Each ray takes the same operations in the same order as in `refraction.newton_slope`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gelslim_optics.camera.refraction import MAX_NEWTON_STEPS, SETTLED, STEEP
+from gelslim_optics.camera.refraction import MAX_NEWTON_STEPS, RELATIVE_STEP, STEEP_SLOPE
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ def slope_of(r: Any, h: Any, n: Any, n2: Any, m2: Any) -> Any:
     for k in range(layers):
         paraxial = paraxial + h[k] / n[k]
     t = r / paraxial
-    if t > STEEP:
+    if t > STEEP_SLOPE:
         sideways = 0.0
         air = 0.0
         for k in range(layers):
@@ -41,16 +41,16 @@ def slope_of(r: Any, h: Any, n: Any, n2: Any, m2: Any) -> Any:
         if bound > t:
             t = bound
     for _ in range(MAX_NEWTON_STEPS):
-        seen = 0.0
+        reach_per_t = 0.0
         growth = 0.0
         for k in range(layers):
             w = 1 / math.sqrt(n2[k] + m2[k] * t * t)
-            seen = seen + h[k] * w
+            reach_per_t = reach_per_t + h[k] * w
             growth = growth + h[k] * w * n2[k] * w * w
-        step = (r - t * seen) / growth
-        settled = not (step > SETTLED * t)
+        step = (r - t * reach_per_t) / growth
+        converged = not (step > RELATIVE_STEP * t)
         t = t + step
-        if settled:
+        if converged:
             break
     return t
 
@@ -60,7 +60,7 @@ def slopes(
     reach: Any, heights: Any, h_first: Any, h_stride: Any, media: Any, n_first: Any, n_stride: Any,
     work: Any, out: Any,
 ) -> None:  # fmt: skip
-    """Slopes `out` (n,): layer k of ray i is heights[h_first[k] + h_stride[k] i], likewise n."""
+    """Slopes `out` (n,); layer k of ray i has the height heights[h_first[k] + h_stride[k] i]."""
     h, n, n2, m2 = work[0], work[1], work[2], work[3]
     for i in range(reach.size):
         for k in range(h.size):
@@ -76,11 +76,11 @@ def slopes(
 def rays_to_points(
     points: Any, pinhole: Any, axes: Any, tops: Any, index: Any, work: Any, out: Any
 ) -> None:
-    """Rays in air to `points` (n, 3), on the camera's axes; not finite in, NaN out.
+    """Rays in air to `points` (n, 3), on the camera's axes; points that are not finite give NaN.
 
-    `axes` (3, 3) has right, down and forward as rows, `tops` (L,) the height at which each layer
-    ends (inf for the last), `index` (L,) its index, the air first; `work` (4, L) is scratch;
-    `out` (n, 3).
+    `axes` (3, 3) has right, down and forward as rows; `tops` (L,) are the heights at which the
+    layers end (inf for the last), `index` (L,) their indices, the air first; `work` (4, L) is
+    work space; the result goes to `out` (n, 3).
     """
     h, n, n2, m2 = work[0], work[1], work[2], work[3]
     for k in range(index.size):
@@ -109,7 +109,7 @@ def rays_to_points(
 def solve_rays(
     points_mm: Array, pinhole_mm: Array, axes: Array, tops: Array, index: Array
 ) -> Array:
-    """`camera_rays.newton_rays` (n, 3), compiled."""
+    """`rays.newton_rays` (n, 3), compiled."""
     out = np.empty(points_mm.shape)
     work = np.empty((4, index.size))
     rays_to_points(np.ascontiguousarray(points_mm), pinhole_mm, axes, tops, index, work, out)
@@ -117,7 +117,7 @@ def solve_rays(
 
 
 def _packed(arrays: Sequence[Array], shape: tuple[int, ...]) -> tuple[Array, Any, Any]:
-    """Values of all layers in one row, where each layer starts and whether it varies by ray."""
+    """Values of all layers in one array, where each layer starts, and whether it varies by ray."""
     parts = [np.broadcast_to(a, shape).ravel() if a.size > 1 else np.reshape(a, 1) for a in arrays]
     first = np.cumsum([0, *(p.size for p in parts[:-1])])
     stride = np.array([1 if a.size > 1 else 0 for a in arrays])

@@ -1,4 +1,4 @@
-"""The camera as the gel sees it: mirrored at the fold mirror, looking through flat layers."""
+"""The virtual camera: the camera mirrored at the fold mirror, looking through flat layers."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_optics.camera.back_projection import Outside, Surface, backproject
-from gelslim_optics.camera.homography import Homography, fit_homography
-from gelslim_optics.camera.layer import Layer, LayerStack
+from gelslim_optics.camera import rays
+from gelslim_optics.camera.back_projection import HeightGrid, Outside, Surface, surface_points
 from gelslim_optics.camera.lens_distortion import LensDistortion
-from gelslim_optics.camera.rays import air_slopes, as_points, rays_on_axes, slope_derivatives
-from gelslim_optics.camera.record import camera_from_record, camera_to_record
-from gelslim_optics.camera.view_quality import Keystone, blur_map, keystone
-
-__all__ = ["Layer", "VirtualCamera", "reflect_direction", "reflect_point"]
+from gelslim_optics.camera.record import COUNTS, MODEL, VECTORS, camera_from_record
+from gelslim_optics.camera.refraction import Layer, LayerStack
 
 Vector = NDArray[np.float64]
 
@@ -36,12 +32,25 @@ def reflect_direction(direction: ArrayLike, normal: ArrayLike) -> Vector:
 
 @dataclass(frozen=True)
 class VirtualCamera:
-    """Pinhole behind flat layers, in the sensor frame; image axes in the OpenCV sense.
+    """A pinhole camera behind flat layers, in the sensor frame; image axes as in OpenCV.
 
-    `position_mm` (3,) is the pinhole's mirror image below the window; `right`, `down` and
-    `forward` (3,) are the mirrored camera axes (left-handed: the fold flips the image); `lens`
-    is the real lens' distortion, none for an ideal one.
-    Raises ValueError for values that make no camera.
+    The fold mirror flips the image, so that `right`, `down` and `forward` are left-handed.
+
+    Attributes:
+        position_mm: Mirror image (3,) of the pinhole, below the window.
+        right: Unit vector (3,) of the image's rows.
+        down: Unit vector (3,) of the image's columns.
+        forward: Unit vector (3,) of the optical axis.
+        focal_px: Focal length in px.
+        image_width_px: Width of the image.
+        image_height_px: Height of the image.
+        window_bottom_z_mm: Height of the lower face of the first layer.
+        layers: The layers, the one next to the camera first.
+        lens: Distortion of the lens; None for an ideal lens.
+        principal_offset_px: Principal point (2,) relative to the centre of the image.
+
+    Raises:
+        ValueError: The values do not describe a camera.
     """
 
     position_mm: Vector
@@ -55,7 +64,6 @@ class VirtualCamera:
     layers: tuple[Layer, ...]
     lens: LensDistortion | None = None
     principal_offset_px: tuple[float, float] = (0.0, 0.0)
-    """Where the axis meets the image, from the image's middle: a real lens sits off centre."""
 
     def __post_init__(self) -> None:
         for name in ("position_mm", "right", "down", "forward"):
@@ -75,7 +83,7 @@ class VirtualCamera:
         object.__setattr__(self, "principal_offset_px", offset)
         if not (np.isfinite(self.air_height_mm) and self.air_height_mm > 0):
             raise ValueError(
-                f"the virtual pinhole at z = {self.position_mm[2]:g} mm must lie below the "
+                f"the virtual pinhole at z = {self.position_mm[2]:g} mm must be below the "
                 f"window's lower face at {self.window_bottom_z_mm:g} mm"
             )
 
@@ -94,10 +102,27 @@ class VirtualCamera:
         layers: tuple[Layer, ...],
         lens: LensDistortion | None = None,
     ) -> VirtualCamera:
-        """Fold a camera that looks along +x, pitched down by `pitch_rad`, at a mirror.
+        """The virtual camera of a real one that looks along +x at a fold mirror.
 
-        The mirror plane rises towards the tip at `mirror_angle_rad` to the gel plane. The camera
-        stands on its head, so that the near edge of the gel is at the top of the image.
+        The camera stands on its head, so that the near edge of the gel is at the top of the image.
+
+        Args:
+            camera_mm: Position (3,) of the real pinhole.
+            pitch_rad: Angle by which the real camera looks down.
+            mirror_point_mm: A point (3,) of the mirror.
+            mirror_angle_rad: Angle of the mirror to the gel plane; it rises towards the tip.
+            focal_px: Focal length in px.
+            image_width_px: Width of the image.
+            image_height_px: Height of the image.
+            window_bottom_z_mm: Height of the lower face of the first layer.
+            layers: The layers, the one next to the camera first.
+            lens: Distortion of the lens; None for an ideal lens.
+
+        Returns:
+            The virtual camera.
+
+        Raises:
+            ValueError: The values do not describe a camera.
         """
         sin_a, cos_a = np.sin(mirror_angle_rad), np.cos(mirror_angle_rad)
         normal = np.array([-sin_a, 0.0, cos_a])
@@ -119,7 +144,7 @@ class VirtualCamera:
 
     @property
     def air_height_mm(self) -> float:
-        """Height of the air between virtual pinhole and window."""
+        """Height of the air between the virtual pinhole and the window."""
         return float(self.window_bottom_z_mm - self.position_mm[2])
 
     @cached_property
@@ -129,7 +154,7 @@ class VirtualCamera:
 
     @property
     def principal_px(self) -> Vector:
-        """Where the axis meets the image (2,), pixel centres at integers."""
+        """Principal point (2,), the centres of pixels at integers."""
         middle = np.array([(self.image_width_px - 1) / 2, (self.image_height_px - 1) / 2])
         return middle + self.principal_offset_px
 
@@ -138,24 +163,61 @@ class VirtualCamera:
         """The media above the virtual pinhole, air first."""
         return LayerStack.above(float(self.position_mm[2]), self.window_bottom_z_mm, self.layers)
 
-    def air_directions(self, points_mm: ArrayLike) -> Vector:
-        """Unit directions (n, 3), in air, of the rays that end at `points_mm` (n, 3).
+    def air_slopes(self, points_mm: ArrayLike) -> Vector:
+        """Slopes dx/dz and dy/dz (n, 2), in air, of the rays to points (n, 3).
 
-        Raises ValueError for points not above the virtual pinhole.
+        Raises ValueError for points that are not above the virtual pinhole.
         """
-        points = as_points(points_mm)
-        directions = np.column_stack([air_slopes(self, points), np.ones(len(points))])
+        return rays.air_slopes(self.position_mm, self.stack, rays.as_points(points_mm))
+
+    def air_directions(self, points_mm: ArrayLike) -> Vector:
+        """Unit vectors (n, 3), in air, of the rays to points (n, 3); raises as `air_slopes`."""
+        slopes = self.air_slopes(points_mm)
+        directions = np.column_stack([slopes, np.ones(len(slopes))])
         unit: Vector = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         return unit
 
-    def project(self, points_mm: ArrayLike) -> Vector:
-        """Image positions (n, 2) in px of points (n, 3) in or on the gel, exactly refracted.
+    def points_along(self, slopes: Vector, z_mm: Vector) -> Vector:
+        """Points (n, 3) at heights `z_mm` (n,) on the rays with `slopes` (n, 2) in air."""
+        return rays.points_along(self.position_mm, self.stack, slopes, z_mm)
 
-        Pixel centres are at integer coordinates; the axis meets the middle of the image. Points
-        outside the picture have positions too; points that are not finite have NaN.
-        Raises ValueError for points behind the camera or beyond the lens distortion's domain.
+    def pixel_slopes(self, pixels: ArrayLike) -> Vector:
+        """Slopes dx/dz and dy/dz (n, 2), in air, of the rays of pixels (n, 2).
+
+        Raises ValueError for pixels whose ray does not rise to the window.
         """
-        image = self._undistorted(rays_on_axes(self, as_points(points_mm)))
+        uv = np.atleast_2d(np.asarray(pixels, dtype=float))
+        if uv.ndim != 2 or uv.shape[1] != 2:
+            raise ValueError(f"pixels have shape {np.shape(pixels)}: give (n, 2), u and v in px")
+        xy = (uv - self.principal_px) / self.focal_px
+        if self.lens is not None:
+            xy = self.lens.undistort(xy)
+        ray = xy[:, :1] * self.right + xy[:, 1:] * self.down + self.forward
+        missed = ray[:, 2] <= 0
+        if missed.any():
+            first = uv[np.argmax(missed)]
+            raise ValueError(
+                f"{int(missed.sum())} of {len(uv)} pixels, such as ({first[0]:g}, {first[1]:g}), "
+                "look away from the window and see no point of it"
+            )
+        return np.asarray(ray[:, :2] / ray[:, 2:])
+
+    def project(self, points_mm: ArrayLike) -> Vector:
+        """Positions in the image of points in or on the gel, with exact refraction.
+
+        Args:
+            points_mm: Points (n, 3).
+
+        Returns:
+            Positions (n, 2) in px, the centres of pixels at integers. Points outside the image
+            have positions too; points that are not finite give NaN.
+
+        Raises:
+            ValueError: A point is behind the camera or outside the domain of the lens distortion.
+        """
+        image = self._undistorted(
+            rays.rays_on_axes(self.position_mm, self.stack, self.axes, rays.as_points(points_mm))
+        )
         if self.lens is not None:
             image = self.lens.distort(image)
         pixels: Vector = self.focal_px * image + self.principal_px
@@ -169,18 +231,45 @@ class VirtualCamera:
         z_range_mm: tuple[float, float] | None = None,
         outside: Outside = "raise",
     ) -> Vector:
-        """Points (n, 3) of a plane z or a height field seen at pixels (n, 2); inverse of `project`.
+        """Points of a surface that are seen at pixels; the inverse of `project`.
 
-        See `back_projection.backproject`.
+        A curved surface is met at the first crossing from the side of the camera. It is found by
+        comparing 33 heights and refined to 1e-13 mm.
+
+        Args:
+            pixels: Positions (n, 2) in px; NaN gives NaN.
+            surface: A height z in mm, a `HeightGrid`, or a function of arrays x and y (n,) that
+                returns heights.
+            z_range_mm: Lowest and highest height at which a function is searched; by default from
+                the back of the gel to one gel thickness above its surface.
+            outside: Whether rays that miss the surface raise ValueError or give NaN.
+
+        Returns:
+            Points (n, 3) in mm.
+
+        Raises:
+            ValueError: A ray misses the surface, or a height is not above the virtual pinhole.
         """
-        return backproject(self, pixels, surface, z_range_mm=z_range_mm, outside=outside)
+        if z_range_mm is None and callable(surface) and not isinstance(surface, HeightGrid):
+            if not self.layers or self.layers[-1].thickness_mm == 0:
+                raise ValueError("a camera without a gel layer needs z_range_mm")
+            back = self.stack.tops_mm[-2]
+            z_range_mm = (back, back + 2 * self.layers[-1].thickness_mm)
+        return surface_points(
+            self.position_mm,
+            self.stack,
+            self.pixel_slopes(pixels),
+            surface,
+            z_range_mm,
+            outside,
+        )
 
     def apparent_distance_mm(self, points_mm: ArrayLike) -> Vector:
-        """Distance (n,) along the axis of the points' images seen from air.
+        """Distance (n,) along the axis of the images of points (n, 3) as seen from air.
 
-        The layers shorten a length h to h/n for rays near the normal (paraxial).
+        A layer shortens a length h to h/n for rays near the normal (paraxial).
         """
-        points = as_points(points_mm)
+        points = rays.as_points(points_mm)
         d = self.air_directions(points)
         heights = self.stack.crossed_mm(points[:, 2])
         apparent = sum(h / n for h, n in zip(heights, self.stack.indices, strict=True))
@@ -188,57 +277,63 @@ class VirtualCamera:
         return distance
 
     def jacobian(self, points_mm: ArrayLike) -> Vector:
-        """Image motion (n, 2, 2) in px/mm per motion of the point along x and y, analytic."""
+        """Derivative (n, 2, 2) in px/mm of `project` by the point's x and y."""
         return self.jacobian_3d(points_mm)[:, :, :2]
 
     def jacobian_3d(self, points_mm: ArrayLike) -> Vector:
-        """Image motion (n, 2, 3) in px/mm per motion of the point along x, y and z, analytic."""
-        planar, change = slope_derivatives(self, as_points(points_mm))
-        rays = planar @ self.axes[:, :2].T + self.axes[:, 2]
-        moved = np.einsum("ij,njk->nik", self.axes[:, :2], change)
-        image = self._undistorted(rays)
-        motion = (moved[:, :2] - image[:, :, None] * moved[:, 2:]) / rays[:, 2, None, None]
+        """Derivative (n, 2, 3) in px/mm of `project` by the point's x, y and z."""
+        planar, change = rays.slope_derivatives(
+            self.position_mm, self.stack, rays.as_points(points_mm)
+        )
+        ray = planar @ self.axes[:, :2].T + self.axes[:, 2]
+        ray_change = np.einsum("ij,njk->nik", self.axes[:, :2], change)
+        image = self._undistorted(ray)
+        motion = (ray_change[:, :2] - image[:, :, None] * ray_change[:, 2:]) / ray[:, 2, None, None]
         if self.lens is not None:
             motion = self.lens.jacobian(image) @ motion
         in_px: Vector = self.focal_px * motion
         return in_px
 
     def blur_on_gel_mm(self, points_mm: ArrayLike, aperture_mm: float, focus_mm: float) -> Vector:
-        """Blur diameter (n,) seen on the gel: A |Z-s| / s for aperture A = f/N focused at s."""
+        """Blur diameter (n,) on the gel: A |Z - s| / s for an aperture A = f/N focused at s."""
         distance = self.apparent_distance_mm(points_mm)
         blur: Vector = aperture_mm * np.abs(distance - focus_mm) / focus_mm
         return blur
 
-    def blur_map(
-        self, x_mm: ArrayLike, y_mm: ArrayLike, aperture_mm: float, focus_mm: float, z_mm: float = 0
-    ) -> Vector:
-        """Blur diameter (len(y), len(x)) in mm on a grid; see `view_quality.blur_map`."""
-        return blur_map(self, x_mm, y_mm, aperture_mm, focus_mm, z_mm)
-
-    def keystone(self, x_mm: ArrayLike, y_mm: ArrayLike, z_mm: float = 0.0) -> Keystone:
-        """Range of the picture's scale over a grid on the pad; see `view_quality.keystone`."""
-        return keystone(self, x_mm, y_mm, z_mm)
-
-    def homography(self, x_mm: ArrayLike, y_mm: ArrayLike, z_mm: float = 0.0) -> Homography:
-        """The plane-to-image homography nearest to `project`, with what it leaves, in px."""
-        return fit_homography(self, x_mm, y_mm, z_mm)
-
     def to_record(self) -> dict[str, object]:
-        """Plain values for a file; lengths mm, axes as unit vectors."""
-        return camera_to_record(self)
+        """Plain values for a file; lengths in mm, axes as unit vectors.
+
+        `lens_distortion` and `principal_offset_px` are left out where there are none.
+        """
+        record: dict[str, object] = {"model": MODEL}
+        record |= {name: getattr(self, name).tolist() for name in VECTORS}
+        record["focal_px"] = float(self.focal_px)
+        record |= {name: getattr(self, name) for name in COUNTS}
+        record["window_bottom_z_mm"] = float(self.window_bottom_z_mm)
+        record["layers"] = [
+            {"thickness_mm": float(v.thickness_mm), "index": float(v.index)} for v in self.layers
+        ]
+        if self.lens is not None:
+            record["lens_distortion"] = self.lens.to_record()
+        if any(self.principal_offset_px):
+            record["principal_offset_px"] = list(self.principal_offset_px)
+        return record
 
     @classmethod
     def from_record(cls, record: Mapping[str, object]) -> VirtualCamera:
-        """Inverse of `to_record`; other keys are ignored. Raises ValueError for a bad record."""
+        """The camera of a record made by `to_record`; unknown keys are ignored.
+
+        Raises ValueError for a record of another model or with values that are missing.
+        """
         return cls(**camera_from_record(record))
 
-    def _undistorted(self, rays: Vector) -> Vector:
-        """Ideal image (n, 2), in focal lengths, of rays (n, 3) on the camera's axes."""
-        behind = rays[:, 2] <= 0
+    def _undistorted(self, ray: Vector) -> Vector:
+        """Image (n, 2) without distortion, in focal lengths, of rays (n, 3) on the axes."""
+        behind = ray[:, 2] <= 0
         if behind.any():
             raise ValueError(
-                f"{int(behind.sum())} of {len(rays)} points lie behind the camera's image plane "
+                f"{int(behind.sum())} of {len(ray)} points lie behind the camera's image plane "
                 "and have no image"
             )
-        image: Vector = rays[:, :2] / rays[:, 2:]
+        image: Vector = ray[:, :2] / ray[:, 2:]
         return image

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_optics.camera.height_field import HeightGrid
+from gelslim_optics.camera.back_projection import HeightGrid
+from gelslim_optics.camera.view_quality import blur_map
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
@@ -112,7 +113,7 @@ class BlurField:
         if aperture_mm == 0:
             sharp = HeightGrid(x, y, np.zeros((_NODES, _NODES)))
             return cls(sharp, sharp)
-        maps = [camera.blur_map(x, y, aperture_mm, focus_mm, z) for z in (0.0, -_SUNKEN_MM)]
+        maps = [blur_map(camera, x, y, aperture_mm, focus_mm, z) for z in (0.0, -_SUNKEN_MM)]
         return cls(HeightGrid(x, y, maps[0]), HeightGrid(x, y, maps[1]))
 
     def at(self, x_mm: Array, y_mm: Array, z_mm: Array | float) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gelslim_optics.camera.layer import Layer
+from gelslim_optics.camera.refraction import Layer
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gelslim_optics.camera.layer import Layer
+from gelslim_optics.camera.refraction import Layer
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 

@@ -12,8 +12,8 @@ from page_text import DOCS, ROOT, text_of
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.spec.reader import read_spec
-from gelslim_optics.camera.pad_grid import pad_axes
 from gelslim_optics.camera.projection_error import ErrorModel, error_map
+from gelslim_optics.camera.view_quality import pad_axes
 from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh

@@ -23,10 +23,10 @@ DESIGNS = Path(__file__).parents[2] / "designs"
 def test_better_models_leave_less(name: str) -> None:
     errors = pad_errors(view_inputs(derive(read_spec(DESIGNS / f"{name}.yaml").spec)))
     printed, straight, apparent = (
-        float(errors.off_mm(m).max()) for m in ("printed", "arctan", "effective_height")
+        float(errors.deviation_mm(m).max()) for m in ("printed", "arctan", "effective_height")
     )
     assert apparent < straight < printed
-    assert float(errors.off_mm("exact").max()) == 0.0
+    assert float(errors.deviation_mm("exact").max()) == 0.0
     # docs/physics.md: the straight ray is 3 to 8 % low, the apparent height within 4 %.
     low = np.nanmean(errors.relative("arctan"))
     assert -0.09 < low < -0.02

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,12 +84,19 @@ def traced(pose: dict, u: float, v: float, depth_of_gel: float) -> Vector:
     return point
 
 
+OFF_CENTRE_PX = (9.0, -6.5)
+
+
 def finger_camera(**changes: object) -> VirtualCamera:
-    """A VGA camera as in a finger with a 28 x 28 mm gel: 31 mm of air, 2.5 acrylic, 2 gel."""
+    """A VGA camera as in a finger with a 28 x 24 mm gel: 31 mm of air, 2.5 acrylic, 2 gel.
+
+    It is off the middle in y and its principal point off the image's centre, so that x and y, or
+    two sides, cannot be swapped unnoticed.
+    """
     mirror_angle, mirror = math.radians(32), np.array([-2.0, 0.0, -14.3])
     normal = np.array([-math.sin(mirror_angle), 0.0, math.cos(mirror_angle)])
     fold: dict = {
-        "camera_mm": reflect_point([-12.37, 0.0, -35.53], mirror, normal),
+        "camera_mm": reflect_point([-12.37, 1.3, -35.53], mirror, normal),
         "pitch_rad": math.pi / 2 - 2 * mirror_angle - TILT,
         "mirror_point_mm": mirror,
         "mirror_angle_rad": mirror_angle,
@@ -98,4 +106,4 @@ def finger_camera(**changes: object) -> VirtualCamera:
         "window_bottom_z_mm": -4.5,
         "layers": (Layer(2.5, 1.4906), Layer(2.0, 1.41)),
     }
-    return VirtualCamera.from_fold(**(fold | changes))
+    return replace(VirtualCamera.from_fold(**(fold | changes)), principal_offset_px=OFF_CENTRE_PX)

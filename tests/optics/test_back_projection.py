@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from camera_cases import HEIGHT, WIDTH, finger_camera, random_pose, traced
 
-from gelslim_optics.camera.height_field import HeightGrid
+from gelslim_optics.camera.back_projection import HeightGrid
 from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -105,8 +105,8 @@ def test_bilinear_heights_by_hand() -> None:
     assert grid(1.5, 1.0) == pytest.approx(1.25 + 2.0)
     np.testing.assert_allclose(grid([3.0, 9.0, -2.0], [2.0, 9.0, -1.0]), [6.0, 6.0, 0.0])
     np.testing.assert_array_equal(grid.contains([0, 3, 3.1], [0, 2, 1]), [True, True, False])
-    # Slopes within a cell do not exceed `steepest`: 1 per mm along, 2 per mm across.
-    assert grid.steepest == pytest.approx(math.hypot(1, 2))
+    # Slopes within a cell do not exceed `max_gradient`: 1 per mm along, 2 per mm across.
+    assert grid.max_gradient == pytest.approx(math.hypot(1, 2))
 
 
 def test_pixels_off_the_surface_are_refused_or_missing() -> None:

@@ -42,15 +42,15 @@ def test_numpy_values_become_plain() -> None:
     ("change", "message"),
     [
         ({"model": "fisheye"}, "fisheye"),
-        ({"position_mm": [0, 0]}, "3 numbers"),
-        ({"right": [0, "1", 0]}, "finite number"),
+        ({"position_mm": [0, 0]}, "position_mm"),
+        ({"right": [0, "1", 0]}, "right"),
         ({"focal_px": None}, "focal_px"),
         ({"focal_px": float("nan")}, "focal_px"),
         ({"image_width_px": 640.5}, "whole"),
         ({"layers": 3}, "layers"),
         ({"layers": [2.5]}, "layers"),
-        ({"layers": [{"thickness_mm": 1.0}]}, "no index"),
-        ({"layers": [{"thickness_mm": 1.0, "index": 0.5}]}, "index of"),
+        ({"layers": [{"thickness_mm": 1.0}]}, "index"),
+        ({"layers": [{"thickness_mm": 1.0, "index": 0.5}]}, "index"),
         ({"lens_distortion": [0.1]}, "by name"),
         ({"lens_distortion": {"k9": 0.1}}, "k9"),
         ({"forward": [0, 0, 1]}, "right angles"),
@@ -63,14 +63,14 @@ def test_bad_records_are_refused(change: dict, message: str) -> None:
 
 def test_a_record_that_lacks_something_is_refused() -> None:
     record = finger_camera().to_record()
-    for key in record:
+    for key in set(record) - {"principal_offset_px"}:
         part = {k: v for k, v in record.items() if k != key}
         with pytest.raises(ValueError, match=key if key != "model" else "model None"):
             VirtualCamera.from_record(part)
 
 
 def test_a_lens_off_centre_shifts_the_picture_and_comes_back() -> None:
-    camera = finger_camera()
+    camera = replace(finger_camera(), principal_offset_px=(0.0, 0.0))
     off = replace(camera, principal_offset_px=(7.0, -4.5))
     points = np.array([[0.0, 0.0, 0.0], [3.0, -2.0, -0.3]])
     assert off.project(points) - camera.project(points) == pytest.approx(

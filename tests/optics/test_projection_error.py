@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from camera_cases import finger_camera, random_pose
 
-from gelslim_optics.camera.pad_grid import pad_axes
 from gelslim_optics.camera.projection_error import (
     MODELS,
     effective_height_mm,
     error_map,
     projection_error_mm,
 )
+from gelslim_optics.camera.view_quality import pad_axes
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
-X, Y = pad_axes(28, 28)
+X, Y = pad_axes(28, 24)
 PRESS = -0.5
 
 
@@ -56,7 +56,7 @@ def test_by_hand_in_the_three_approximate_models() -> None:
     seen = (height - 4.5) + 2.5 / 1.4906 + 2.0 / 1.41
     assert effective_height_mm(camera) == pytest.approx(seen, rel=1e-14)
     reach = 12.0
-    point = [[camera.position_mm[0] + 12 * 0.8, 12 * 0.6, 0.0]]
+    point = [[*(camera.position_mm[:2] + np.array([9.6, 7.2])), 0.0]]
     for model, alpha in (
         ("printed", reach / height),
         ("arctan", math.atan(reach / height)),
@@ -109,8 +109,8 @@ def test_error_map_holds_every_model_by_rows_of_y() -> None:
         one = projection_error_mm(camera, [[5.0, -2.0, -0.1]], -0.3, model)
         np.testing.assert_array_equal(seen.delta_mm[model][0, 2], one[0])
         off = seen.delta_mm[model][0, 2] - seen.delta_mm["exact"][0, 2]
-        assert seen.off_mm(model)[0, 2] == pytest.approx(np.hypot(*off), abs=1e-15)
-    assert np.all(seen.off_mm("exact") == 0)
+        assert seen.deviation_mm(model)[0, 2] == pytest.approx(np.hypot(*off), abs=1e-15)
+    assert np.all(seen.deviation_mm("exact") == 0)
 
 
 def test_under_the_foot_there_is_no_error_and_no_ratio() -> None:
@@ -118,7 +118,7 @@ def test_under_the_foot_there_is_no_error_and_no_ratio() -> None:
     foot = [[*camera.position_mm[:2], 0.0]]
     for model in MODELS:
         np.testing.assert_array_equal(projection_error_mm(camera, foot, PRESS, model), [[0, 0]])
-    seen = error_map(camera, [camera.position_mm[0]], [0.0], PRESS)
+    seen = error_map(camera, *camera.position_mm[:2, None], PRESS)
     assert np.isnan(seen.relative("arctan")).all()
 
 

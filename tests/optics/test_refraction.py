@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from gelslim_optics.camera.refraction import lateral_reach, newton_slope, ray_slope, reach_growth
+from gelslim_optics.camera.rays import ray_slope
+from gelslim_optics.camera.refraction import lateral_reach, newton_slope, reach_growth
 
 LAYERS = [
     ([8.0], [1.0]),
@@ -207,11 +208,11 @@ def test_growth_is_the_derivative_of_the_reach() -> None:
 @pytest.mark.parametrize(
     ("reach", "heights", "indices", "message"),
     [
-        (1.0, [5.0, 2.0], [1.0, 0.9], "index of"),
+        (1.0, [5.0, 2.0], [1.0, 0.9], "index"),
         (1.0, [5.0, 2.0], [1.0, math.nan], "index"),
         (1.0, [5.0, -2.0], [1.0, 1.4], "height"),
         (1.0, [5.0, math.inf], [1.0, 1.4], "height"),
-        (1.0, [5.0, 2.0], [1.33, 1.4], "layer 0 is the air"),
+        (1.0, [5.0, 2.0], [1.33, 1.4], "layer 0"),
         (1.0, [5.0, 2.0], [1.0], "one of each"),
         (1.0, [], [], "one of each"),
         (1e200, [5.0], [1.0], "limit"),

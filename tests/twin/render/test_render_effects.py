@@ -13,6 +13,7 @@ import pytest
 from render_rig import CAMERA, GRID, dent, detected_error, light, moved, renderer, rms
 from scipy.ndimage import gaussian_filter
 
+from gelslim_optics.camera.view_quality import blur_map
 from gelslim_twin.render.compression import Compression
 from gelslim_twin.render.defocus import Defocus, kernel_taps
 from gelslim_twin.render.dirt import Dirt
@@ -178,12 +179,12 @@ def test_defocus_grows_away_from_the_focus_as_the_camera_says():
     focus = float(CAMERA.apparent_distance_mm(places[3:4])[0])
     lens = Defocus(1.24, focus)
     field = lens.field(CAMERA, 22.0, 21.0)
-    exact = CAMERA.blur_map(x, [2.3], 1.24, focus)[0] * 20 / 4
+    exact = blur_map(CAMERA, x, [2.3], 1.24, focus)[0] * 20 / 4
     assert lens.sigma_px(field, places, np.full(7, 20.0)) == pytest.approx(exact, abs=0.02)
     assert exact[0] > 0.4
     assert exact[6] > 0.4
     sunken = places - [0, 0, 0.8]
-    deep = CAMERA.blur_map(x, [2.3], 1.24, focus, -0.8)[0] * 20 / 4
+    deep = blur_map(CAMERA, x, [2.3], 1.24, focus, -0.8)[0] * 20 / 4
     assert lens.sigma_px(field, sunken, np.full(7, 20.0)) == pytest.approx(deep, abs=0.05)
     assert np.abs(deep - exact).max() > 0.05
 
