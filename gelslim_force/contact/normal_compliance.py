@@ -114,7 +114,7 @@ def _symmetries(operator: Compliant, columns: int) -> Nodes:
     if system is None:
         return identity[None]
     cells = np.asarray(system.mesh.occupancy)[:, :, 0].T
-    rows, across = np.asarray(system.places).T
+    rows, across = np.asarray(system.lattice_positions).T
     numbers = np.full((cells.shape[0] + 1, cells.shape[1] + 1), -1)
     numbers[rows, across] = identity
     pitch_x, pitch_y, _ = system.mesh.cell_size_mm

@@ -20,9 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from gelslim_force.contact.anderson import Anderson
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
-from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
-from ifem_export.operators.surface_field import checked
 
 Array = NDArray[np.float64]
 
@@ -45,7 +44,7 @@ class FiniteStrainForce:
     @cached_property
     def pad(self) -> NeoHookeanPad:
         """The pad at large strain."""
-        return NeoHookeanPad.of(self.bundle.mesh, self.bundle.material)
+        return NeoHookeanPad(self.bundle.mesh, self.bundle.material)
 
     @cached_property
     def inner(self) -> Solver:
@@ -58,7 +57,7 @@ class FiniteStrainForce:
         Raises IfemError for a wrong shape, FiniteStrainError for a motion that turns a cell
         inside out, ConvergenceError where the inner nodes find no balance.
         """
-        u = checked(displacement_mm, self.system.columns)
+        u = checked_field(displacement_mm, self.system.columns)
         whole = np.zeros((self.bundle.mesh.n_nodes, 3))
         whole[-self.system.columns :] = u
         if self.system.layers == 1:

@@ -73,7 +73,7 @@ class SurfaceCompliance:
             return None
         if type(system) is not PadSystem:
             return factored(system.stiffness)
-        places = np.asarray(system.places)
+        places = np.asarray(system.lattice_positions)
         row = places[:, int(np.ptp(places[:, 1]) > np.ptp(places[:, 0]))]
         if 3 * system.layers * np.bincount(row - row.min()).max() > MOST_ROW:
             return factored(system.stiffness)

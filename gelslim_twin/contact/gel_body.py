@@ -34,7 +34,7 @@ class GelBody:
     @cached_property
     def pad(self) -> NeoHookeanPad:
         """The law."""
-        return NeoHookeanPad.of(self.bundle.mesh, self.bundle.material)
+        return NeoHookeanPad(self.bundle.mesh, self.bundle.material)
 
     @cached_property
     def surface(self) -> Nodes:

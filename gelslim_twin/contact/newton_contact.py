@@ -142,7 +142,7 @@ class _Walk:
         self.force = force.copy()
         self.inner = self.body.pad.force(self.whole)
         assert last.whole_mm is not None
-        self.pressure = self.body.pad.ahead_pressure_mpa(last.whole_mm, whole - last.whole_mm)
+        self.pressure = self.body.pad.predicted_pressure_mpa(last.whole_mm, whole - last.whole_mm)
         self.target, ahead = self.solver.targets(last, before, pose)
         points = self.solver.points_mm
         tool = self.solver.tool
@@ -244,7 +244,7 @@ class _Walk:
             try:
                 ahead = self.whole + share * step
                 self.inner = self.body.pad.force(ahead)
-                full = self.body.pad.ahead_pressure_mpa(self.whole, step)
+                full = self.body.pad.predicted_pressure_mpa(self.whole, step)
                 self.pressure = self.pressure + share * (full - self.pressure)
                 self.whole = ahead
                 return

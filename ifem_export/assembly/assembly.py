@@ -1,8 +1,9 @@
-"""Global stiffness matrix of a cropped uniform lattice, written directly in CSR or BSR form.
+"""Global stiffness matrix of a cropped uniform lattice, written directly in CSR form.
 
-Every node's rows are copied from the occupancy table of its cells, so there is no triplet list
-and no sort: the peak memory is about that of the matrix, whose rows come out sorted and which
-is symmetric to the bit, whatever the number of threads.
+Every node's rows are copied from a table of its possible cells, so there is no list of triplets
+and no sort. The peak memory is about that of the matrix. Its rows are sorted, and it is exactly
+symmetric for any number of threads. Cells may be scaled by their filled fraction φ_e,
+K = Σ φ_e K_e; with all fractions 1 the matrix is the same to the bit.
 """
 
 from __future__ import annotations
@@ -11,140 +12,151 @@ import itertools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.assembly.occupancy_table import neighbour_pattern, occupancy_table
+from ifem_export.assembly.occupancy_table import (
+    NeighbourPattern,
+    neighbour_pattern,
+    occupancy_table,
+    shared_cells,
+)
 from ifem_export.errors import MeshError
 from ifem_export.mesh.lattice import Numbering, number_nodes
+from ifem_export.mesh.pad_mesh import PadMesh
 
+Array = NDArray[np.float64]
 _SERIAL_BELOW_BYTES = 50_000_000
+
+
+def mesh_stiffness(mesh: PadMesh, element_matrix: Array) -> sparse.csr_array:
+    """Stiffness matrix of a pad.
+
+    Args:
+        mesh: The pad; its `fill`, where present, scales the cells.
+        element_matrix: (24, 24) in N/mm, symmetric, corners in VTK_HEXAHEDRON order.
+
+    Returns:
+        (3n, 3n) in N/mm for n nodes. Unknown 3a+i is displacement i of node a.
+
+    Raises:
+        MeshError: The element matrix is not a finite (24, 24) matrix.
+    """
+    fill = None if mesh.fill is None else np.asarray(mesh.fill)
+    return assemble_csr(
+        np.asarray(mesh.occupancy), np.asarray(element_matrix), fill, numbering=mesh.numbering
+    )
 
 
 def assemble_csr(
     occupancy: NDArray[np.bool_],
-    element_matrix: NDArray[np.float64],
+    element_matrix: Array,
+    fill: Array | None = None,
     *,
     numbering: Numbering | None = None,
     threads: int | None = None,
 ) -> sparse.csr_array:
-    """Stiffness matrix of the existing cells as scalar CSR.
+    """Stiffness matrix of the existing cells in CSR form.
 
     Args:
         occupancy: (nx, ny, nz) bool.
         element_matrix: (24, 24) in N/mm, symmetric, corners in VTK_HEXAHEDRON order.
-        numbering: `number_nodes(occupancy)` when it is already at hand.
-        threads: worker threads; by default one below 50 MB and one per processor above.
+        fill: (nx, ny, nz) factor of each cell, > 0 where a cell exists; None for 1.
+        numbering: `number_nodes(occupancy)`, where it is known already.
+        threads: Worker threads; None takes one below 50 MB and one per processor above.
 
     Returns:
-        (3n, 3n) in N/mm, sorted indices; unknown 3a+i is displacement i of node a in the
-        numbering of `PadMesh`.
+        (3n, 3n) in N/mm with sorted indices, in the node numbering of `PadMesh`.
 
     Raises:
-        MeshError: no cell exists or the element matrix is not a finite (24, 24).
+        MeshError: No cell exists, the element matrix is not a finite (24, 24) matrix, or the
+            fill has another shape or a value that is not finite and > 0.
     """
-    from ifem_export.assembly.kernels import fill_csr
+    from ifem_export.assembly.kernels import fill_csr, fill_weighted_csr
 
-    plan = Plan(occupancy, element_matrix, numbering)
-    n, blocks = plan.numbering.n_nodes, plan.n_blocks
+    matrix = np.asarray(element_matrix, dtype=float)
+    if matrix.shape != (24, 24) or not np.isfinite(matrix).all():
+        raise MeshError(
+            f"element matrix of shape {matrix.shape}: must be finite, (24, 24)",
+            field="element_matrix",
+        )
+    nodes = number_nodes(occupancy) if numbering is None else numbering
+    kernel: Callable[..., None] = fill_csr
+    recipe: Any
+    if fill is None:
+        recipe = np.ascontiguousarray(occupancy_table(matrix).transpose(0, 2, 1, 3))
+    else:
+        kernel = fill_weighted_csr
+        by_corner = matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3)
+        scales = corner_fill(occupancy, fill)[nodes.positions]
+        recipe = (scales, np.ascontiguousarray(by_corner), *_pairs())
+    return _filled(kernel, nodes, recipe, threads)
+
+
+def _filled(
+    kernel: Callable[..., None], nodes: Numbering, recipe: Any, threads: int | None
+) -> sparse.csr_array:
+    """Let `kernel` write all rows, over as many threads as the size of the matrix requires."""
+    pattern = neighbour_pattern()
+    ends = np.cumsum(pattern.counts[nodes.masks])
+    blocks, n = int(ends[-1]), nodes.n_nodes
     index = np.int32 if 9 * blocks <= np.iinfo(np.int32).max else np.int64
     indptr = np.empty(3 * n + 1, dtype=index)
     indptr[-1] = 9 * blocks
     indices = np.empty(9 * blocks, dtype=index)
     data = np.empty(9 * blocks)
-    table = np.ascontiguousarray(plan.table.transpose(0, 2, 1, 3))
-    plan.run(fill_csr, table, indptr, indices, data, threads)
-    return wrapped(sparse.csr_array((data, indices, indptr), shape=(3 * n, 3 * n)))
+    shared = (
+        nodes.masks,
+        nodes.positions,
+        np.concatenate([[0], ends[:-1]]),
+        nodes.node_index,
+        pattern.counts,
+        pattern.slots,
+        _slot_strides(nodes),
+        recipe,
+        indptr,
+        indices,
+        data,
+    )
+    workers = _worker_count(threads, data.nbytes + indices.nbytes)
+    bounds = np.linspace(0, n, workers + 1).astype(int).tolist()
+    with ThreadPoolExecutor(workers) as pool:
+        jobs = [pool.submit(kernel, a, b, *shared) for a, b in itertools.pairwise(bounds)]
+        for job in jobs:
+            job.result()
+    matrix = sparse.csr_array((data, indices, indptr), shape=(3 * n, 3 * n))
+    # SciPy then never checks or sorts: the kernel writes sorted rows without duplicates.
+    matrix.has_sorted_indices = True
+    matrix.has_canonical_format = True
+    return matrix
 
 
-def assemble_bsr(
-    occupancy: NDArray[np.bool_],
-    element_matrix: NDArray[np.float64],
-    *,
-    numbering: Numbering | None = None,
-    threads: int | None = None,
-) -> sparse.bsr_array:
-    """The same matrix as 3x3 block CSR; arguments as for `assemble_csr`."""
-    from ifem_export.assembly.kernels import fill_bsr
-
-    plan = Plan(occupancy, element_matrix, numbering)
-    n, blocks = plan.numbering.n_nodes, plan.n_blocks
-    index = np.int32 if blocks <= np.iinfo(np.int32).max else np.int64
-    indptr = np.empty(n + 1, dtype=index)
-    indptr[-1] = blocks
-    indices = np.empty(blocks, dtype=index)
-    data = np.empty((blocks, 3, 3))
-    plan.run(fill_bsr, plan.table, indptr, indices, data, threads)
-    return wrapped(sparse.bsr_array((data, indices, indptr), shape=(3 * n, 3 * n)))
+def block_pattern(nodes: Numbering) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Which 3x3 blocks of the stiffness matrix exist, as CSR `indptr` and `indices` of nodes."""
+    pattern: NeighbourPattern = neighbour_pattern()
+    counts = pattern.counts[nodes.masks]
+    present = np.arange(27) < counts[:, None]
+    offsets = _slot_strides(nodes)[pattern.slots[nodes.masks]]
+    neighbours = (nodes.positions[:, None] + offsets)[present]
+    return np.concatenate([[0], np.cumsum(counts)]), nodes.node_index[neighbours]
 
 
-class Plan:
-    """What both forms need: numbering, pattern, block offsets and the value table."""
-
-    def __init__(
-        self,
-        occupancy: NDArray[np.bool_],
-        element_matrix: NDArray[np.float64],
-        numbering: Numbering | None,
-    ) -> None:
-        matrix = np.asarray(element_matrix, dtype=float)
-        if matrix.shape != (24, 24) or not np.isfinite(matrix).all():
-            raise MeshError(f"element matrix of shape {matrix.shape}: must be finite, (24, 24)")
-        self.numbering = number_nodes(occupancy) if numbering is None else numbering
-        self.pattern = neighbour_pattern()
-        self.table = occupancy_table(matrix)
-        ends = np.cumsum(self.pattern.counts[self.numbering.masks])
-        self.n_blocks = int(ends[-1])
-        self.first_block = np.concatenate([[0], ends[:-1]])
-
-    def run(
-        self,
-        fill: Callable[..., None],
-        table: Any,
-        indptr: NDArray[Any],
-        indices: NDArray[Any],
-        data: NDArray[np.float64],
-        threads: int | None,
-    ) -> None:
-        """Let `fill` write all rows into the arrays, over as many threads as the size asks for."""
-        _, ny1, nx1 = self.numbering.shape
-        d = np.arange(-1, 2)
-        strides = ((d[:, None, None] * ny1 + d[None, :, None]) * nx1 + d).reshape(27)
-        shared = (
-            self.numbering.masks,
-            self.numbering.positions,
-            self.first_block,
-            self.numbering.node_index,
-            self.pattern.counts,
-            self.pattern.slots,
-            strides,
-            table,
-            indptr,
-            indices,
-            data,
-        )
-        n = self.numbering.n_nodes
-        workers = _worker_count(threads, data.nbytes + indices.nbytes)
-        if workers == 1:
-            fill(0, n, *shared)
-            return
-        bounds = np.linspace(0, n, workers + 1).astype(int)
-        with ThreadPoolExecutor(workers) as pool:
-            jobs = [
-                pool.submit(fill, int(a), int(b), *shared) for a, b in itertools.pairwise(bounds)
-            ]
-            for job in jobs:
-                job.result()
+def _slot_strides(nodes: Numbering) -> NDArray[np.int64]:
+    """Offset (27,) of each neighbour slot in the flat lattice of nodes."""
+    _, ny1, nx1 = nodes.shape
+    d = np.arange(-1, 2)
+    return ((d[:, None, None] * ny1 + d[None, :, None]) * nx1 + d).reshape(27)
 
 
 def _worker_count(threads: int | None, n_bytes: int) -> int:
     if threads is None:
         return 1 if n_bytes < _SERIAL_BELOW_BYTES else _available_processors()
     if threads < 1:
-        raise MeshError(f"threads = {threads}: must be >= 1")
+        raise MeshError(f"threads = {threads}: must be >= 1", field="threads", value=threads)
     return threads
 
 
@@ -154,8 +166,38 @@ def _available_processors() -> int:
     return os.cpu_count() or 1
 
 
-def wrapped(matrix: Any) -> Any:
-    """Tell SciPy what the fill guarantees, so that it never checks or sorts."""
-    matrix.has_sorted_indices = True
-    matrix.has_canonical_format = True
-    return matrix
+def corner_fill(occupancy: NDArray[np.bool_], fill: Array) -> Array:
+    """Fill (nodes, 8) of the eight cells around each lattice node, 0 where no cell exists.
+
+    The nodes are those of the whole lattice, x fastest; the cells are in the bit order of
+    `Numbering`.
+
+    Raises:
+        MeshError: The fill has another shape, or is not finite and > 0 in an existing cell.
+    """
+    if fill.shape != occupancy.shape:
+        raise MeshError(
+            f"fill has shape {fill.shape}: must be that of the cells {occupancy.shape}",
+            field="fill",
+        )
+    kept = fill[occupancy]
+    if not (np.isfinite(kept).all() and (kept > 0.0).all()):
+        raise MeshError("fill must be finite and > 0 in every cell that exists", field="fill")
+    cells = np.where(occupancy, fill, 0.0).transpose(2, 1, 0)
+    nz, ny, nx = cells.shape
+    around = np.zeros((nz + 1, ny + 1, nx + 1, 8))
+    for bit in range(8):
+        k, j, i = 1 - (bit >> 2 & 1), 1 - (bit >> 1 & 1), 1 - (bit & 1)
+        around[k : nz + k, j : ny + j, i : nx + i, bit] = cells
+    return around.reshape(-1, 8)
+
+
+@lru_cache(maxsize=1)
+def _pairs() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Per neighbour slot the number and list (27, 8, 3) of shared cells: cell bit, two corners."""
+    shared = shared_cells()
+    counts = np.array([len(pairs) for pairs in shared])
+    table = np.zeros((27, 8, 3), dtype=np.int64)
+    for slot, pairs in enumerate(shared):
+        table[slot, : len(pairs)] = pairs
+    return counts, table

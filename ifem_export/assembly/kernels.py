@@ -1,4 +1,4 @@
-"""Compiled loops. Import this module only where they run: it loads numba."""
+"""Compiled loops of the assembly. Import this module only where they run (numba)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 from numba import njit
 
-# Arguments shared by the two fills: nodes [start, stop) are written; `masks`, `positions` and
+# Arguments of both kernels: the rows of nodes [start, stop) are written. `masks`, `positions` and
 # `first_block` are per node, `node_index` is over the lattice, `counts` and `slots` are the
-# neighbour pattern and `strides` the lattice offset of each slot. A node's rows depend on
-# nothing that another node writes, so any split over threads gives the same bits.
+# neighbour pattern, and `strides` is the lattice offset of each slot. The rows of a node do not
+# depend on those of another node, so any division among threads gives the same bits.
 
 
 @njit(cache=True, nogil=True)
@@ -49,7 +49,7 @@ def fill_csr(
 
 
 @njit(cache=True, nogil=True)
-def fill_bsr(
+def fill_weighted_csr(
     start: int,
     stop: int,
     masks: Any,
@@ -59,20 +59,37 @@ def fill_bsr(
     counts: Any,
     slots: Any,
     strides: Any,
-    table: Any,
+    recipe: Any,
     indptr: Any,
     indices: Any,
     data: Any,
 ) -> None:
-    """Write the block rows start … stop; `table` is (256, 27, 3, 3), `data` (blocks, 3, 3)."""
+    """Write the scalar CSR rows 3·start … 3·stop.
+
+    `recipe` holds the fill of each node's cells (n, 8), the element's blocks (8, 8, 3, 3), and
+    for each slot the number of shared cells (27,) and the cells themselves (27, 8, 3).
+    """
+    scales, blocks, pair_counts, pairs = recipe
     for node in range(start, stop):
         mask = masks[node]
+        count = counts[mask]
         position = positions[node]
-        at = first_block[node]
-        indptr[node] = at
-        for b in range(counts[mask]):
+        row_start = 9 * first_block[node]
+        width = 3 * count
+        for row in range(3):
+            indptr[3 * node + row] = row_start + row * width
+        for b in range(count):
             slot = slots[mask, b]
-            indices[at + b] = node_index[position + strides[slot]]
+            column = 3 * node_index[position + strides[slot]]
+            at = row_start + 3 * b
             for row in range(3):
                 for c in range(3):
-                    data[at + b, row, c] = table[mask, slot, row, c]
+                    total = 0.0
+                    for p in range(pair_counts[slot]):
+                        bit = pairs[slot, p, 0]
+                        total += (
+                            scales[node, bit] * blocks[pairs[slot, p, 1], pairs[slot, p, 2], row, c]
+                        )
+                    indices[at + c] = column + c
+                    data[at + c] = total
+                at += width

@@ -1,7 +1,7 @@
-"""Stiffness rows of a lattice node by which of its eight cells exist.
+"""Table of the stiffness rows of a lattice node for every set of existing cells around it.
 
-All cells of a uniform lattice share one element matrix, so a node's rows of K depend only on
-the 8-bit mask of its existing cells: 256 masks x 27 neighbours x 3x3 covers every crop.
+All cells of a uniform lattice share one element matrix, so the rows of a node depend only on the
+8-bit mask of its existing cells: 256 masks x 27 neighbours x 3x3 values cover every crop.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from ifem_export.mesh.lattice import VTK_CORNERS
 
 @dataclass(frozen=True, eq=False)
 class NeighbourPattern:
-    """Which of a node's 27 neighbours share a cell with it, by mask.
+    """Which of a node's 27 neighbours share a cell with it, for each mask.
 
     Neighbour slot 9(dz+1)+3(dy+1)+(dx+1) lies at offset (dx, dy, dz); slots increase with the
     neighbour's number.
 
-    Args:
-        counts: (256,) neighbours, the node itself included.
+    Attributes:
+        counts: (256,) number of neighbours, the node itself included.
         slots: (256, 27) uint8, the present slots in increasing order, then the absent ones.
     """
 
@@ -33,10 +33,10 @@ class NeighbourPattern:
 
 @lru_cache(maxsize=1)
 def shared_cells() -> tuple[tuple[tuple[int, int, int], ...], ...]:
-    """For each slot the (cell bit, node's corner, neighbour's corner) of the cells they share.
+    """For each slot the shared cells, as (cell bit, corner of the node, corner of the neighbour).
 
-    Cells are in lattice order, so that the sums for (i, j) and (j, i) run over the same cells
-    in the same order: that makes the assembled matrix symmetric to the bit.
+    Cells are in lattice order, so that the sums for (i, j) and (j, i) add the same cells in the
+    same order, which makes the assembled matrix exactly symmetric.
     """
     corner_number = {tuple(corner): a for a, corner in enumerate(VTK_CORNERS.tolist())}
     shared = []
@@ -65,13 +65,13 @@ def neighbour_pattern() -> NeighbourPattern:
 
 
 def occupancy_table(element_matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Stiffness blocks by mask and neighbour.
+    """Stiffness blocks for each mask and neighbour.
 
     Args:
         element_matrix: (24, 24) in N/mm.
 
     Returns:
-        (256, 27, 3, 3) in N/mm; zero where no cell is shared.
+        (256, 27, 3, 3) in N/mm, zero where no cell is shared.
     """
     blocks = element_matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3)
     bits = (np.arange(256)[:, None] >> np.arange(8) & 1).astype(float)

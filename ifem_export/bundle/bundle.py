@@ -1,8 +1,6 @@
-"""The stiffness bundle: all a force pipeline needs to know about one sensor.
+"""The stiffness bundle: everything that the force pipeline needs to know about one sensor.
 
-`build_bundle` makes one from a mesh and a material, `bundle_io` writes and reads it, and
-`force` applies the paper's operator, F = K u with the lower face fixed to the acrylic. With one
-layer every free node is on the outer surface and observed; the paper's form is that case.
+`build_bundle` makes one from a mesh and a material. `ifem_export.bundle.files` writes and reads it.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from gelslim_core.budget.budget import Budget
-from ifem_export.assembly.weighted_assembly import mesh_stiffness
+from ifem_export.assembly.assembly import mesh_stiffness
 from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
@@ -34,7 +32,12 @@ _SELF_TEST_AMPLITUDE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SelfTest:
-    """A displacement (n, 3) in mm and the nodal forces (n, 3) in N that K gives for it."""
+    """A displacement and its nodal forces F = K u, checked whenever the bundle is loaded.
+
+    Attributes:
+        displacement_mm: (n, 3).
+        force_n: (n, 3).
+    """
 
     displacement_mm: NDArray[np.float64]
     force_n: NDArray[np.float64]
@@ -42,20 +45,20 @@ class SelfTest:
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """Mesh, element recipe, optional stiffness matrix, markers and camera of one sensor.
+    """Mesh, stiffness, markers and camera of one sensor.
 
-    Args:
-        mesh: the cropped pad.
-        material: the gel.
+    Attributes:
+        mesh: The cropped pad.
+        material: The gel.
         formulation: Hex-8 formulation of `element_matrix`.
         element_matrix: (24, 24) in N/mm; with the mesh's occupancy and fill it determines K.
-        stiffness: materialised K, (3n, 3n) CSR in N/mm, or None.
-        markers: marker grid, or None for a bare pad.
-        camera: camera parameters, any JSON-able mapping; passed through untouched.
-        self_test: reference pair checked when the bundle is loaded.
-        spec_hash: identifies the spec the bundle was made from.
-        ladder: surface operators with their measured error and time, or None.
-        operator: label of the ladder's rung that the bundle's maker chose, or "".
+        stiffness: Stored stiffness matrix K, (3n, 3n) CSR in N/mm, or None.
+        markers: Markers and their interpolation, or None for a pad without markers.
+        camera: Camera parameters, a mapping of JSON values that is stored unchanged.
+        self_test: Pair of displacement and force that is checked when the bundle is loaded.
+        spec_hash: SHA-256 of the spec from which the bundle was made.
+        ladder: Surface operators with their measured error and time, or None.
+        operator: Label of the default rung of the ladder, or "".
     """
 
     mesh: PadMesh
@@ -77,11 +80,21 @@ class Bundle:
         budget: Budget | None = None,
         **parameters: Any,
     ) -> SurfaceOperator:
-        """Operator on the outer surface, F = S u and u = C F.
+        """Make the operator on the outer surface, F = S u and u = C F.
 
-        By name with its parameters, or by budget from the measured ladder; else the maker's
-        choice, else `pcg`. Raises BudgetError where no rung keeps the budget, IfemError where none
-        was measured.
+        Without a rung and a budget it is the default rung of the bundle, or else `pcg`.
+
+        Args:
+            rung: Name of the operator, with its `parameters`.
+            budget: Allowed error and time, by which the ladder chooses the operator.
+            **parameters: See `ifem_export.operators.surface_operator.surface_operator`.
+
+        Returns:
+            The operator.
+
+        Raises:
+            BudgetError: No rung keeps the budget.
+            IfemError: A budget is given, but the bundle has no ladder.
         """
         if rung is None:
             chosen = chosen_rung(self.ladder, self.operator, budget)
@@ -93,20 +106,20 @@ class Bundle:
 
     @cached_property
     def stiffness_matrix(self) -> sparse.csr_array:
-        """K, (3n, 3n) in N/mm: the stored one, else assembled from the recipe once."""
+        """K (3n, 3n) in N/mm: the stored matrix, or else assembled once."""
         if self.stiffness is not None:
             return self.stiffness
         return mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
 
     @property
     def times_key(self) -> str:
-        """Names this sensor's operators among the times of a machine."""
+        """Key of this sensor's operators among the measured times of a machine."""
         parts = f"{self.geometry_hash}|{self.material}|{self.formulation}"
         return f"operators-{hashlib.sha256(parts.encode()).hexdigest()[:32]}"
 
     @cached_property
     def geometry_hash(self) -> str:
-        """SHA-256 of pad lattice and marker positions, see `geometry_hash`."""
+        """SHA-256 of pad lattice and marker positions; see `geometry_hash`."""
         return geometry_hash(self.mesh, self.markers)
 
 
@@ -123,103 +136,49 @@ def build_bundle(
     ladder: OperatorLadder | None = None,
     operator: str = "",
 ) -> Bundle:
-    """Make a bundle.
+    """Make the bundle of one sensor.
 
     Args:
-        mesh: the cropped pad.
-        material: the gel.
-        formulation: "full" (the paper's standard element), "bbar" or "incompatible".
+        mesh: The cropped pad.
+        material: The gel.
+        formulation: "full" (the element of the GelSlim 2.0 paper), "bbar" or "incompatible".
         marker_positions_mm: (k, 2) or (k, 3) in the sensor frame.
-        marker_arrays: further arrays of length k by name.
-        camera: JSON-able mapping of camera parameters.
-        spec_hash: hash of the spec this sensor comes from.
-        with_stiffness: materialise K.
-        ladder: measured surface operators of this pad.
-        operator: label of the rung to use unless told otherwise.
+        marker_arrays: Further arrays of length k by name.
+        camera: Camera parameters, a mapping of JSON values.
+        spec_hash: SHA-256 of the spec of this sensor.
+        with_stiffness: Whether the stiffness matrix is stored.
+        ladder: Measured surface operators of this pad.
+        operator: Label of the default rung of the ladder.
+
+    Returns:
+        The bundle.
 
     Raises:
-        IfemError: markers that carry no field, marker arrays of another length, or a camera
-            that is not plain JSON.
+        IfemError: The markers do not determine a field, a marker array has another length, or the
+            camera is not plain JSON.
     """
     plain_camera = _plain_json(camera or {})
     matrix = hex8_stiffness(mesh.cell_size_mm, material, formulation)
-    stiffness = None
-    if with_stiffness:
-        stiffness = mesh_stiffness(mesh, matrix)
     displacement = _test_displacement(mesh)
     return Bundle(
         mesh=mesh,
         material=material,
         formulation=formulation,
         element_matrix=matrix,
-        stiffness=stiffness,
+        stiffness=mesh_stiffness(mesh, matrix) if with_stiffness else None,
         markers=marker_field(mesh, marker_positions_mm, marker_arrays),
         camera=plain_camera,
-        self_test=SelfTest(displacement, recipe_force(mesh, matrix, displacement)),
+        self_test=SelfTest(displacement, elementwise_force(mesh, matrix, displacement)),
         spec_hash=spec_hash,
         ladder=ladder,
         operator=operator,
     )
 
 
-def force(bundle: Bundle, displacement_mm: ArrayLike) -> NDArray[np.float64]:
-    """Nodal forces F = K u with the lower face fixed.
-
-    Args:
-        bundle: the sensor.
-        displacement_mm: (n, 3) displacement of every node, zero on the bonded nodes.
-
-    Returns:
-        (n, 3) in N: external force on the gel at each free node, and on the bonded nodes the
-        reaction of the acrylic; the rows sum to zero.
-
-    Raises:
-        IfemError: wrong shape, a value that is not finite, or a bonded node that moves.
-    """
-    u = np.asarray(displacement_mm, dtype=float)
-    n = bundle.mesh.n_nodes
-    if u.shape != (n, 3):
-        raise IfemError(f"displacement has shape {u.shape}: must be ({n}, 3), one row per node")
-    if not np.isfinite(u).all():
-        raise IfemError("displacement holds a value that is not finite: fill lost markers first")
-    if u[bundle.mesh.bonded].any():
-        worst = np.abs(u[bundle.mesh.bonded]).max()
-        raise IfemError(
-            f"displacement moves a bonded node by {worst:.3g} mm: the lower face is fixed to the "
-            "acrylic, so those rows must be zero"
-        )
-    return np.asarray(bundle.stiffness_matrix @ u.reshape(-1)).reshape(n, 3)
-
-
-def node_displacement(bundle: Bundle, marker_displacement_mm: ArrayLike) -> NDArray[np.float64]:
-    """Displacement of every node from that of the markers.
-
-    Args:
-        bundle: the sensor.
-        marker_displacement_mm: (k, 3).
-
-    Returns:
-        (n, 3) in mm: interpolated on the surface nodes, zero on all others, which is complete
-        for one layer.
-
-    Raises:
-        IfemError: the bundle has no markers or the shape is wrong.
-    """
-    if bundle.markers is None:
-        raise IfemError("the bundle has no markers: rebuild it with marker positions")
-    d = np.asarray(marker_displacement_mm, dtype=float)
-    k = len(bundle.markers.positions_mm)
-    if d.shape != (k, 3):
-        raise IfemError(f"marker displacement has shape {d.shape}: must be ({k}, 3)")
-    u = np.zeros((bundle.mesh.n_nodes, 3))
-    u[bundle.mesh.surface] = bundle.markers.to_surface @ d
-    return u
-
-
-def recipe_force(
+def elementwise_force(
     mesh: PadMesh, element_matrix: NDArray[np.float64], displacement_mm: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """F = K u element by element, without K: an independent check of the assembled matrix."""
+    """F = K u (n, 3) in N summed over the elements: an independent check of the assembled K."""
     per_element = displacement_mm[mesh.hexes].reshape(-1, 24) @ element_matrix
     if mesh.fill is not None:
         # Cells are numbered x fastest, z slowest.
@@ -234,10 +193,10 @@ def recipe_force(
 
 
 def geometry_hash(mesh: PadMesh, markers: MarkerField | None) -> str:
-    """SHA-256 of what makes a pad another pad: lattice, occupancy and marker positions.
+    """SHA-256 of what distinguishes pads: lattice, occupancy and marker positions.
 
-    Lengths are rounded to 1e-9 mm, so that rounding between machines does not matter. Material
-    and camera are left out: both may be recalibrated on the same pad.
+    Lengths are rounded to 1e-9 mm, so that rounding differences between machines do not matter.
+    Material and camera are not included, because both may be recalibrated on the same pad.
     """
     digest = hashlib.sha256(b"gelslim-geometry/1")
     lengths = np.array([*mesh.cell_size_mm, *mesh.origin_mm])
@@ -266,7 +225,7 @@ def _rounded(lengths_mm: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _test_displacement(mesh: PadMesh) -> NDArray[np.float64]:
-    """Fixed pseudo-random displacement of the free nodes, zero on the bonded ones."""
+    """Fixed pseudo-random displacement (n, 3) of the free nodes, zero on the bonded nodes."""
     rng = np.random.default_rng(_SELF_TEST_SEED)
     u = rng.uniform(-_SELF_TEST_AMPLITUDE, _SELF_TEST_AMPLITUDE, (mesh.n_nodes, 3))
     u[mesh.bonded] = 0.0
@@ -274,11 +233,12 @@ def _test_displacement(mesh: PadMesh) -> NDArray[np.float64]:
 
 
 def _plain_json(camera: Mapping[str, Any]) -> dict[str, Any]:
-    """The mapping as it will be read back from JSON (tuples become lists)."""
+    """The mapping as it is read back from JSON, where tuples become lists."""
     try:
         plain: dict[str, Any] = json.loads(json.dumps(dict(camera), allow_nan=False))
     except (TypeError, ValueError) as error:
         raise IfemError(
-            f"camera is not plain JSON ({error}): use only finite numbers, text, lists and maps"
+            f"camera is not plain JSON ({error}): use only finite numbers, text, lists and maps",
+            field="camera",
         ) from error
     return plain

@@ -1,4 +1,4 @@
-"""Does a bundle hold together? Values, index ranges, mesh, element and the self-test pair."""
+"""Checks that the parts of a bundle agree: values, indices, mesh, element and self-test pair."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.assembly.weighted_assembly import corner_fill
-from ifem_export.bundle.bundle import Bundle, recipe_force
+from ifem_export.assembly.assembly import corner_fill
+from ifem_export.bundle.bundle import Bundle, elementwise_force
 from ifem_export.bundle.manifest import REBUILD
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.markers.field import MarkerField
 from ifem_export.markers.thin_plate import affine
-from ifem_export.mesh.crowned_surface import column_tops
+from ifem_export.mesh.crown import column_tops
 from ifem_export.mesh.pad_mesh import PadMesh
 
 _SELF_TEST_TOLERANCE = 1e-10
@@ -25,10 +25,10 @@ _ELEMENT_TOLERANCE = 1e-12
 
 
 def check_bundle(bundle: Bundle) -> None:
-    """Check that every part of the bundle agrees with its recipe.
+    """Check that every part of the bundle agrees with the others.
 
     Raises:
-        BundleError: names the array's file, what is wrong and what to do.
+        BundleError: A part is damaged or does not agree with the others.
     """
     _check_finite(bundle)
     _check_mesh(bundle.mesh)
@@ -101,12 +101,12 @@ def _check_mesh(mesh: PadMesh) -> None:
 
 
 def _stored_surface(mesh: PadMesh) -> NDArray[np.int32]:
-    """Surface nodes that a crowned mesh's own heights lead to: one per column."""
+    """Surface nodes of a crowned mesh, after checking that there is one per column."""
     shift = np.asarray(mesh.surface_shift)
     if shift.shape != np.asarray(mesh.surface).shape:
         _fail("surface_shift", f"holds {shift.size} heights for {len(mesh.surface)} surface nodes")
     if not (np.isfinite(shift).all() and (np.abs(shift) <= 0.5).all()):
-        _fail("surface_shift", "must lie from -1/2 to 1/2")
+        _fail("surface_shift", "a height is outside -1/2 to 1/2")
     nodes = np.asarray(mesh.surface)
     if nodes.min() < 0 or nodes.max() >= mesh.n_nodes:
         _fail("surface_nodes", "a node number is out of range")
@@ -146,16 +146,17 @@ def _check_markers(markers: MarkerField | None) -> None:
     to_nodes, bending = markers.spline.to_nodes, markers.spline.bending
     if np.abs(to_nodes.sum(axis=1) - 1.0).max() > _ROW_TOLERANCE:
         _fail("thin_plate", "rows do not sum to one")
-    # What lost markers read rests on this form: symmetric and zero on affine fields.
+    # The values of lost markers rely on this form: symmetric and zero on affine fields.
     planes = affine(np.asarray(markers.positions_mm)[:, :2])
     scale = np.abs(bending).max()
-    off = np.abs(bending @ planes).max() / np.abs(planes).max()
-    if np.abs(bending - bending.T).max() > _ROW_TOLERANCE * scale or off > _ROW_TOLERANCE * scale:
+    deviation = np.abs(bending @ planes).max() / np.abs(planes).max()
+    asymmetry = np.abs(bending - bending.T).max()
+    if max(asymmetry, deviation) > _ROW_TOLERANCE * scale:
         _fail("thin_plate_bending", "is not the bending energy of a spline through the markers")
 
 
 def _check_csr(name: str, matrix: sparse.csr_array) -> None:
-    """Refuse indices that would make a product read outside the arrays."""
+    """Raise BundleError for indices with which a product would read outside the arrays."""
     steps = np.diff(matrix.indptr)
     if matrix.indptr[0] != 0 or matrix.indptr[-1] != len(matrix.indices) or (steps < 0).any():
         _fail(f"{name}_indptr", "row pointers are out of order")
@@ -171,13 +172,13 @@ def _check_self_test(bundle: Bundle) -> None:
     scale = np.abs(stored).max()
     if not scale > 0.0:
         _fail("self_test_force_n", "is zero everywhere")
-    found = recipe_force(bundle.mesh, np.asarray(bundle.element_matrix), u)
+    found = elementwise_force(bundle.mesh, np.asarray(bundle.element_matrix), u)
     error = np.abs(found - stored).max() / scale
     if error > _SELF_TEST_TOLERANCE:
-        _fail("self_test_force_n", f"the recipe gives other forces, by {error:.2g}")
+        _fail("self_test_force_n", f"the elements give other forces, by {error:.2g}")
     if bundle.stiffness is None:
         return
     found = (bundle.stiffness @ u.reshape(-1)).reshape(-1, 3)
     error = np.abs(found - stored).max() / scale
     if error > _SELF_TEST_TOLERANCE:
-        _fail("stiffness_data_n_per_mm", f"K gives other forces than the recipe, by {error:.2g}")
+        _fail("stiffness_data_n_per_mm", f"K gives other forces than its elements, by {error:.2g}")

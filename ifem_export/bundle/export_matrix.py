@@ -1,7 +1,7 @@
-"""A bundle's matrices for other programs: Matrix Market, MATLAB .mat, safetensors.
+"""Exports of a bundle's matrices for other programs: Matrix Market, MATLAB and safetensors.
 
-`stiffness` is K (3n, 3n) in N/mm, unknown 3a+i for displacement i of node a; `free_unknowns` are
-the rows that are not bonded, 0-based (1-based in the .mat file, as MATLAB counts).
+`stiffness` is K (3n, 3n) in N/mm, where unknown 3a+i is displacement i of node a. `free_unknowns`
+are the rows that are not bonded, counted from 0 (in the .mat file from 1, as MATLAB does).
 """
 
 from __future__ import annotations
@@ -24,40 +24,57 @@ Arrays = dict[str, NDArray[Any]]
 HEADER_DATE = b"gelslim-bundle"
 
 
-def export_matrix_market(bundle: Bundle, path: str | os.PathLike[str]) -> None:
-    """Write K as a symmetric Matrix Market file, 17 digits. Raises IfemError, OSError."""
+def export_matrix(bundle: Bundle, path: str | os.PathLike[str]) -> None:
+    """Write the stiffness matrix in the format that the ending of the name selects.
+
+    Args:
+        bundle: The sensor.
+        path: File to write atomically, with an ending of `EXPORTS`: ".mtx" (symmetric Matrix
+            Market, 17 digits), ".mat" (MATLAB 5, with the mesh; numbers count from 1) or
+            ".safetensors" (CSR arrays and the mesh, which C++ and Rust read without copies).
+
+    Raises:
+        IfemError: The ending is unknown, or the package safetensors is not installed.
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix not in EXPORTS:
+        raise IfemError(
+            f"{target}: the ending {target.suffix!r} names no format; use {', '.join(EXPORTS)}",
+            field="path",
+            value=target.suffix,
+        )
+    replace_file(target, EXPORTS[target.suffix](bundle), parents=True)
+
+
+def _matrix_market(bundle: Bundle) -> bytes:
     from scipy.io import mmwrite
 
-    def fill(stream: io.BytesIO) -> None:
-        comment = f"K in N/mm of geometry {bundle.geometry_hash}; unknown 3a+i of node a"
-        mmwrite(stream, bundle.stiffness_matrix, comment, "real", 17, "symmetric")
+    stream = io.BytesIO()
+    comment = f"K in N/mm of geometry {bundle.geometry_hash}; unknown 3a+i of node a"
+    mmwrite(stream, bundle.stiffness_matrix, comment, "real", 17, "symmetric")
+    return stream.getvalue()
 
-    _write(path, ".mtx", fill)
 
-
-def export_mat(bundle: Bundle, path: str | os.PathLike[str]) -> None:
-    """Write K and the mesh as a MATLAB 5 file; node and unknown numbers count from 1."""
+def _mat(bundle: Bundle) -> bytes:
     from scipy.io import savemat
 
-    def fill(stream: io.BytesIO) -> None:
-        arrays = _arrays(bundle)
-        for name in ("hexes", "surface_nodes", "bonded_nodes", "free_unknowns"):
-            arrays[name] = arrays[name] + 1
-        savemat(stream, {"stiffness": bundle.stiffness_matrix.tocsc(), **arrays}, oned_as="column")
+    stream = io.BytesIO()
+    arrays = _arrays(bundle)
+    for name in ("hexes", "surface_nodes", "bonded_nodes", "free_unknowns"):
+        arrays[name] = arrays[name] + 1
+    savemat(stream, {"stiffness": bundle.stiffness_matrix.tocsc(), **arrays}, oned_as="column")
+    # The header of 116 bytes contains a date, which would make two exports differ.
+    return (b"MATLAB 5.0 MAT-file, " + HEADER_DATE).ljust(116) + stream.getvalue()[116:]
 
-    _write(path, ".mat", fill, _undated)
 
-
-def export_safetensors(bundle: Bundle, path: str | os.PathLike[str]) -> None:
-    """Write K (CSR arrays) and the mesh as safetensors, which C++ and Rust read without copies.
-
-    Raises IfemError where the package safetensors is not installed.
-    """
+def _safetensors(bundle: Bundle) -> bytes:
     try:
         from safetensors.numpy import save
     except ImportError as error:
         raise IfemError(
-            f"writing safetensors needs the package safetensors: {install_command('export')}"
+            f"writing safetensors needs the package safetensors: {install_command('export')}",
+            field="path",
         ) from error
     matrix = bundle.stiffness_matrix
     arrays = {
@@ -67,8 +84,16 @@ def export_safetensors(bundle: Bundle, path: str | os.PathLike[str]) -> None:
         **_arrays(bundle),
     }
     facts = {"format": "gelslim-bundle/1", "geometry_hash": bundle.geometry_hash}
-    data = save({k: np.ascontiguousarray(v) for k, v in arrays.items()}, facts)
-    _write(path, ".safetensors", lambda stream: stream.write(data))
+    data: bytes = save({k: np.ascontiguousarray(v) for k, v in arrays.items()}, facts)
+    return data
+
+
+EXPORTS: dict[str, Callable[[Bundle], bytes]] = {
+    ".mtx": _matrix_market,
+    ".mat": _mat,
+    ".safetensors": _safetensors,
+}
+"""Content of an exported file by the ending of its name."""
 
 
 def _arrays(bundle: Bundle) -> Arrays:
@@ -84,23 +109,3 @@ def _arrays(bundle: Bundle) -> Arrays:
         "self_test_displacement_mm": np.asarray(bundle.self_test.displacement_mm),
         "self_test_force_n": np.asarray(bundle.self_test.force_n),
     }
-
-
-def _undated(data: bytes) -> bytes:
-    """The file's 116 bytes of text hold a date, which would make two exports differ."""
-    return (b"MATLAB 5.0 MAT-file, " + HEADER_DATE).ljust(116) + data[116:]
-
-
-def _write(
-    path: str | os.PathLike[str],
-    suffix: str,
-    fill: Callable[[io.BytesIO], Any],
-    finish: Callable[[bytes], bytes] = bytes,
-) -> None:
-    """Whole or not at all."""
-    target = Path(path)
-    if target.suffix != suffix:
-        raise IfemError(f"{target}: the name must end in {suffix}")
-    stream = io.BytesIO()
-    fill(stream)
-    replace_file(target, finish(stream.getvalue()), parents=True)

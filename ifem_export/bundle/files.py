@@ -1,7 +1,7 @@
-"""Write and read `gelslim-bundle/1`: a directory of `.npy` arrays and a manifest.json.
+"""Write and read a `gelslim-bundle/1`: a directory of `.npy` arrays and a manifest.json.
 
-Arrays open memory-mapped and are never unpickled. A bundle is written beside its place and
-renamed into it, so a reader sees the old one or the new one.
+Arrays are opened as memory maps and are never unpickled. A bundle is written in a temporary
+directory next to its own and then renamed, so a reader finds either the old or the new bundle.
 """
 
 from __future__ import annotations
@@ -20,26 +20,34 @@ from gelslim_core.files.file_lock import locked
 from gelslim_core.files.replaced_folder import FolderError, recover, replaced_folder
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.check import check_bundle
-from ifem_export.bundle.ladder import LADDER, ladder_json, read_ladder
 from ifem_export.bundle.layout import bundle_arrays, bundle_from
-from ifem_export.bundle.manifest import MANIFEST, REBUILD, describe, read_manifest, to_json
+from ifem_export.bundle.manifest import (
+    LADDER,
+    MANIFEST,
+    REBUILD,
+    describe,
+    ladder_json,
+    read_ladder,
+    read_manifest,
+    to_json,
+)
 from ifem_export.errors import BundleError
 
 FAMILY = "gelslim-bundle/"
-"""How the format of a bundle's manifest begins, whatever its version."""
+"""Prefix of the format of a bundle's manifest, for all versions."""
 _ALTERED = "copy the bundle again from where it was built, or " + REBUILD
 
 
 def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
-    """Check the bundle and write it as a directory, replacing a bundle already there.
+    """Check the bundle and write it as a directory, replacing a bundle that is already there.
 
     Args:
-        path: the bundle's directory; folders above it are made.
-        bundle: what to write.
+        path: Directory of the bundle; missing parents are created.
+        bundle: The bundle.
 
     Raises:
-        BundleError: the bundle does not hold together, something else is at `path`, or the
-            disk refuses.
+        BundleError: The parts of the bundle do not agree, `path` is something other than a
+            bundle, or the disk cannot be written.
     """
     check_bundle(bundle)
     target = Path(os.path.abspath(path))
@@ -78,19 +86,19 @@ def load_bundle(
     *,
     expected_geometry_hash: str | None = None,
 ) -> Bundle:
-    """Open a bundle; its arrays are memory-mapped and read-only.
+    """Open a bundle, whose arrays are memory-mapped and read-only.
 
     Args:
-        path: the bundle's directory.
-        verify: check every file's SHA-256, all values and the self-test pair. Without it only
-            the manifest and the array headers are read, and nothing else until it is used.
-        expected_geometry_hash: refuse the bundle of any other pad.
+        path: Directory of the bundle.
+        verify: Whether the SHA-256 of every file, all values and the self-test pair are checked.
+            Otherwise only the manifest and the array headers are read, and values when used.
+        expected_geometry_hash: Geometry hash that the bundle must have; None accepts all.
 
     Returns:
         The bundle.
 
     Raises:
-        BundleError: names the file, what is wrong and what to do.
+        BundleError: A file is missing, damaged or altered, or the bundle belongs to another pad.
     """
     folder = Path(path)
     if not folder.is_dir():
@@ -117,6 +125,42 @@ def load_bundle(
     return bundle
 
 
+def summarise_bundle(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Describe a bundle and verify it.
+
+    Args:
+        path: Directory of the bundle.
+
+    Returns:
+        Mapping for JSON: format, hashes, versions, units, material, mesh, element, stiffness,
+        markers, camera, the arrays with their sizes in bytes, the total size, and
+        `verification` with `ok` and, if it failed, `file`, `reason` and `remedy`.
+
+    Raises:
+        BundleError: The manifest itself cannot be read.
+    """
+    folder = Path(path)
+    manifest = read_manifest(folder)
+    manifest.pop("conventions")
+    for entry in manifest["arrays"].values():
+        file = folder / entry["file"]
+        entry["bytes"] = file.stat().st_size if file.is_file() else None
+    total = sum(entry["bytes"] or 0 for entry in manifest["arrays"].values())
+    verification: dict[str, Any] = {"ok": True}
+    try:
+        loaded = load_bundle(folder)
+        if loaded.ladder is not None:
+            manifest["ladder"] = {**manifest["ladder"], **loaded.ladder.to_record()}
+    except BundleError as error:
+        verification = {
+            "ok": False,
+            "file": error.file,
+            "reason": error.reason,
+            "remedy": error.remedy,
+        }
+    return {**manifest, "total_bytes": total, "verification": verification}
+
+
 def _require_replaceable(target: Path) -> None:
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
@@ -129,7 +173,7 @@ def _require_replaceable(target: Path) -> None:
 
 
 def _manifest_of(folder: Path) -> dict[str, Any]:
-    """The manifest as it is; empty where there is none or it is damaged."""
+    """The manifest without checks; empty if it is missing or damaged."""
     try:
         found = json.loads((folder / MANIFEST).read_bytes())
     except (OSError, ValueError):
@@ -138,14 +182,14 @@ def _manifest_of(folder: Path) -> dict[str, Any]:
 
 
 def _files_of(folder: Path) -> set[str]:
-    """The files that a bundle there consists of; any others are not ours."""
+    """Names of the files that belong to a bundle in this directory."""
     arrays = _manifest_of(folder).get("arrays")
     entries = arrays.values() if isinstance(arrays, dict) else ()
     return {MANIFEST, LADDER, *(str(e.get("file")) for e in entries if isinstance(e, dict))}
 
 
-class _Plain:
-    """A stream that NumPy writes through, and not past: past it, a full disk has no reason."""
+class _Stream:
+    """A stream without a file descriptor, so that NumPy reports why a full disk fails."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self.write = stream.write
@@ -155,7 +199,7 @@ def _write_array(folder: Path, name: str, array: NDArray[Any]) -> dict[str, Any]
     file = f"{name}.npy"
     contiguous = np.ascontiguousarray(array)
     with open(folder / file, "wb") as stream:
-        np.save(_Plain(stream), contiguous, allow_pickle=False)
+        np.save(_Stream(stream), contiguous, allow_pickle=False)
     return {
         "file": file,
         "sha256": _sha256(folder / file),
@@ -170,7 +214,7 @@ def _sha256(path: Path) -> str:
 
 
 def _open_array(folder: Path, entry: dict[str, Any], verify: bool) -> NDArray[Any]:
-    """Memory-map one array after checking its header against the manifest."""
+    """Memory-map one array and check its header against the manifest."""
     file = entry["file"]
     path = folder / file
     if not path.is_file():
@@ -195,7 +239,7 @@ def _map(path: Path) -> NDArray[Any]:
     try:
         return np.lib.format.open_memmap(path, mode="r")
     except ValueError:
-        # An empty array cannot be mapped; anything else fails here again, with its own reason.
+        # An empty array cannot be mapped. Every other array fails here again with its reason.
         array: NDArray[Any] = np.load(path, allow_pickle=False)
         if array.size:
             raise

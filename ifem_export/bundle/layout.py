@@ -1,4 +1,4 @@
-"""How the parts of a bundle map to named arrays, both ways."""
+"""Conversion between the parts of a bundle and its named arrays."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ifem_export.operators.operator_ladder import OperatorLadder
 
 
 def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
-    """Every array of a bundle by the name it is stored under."""
+    """Every array of a bundle by the name under which it is stored."""
     mesh = bundle.mesh
     arrays: dict[str, Any] = {
         "nodes_mm": mesh.nodes_mm,
@@ -58,10 +58,10 @@ def bundle_from(
     arrays: dict[str, NDArray[Any]],
     ladder: tuple[OperatorLadder | None, str] = (None, ""),
 ) -> Bundle:
-    """Put a bundle together from its manifest and opened arrays, reading no values.
+    """Make a bundle from its manifest and the opened arrays, without reading their values.
 
     Raises:
-        BundleError: a section or array is missing or does not fit the others.
+        BundleError: A section or array is missing or does not fit the others.
     """
     try:
         material = Material(**manifest["material"])
@@ -79,7 +79,7 @@ def bundle_from(
         raise BundleError(MANIFEST, reason, REBUILD) from error
     if len(size) != 3 or len(origin) != 3:
         raise BundleError(MANIFEST, "cell_size_mm and origin_mm must have 3 values", REBUILD)
-    take = _Taker(arrays)
+    take = _Arrays(arrays)
     mesh = PadMesh(
         nodes_mm=take("nodes_mm", "<f8", (n, 3)),
         hexes=take("hexes", "<i4", (m, 8)),
@@ -113,7 +113,7 @@ def bundle_from(
     )
 
 
-def _markers_from(manifest: dict[str, Any], take: _Taker, n_surface: int) -> MarkerField | None:
+def _markers_from(manifest: dict[str, Any], take: _Arrays, n_surface: int) -> MarkerField | None:
     section = manifest["markers"]
     if section is None:
         return None
@@ -134,8 +134,8 @@ def _markers_from(manifest: dict[str, Any], take: _Taker, n_surface: int) -> Mar
     )
 
 
-class _Taker:
-    """Hands out the bundle's arrays, each checked for presence, type and shape."""
+class _Arrays:
+    """The arrays of a bundle, each checked for presence, type and shape when it is requested."""
 
     def __init__(self, arrays: dict[str, NDArray[Any]]) -> None:
         self._arrays = arrays
@@ -159,7 +159,7 @@ class _Taker:
         return array
 
     def csr(self, name: str, data: str, shape: tuple[int, int]) -> sparse.csr_array:
-        """A sparse matrix on the mapped arrays, without copying or reading them."""
+        """A sparse matrix on the mapped arrays, which are neither copied nor read."""
         values = self(data, "<f8", (None,))
         indices = self(f"{name}_indices", None, (len(values),))
         indptr = self(f"{name}_indptr", indices.dtype.str, (shape[0] + 1,))

@@ -1,4 +1,4 @@
-"""manifest.json of a `gelslim-bundle/1` directory: what is in it and how to trust it."""
+"""manifest.json of a `gelslim-bundle/1` directory, and ladder.json with its operators."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ import numpy as np
 import scipy
 
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.bundle.ladder import ladder_section
-from ifem_export.errors import BundleError
+from ifem_export.errors import BundleError, IfemError
+from ifem_export.operators.operator_ladder import OperatorLadder
 
 FORMAT = "gelslim-bundle/1"
 MANIFEST = "manifest.json"
+LADDER = "ladder.json"
 REBUILD = "rebuild the bundle from its spec (gelslim bundle SPEC)"
 _SEAL = "manifest_sha256"
 _MAX_BYTES = 16_000_000
@@ -55,8 +56,8 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
     """Manifest of a bundle whose arrays have been written.
 
     Args:
-        bundle: the bundle.
-        arrays: by array name: file, sha256, dtype and shape.
+        bundle: The bundle.
+        arrays: For each array its file, sha256, dtype and shape.
     """
     mesh, markers = bundle.mesh, bundle.markers
     manifest: dict[str, Any] = {
@@ -98,14 +99,14 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
             "thin_plate": markers.spline is not None,
         },
         "camera": dict(bundle.camera),
-        "ladder": ladder_section(bundle),
+        "ladder": _ladder_section(bundle),
         "arrays": arrays,
     }
     return {**manifest, _SEAL: _seal(manifest)}
 
 
 def to_json(manifest: dict[str, Any]) -> str:
-    """The manifest as text; the same manifest always gives the same text."""
+    """The manifest as JSON text, the same for the same manifest."""
     return json.dumps(manifest, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
@@ -113,7 +114,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Read manifest.json and check its format, seal and sections.
 
     Raises:
-        BundleError: it is missing, unreadable, altered, or of another format.
+        BundleError: The file is missing, unreadable, altered or of another format.
     """
     manifest = _parse(folder)
     found = manifest.get("format")
@@ -182,3 +183,41 @@ def _versions() -> dict[str, str]:
     except metadata.PackageNotFoundError:
         own = "unknown"
     return {"gelslim-cad": own, "numpy": np.__version__, "scipy": scipy.__version__}
+
+
+def ladder_json(bundle: Bundle) -> bytes:
+    """The ladder as JSON; empty if none was measured."""
+    if bundle.ladder is None:
+        return b""
+    record = bundle.ladder.to_record()
+    return (json.dumps(record, indent=1, sort_keys=True, allow_nan=False) + "\n").encode()
+
+
+def _ladder_section(bundle: Bundle) -> dict[str, Any] | None:
+    """The section of the manifest on the ladder."""
+    data = ladder_json(bundle)
+    if not data:
+        return None
+    digest = hashlib.sha256(data).hexdigest()
+    return {"file": LADDER, "sha256": digest, "operator": bundle.operator}
+
+
+def read_ladder(folder: Path, manifest: dict[str, Any]) -> tuple[OperatorLadder | None, str]:
+    """The ladder and the label of the default operator.
+
+    Raises:
+        BundleError: The file is missing, altered or malformed.
+    """
+    section = manifest.get("ladder")
+    if section is None:
+        return None, ""
+    try:
+        data = (folder / LADDER).read_bytes()
+    except OSError as error:
+        raise BundleError(LADDER, f"cannot be read ({error.strerror})", REBUILD) from error
+    if not isinstance(section, dict) or hashlib.sha256(data).hexdigest() != section.get("sha256"):
+        raise BundleError(LADDER, "its SHA-256 differs from the manifest, it was altered", REBUILD)
+    try:
+        return OperatorLadder.from_record(json.loads(data)), str(section.get("operator", ""))
+    except (ValueError, IfemError) as error:
+        raise BundleError(LADDER, str(error), REBUILD) from error

@@ -14,12 +14,12 @@ from ifem_export.mesh.lattice import VTK_CORNERS
 # Corner signs (8, 3) in VTK_HEXAHEDRON order, and the 2x2x2 Gauss points in the same order.
 SIGNS = (2.0 * VTK_CORNERS - 1.0).astype(np.float64)
 GAUSS = (SIGNS / math.sqrt(3.0)).astype(np.float64)
-# Volume change of a strain in the order of `strain_displacement`.
+# This row times a strain is its volume change, in the order of `strain_displacement`.
 TRACE = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def shape_gradients(
-    cell_size_mm: Sequence[float], local: NDArray[np.float64]
+    cell_size_mm: Sequence[float] | NDArray[np.float64], local: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Gradients of the trilinear shape functions of a box cell.
 
@@ -33,8 +33,8 @@ def shape_gradients(
     size = np.asarray(cell_size_mm, dtype=float)
     factors = 1.0 + local[..., None, :] * SIGNS
     x, y, z = factors[..., 0], factors[..., 1], factors[..., 2]
-    along = np.stack([y * z, x * z, x * y], axis=-1)
-    return np.asarray(SIGNS * along / 8.0 * (2.0 / size))
+    transverse = np.stack([y * z, x * z, x * y], axis=-1)
+    return np.asarray(SIGNS * transverse / 8.0 * (2.0 / size))
 
 
 def strain_displacement(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -58,12 +58,12 @@ def strain_displacement(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def elasticity_matrix(material: Material) -> NDArray[np.float64]:
-    """6x6 matrix D in MPa, stress = D strain in the order of `strain_displacement`."""
+    """Matrix D (6, 6) in MPa: stress = D strain, in the order of `strain_displacement`."""
     return deviatoric_matrix(material) + material.bulk_modulus_mpa * np.outer(TRACE, TRACE)
 
 
 def deviatoric_matrix(material: Material) -> NDArray[np.float64]:
-    """The part of D, 6x6 in MPa, that no volume change enters."""
+    """Deviatoric part of D, (6, 6) in MPa, which a pure volume change does not affect."""
     g = material.shear_modulus_mpa
     return np.asarray(
         g * (np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0]) - 2.0 / 3.0 * np.outer(TRACE, TRACE))

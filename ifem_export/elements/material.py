@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from ifem_export.errors import MaterialError
 
@@ -12,13 +13,13 @@ from ifem_export.errors import MaterialError
 class Material:
     """Linear isotropic elastic solid.
 
-    Args:
+    Attributes:
         youngs_modulus_mpa: Young's modulus E, > 0.
-        poissons_ratio: ν, -1 < ν < 0.5 (0.5 itself has an infinite bulk modulus).
-        density_kg_m3: mass density, > 0; statics do not use it.
+        poissons_ratio: Poisson's ratio, -1 < ν < 0.5; at 0.5 the bulk modulus is infinite.
+        density_kg_m3: Mass density, > 0; static forces do not depend on it.
 
     Raises:
-        MaterialError: a constant is not a finite number or is out of range.
+        MaterialError: A constant is not a finite number or is out of range.
     """
 
     youngs_modulus_mpa: float
@@ -29,21 +30,20 @@ class Material:
         for name in ("youngs_modulus_mpa", "poissons_ratio", "density_kg_m3"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise MaterialError(f"{name} = {value!r}: must be a number")
+                raise _refusal(name, value, "must be a number")
             if not math.isfinite(value):
-                raise MaterialError(f"{name} = {value!r}: must be finite")
+                raise _refusal(name, value, "must be finite")
         if self.youngs_modulus_mpa <= 0.0:
-            raise MaterialError(
-                f"youngs_modulus_mpa = {self.youngs_modulus_mpa!r}: must be > 0 "
-                "(a gel is typically 0.05 to 1 MPa)"
-            )
+            reason = "must be > 0 (a gel is typically 0.05 to 1 MPa)"
+            raise _refusal("youngs_modulus_mpa", self.youngs_modulus_mpa, reason)
         if not -1.0 < self.poissons_ratio < 0.5:
-            raise MaterialError(
-                f"poissons_ratio = {self.poissons_ratio!r}: must lie strictly between -1 and 0.5; "
+            reason = (
+                "must lie strictly between -1 and 0.5; "
                 "for a nearly incompressible gel use 0.49 to 0.4999"
             )
+            raise _refusal("poissons_ratio", self.poissons_ratio, reason)
         if self.density_kg_m3 <= 0.0:
-            raise MaterialError(f"density_kg_m3 = {self.density_kg_m3!r}: must be > 0")
+            raise _refusal("density_kg_m3", self.density_kg_m3, "must be > 0")
 
     @property
     def lame_lambda_mpa(self) -> float:
@@ -65,3 +65,7 @@ class Material:
     def constrained_modulus_mpa(self) -> float:
         """Modulus of uniaxial strain, M = λ + 2G."""
         return self.lame_lambda_mpa + 2.0 * self.shear_modulus_mpa
+
+
+def _refusal(name: str, value: Any, reason: str) -> MaterialError:
+    return MaterialError(f"{name} = {value!r}: {reason}", field=name, value=value)

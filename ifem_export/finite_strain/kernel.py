@@ -1,9 +1,9 @@
-"""Compiled neo-Hookean element forces. Import this module only where they run: it loads numba.
+"""Compiled neo-Hookean element forces. Import this module only where they run (numba).
 
-Cells are taken eight at a time with the cell as the innermost index, so that one vector
-instruction serves several of them. Local corners and Gauss points are numbered by bits,
-x + 2y + 4z. A cell's forces depend on no other cell and a node sums its cells in increasing
-order, so any split over threads gives the same bits.
+Eight cells are processed at a time, with the cell as the innermost index, so that one vector
+instruction serves several cells. Local corners and Gauss points are numbered by bits,
+x + 2y + 4z. The forces of a cell depend on no other cell, and a node sums its cells in increasing
+order, so any division among threads gives the same bits.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def element_forces(
     h = np.empty((9, 8, LANES))
     c = np.empty((9, 8, LANES))
     iso = np.empty((8, LANES))
-    rise = np.empty((8, LANES))
+    dilatation = np.empty((8, LANES))
     mean = np.empty(LANES)
     for first in range(start, stop, LANES):
         used = min(LANES, stop - first)
@@ -58,27 +58,27 @@ def element_forces(
                 for i in range(3):
                     u[i, corner, lane] = displacement[node, i]
         _gradients(u, cell_size, h)
-        _determinants(h, c, rise)
+        _determinants(h, c, dilatation)
         for lane in range(LANES):
             mean[lane] = 0.0
         for g in range(8):
             for lane in range(LANES):
-                mean[lane] += 0.125 * rise[g, lane]
+                mean[lane] += 0.125 * dilatation[g, lane]
         least = np.inf
         for g in range(8):
             for lane in range(LANES):
-                least = min(least, rise[g, lane])
-                if not floor < rise[g, lane] < np.inf:
+                least = min(least, dilatation[g, lane])
+                if not floor < dilatation[g, lane] < np.inf:
                     least = -np.inf
         if not least > floor:
             for lane in range(used):
                 for g in range(8):
-                    if not floor < rise[g, lane] < np.inf:
+                    if not floor < dilatation[g, lane] < np.inf:
                         return first + lane
-        _isochoric_factors(rise, iso)
+        _isochoric_factors(dilatation, iso)
         for lane in range(LANES):
             mean[lane] *= bulk
-        _stresses(h, c, rise, iso, mean, shear)
+        _stresses(h, c, dilatation, iso, mean, shear)
         _nodal(h, cell_size, weight, u)
         for lane in range(used):
             cell = first + lane
@@ -90,7 +90,7 @@ def element_forces(
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _gradients(u: Any, cell_size: Any, h: Any) -> None:
-    """Displacement gradients: edge differences along j, interpolated in the other two axes."""
+    """Displacement gradients: differences along the edges j, interpolated along the other axes."""
     for i in range(3):
         for j in range(3):
             along = 1 << j
@@ -122,8 +122,8 @@ def _gradients(u: Any, cell_size: Any, h: Any) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _determinants(h: Any, c: Any, rise: Any) -> None:
-    """Cofactors of F = 1 + H, and J - 1 without the cancellation of J - 1."""
+def _determinants(h: Any, c: Any, dilatation: Any) -> None:
+    """Cofactors of F = 1 + H, and J - 1 computed from H without cancellation."""
     for g in range(8):
         for lane in range(LANES):
             h0, h1, h2 = h[0, g, lane], h[1, g, lane], h[2, g, lane]
@@ -143,20 +143,20 @@ def _determinants(h: Any, c: Any, rise: Any) -> None:
             c[6, g, lane] = h1 * h5 - h2 * h4 - h2
             c[7, g, lane] = h2 * h3 - h0 * h5 - h5
             c[8, g, lane] = 1.0 + h0 + h4 + m8
-            rise[g, lane] = (h0 + h4 + h8) + (m0 + m4 + m8) + (h0 * m0 + h1 * m1 + h2 * m2)
+            dilatation[g, lane] = (h0 + h4 + h8) + (m0 + m4 + m8) + (h0 * m0 + h1 * m1 + h2 * m2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _isochoric_factors(rise: Any, iso: Any) -> None:
+def _isochoric_factors(dilatation: Any, iso: Any) -> None:
     """J^(-2/3)."""
     for g in range(8):
         for lane in range(LANES):
-            iso[g, lane] = (1.0 + rise[g, lane]) ** (-2.0 / 3.0)
+            iso[g, lane] = (1.0 + dilatation[g, lane]) ** (-2.0 / 3.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _stresses(h: Any, c: Any, rise: Any, iso: Any, pressure: Any, shear: float) -> None:
-    """First Piola-Kirchhoff stress in place of the displacement gradient."""
+def _stresses(h: Any, c: Any, dilatation: Any, iso: Any, pressure: Any, shear: float) -> None:
+    """Replace the displacement gradient by the first Piola-Kirchhoff stress."""
     for g in range(8):
         for lane in range(LANES):
             h0, h1, h2 = 1.0 + h[0, g, lane], h[1, g, lane], h[2, g, lane]
@@ -165,7 +165,7 @@ def _stresses(h: Any, c: Any, rise: Any, iso: Any, pressure: Any, shear: float) 
             trace = h0 * h0 + h1 * h1 + h2 * h2 + h3 * h3 + h4 * h4
             trace += h5 * h5 + h6 * h6 + h7 * h7 + h8 * h8
             a = shear * iso[g, lane]
-            b = pressure[lane] - a * trace / (3.0 * (1.0 + rise[g, lane]))
+            b = pressure[lane] - a * trace / (3.0 * (1.0 + dilatation[g, lane]))
             h[0, g, lane] = a * h0 + b * c[0, g, lane]
             h[1, g, lane] = a * h1 + b * c[1, g, lane]
             h[2, g, lane] = a * h2 + b * c[2, g, lane]
@@ -179,7 +179,7 @@ def _stresses(h: Any, c: Any, rise: Any, iso: Any, pressure: Any, shear: float) 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _nodal(h: Any, cell_size: Any, weight: float, f: Any) -> None:
-    """Corner forces from stresses: the transpose of `_gradients`."""
+    """Corner forces from stresses by the transpose of `_gradients`."""
     for i in range(3):
         for corner in range(8):
             for lane in range(LANES):

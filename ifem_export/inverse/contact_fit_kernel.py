@@ -1,4 +1,4 @@
-"""Compiled steps of a fit of contact forces. Import only where it runs: numba."""
+"""Compiled steps of a fit of contact forces. Import this module only where they run (numba)."""
 
 from __future__ import annotations
 
@@ -13,63 +13,66 @@ POWER_STEPS = 8
 
 
 @njit(**COMPILED)
-def largest(gram: Any) -> Any:
-    """Largest eigenvalue of `gram` (3n, 3n), from below, by power steps from a uniform push."""
+def largest_eigenvalue(gram: Any) -> Any:
+    """Largest eigenvalue of `gram` (3n, 3n), estimated from below by power iteration."""
     size = gram.shape[0]
-    x, found = np.empty(size), 0.0
+    x, estimate = np.empty(size), 0.0
     for k in range(size):
         x[k] = (0.3, 0.2, -1.0)[k % 3]
     for _ in range(POWER_STEPS):
         x /= math.sqrt(x @ x)
         y = gram @ x
-        found = max(found, x @ y)
+        estimate = max(estimate, x @ y)
         x = y
-    return found
+    return estimate
 
 
 @njit(**COMPILED)
 def project(force: Any, friction: Any) -> None:
-    """Move forces (3n,) to the nearest that push, F_z <= 0, and keep |F_xy| <= friction |F_z|."""
+    """Project forces (3n,) onto the friction cones F_z <= 0, |F_xy| <= friction |F_z|."""
     for k in range(0, len(force), 3):
-        push, side = -force[k + 2], math.hypot(force[k], force[k + 1])
+        normal, tangential = -force[k + 2], math.hypot(force[k], force[k + 1])
         if math.isinf(friction):
-            force[k + 2] = -max(push, 0.0)
+            force[k + 2] = -max(normal, 0.0)
             continue
-        if side <= friction * push:
+        if tangential <= friction * normal:
             continue
-        along = max((push + friction * side) / (1 + friction * friction), 0.0)
-        scale = friction * along / side if side > 0 else 0.0
+        nearest = max((normal + friction * tangential) / (1 + friction * friction), 0.0)
+        scale = friction * nearest / tangential if tangential > 0 else 0.0
         force[k] *= scale
         force[k + 1] *= scale
-        force[k + 2] = -along
+        force[k + 2] = -nearest
 
 
 @njit(**COMPILED)
 def descend(
     gram: Any, slope: Any, force: Any, friction: Any, step: Any, tolerance: Any, most: Any
 ) -> Any:
-    """Improve `force` (3n,) in place; returns the last step's size over the force's, and steps.
+    """Improve `force` (3n,) in place by accelerated projected gradients with restart.
 
-    Minimises slope·d + d·gram d / 2 for d from the start, on the cones, by accelerated projected
-    gradients with restart, at most `most` of them and until a change is within `tolerance`.
+    Minimises slope·d + d·gram d / 2 over the change d of the force, on the friction cones. It ends
+    after `most` steps, or when the relative change of a step is within `tolerance`.
+
+    Returns:
+        The relative change of the last step, and the number of steps.
     """
     start, ahead = force.copy(), force.copy()
-    pace, change, steps = 1.0, np.inf, 0
+    momentum, change, steps = 1.0, np.inf, 0
     while steps < most and change > tolerance:
         steps += 1
         moved = ahead - step * (slope + gram @ (ahead - start))
         project(moved, friction)
-        back = gone = size = 0.0
+        overshoot = change_square = size = 0.0
         for k in range(len(moved)):
             delta = moved[k] - force[k]
-            back += (ahead[k] - moved[k]) * delta
-            gone += delta * delta
+            overshoot += (ahead[k] - moved[k]) * delta
+            change_square += delta * delta
             size += moved[k] * moved[k]
-        if back > 0:
-            pace = 1.0
-        last, pace = pace, (1 + math.sqrt(1 + 4 * pace * pace)) / 2
-        change = math.sqrt(gone / size) if size > 0 else 0.0
+        if overshoot > 0:
+            momentum = 1.0
+        last, momentum = momentum, (1 + math.sqrt(1 + 4 * momentum * momentum)) / 2
+        change = math.sqrt(change_square / size) if size > 0 else 0.0
         for k in range(len(moved)):
-            ahead[k] = moved[k] + (last - 1) / pace * (moved[k] - force[k])
+            ahead[k] = moved[k] + (last - 1) / momentum * (moved[k] - force[k])
             force[k] = moved[k]
     return change, steps

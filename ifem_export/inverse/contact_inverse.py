@@ -1,14 +1,15 @@
-"""Surface forces from noisy motion: least squares on a contact mask, or a low-pass without one.
+"""Surface forces from noisy displacements.
 
-F = S u amplifies noise, the more the finer. Where the contact is known, forces vanish elsewhere,
-only push (no adhesion) and keep Coulomb's cone: `masked_force` fits the whole surface's motion
-with such forces. Where it is not, `smoothed_force` spreads each nodal force over its neighbours,
-which keeps the resultant exactly.
+The forces F = S u amplify noise, the more so the finer the mesh. Where the contact region is known,
+the forces vanish outside it, only push (no adhesion) and satisfy Coulomb's law of friction:
+`masked_force` fits the displacements of the whole surface with such forces. Where it is not known,
+`smoothing` spreads each nodal force over its neighbours, which keeps the resultant exactly.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,25 +18,30 @@ from scipy.linalg import eigvalsh_tridiagonal
 from scipy.spatial import cKDTree
 
 from ifem_export.errors import IfemError
-from ifem_export.operators.compliance_gram import ComplianceGram, gram_of
-from ifem_export.operators.surface_field import checked
+from ifem_export.operators.convolved_operator import ComplianceProducts
+from ifem_export.operators.pad_system import checked_field
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 LANCZOS_STEPS = 4
 MARGIN = 1.05
-"""Room above the estimated largest eigenvalue: Lanczos comes from below."""
-MOST_BY_GRAM = 200
-"""Nodes up to which products among them, (3n)², are quicker than the operator."""
-ROUND = 10.0
-"""Change of a round over that of a step at which the rounds end."""
+"""Factor on the estimated largest eigenvalue, because Lanczos estimates it from below."""
+MOST_BY_PRODUCTS = 200
+"""Number of nodes up to which the products among them, (3n)², are faster than the operator."""
+LAST_ROUND = 10.0
+"""The rounds end when the change of a round is this many times the tolerance or less."""
 
 
 @dataclass(frozen=True, eq=False)
 class MaskedForce:
-    """Forces (c, 3) in N, how much of the motion they explain, and steps taken.
+    """Result of a fit of contact forces.
 
-    `misfit` is |C F - u| / |u|; `change` the last step's size over the forces' own.
+    Attributes:
+        force_n: (c, 3) nodal forces.
+        misfit: |C F - u| / |u|, the share of the displacements that the forces do not explain.
+        change: Relative change of the forces in the last step.
+        steps: Steps taken.
+        converged: Whether `change` is within the tolerance.
     """
 
     force_n: Array
@@ -43,6 +49,68 @@ class MaskedForce:
     change: float
     steps: int
     converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Minimise |C F - u|² over the friction cones of the nodes in contact."""
+
+    operator: SurfaceOperator
+    displacement_mm: Array
+    in_contact: NDArray[np.bool_]
+    friction: float
+    most_steps: int
+    tolerance: float
+
+    def result(self, force: Array, residual: Array, change: float, steps: int) -> MaskedForce:
+        misfit = float(np.linalg.norm(residual) / np.linalg.norm(self.displacement_mm))
+        return MaskedForce(force, misfit, change, steps, change <= self.tolerance)
+
+    def by_operator(self, force: Array) -> MaskedForce:
+        """Accelerated projected gradients whose every step applies the compliance twice."""
+        operator, u = self.operator, self.displacement_mm
+        step = 1.0 / (MARGIN * _largest_eigenvalue(operator, self.in_contact))
+        ahead, momentum, change, steps = force, 1.0, np.inf, 0
+        while steps < self.most_steps and change > self.tolerance:
+            steps += 1
+            slope = operator.displacement(operator.displacement(ahead) - u)
+            moved = _projected(ahead - step * slope, self.in_contact, self.friction)
+            if float(np.vdot(ahead - moved, moved - force)) > 0:
+                momentum = 1.0
+            last, momentum = momentum, (1 + np.sqrt(1 + 4 * momentum * momentum)) / 2
+            change = _relative_change(moved, force)
+            ahead = moved + (last - 1) / momentum * (moved - force)
+            force = moved
+        return self.result(force, operator.displacement(force) - u, change, steps)
+
+    def by_products(self, products: ComplianceProducts, start: Array) -> MaskedForce:
+        """Rounds of steps on a quadratic upper bound of the misfit.
+
+        The bound touches the true misfit at the start of each round, so every round decreases it.
+        Only the slope at the start of a round needs the operator.
+        """
+        from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue
+
+        nodes = np.flatnonzero(self.in_contact)
+        gram = products.block(nodes)
+        step = 1.0 / (MARGIN * largest_eigenvalue(gram))
+        contact_force = np.ascontiguousarray(start[nodes]).reshape(-1)
+        force = np.zeros_like(start)
+        residual = self.operator.displacement(start) - self.displacement_mm
+        steps, change = 0, np.inf
+        while True:
+            before = contact_force.copy()
+            slope = self.operator.displacement(residual)[nodes].reshape(-1)
+            change, taken = descend(
+                gram, slope, contact_force, self.friction, step, self.tolerance,
+                self.most_steps - steps,
+            )  # fmt: skip
+            steps += taken
+            force[nodes] = contact_force.reshape(-1, 3)
+            residual = self.operator.displacement(force) - self.displacement_mm
+            small = _relative_change(contact_force, before) <= LAST_ROUND * self.tolerance
+            if steps >= self.most_steps or small or taken <= 1:
+                return self.result(force, residual, change, steps)
 
 
 def masked_force(
@@ -55,114 +123,63 @@ def masked_force(
     most_steps: int = 200,
     tolerance: float = 1e-3,
 ) -> MaskedForce:
-    """Forces on the masked nodes that fit the motion best in least squares.
+    """Fit forces on the nodes in contact to displacements of the whole surface, in least squares.
 
-    Minimises |C F - u|² over F = 0 off the mask, F_z <= 0 and |F_xy| <= friction · |F_z|, by
-    accelerated projected gradients with restart (Beck and Teboulle 2009; O'Donoghue and Candès
-    2015) from `start_n`, the last frame's forces.
+    Minimises |C F - u|² over F = 0 outside the contact, F_z <= 0 and |F_xy| <= friction · |F_z|,
+    by accelerated projected gradients with restart (Beck and Teboulle 2009; O'Donoghue and Candès
+    2015).
 
     Args:
-        operator: supplies C; `fft` is quick, the condensed ones are exact at the rim.
-        displacement_mm: (c, 3) measured motion of the surface nodes.
-        mask: (c,) bool, nodes in contact.
-        friction: Coulomb coefficient; inf leaves the tangential forces free.
-        start_n: (c, 3) or None.
-        most_steps: steps after which the best so far is returned with `converged` False.
-        tolerance: change of a step, relative to the forces, at which to stop.
+        operator: Supplies the compliance C. `fft` is fast; condensed operators are exact at the
+            rim.
+        displacement_mm: (c, 3) measured displacements of the surface nodes.
+        mask: (c,) bool, the nodes in contact.
+        friction: Coefficient of friction; inf leaves the tangential forces free.
+        start_n: (c, 3) initial forces, such as those of the last frame; None for zero.
+        most_steps: Number of steps after which the best forces so far are returned with
+            `converged` False.
+        tolerance: Relative change of the forces in a step at which the fit ends.
+
+    Returns:
+        The forces and how well they explain the displacements.
 
     Raises:
-        IfemError: shapes that do not fit, values that are not finite, a negative friction.
+        IfemError: Shapes do not fit, a value is not finite, or the friction is negative.
     """
-    u = checked(displacement_mm, len(np.asarray(mask)))
-    touched = np.asarray(mask, dtype=bool)
-    if touched.ndim != 1 or not friction >= 0:
-        raise IfemError(f"mask {touched.shape} must be one-dimensional, friction {friction} >= 0")
-    if not touched.any() or not u.any():
+    in_contact = np.asarray(mask, dtype=bool)
+    if in_contact.ndim != 1:
+        raise IfemError(f"mask {in_contact.shape}: must be one-dimensional", field="mask")
+    if not friction >= 0:
+        raise IfemError(f"friction {friction}: must be >= 0", field="friction", value=friction)
+    u = checked_field(displacement_mm, len(in_contact))
+    if not in_contact.any() or not u.any():
         return MaskedForce(np.zeros_like(u), 1.0 if u.any() else 0.0, 0.0, 0, True)
-    start = np.zeros_like(u) if start_n is None else checked(start_n, len(u))
-    start = _projected(start, touched, friction)
-    gram = gram_of(operator)
-    if gram is not None and touched.sum() <= MOST_BY_GRAM:
-        return _by_gram(operator, gram, u, touched, friction, start, most_steps, tolerance)
-    return _by_operator(operator, u, touched, friction, start, most_steps, tolerance)
-
-
-def _by_operator(
-    operator: SurfaceOperator,
-    u: Array,
-    touched: NDArray[np.bool_],
-    friction: float,
-    force: Array,
-    most_steps: int,
-    tolerance: float,
-) -> MaskedForce:
-    """Every step asks the operator twice."""
-    step = 1.0 / (MARGIN * _largest(operator, touched))
-    ahead, pace, change, steps = force, 1.0, np.inf, 0
-    while steps < most_steps and change > tolerance:
-        steps += 1
-        slope = operator.displacement(operator.displacement(ahead) - u)
-        moved = _projected(ahead - step * slope, touched, friction)
-        if float(np.vdot(ahead - moved, moved - force)) > 0:
-            pace = 1.0
-        last, pace = pace, (1 + np.sqrt(1 + 4 * pace * pace)) / 2
-        size = float(np.linalg.norm(moved))
-        change = float(np.linalg.norm(moved - force)) / size if size > 0 else 0.0
-        ahead = moved + (last - 1) / pace * (moved - force)
-        force = moved
-    misfit = float(np.linalg.norm(operator.displacement(force) - u) / np.linalg.norm(u))
-    return MaskedForce(force, misfit, change, steps, change <= tolerance)
-
-
-def _by_gram(
-    operator: SurfaceOperator,
-    gram: ComplianceGram,
-    u: Array,
-    touched: NDArray[np.bool_],
-    friction: float,
-    start: Array,
-    most_steps: int,
-    tolerance: float,
-) -> MaskedForce:
-    """The operator is asked for the slope at the start of each round; the steps of a round follow
-    a quadratic that lies above the true one and touches it there, so that every round descends."""
-    from ifem_export.inverse.contact_fit_kernel import descend, largest
-
-    nodes = np.flatnonzero(touched)
-    product = gram.block(nodes)
-    step = 1.0 / (MARGIN * largest(product))
-    found = np.ascontiguousarray(start[touched]).reshape(-1)
-    force, left = np.zeros_like(u), operator.displacement(start) - u
-    steps, change = 0, np.inf
-    while True:
-        before = found.copy()
-        slope = operator.displacement(left)[touched].reshape(-1)
-        change, taken = descend(
-            product, slope, found, friction, step, tolerance, most_steps - steps
-        )
-        steps += taken
-        force[touched] = found.reshape(-1, 3)
-        left = operator.displacement(force) - u
-        size = float(np.linalg.norm(found))
-        gone = float(np.linalg.norm(found - before)) / size if size > 0 else 0.0
-        if steps >= most_steps or gone <= ROUND * tolerance or taken <= 1:
-            break
-    misfit = float(np.linalg.norm(left) / np.linalg.norm(u))
-    return MaskedForce(force, misfit, change, steps, change <= tolerance)
+    start = np.zeros_like(u) if start_n is None else checked_field(start_n, len(u))
+    start = _projected(start, in_contact, friction)
+    fit = _Fit(operator, u, in_contact, friction, most_steps, tolerance)
+    products: Any = getattr(operator, "compliance_products", None)
+    if isinstance(products, ComplianceProducts) and in_contact.sum() <= MOST_BY_PRODUCTS:
+        return fit.by_products(products, start)
+    return fit.by_operator(start)
 
 
 def smoothing(points_mm: ArrayLike, width_mm: float) -> sparse.csr_array:
-    """Spreads a nodal force over its neighbours as a Gaussian of standard deviation `width_mm`.
+    """Matrix that spreads each nodal force over its neighbours with Gaussian weights.
 
     Args:
         points_mm: (c, 2) or (c, 3) surface nodes.
-        width_mm: > 0.
+        width_mm: Standard deviation of the Gaussian, > 0.
 
     Returns:
-        (c, c); columns sum to 1, so that the resultant is kept.
+        (c, c); its columns sum to 1, which keeps the resultant.
+
+    Raises:
+        IfemError: The width is not finite and positive.
     """
     if not (np.isfinite(width_mm) and width_mm > 0):
-        raise IfemError(f"smoothing width_mm = {width_mm!r}: must be > 0")
+        raise IfemError(
+            f"smoothing width_mm = {width_mm!r}: must be > 0", field="width_mm", value=width_mm
+        )
     points = np.asarray(points_mm, dtype=float)[:, :2]
     pairs = cKDTree(points).query_pairs(3 * width_mm, output_type="ndarray")
     rows = np.concatenate([pairs[:, 0], pairs[:, 1], np.arange(len(points))])
@@ -173,53 +190,50 @@ def smoothing(points_mm: ArrayLike, width_mm: float) -> sparse.csr_array:
     return sparse.csr_array(spread @ sparse.diags_array(1.0 / spread.sum(axis=0)))
 
 
-def smoothed_force(
-    operator: SurfaceOperator, displacement_mm: ArrayLike, spread: sparse.csr_array
-) -> Array:
-    """Forces (c, 3) in N, S u low-passed by `smoothing`; their sum is that of S u."""
-    return np.asarray(spread @ operator.force(displacement_mm))
-
-
-def _projected(force: Array, touched: NDArray[np.bool_], friction: float) -> Array:
-    """Nearest forces on the mask that push and keep the cone |F_xy| <= friction |F_z|."""
+def _projected(force: Array, in_contact: NDArray[np.bool_], friction: float) -> Array:
+    """Projection of the forces in contact onto the cones F_z <= 0, |F_xy| <= friction |F_z|."""
     kept = np.zeros_like(force)
-    pull, side = force[touched, 2], np.hypot(force[touched, 0], force[touched, 1])
-    push = -pull
+    normal = -force[in_contact, 2]
+    tangential = np.hypot(force[in_contact, 0], force[in_contact, 1])
     if np.isinf(friction):
-        kept[touched] = force[touched]
-        kept[touched, 2] = -np.maximum(push, 0.0)
+        kept[in_contact] = force[in_contact]
+        kept[in_contact, 2] = -np.maximum(normal, 0.0)
         return kept
-    inside = side <= friction * push
-    # Beyond the polar cone the nearest point is the tip, else one on the cone's surface.
-    along = np.where(
-        inside, push, np.maximum((push + friction * side) / (1 + friction * friction), 0.0)
-    )
-    scale = np.where(inside, 1.0, friction * along / np.where(side > 0, side, 1.0))
-    kept[touched, 0] = force[touched, 0] * scale
-    kept[touched, 1] = force[touched, 1] * scale
-    kept[touched, 2] = -np.where(inside, push, along)
+    inside = tangential <= friction * normal
+    # In the polar cone the nearest point is the apex, otherwise one on the surface of the cone.
+    nearest = np.maximum((normal + friction * tangential) / (1 + friction * friction), 0.0)
+    scale = np.where(inside, 1.0, friction * nearest / np.where(tangential > 0, tangential, 1.0))
+    kept[in_contact, 0] = force[in_contact, 0] * scale
+    kept[in_contact, 1] = force[in_contact, 1] * scale
+    kept[in_contact, 2] = -np.where(inside, normal, nearest)
     return kept
 
 
-def _largest(operator: SurfaceOperator, touched: NDArray[np.bool_]) -> float:
-    """Largest eigenvalue of P C C P, from below, by Lanczos steps from a uniform push.
+def _relative_change(force: Array, before: Array) -> float:
+    size = float(np.linalg.norm(force))
+    return float(np.linalg.norm(force - before)) / size if size > 0 else 0.0
 
-    Four tell as much as a dozen power steps: within 3 % on masks from two nodes to the whole pad.
+
+def _largest_eigenvalue(operator: SurfaceOperator, in_contact: NDArray[np.bool_]) -> float:
+    """Largest eigenvalue of P C C P, estimated from below by Lanczos steps from a uniform force.
+
+    Four steps are as accurate as a dozen power steps: within 3 % for contacts from two nodes to
+    the whole pad.
     """
-    x = np.zeros((len(touched), 3))
-    x[touched] = (0.3, 0.2, -1.0)
+    x = np.zeros((len(in_contact), 3))
+    x[in_contact] = (0.3, 0.2, -1.0)
     x /= np.linalg.norm(x)
     before, beta = np.zeros_like(x), 0.0
     diagonal: list[float] = []
-    beside: list[float] = []
+    off_diagonal: list[float] = []
     for _ in range(LANCZOS_STEPS):
         y = operator.displacement(operator.displacement(x))
-        y[~touched] = 0.0
+        y[~in_contact] = 0.0
         diagonal.append(float(np.vdot(x, y)))
         y -= diagonal[-1] * x + beta * before
         beta = float(np.linalg.norm(y))
         if beta <= 1e-12 * diagonal[0]:
             break
-        beside.append(beta)
+        off_diagonal.append(beta)
         before, x = x, y / beta
-    return float(eigvalsh_tridiagonal(diagonal, beside[: len(diagonal) - 1])[-1])
+    return float(eigvalsh_tridiagonal(diagonal, off_diagonal[: len(diagonal) - 1])[-1])

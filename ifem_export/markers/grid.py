@@ -1,4 +1,4 @@
-"""The lattice of dots on the gel: one source for the print, the mesh nodes and the tracker."""
+"""The lattice of marker dots on the gel, shared by print, mesh and force pipeline."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ifem_export.markers.anchors import choose_anchor_sites, fewest_contradictions
+from ifem_export.errors import MarkerGridError
+from ifem_export.markers.anchors import choose_anchor_sites
 
 Anchors = Literal["odd_sized", "omitted", "none"]
-"""How anchors show: a larger dot, a site without a dot, or no anchors."""
+"""How anchors are marked: by a larger dot, by a site without a dot, or no anchors."""
 REGULAR, ANCHOR_LARGE = 0, 1
 """Values of `MarkerGrid.kind`."""
 _RIM_POINTS = 32
@@ -21,29 +22,36 @@ _LATTICE_TOLERANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class MarkerGrid:
-    """Dots on a square lattice centred on the sensor frame's origin.
+    """Dots on a square lattice centred on the origin of the sensor frame.
 
-    x runs along the finger towards the tip and grows with the row, y runs across it and grows
-    with the column. Markers are in row-major order, and a marker's index is its id. Arrays are
-    read-only copies. Raises ValueError where arrays disagree in length, a marker is not on its
-    lattice site, a site is used twice, or dots would overlap.
+    x points along the finger to the tip and increases with the row, y points across it and
+    increases with the column. Markers are in row-major order, and the index of a marker is its
+    id. The arrays are read-only copies.
+
+    Attributes:
+        positions_mm: (m, 2) dot centres in the sensor frame.
+        row: (m,) lattice row, 0 at the smallest x.
+        column: (m,) lattice column, 0 at the smallest y.
+        diameter_mm: (m,) dot diameters.
+        kind: (m,) `REGULAR` or `ANCHOR_LARGE`.
+        pitch_mm: Distance of neighbouring rows and of neighbouring columns.
+        lattice_shape: (rows, columns) of the complete lattice, clipped dots included.
+        omitted: (k, 2) sites (row, column) left without a dot as anchors; clipped sites are not
+            listed.
+
+    Raises:
+        MarkerGridError: Arrays disagree in length, a marker is off its lattice site, a site is
+            used twice, or dots overlap.
     """
 
     positions_mm: NDArray[np.float64]
-    """(m, 2) dot centres in the sensor frame."""
     row: NDArray[np.int64]
-    """(m,) lattice row, 0 at the smallest x."""
     column: NDArray[np.int64]
-    """(m,) lattice column, 0 at the smallest y."""
     diameter_mm: NDArray[np.float64]
-    """(m,) dot diameters."""
     kind: NDArray[np.int64]
-    """(m,) `REGULAR` or `ANCHOR_LARGE`."""
     pitch_mm: float
     lattice_shape: tuple[int, int]
-    """(rows, columns) of the whole lattice, clipped dots included."""
     omitted: NDArray[np.int64]
-    """(k, 2) sites (row, column) left without a dot on purpose; clipped sites are not listed."""
 
     def __post_init__(self) -> None:
         shape = (int(self.lattice_shape[0]), int(self.lattice_shape[1]))
@@ -58,13 +66,15 @@ class MarkerGrid:
         _check_sites(self)
         gap = self.smallest_gap_mm
         if gap < -1e-9:
-            raise ValueError(
+            raise MarkerGridError(
                 f"marker dots overlap by {-gap:.4g} mm: the pitch is {self.pitch_mm:g} mm and the "
-                f"largest dot {self.diameter_mm.max():g} mm; use a larger pitch or smaller dots"
+                f"largest dot {self.diameter_mm.max():g} mm; use a larger pitch or smaller dots",
+                field="pitch_mm",
+                value=self.pitch_mm,
             )
 
     def __len__(self) -> int:
-        """Return the number of dots."""
+        """Number of dots."""
         return len(self.row)
 
     @property
@@ -82,19 +92,8 @@ class MarkerGrid:
         return ids
 
     @property
-    def anchor_margin(self) -> int:
-        """Contradictions met by the most plausible wrong shift, turn or mirror image.
-
-        2 or more: the lattice stays unambiguous when any one anchor is not seen. 1: only while
-        all are seen. 0: ambiguous (always so without anchors). See `marker_anchors`.
-        """
-        anchors = np.zeros(self.lattice_shape, dtype=bool)
-        anchors[tuple(self.anchor_sites.T)] = True
-        return fewest_contradictions((self.index_map >= 0) | anchors, anchors)
-
-    @property
     def smallest_gap_mm(self) -> float:
-        """Least distance between the rims of two neighbouring dots; inf without neighbours."""
+        """Smallest distance between the rims of two neighbouring dots; inf without neighbours."""
         size = np.full(self.lattice_shape, np.nan)
         size[self.row, self.column] = self.diameter_mm
         reach = [size[1:] + size[:-1], size[:, 1:] + size[:, :-1]]
@@ -109,25 +108,34 @@ class MarkerGrid:
         return float(gaps.min()) if len(gaps) else float("inf")
 
     def sites_mm(self, sites: ArrayLike) -> NDArray[np.float64]:
-        """Return the positions (k, 2) in the sensor frame of lattice sites (k, 2)."""
+        """Positions (k, 2) in the sensor frame of lattice sites (k, 2)."""
         return _lattice_mm(np.asarray(sites, dtype=np.int64), self.lattice_shape, self.pitch_mm)
 
     def clipped(self, contains: Callable[[NDArray[np.float64]], ArrayLike]) -> MarkerGrid:
-        """Return the grid without the dots that cross an outline.
+        """The grid without the dots that cross an outline.
 
-        `contains` takes points (n, 2) in mm and returns (n,) booleans; it is asked for 32 points
-        on each dot's rim and for its centre. Omitted sites whose missing dot would cross the
-        outline are dropped too, for there a missing dot tells nothing. Ids are renumbered;
-        lattice indices stay. Raises ValueError when no dot is left.
+        Ids are renumbered; lattice indices stay. Omitted sites whose missing dot would cross the
+        outline are dropped too, because no dot would be visible there anyway.
+
+        Args:
+            contains: Function from points (n, 2) in mm to (n,) booleans. It is called with 32
+                points on the rim of each dot and with its centre.
+
+        Returns:
+            The clipped grid.
+
+        Raises:
+            MarkerGridError: No dot is left.
         """
         keep = _rims_inside(self.positions_mm, self.diameter_mm, contains)
         if not keep.any():
-            raise ValueError(
+            raise MarkerGridError(
                 f"none of the {len(self)} markers lies inside the outline; "
-                "use a smaller marker pitch or dot, or a larger gel"
+                "use a smaller marker pitch or dot, or a larger gel",
+                field="outline",
             )
-        hole_mm = np.full(len(self.omitted), self.diameter_mm[keep].max())
-        known = _rims_inside(self.sites_mm(self.omitted), hole_mm, contains)
+        missing_mm = np.full(len(self.omitted), self.diameter_mm[keep].max())
+        known = _rims_inside(self.sites_mm(self.omitted), missing_mm, contains)
         return MarkerGrid(
             positions_mm=self.positions_mm[keep],
             row=self.row[keep],
@@ -148,12 +156,22 @@ def build_marker_grid(
     anchors: Anchors = "odd_sized",
     anchor_scale: float = 1.5,
 ) -> MarkerGrid:
-    """Return a full lattice centred on the origin, with anchors.
+    """Make a complete lattice centred on the origin, with anchors.
 
-    `rows` run along x, `columns` along y. Odd-sized anchors have `anchor_scale` times the
-    diameter. Raises ValueError for sizes that cannot be made (counts under 1, lengths not
-    positive or not finite, overlapping dots, a scale not above 1) and for anchors on a lattice
-    of fewer than 5 rows or columns.
+    Args:
+        rows: Number of rows along x.
+        columns: Number of columns along y.
+        pitch_mm: Distance of neighbouring rows and columns.
+        diameter_mm: Diameter of a regular dot.
+        anchors: "odd_sized" (larger dots), "omitted" (sites without a dot) or "none".
+        anchor_scale: Diameter of an odd-sized anchor divided by that of a regular dot, > 1.
+
+    Returns:
+        The grid.
+
+    Raises:
+        MarkerGridError: A count, a length or the scale is out of range, dots would overlap, or a
+            lattice with anchors has fewer than 5 rows or columns.
     """
     _check_request(rows, columns, pitch_mm, diameter_mm, anchors, anchor_scale)
     sites = np.argwhere(np.ones((rows, columns), dtype=bool))
@@ -161,8 +179,8 @@ def build_marker_grid(
     if anchors != "none":
         chosen[tuple(choose_anchor_sites(rows, columns).T)] = True
     large = chosen if anchors == "odd_sized" else np.zeros_like(chosen)
-    hole = chosen if anchors == "omitted" else np.zeros_like(chosen)
-    sites = sites[~hole.ravel()]
+    without_dot = chosen if anchors == "omitted" else np.zeros_like(chosen)
+    sites = sites[~without_dot.ravel()]
     kind = large[tuple(sites.T)].astype(np.int64)
     return MarkerGrid(
         positions_mm=_lattice_mm(sites, (rows, columns), pitch_mm),
@@ -172,7 +190,7 @@ def build_marker_grid(
         kind=kind,
         pitch_mm=pitch_mm,
         lattice_shape=(rows, columns),
-        omitted=np.argwhere(hole),
+        omitted=np.argwhere(without_dot),
     )
 
 
@@ -185,7 +203,9 @@ def _lattice_mm(
 def _frozen(values: ArrayLike, dtype: type) -> NDArray:
     array = np.array(values)
     if dtype is np.int64 and array.size and not np.array_equal(array, np.rint(array)):
-        raise ValueError("marker grid: lattice indices and kinds must be whole numbers")
+        raise MarkerGridError(
+            "marker grid: lattice indices and kinds must be whole numbers", field="kind"
+        )
     array = array.astype(dtype)
     array.setflags(write=False)
     return array
@@ -201,9 +221,10 @@ def _rims_inside(
     points = centres_mm[:, None, :] + diameter_mm[:, None, None] * disc
     inside = np.asarray(contains(points.reshape(-1, 2)), dtype=bool)
     if inside.shape != (points.shape[0] * points.shape[1],):
-        raise ValueError(
+        raise MarkerGridError(
             f"contains must return one boolean per point, got shape {inside.shape} "
-            f"for {points.shape[0] * points.shape[1]} points"
+            f"for {points.shape[0] * points.shape[1]} points",
+            field="contains",
         )
     return np.all(inside.reshape(points.shape[:2]), axis=1)
 
@@ -218,21 +239,35 @@ def _check_request(
 ) -> None:
     for name, count in (("rows", rows), ("columns", columns)):
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-            raise ValueError(f"marker {name} = {count!r}: must be a whole number, at least 1")
+            raise MarkerGridError(
+                f"marker {name} = {count!r}: must be a whole number, at least 1",
+                field=name,
+                value=count,
+            )
     for name, length in (("pitch_mm", pitch_mm), ("diameter_mm", diameter_mm)):
         if not (np.isfinite(length) and length > 0):
-            raise ValueError(f"marker {name} = {length!r}: must be a finite length > 0")
+            raise MarkerGridError(
+                f"marker {name} = {length!r}: must be a finite length > 0", field=name, value=length
+            )
     if anchors not in ("odd_sized", "omitted", "none"):
-        raise ValueError(f"marker anchors = {anchors!r}: must be 'odd_sized', 'omitted' or 'none'")
+        raise MarkerGridError(
+            f"marker anchors = {anchors!r}: must be 'odd_sized', 'omitted' or 'none'",
+            field="anchors",
+            value=anchors,
+        )
     if anchors == "odd_sized" and not (np.isfinite(anchor_scale) and anchor_scale > 1):
-        raise ValueError(
+        raise MarkerGridError(
             f"marker anchor_scale = {anchor_scale!r}: must be > 1, or the anchors look like the "
-            "other dots; 1.5 is usual"
+            "other dots; 1.5 is usual",
+            field="anchor_scale",
+            value=anchor_scale,
         )
     if diameter_mm > pitch_mm:
-        raise ValueError(
+        raise MarkerGridError(
             f"marker diameter_mm = {diameter_mm:g} exceeds pitch_mm = {pitch_mm:g}: the dots would "
-            "overlap; use a larger pitch or smaller dots"
+            "overlap; use a larger pitch or smaller dots",
+            field="diameter_mm",
+            value=diameter_mm,
         )
 
 
@@ -243,28 +278,40 @@ def _check_lengths(grid: MarkerGrid) -> None:
     )
     for name, shape in expected.items():
         if getattr(grid, name).shape != shape:
-            raise ValueError(
-                f"marker grid: {name} has shape {getattr(grid, name).shape}, expected {shape}"
+            raise MarkerGridError(
+                f"marker grid: {name} has shape {getattr(grid, name).shape}, expected {shape}",
+                field=name,
             )
     if grid.omitted.size == 0:
         empty = np.zeros((0, 2), dtype=np.int64)
         empty.setflags(write=False)
         object.__setattr__(grid, "omitted", empty)
     if grid.omitted.ndim != 2 or grid.omitted.shape[1] != 2:
-        raise ValueError(
-            f"marker grid: omitted has shape {grid.omitted.shape}, expected (k, 2) sites"
+        raise MarkerGridError(
+            f"marker grid: omitted has shape {grid.omitted.shape}, expected (k, 2) sites",
+            field="omitted",
         )
     if count == 0:
-        raise ValueError("marker grid: no markers; use a smaller pitch or a larger gel")
+        raise MarkerGridError(
+            "marker grid: no markers; use a smaller pitch or a larger gel", field="row"
+        )
 
 
 def _check_values(grid: MarkerGrid) -> None:
     if not (np.isfinite(grid.pitch_mm) and grid.pitch_mm > 0):
-        raise ValueError(f"marker grid: pitch_mm = {grid.pitch_mm}: must be a finite length > 0")
+        raise MarkerGridError(
+            f"marker grid: pitch_mm = {grid.pitch_mm}: must be a finite length > 0",
+            field="pitch_mm",
+            value=grid.pitch_mm,
+        )
     if not np.all(np.isfinite(grid.diameter_mm) & (grid.diameter_mm > 0)):
-        raise ValueError("marker grid: every diameter_mm must be a finite length > 0")
+        raise MarkerGridError(
+            "marker grid: every diameter_mm must be a finite length > 0", field="diameter_mm"
+        )
     if not np.isin(grid.kind, (REGULAR, ANCHOR_LARGE)).all():
-        raise ValueError("marker grid: kind must be 0 (regular) or 1 (large anchor)")
+        raise MarkerGridError(
+            "marker grid: kind must be 0 (regular) or 1 (large anchor)", field="kind"
+        )
 
 
 def _check_sites(grid: MarkerGrid) -> None:
@@ -272,15 +319,19 @@ def _check_sites(grid: MarkerGrid) -> None:
     dots = np.column_stack([grid.row, grid.column])
     sites = np.vstack([dots, grid.omitted])
     if (sites < 0).any() or (sites >= np.array([rows, columns])).any():
-        raise ValueError(f"marker grid: a site lies outside the {rows} x {columns} lattice")
+        raise MarkerGridError(
+            f"marker grid: a site lies outside the {rows} x {columns} lattice", field="omitted"
+        )
     flat = sites[:, 0] * columns + sites[:, 1]
     if len(np.unique(flat)) != len(flat):
-        raise ValueError("marker grid: a lattice site is used twice")
+        raise MarkerGridError("marker grid: a lattice site is used twice", field="row")
     if np.any(np.diff(flat[: len(dots)]) < 0):
-        raise ValueError("marker grid: markers must be in row-major order")
-    off_mm = np.abs(grid.positions_mm - grid.sites_mm(dots))
-    if not np.all(off_mm <= _LATTICE_TOLERANCE * grid.pitch_mm):
-        raise ValueError(
-            f"marker grid: a marker lies {off_mm.max():.4g} mm off its lattice site; "
-            "positions are (row, column) times the pitch, centred on the origin"
+        raise MarkerGridError("marker grid: markers must be in row-major order", field="row")
+    offset_mm = np.abs(grid.positions_mm - grid.sites_mm(dots))
+    if not np.all(offset_mm <= _LATTICE_TOLERANCE * grid.pitch_mm):
+        raise MarkerGridError(
+            f"marker grid: a marker lies {offset_mm.max():.4g} mm off its lattice site; "
+            "positions are (row, column) times the pitch, centred on the origin",
+            field="positions_mm",
+            value=float(offset_mm.max()),
         )

@@ -1,9 +1,9 @@
-"""Sparse operator that carries a displacement field from markers to surface nodes.
+"""Sparse interpolation of a displacement field from markers to surface nodes.
 
-The weights depend on positions at rest only, so they are computed once. A node inside a lattice
-cell with all four markers takes bilinear weights; any other node inside the markers' hull
-takes linear weights in its Delaunay triangle; a node outside takes the value of the nearest
-point of the hull. Rows sum to one, and linear fields come out exactly inside the hull.
+The weights depend only on the positions at rest, so they are computed once. A node inside a
+lattice cell with all four markers has bilinear weights. Any other node inside the convex hull of
+the markers has linear weights in its Delaunay triangle. A node outside takes the value of the
+nearest point of the hull. Rows sum to one, and linear fields are exact inside the hull.
 """
 
 from __future__ import annotations
@@ -16,26 +16,28 @@ from scipy import sparse
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ifem_export.errors import InterpolationError
+from ifem_export.mesh.alignment import points_in_plane
 
 _WEIGHT_FLOOR = 1e-12
 
 
 def marker_to_node(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> sparse.csr_array:
-    """Interpolation operator from markers to nodes.
+    """Matrix that interpolates from markers to nodes.
 
     Args:
         markers_mm: (k, 2) or (k, 3) marker positions at rest, k >= 3; only x and y are used.
-            Regular lattices with missing or extra markers and scattered markers both do.
+            The markers may form a lattice with missing or additional markers, or be scattered.
         nodes_mm: (n, 2) or (n, 3) node positions at rest; only x and y are used.
 
     Returns:
         (n, k) CSR, float64 and int32, sorted; rows sum to 1.
 
     Raises:
-        InterpolationError: wrong shape, values that are not finite, two markers in one place,
-            or markers all on one line.
+        InterpolationError: A shape is wrong, a value is not finite, two markers coincide, or all
+            markers lie on one line.
     """
-    markers, nodes = checked_markers(markers_mm), points_in_plane(nodes_mm, "nodes_mm")
+    markers = checked_markers(markers_mm)
+    nodes = points_in_plane(nodes_mm, "nodes_mm", InterpolationError)
     triangulation = _triangulate(markers)
     columns, weights = _in_lattice(markers, nodes)
     rest = np.flatnonzero(weights.sum(axis=1) == 0.0)
@@ -55,38 +57,35 @@ def marker_to_node(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> sparse.csr_arr
     return operator
 
 
-def points_in_plane(points_mm: ArrayLike, name: str) -> NDArray[np.float64]:
-    """x and y (n, 2) of finite points (n, 2) or (n, 3); raises InterpolationError for others."""
-    points = np.asarray(points_mm, dtype=float)
-    if points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
-        raise InterpolationError(f"{name} has shape {points.shape}: must be (k, 2) or (k, 3)")
-    if not np.isfinite(points).all():
-        raise InterpolationError(f"{name} holds a value that is not finite: check the positions")
-    return points[:, :2]
-
-
 def checked_markers(markers_mm: ArrayLike) -> NDArray[np.float64]:
-    """x and y (k, 2) of markers that carry a field.
+    """Coordinates x and y (k, 2) of markers that determine a field.
 
     Raises:
-        InterpolationError: fewer than 3, two in one place, all on one line, or not finite.
+        InterpolationError: There are fewer than 3 markers, two coincide, all lie on one line, or a
+            value is not finite.
     """
-    markers = points_in_plane(markers_mm, "markers_mm")
+    markers = points_in_plane(markers_mm, "markers_mm", InterpolationError)
     if len(markers) < 3:
         raise InterpolationError(
-            f"{len(markers)} markers: a displacement field needs at least 3, not on one line"
+            f"{len(markers)} markers: a displacement field needs at least 3, not on one line",
+            field="markers_mm",
+            value=len(markers),
         )
     extent = float(np.ptp(markers, axis=0).max())
     pairs = cKDTree(markers).query_pairs(1e-9 * extent)
     if pairs:
         a, b = min(pairs)
         raise InterpolationError(
-            f"markers {a} and {b} are at the same place ({markers[a][0]:g}, {markers[a][1]:g}) mm: "
-            "remove one"
+            f"markers {a} and {b} are at the same position "
+            f"({markers[a][0]:g}, {markers[a][1]:g}) mm: remove one",
+            field="markers_mm",
+            value=(a, b),
         )
     spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-9 * spread[0]:
-        raise InterpolationError("the markers lie on one line: a field needs a second row")
+        raise InterpolationError(
+            "the markers lie on one line: a field needs a second row", field="markers_mm"
+        )
     return markers
 
 
@@ -94,11 +93,13 @@ def _triangulate(markers: NDArray[np.float64]) -> Delaunay:
     try:
         return Delaunay(markers)
     except QhullError as error:
-        raise InterpolationError(f"the markers cannot be triangulated: {error}") from error
+        raise InterpolationError(
+            f"the markers cannot be triangulated: {error}", field="markers_mm"
+        ) from error
 
 
 def _lines(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Distinct coordinates, rounding apart, and each value's line."""
+    """Distinct coordinates up to rounding, and the index of the one that each value belongs to."""
     order = np.argsort(values, kind="stable")
     ordered = values[order]
     step = np.concatenate([[0], np.diff(ordered) > 1e-9 * np.ptp(values)]).astype(np.int64)
@@ -116,7 +117,7 @@ def _in_lattice(
     weights = np.zeros((len(nodes), 4))
     x_lines, i = _lines(markers[:, 0])
     y_lines, j = _lines(markers[:, 1])
-    # Scattered markers give a line each; the table is worth building for a lattice only.
+    # Each scattered marker has lines of its own; the table is useful for a lattice only.
     if len(x_lines) * len(y_lines) > 4 * len(markers):
         return columns, weights
     table = np.full((len(x_lines), len(y_lines)), -1, dtype=np.int64)
@@ -135,7 +136,7 @@ def _in_lattice(
 def _bracket(
     lines: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Interval of each value between sorted lines, its fraction there, and whether inside."""
+    """Interval of each value between sorted lines, its fraction there, and whether it is inside."""
     tolerance = 1e-9 * (lines[-1] - lines[0])
     cell = np.clip(np.searchsorted(lines, values, side="right") - 1, 0, len(lines) - 2)
     fraction = np.clip((values - lines[cell]) / (lines[cell + 1] - lines[cell]), 0.0, 1.0)
@@ -146,13 +147,13 @@ def _bracket(
 def _in_triangles(
     triangulation: Delaunay, nodes: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Barycentric weights (n, 4), the fourth unused; zero rows outside the hull."""
+    """Barycentric weights (n, 4), of which the fourth is not used; zero rows outside the hull."""
     columns = np.zeros((len(nodes), 4), dtype=np.int64)
     weights = np.zeros((len(nodes), 4))
     triangle = triangulation.find_simplex(nodes, tol=1e-9)
     a, b, c = (triangulation.points[triangulation.simplices[:, v]] for v in range(3))
     double_areas = _cross(b - a, c - a)
-    # Rounding can leave a flat triangle on a straight side of the hull: no weights from it.
+    # Rounding can produce a flat triangle on a straight side of the hull, which has no weights.
     flat = np.abs(double_areas) <= 1e-12 * np.ptp(triangulation.points, axis=0).prod()
     inside = np.flatnonzero((triangle >= 0) & ~flat[triangle])
     corners = triangulation.simplices[triangle[inside]]
@@ -171,7 +172,7 @@ def _cross(u: NDArray[Any], v: NDArray[Any]) -> NDArray[Any]:
 def _on_hull(
     triangulation: Delaunay, nodes: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Weights (n, 4) of the nearest point of the hull, the last two unused."""
+    """Weights (n, 4) of the nearest point of the hull; the last two are not used."""
     edges = triangulation.convex_hull.astype(np.int64)
     a, b = triangulation.points[edges[:, 0]], triangulation.points[edges[:, 1]]
     u = b - a

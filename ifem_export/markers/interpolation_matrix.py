@@ -1,16 +1,17 @@
 """Displacement of the surface nodes from that of the markers, some of which may be lost.
 
-Two interpolations share one interface. `sparse_interpolation` is bilinear in the lattice's cells:
-four weights a node, never more noise than a marker has, constant beyond the outermost markers.
-`thin_plate_interpolation` bends least: a dense matrix, closer to smooth fields, affine beyond.
+Two interpolations share one interface. `sparse_interpolation` is bilinear in the cells of the
+lattice: it has four weights per node, never amplifies the noise of the markers, and is constant
+beyond the outermost markers. `thin_plate_interpolation` is a dense matrix: it is more accurate for
+smooth fields, and affine beyond the outermost markers.
 
-A lost marker takes the value that makes the field least rough, with B the roughness (of the
-spline its bending energy; else the distance from locally fitted planes):
+A lost marker is given the value that minimises the roughness dᵀ B d of the field. For the spline,
+B is its bending energy; otherwise, the distance from locally fitted planes:
 
     B_RR d_R = -B_RK d_K     (R lost, K kept)
 
-For the spline that is the spline of the kept markers itself: the lost ones get no weight, as if
-they had never been there. Only B_RR is factored anew, so a frame may lose others than the last.
+For the spline the result is the spline through the kept markers. Only B_RR has to be factored
+again when other markers are lost.
 """
 
 from __future__ import annotations
@@ -21,21 +22,26 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, sparse
+from scipy.spatial import cKDTree
 
 from ifem_export.errors import InterpolationError
-from ifem_export.markers.interpolation import checked_markers, marker_to_node, points_in_plane
-from ifem_export.markers.roughness import local_roughness
+from ifem_export.markers.interpolation import checked_markers, marker_to_node
 from ifem_export.markers.thin_plate import thin_plate
+from ifem_export.mesh.alignment import points_in_plane
 
 Array = NDArray[np.float64]
 Operator: TypeAlias = Any
-"""(n, k) dense or CSR: what both take is @ and row selection."""
+"""(n, k) dense or CSR, which share the operator @ and the selection of rows."""
+NEIGHBOURS = 8
+"""Number of markers around an inner marker of a square lattice."""
+_TIE = 1.0 + 1e-6
+_FLAT = 1e-6
 _SINGULAR = 1e-12
 _ON_A_LINE = 1e-9
 
 
 class MarkerInterpolation(Protocol):
-    """Carries values from k markers to s surface nodes."""
+    """Interpolation of values from k markers to s surface nodes."""
 
     @property
     def n_markers(self) -> int:
@@ -47,21 +53,21 @@ class MarkerInterpolation(Protocol):
 
     @property
     def lost(self) -> NDArray[np.bool_]:
-        """(k,) markers whose values are not read."""
+        """(k,) bool, the markers whose values are not read."""
 
     def __call__(self, values: ArrayLike) -> Array:
-        """Values (s, m) at the nodes from (k, m) at the markers; rows of lost ones may be NaN.
+        """Values (s, m) at the nodes from (k, m) at the markers; lost markers may be NaN.
 
         Raises InterpolationError for a wrong shape or a kept value that is not finite.
         """
 
     def transposed(self, values: ArrayLike) -> Array:
-        """The transpose: (k, m) at the markers from (s, m) at the nodes; 0 at lost ones."""
+        """The transpose: (k, m) at the markers from (s, m) at the nodes, 0 at lost markers."""
 
     def with_missing(self, mask: ArrayLike) -> MarkerInterpolation:
-        """The same without the markers of (k,) bool `mask`, which replaces an earlier mask.
+        """The same without the markers in the (k,) bool `mask`, which replaces an earlier mask.
 
-        Raises InterpolationError where those kept carry no field.
+        Raises InterpolationError if the kept markers do not determine a field.
         """
 
 
@@ -84,14 +90,14 @@ class _Fill:
 
 @dataclass(frozen=True, eq=False)
 class FilledInterpolation:
-    """A matrix from markers to nodes, and a roughness that tells what lost markers would read.
+    """A matrix from markers to nodes, and a roughness that determines the values of lost markers.
 
-    Args:
+    Attributes:
         markers_mm: (k, 2) positions at rest.
         to_nodes: (s, k), dense or CSR; rows sum to 1.
         roughness: (k, k), dense or CSR; symmetric, positive semi-definite, zero on affine
             fields.
-        fill: made by `with_missing`.
+        fill: Values of the lost markers from those of the kept ones; made by `with_missing`.
     """
 
     markers_mm: Array
@@ -111,7 +117,7 @@ class FilledInterpolation:
 
     @property
     def lost(self) -> NDArray[np.bool_]:
-        """(k,) markers whose values are not read."""
+        """(k,) bool, the markers whose values are not read."""
         mask = np.zeros(self.n_markers, dtype=bool)
         if self.fill is not None:
             mask[self.fill.lost] = True
@@ -123,14 +129,18 @@ class FilledInterpolation:
         if d.ndim != 2 or len(d) != self.n_markers:
             raise InterpolationError(
                 f"marker values have shape {d.shape}: must be ({self.n_markers}, m), one row per "
-                "marker"
+                "marker",
+                field="values",
+                value=d.shape,
             )
         if self.fill is not None:
             d[self.fill.lost] = 0.0
         if not np.isfinite(d).all():
             first = int(np.flatnonzero(~np.isfinite(d).all(axis=1))[0])
             raise InterpolationError(
-                f"the value of marker {first} is not finite: name lost markers in with_missing"
+                f"the value of marker {first} is not finite: give lost markers to with_missing",
+                field="marker",
+                value=first,
             )
         if self.fill is not None:
             d[self.fill.lost] = self.fill(d)
@@ -150,7 +160,9 @@ class FilledInterpolation:
         if lost.shape != (self.n_markers,) or lost.dtype != np.bool_:
             raise InterpolationError(
                 f"the mask of lost markers has shape {lost.shape} and type {lost.dtype}: must be "
-                f"({self.n_markers},) bool"
+                f"({self.n_markers},) bool",
+                field="mask",
+                value=lost.shape,
             )
         where = np.flatnonzero(lost)
         if len(where) == 0:
@@ -162,20 +174,21 @@ class FilledInterpolation:
         return replace(self, fill=_Fill(where, rows, _factored(np.asarray(block))))
 
     def dense(self) -> Array:
-        """The effective matrix (s, k), zero in the columns of lost markers."""
+        """The effective matrix (s, k), with zero columns for lost markers."""
         found = self(np.where(self.lost[:, None], 0.0, np.eye(self.n_markers)))
         found[:, self.lost] = 0.0
         return found
 
     def noise_gain(self) -> Array:
-        """(s,) standard deviation at each node for independent unit noise on the markers."""
+        """Standard deviation (s,) at each node for independent unit noise on the markers."""
         return np.asarray(np.linalg.norm(self.dense(), axis=1))
 
 
 def sparse_interpolation(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> FilledInterpolation:
     """Interpolation by `marker_to_node`; arguments and errors as there."""
     operator = marker_to_node(markers_mm, nodes_mm)
-    return filled_sparse(points_in_plane(markers_mm, "markers_mm"), operator)
+    markers = points_in_plane(markers_mm, "markers_mm", InterpolationError)
+    return filled_sparse(markers, operator)
 
 
 def filled_sparse(markers_mm: Array, to_nodes: sparse.csr_array) -> FilledInterpolation:
@@ -191,13 +204,14 @@ def thin_plate_interpolation(
     Args:
         markers_mm: (k, 2) or (k, 3) positions at rest, 3 <= k <= 4000; only x and y are used.
         nodes_mm: (s, 2) or (s, 3).
-        smoothing_mm2: see `thin_plate`; 0 passes through every marker.
+        smoothing_mm2: See `thin_plate`; 0 passes through every marker.
 
     Raises:
-        InterpolationError: as `marker_to_node`, too many markers or a smoothing below 0.
+        InterpolationError: As `marker_to_node`; there are too many markers, or the smoothing is
+            negative.
     """
     markers = checked_markers(markers_mm)
-    nodes = points_in_plane(nodes_mm, "nodes_mm")
+    nodes = points_in_plane(nodes_mm, "nodes_mm", InterpolationError)
     spline = thin_plate(markers, nodes, smoothing_mm2)
     return FilledInterpolation(markers, spline.to_nodes, spline.bending)
 
@@ -206,17 +220,21 @@ def _require_field(kept: Array, markers: Array) -> None:
     if len(kept) < 3:
         raise InterpolationError(
             f"{len(kept)} of {len(markers)} markers are left: a displacement field needs at "
-            "least 3, not on one line"
+            "least 3, not on one line",
+            field="mask",
+            value=len(kept),
         )
     spread = np.linalg.eigvalsh(np.cov(kept.T))
     if spread[0] <= _ON_A_LINE**2 * spread[1]:
         raise InterpolationError(
-            f"the {len(kept)} markers left lie on one line: a field needs a second row"
+            f"the {len(kept)} markers left lie on one line: a field needs a second row",
+            field="mask",
+            value=len(kept),
         )
 
 
 def _factored(block: Array) -> tuple[Array, bool]:
-    """Cholesky factor of B_RR, refused where the kept markers leave a motion of others open."""
+    """Cholesky factor of B_RR. Raises InterpolationError if the kept markers do not suffice."""
     scale = 1.0 / np.sqrt(np.diag(block)) if (np.diag(block) > 0).all() else None
     try:
         if scale is None:
@@ -226,7 +244,46 @@ def _factored(block: Array) -> tuple[Array, bool]:
             raise linalg.LinAlgError
     except linalg.LinAlgError as error:
         raise InterpolationError(
-            f"the markers left say nothing about some of the {len(block)} lost ones: too many are "
-            "missing in one place"
+            f"the markers left do not determine some of the {len(block)} lost ones: too many are "
+            "missing in one region",
+            field="mask",
+            value=len(block),
         ) from error
     return factor, bool(lower)
+
+
+def local_roughness(markers_mm: NDArray[np.float64]) -> sparse.csr_array:
+    """Sum over the markers of the squared distance from the plane fitted to their neighbours.
+
+    The neighbours of a marker are the eight nearest and all others at the distance of the eighth,
+    so that a lattice is treated symmetrically.
+
+    Args:
+        markers_mm: (k, 2) distinct positions, k >= 3.
+
+    Returns:
+        (k, k) CSR B, symmetric and positive semi-definite: roughness = dᵀ B d. It is zero on
+        affine fields, and only on those if the neighbourhoods overlap.
+    """
+    count = len(markers_mm)
+    tree = cKDTree(markers_mm)
+    nearest = min(NEIGHBOURS + 1, count)
+    reach = tree.query(markers_mm, k=nearest)[0][:, -1]
+    around = tree.query_ball_point(markers_mm, reach * _TIE, return_sorted=True)
+    rows, columns, values = [], [], []
+    for marker, near in enumerate(around):
+        offsets = (markers_mm[near] - markers_mm[marker]) / reach[marker]
+        u, size, _ = np.linalg.svd(np.column_stack([np.ones(len(near)), offsets]), False)
+        u = u[:, size > _FLAT * size[0]]
+        residual = -u @ u[near.index(marker)]
+        residual[near.index(marker)] += 1.0
+        rows.append(np.full(len(near), marker))
+        columns.append(near)
+        values.append(residual)
+    residuals = sparse.csr_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(count, count),
+    )
+    form = sparse.csr_array(residuals.T @ residuals)
+    form.sort_indices()
+    return form

@@ -1,31 +1,37 @@
-"""Phase of a lattice that puts given points (markers) on its nodes."""
+"""Shift of a lattice that puts given points (markers) on its nodes."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ifem_export.errors import MeshError
+from ifem_export.errors import IfemError, MeshError
 
 
-def points_xy(points_mm: ArrayLike) -> NDArray[np.float64]:
-    """The points' x and y, (k, 2).
+def points_in_plane(
+    points_mm: ArrayLike, name: str, error: type[IfemError] = MeshError
+) -> NDArray[np.float64]:
+    """Coordinates x and y (k, 2) of points (k, 2) or (k, 3).
 
-    Raises:
-        MeshError: wrong shape or a value that is not finite.
+    Args:
+        points_mm: The points.
+        name: Their name in messages.
+        error: Class of the error for a wrong shape or a value that is not finite.
     """
     points = np.asarray(points_mm, dtype=float)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
-        raise MeshError(f"points_mm has shape {points.shape}: must be (k, 2) or (k, 3), k >= 1")
+        raise error(
+            f"{name} has shape {points.shape}: must be (k, 2) or (k, 3), k >= 1", field=name
+        )
     if not np.isfinite(points).all():
-        raise MeshError("points_mm holds a value that is not finite: check the markers")
+        raise error(f"{name} holds a value that is not finite: check the positions", field=name)
     return points[:, :2]
 
 
-def shift_to(
+def aligned_start(
     points: NDArray[np.float64], start: NDArray[np.float64], pitch: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], int, float]:
-    """Shift a lattice, along each axis on its own, so that most points fall on its lines.
+    """Shift a lattice along each axis separately so that most points fall on its lines.
 
     Args:
         points: (k, 2) in mm.
@@ -33,8 +39,8 @@ def shift_to(
         pitch: (hx, hy) in mm.
 
     Returns:
-        The shifted start, the number of points on nodes, and the largest distance of a point
-        from the nearest line along an axis in mm.
+        The shifted start (2,) in mm, the number of points on nodes, and the largest distance in
+        mm of a point from the nearest lattice line along an axis.
     """
     shifted = start.copy()
     for axis in (0, 1):
@@ -43,7 +49,7 @@ def shift_to(
         gap = offset[None, :] - offset[:, None]
         gap = np.abs(gap - np.rint(gap)) * pitch[axis]
         on_line = ((gap < 1e-6) * weights).sum(axis=1)
-        # Most points on lines; then the smallest worst distance; then the smallest shift.
+        # Prefer most points on lines, then the smallest largest distance, then the smallest shift.
         shift = offset - np.rint(offset)
         best = np.lexsort((np.abs(shift), gap.max(axis=1).round(9), -on_line))[0]
         shifted[axis] += shift[best] * pitch[axis]
@@ -52,22 +58,24 @@ def shift_to(
     return shifted, int((distance.max(axis=1) < 1e-6).sum()), float(distance.max())
 
 
-def misaligned(
+def misalignment(
     points: NDArray[np.float64],
     pitch: NDArray[np.float64],
     error: float,
     aligned: int,
     tolerance: float,
-) -> str:
-    """Refusal that names the nearest pitch that divides the markers' own spacing."""
+) -> MeshError:
+    """The error for points off the lattice, with the nearest pitch that divides their spacing."""
     fitting = []
     for axis in (0, 1):
         gaps = np.diff(np.unique(np.round(points[:, axis], 9)))
         spacing = float(gaps.min()) if len(gaps) else float(pitch[axis])
         fitting.append(spacing / max(1, round(spacing / pitch[axis])))
-    return (
-        f"{len(points) - aligned} of {len(points)} points to align with miss the lattice of "
+    return MeshError(
+        f"{len(points) - aligned} of {len(points)} alignment points lie off the lattice of "
         f"pitch {pitch[0]:g} x {pitch[1]:g} mm by up to {error:.4g} mm, "
         f"the limit is {tolerance:g} mm: use a pitch that divides the marker spacing, "
-        f"such as {fitting[0]:.6g} x {fitting[1]:.6g} mm"
+        f"such as {fitting[0]:.6g} x {fitting[1]:.6g} mm",
+        field="pitch_mm",
+        value=(fitting[0], fitting[1]),
     )

@@ -1,13 +1,14 @@
 """Numbering of nodes and cells on a cropped uniform lattice.
 
-An occupancy `(nx, ny, nz)` says which cells of a box lattice exist. Nodes are the corners of
-existing cells, numbered with x fastest and z slowest; cells likewise. The bonded lower face
-therefore comes first and the outer surface of a flat pad last, and the neighbours of a node
-have increasing numbers in slot order, which is what keeps the assembled rows sorted.
+An occupancy (nx, ny, nz) tells which cells of a box lattice exist. Nodes are the corners of
+existing cells and are numbered with x fastest and z slowest, as are the cells. Therefore the
+bonded lower face comes first and the outer surface of a flat pad last, and the neighbours of a
+node have increasing numbers, which keeps the assembled rows sorted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,12 @@ _INT32_MAX = np.iinfo(np.int32).max
 class Numbering:
     """Node numbers of a cropped lattice.
 
-    Args:
-        shape: nodes of the box lattice along (z, y, x).
+    Attributes:
+        shape: Nodes of the box lattice along (z, y, x).
         masks: (n,) uint8, which of a node's eight cells exist; bit 4(k+1)+2(j+1)+(i+1) is the
             cell at offset (i, j, k), each -1 or 0.
         positions: (n,) flat index of each node in the lattice.
-        node_index: flat (lattice nodes,) int32, the node's number or -1.
+        node_index: Flat (lattice nodes,) int32, the node's number or -1.
     """
 
     shape: tuple[int, int, int]
@@ -67,12 +68,13 @@ def number_nodes(occupancy: NDArray[np.bool_]) -> Numbering:
         occupancy: (nx, ny, nz) bool.
 
     Raises:
-        MeshError: no cell exists, or there are more nodes than a 32-bit index can count.
+        MeshError: No cell exists, or a 32-bit index cannot count the nodes.
     """
     if occupancy.ndim != 3 or occupancy.dtype != np.bool_:
         raise MeshError(
             f"occupancy has shape {occupancy.shape} and type {occupancy.dtype}: "
-            "must be a bool array (nx, ny, nz)"
+            "must be a bool array (nx, ny, nz)",
+            field="occupancy",
         )
     cells = zyx(occupancy).view(np.uint8)
     nz, ny, nx = cells.shape
@@ -87,10 +89,24 @@ def number_nodes(occupancy: NDArray[np.bool_]) -> Numbering:
     flat = masks.reshape(-1)
     positions = np.flatnonzero(flat)
     if len(positions) == 0:
-        raise MeshError("no cell is inside the outline: use a finer pitch or a larger outline")
+        raise MeshError(
+            "no cell is inside the outline: use a finer pitch or a larger outline",
+            field="occupancy",
+        )
     node_index = np.full(flat.shape, -1, dtype=np.int32)
     node_index[positions] = np.arange(len(positions), dtype=np.int32)
     return Numbering(shape, flat[positions], positions, node_index)
+
+
+def checked_cell_size(cell_size_mm: Sequence[float]) -> NDArray[np.float64]:
+    """The cell size (3,) in mm. Raises MeshError unless it is three finite numbers > 0."""
+    size = np.asarray(cell_size_mm, dtype=float)
+    if size.shape != (3,) or not np.isfinite(size).all() or (size <= 0.0).any():
+        raise MeshError(
+            f"cell_size_mm = {cell_size_mm}: must be three finite numbers > 0",
+            field="cell_size_mm",
+        )
+    return size
 
 
 def node_coordinates(
@@ -112,7 +128,7 @@ def hexahedra(occupancy: NDArray[np.bool_], numbering: Numbering) -> NDArray[np.
 
 @dataclass(frozen=True, eq=False)
 class NodeSets:
-    """Sorted int32 node numbers: `bonded` to the acrylic, outer `surface`, lateral `sides`."""
+    """Sorted int32 node numbers of the three faces; see `node_sets`."""
 
     bonded: NDArray[np.int32]
     surface: NDArray[np.int32]
@@ -123,46 +139,46 @@ def node_sets(occupancy: NDArray[np.bool_], numbering: Numbering) -> NodeSets:
     """Node sets by exposed faces.
 
     `bonded` holds the nodes of faces on the lowest lattice plane, `surface` those of upward
-    faces with no cell above, `sides` those of lateral faces with no neighbour. Nodes on a rim
-    belong to both sets that meet there.
+    faces with no cell above, and `sides` those of lateral faces with no neighbour. Nodes on a
+    rim belong to both sets that meet there.
     """
     cells = zyx(occupancy)
-    exposed = {
+    faces_of = {
         "bonded": [(0, 0)],
         "surface": [(0, 1)],
         "sides": [(1, 0), (1, 1), (2, 0), (2, 1)],
     }
     found = {}
-    for name, faces in exposed.items():
+    for name, faces in faces_of.items():
         on_set = np.zeros(numbering.shape, dtype=bool)
         for axis, end in faces:
-            bare = _bare_faces(cells, axis, end)
+            exposed_cells = _cells_with_exposed_face(cells, axis, end)
             if name == "bonded":
-                bare[1:] = False
-            _mark_face_nodes(on_set, bare, axis, end)
+                exposed_cells[1:] = False
+            _mark_face_nodes(on_set, exposed_cells, axis, end)
         found[name] = numbering.node_index[np.flatnonzero(on_set.reshape(-1))]
     return NodeSets(**found)
 
 
-def _bare_faces(cells: NDArray[np.bool_], axis: int, end: int) -> NDArray[np.bool_]:
+def _cells_with_exposed_face(cells: NDArray[np.bool_], axis: int, end: int) -> NDArray[np.bool_]:
     """Cells whose neighbour along `axis` towards `end` (0 low, 1 high) is absent."""
-    bare = cells.copy()
+    exposed_cells = cells.copy()
     here = [slice(None)] * 3
     there = [slice(None)] * 3
     here[axis], there[axis] = (slice(None, -1), slice(1, None))
     if end == 0:
         here, there = there, here
-    bare[tuple(here)] &= ~cells[tuple(there)]
-    return bare
+    exposed_cells[tuple(here)] &= ~cells[tuple(there)]
+    return exposed_cells
 
 
 def _mark_face_nodes(
-    on_set: NDArray[np.bool_], bare: NDArray[np.bool_], axis: int, end: int
+    on_set: NDArray[np.bool_], exposed_cells: NDArray[np.bool_], axis: int, end: int
 ) -> None:
     across = [a for a in range(3) if a != axis]
     for p in (0, 1):
         for q in (0, 1):
             window = [slice(None)] * 3
             for a, shift in ((axis, end), (across[0], p), (across[1], q)):
-                window[a] = slice(shift, shift + bare.shape[a])
-            on_set[tuple(window)] |= bare
+                window[a] = slice(shift, shift + exposed_cells.shape[a])
+            on_set[tuple(window)] |= exposed_cells

@@ -1,12 +1,11 @@
 """Uniform Hex-8 mesh of the gel pad, cropped to its outline.
 
-As in the GelSlim 2.0 paper: mesh a box a little larger than the gel with equal elements, then
-crop to the gel by the cell-centre rule. z runs from -thickness (bonded to the acrylic) to 0
-(outer surface).
+As in the GelSlim 2.0 paper, a box slightly larger than the gel is meshed with equal elements and
+then cropped to the gel. z runs from -thickness (bonded to the acrylic) to 0 (outer surface).
 
 The paper prints "1964 elements with 3698 nodes" for its one-layer mesh. 3698 nodes are two
-layers of 1849 = 43 x 43, and 43 x 43 nodes bound 42 x 42 = 1764 elements: a one-layer patch
-has fewer elements than nodes per layer, so 1964 is a misprint of 1764.
+layers of 1849 = 43 x 43, and 43 x 43 nodes bound 42 x 42 = 1764 elements. A one-layer mesh has
+fewer elements than nodes per layer, so 1964 is a misprint of 1764.
 """
 
 from __future__ import annotations
@@ -21,13 +20,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import MeshError
-from ifem_export.mesh.alignment import misaligned, points_xy, shift_to
-from ifem_export.mesh.cell_fill import DEFAULT_FLOOR, Weighting, filled_cells
-from ifem_export.mesh.crop import CropReport, keep_bonded_part
-from ifem_export.mesh.crown import Crown
-from ifem_export.mesh.crowned_surface import crown_levels, require_thick, surface_of
+from ifem_export.mesh.alignment import aligned_start, misalignment, points_in_plane
+from ifem_export.mesh.crop import (
+    DEFAULT_FLOOR,
+    CropReport,
+    Weighting,
+    filled_cells,
+    keep_bonded_part,
+)
+from ifem_export.mesh.crown import Crown, crown_levels, require_thick, surface_of
 from ifem_export.mesh.lattice import (
     Numbering,
+    checked_cell_size,
     hexahedra,
     node_coordinates,
     node_sets,
@@ -43,19 +47,18 @@ _ARRAYS = ("nodes_mm", "hexes", "bonded", "surface", "sides", "occupancy", "fill
 class PadMesh:
     """Cropped uniform mesh of 8-node hexahedra; its arrays are read-only.
 
-    Args:
+    Attributes:
         nodes_mm: (n, 3) node coordinates.
         hexes: (m, 8) int32 corner nodes in VTK_HEXAHEDRON order.
         bonded: int32 nodes fixed to the acrylic (lowest face).
         surface: int32 nodes of the outer surface.
         sides: int32 nodes of the lateral faces, rims included.
         cell_size_mm: (hx, hy, hz).
-        origin_mm: lowest corner of the lattice box.
+        origin_mm: (x, y, z) of the lowest corner of the lattice box.
         occupancy: (nx, ny, nz) bool, the cells of the lattice box that exist.
-        fill: (nx, ny, nz) by which each cell's stiffness is scaled, or None where all count
-            fully.
-        surface_shift: (s,) how far the outer surface of a crowned pad lies above its nodes, in
-            cells, from -1/2 to 1/2 (see `crowned_surface`); None for a flat one.
+        fill: (nx, ny, nz) factor that scales each cell's stiffness; None where all are full.
+        surface_shift: (s,) height of a crowned outer surface above its nodes in cells, from -1/2
+            to 1/2 (see `ifem_export.mesh.crown`); None for a flat surface.
     """
 
     nodes_mm: NDArray[np.float64]
@@ -85,23 +88,23 @@ class PadMesh:
         origin_mm: Sequence[float],
         fill: NDArray[np.float64] | None = None,
     ) -> PadMesh:
-        """Mesh of every existing cell, connected or not; flat.
+        """Flat mesh of all existing cells, connected or not.
 
         Args:
             occupancy: (nx, ny, nz) bool.
             cell_size_mm: (hx, hy, hz), > 0.
-            origin_mm: lowest corner of the lattice box.
-            fill: (nx, ny, nz) scale of each cell's stiffness, > 0 where it exists.
+            origin_mm: (x, y, z) of the lowest corner of the lattice box.
+            fill: (nx, ny, nz) factor of each cell's stiffness, > 0 where the cell exists.
 
         Raises:
-            MeshError: a size is not positive and finite, or no cell exists.
+            MeshError: A size is not positive and finite, or no cell exists.
         """
-        size = np.array(cell_size_mm, dtype=float)
+        size = checked_cell_size(cell_size_mm)
         origin = np.array(origin_mm, dtype=float)
-        if size.shape != (3,) or not np.isfinite(size).all() or (size <= 0.0).any():
-            raise MeshError(f"cell_size_mm = {tuple(cell_size_mm)}: must be three numbers > 0")
         if origin.shape != (3,) or not np.isfinite(origin).all():
-            raise MeshError(f"origin_mm = {tuple(origin_mm)}: must be three finite numbers")
+            raise MeshError(
+                f"origin_mm = {tuple(origin_mm)}: must be three finite numbers", field="origin_mm"
+            )
         numbering = number_nodes(occupancy)
         sets = node_sets(occupancy, numbering)
         return cls(
@@ -119,8 +122,12 @@ class PadMesh:
     def crowned(self, levels: NDArray[np.float64] | None) -> PadMesh:
         """The same cells with one surface node per column.
 
-        `levels` (ny + 1, nx + 1) is the height of the outer surface in layers; None puts it on
-        the highest nodes. Raises MeshError where a column has a gap.
+        Args:
+            levels: (ny + 1, nx + 1) height of the outer surface in layers; None puts it on the
+                highest nodes.
+
+        Raises:
+            MeshError: A column has a gap.
         """
         surface, shift = surface_of(np.asarray(self.occupancy), self.numbering, levels)
         return replace(self, surface=surface, surface_shift=shift)
@@ -137,7 +144,7 @@ class PadMesh:
 
     @property
     def surface_mm(self) -> NDArray[np.float64]:
-        """Points (s, 3) of the outer surface over its nodes."""
+        """Points (s, 3) of the outer surface at its nodes."""
         points = np.array(self.nodes_mm[self.surface])
         if self.surface_shift is not None:
             points[:, 2] += self.surface_shift * self.cell_size_mm[2]
@@ -157,7 +164,7 @@ class PadMesh:
 
     @cached_property
     def numbering(self) -> Numbering:
-        """Node numbers of the lattice, rebuilt from the occupancy."""
+        """Node numbers of the lattice, computed from the occupancy."""
         return number_nodes(np.asarray(self.occupancy))
 
 
@@ -177,27 +184,34 @@ def build_pad_mesh(
     """Mesh the gel inside `outline`, from z = -thickness (bonded) to z = 0 (surface).
 
     Args:
-        outline: the gel seen from above.
-        thickness_mm: gel thickness, > 0; of a crowned gel at its apex.
-        cells: (nx, ny, nz) cells across the outline's bounding box and through the thickness.
-        pitch_mm: or the cell size, one number or (hx, hy); the lattice is centred on the
-            outline. Exactly one of `cells` and `pitch_mm` is given.
-        layers: layers through the thickness when `pitch_mm` is given.
-        align_to_mm: (k, 2) or (k, 3) points (markers) that must fall on surface nodes; the
+        outline: The gel seen from above.
+        thickness_mm: Thickness of the gel, > 0; of a crowned gel at its apex.
+        cells: (nx, ny, nz) cells along the sides of the outline's bounding box and through the
+            thickness. Exactly one of `cells` and `pitch_mm` is given.
+        pitch_mm: Cell size, one number or (hx, hy); the lattice is centred on the outline.
+        layers: Layers through the thickness if `pitch_mm` is given.
+        align_to_mm: (k, 2) or (k, 3) points (markers) that must coincide with surface nodes; the
             lattice is shifted so that as many as possible do.
-        alignment_tolerance_mm: how far from a lattice line such a point may stay; None only
-            reports the distance.
-        crown: the outer surface of a domed gel; None is flat at z = 0.
-        weighting: what becomes of cells that outline or crown cuts: "cell_centre" keeps or
-            drops them whole, "volume_fraction" scales them.
-        floor: filled fraction under which "volume_fraction" drops a cell.
+        alignment_tolerance_mm: Largest distance of such a point from a lattice line; None accepts
+            every distance and only reports it.
+        crown: Outer surface of a crowned gel; None for a flat one at z = 0.
+        weighting: Treatment of cells that the outline or the crown cuts: "cell_centre" keeps or
+            drops them as a whole, "volume_fraction" scales their stiffness.
+        floor: Filled fraction below which "volume_fraction" drops a cell.
+
+    Returns:
+        The mesh, and the report of what the cropping did.
 
     Raises:
-        MeshError: bad sizes, too many cells, nothing inside the outline, or points that no
-            shift of the lattice can reach.
+        MeshError: A size is out of range, the lattice has too many cells, no cell is inside the
+            outline, or no shift of the lattice reaches the points.
     """
     if not math.isfinite(thickness_mm) or thickness_mm <= 0.0:
-        raise MeshError(f"thickness_mm = {thickness_mm!r}: must be a finite number > 0")
+        raise MeshError(
+            f"thickness_mm = {thickness_mm!r}: must be a finite number > 0",
+            field="thickness_mm",
+            value=thickness_mm,
+        )
     x_min, y_min, x_max, y_max = outline.bounds_mm
     extent = np.array([x_max - x_min, y_max - y_min])
     pitch, n_across, n_layers = _lattice_pitch(extent, cells, pitch_mm, layers)
@@ -205,11 +219,11 @@ def build_pad_mesh(
     start = centre - n_across * pitch / 2.0
     aligned, error = 0, 0.0
     if align_to_mm is not None:
-        points = points_xy(align_to_mm)
-        start, aligned, error = shift_to(points, start, pitch)
+        points = points_in_plane(align_to_mm, "align_to_mm")
+        start, aligned, error = aligned_start(points, start, pitch)
         if alignment_tolerance_mm is not None and error > alignment_tolerance_mm:
-            raise MeshError(misaligned(points, pitch, error, aligned, alignment_tolerance_mm))
-    # One spare cell on each side: the box is a little larger than the gel however it is shifted.
+            raise misalignment(points, pitch, error, aligned, alignment_tolerance_mm)
+    # With one spare cell on each side the box contains the gel, however the lattice is shifted.
     low = np.floor((np.array([x_min, y_min]) - start) / pitch).astype(int) - 1
     high = np.ceil((np.array([x_max, y_max]) - start) / pitch).astype(int) + 1
     _check_count(high - low, n_layers)
@@ -219,10 +233,13 @@ def build_pad_mesh(
     z = np.asarray(np.arange(-n_layers, 1) * hz, dtype=np.float64)
     occupancy, fill = filled_cells(outline, crown, (x, y, z), weighting, floor)
     if not occupancy.any():
-        empty = "centre of" if weighting == "cell_centre" else f"filled by {floor:g} or more in"
+        by_centre = weighting == "cell_centre"
+        lacking = "has its centre" if by_centre else f"is filled by {floor:g} or more"
         raise MeshError(
-            f"no cell {empty} a {pitch[0]:g} x {pitch[1]:g} mm lattice is inside the outline: "
-            "use a finer pitch"
+            f"no cell of the {pitch[0]:g} x {pitch[1]:g} mm lattice {lacking} inside the outline: "
+            "use a finer pitch",
+            field="pitch_mm",
+            value=(float(pitch[0]), float(pitch[1])),
         )
     kept, dropped = keep_bonded_part(occupancy)
     window, first = _trim(kept)
@@ -247,9 +264,10 @@ def build_pad_mesh(
     if crown is None:
         return mesh, report
     require_thick(outline, crown, thickness_mm, n_layers, (x, y))
-    on_steps = weighting == "cell_centre"
+    if weighting == "cell_centre":
+        return mesh.crowned(None), report
     levels = crown_levels(crown, mesh.occupancy.shape, mesh.origin_mm, mesh.cell_size_mm)
-    return mesh.crowned(None if on_steps else levels), report
+    return mesh.crowned(levels), report
 
 
 def _lattice_pitch(
@@ -258,19 +276,19 @@ def _lattice_pitch(
     pitch_mm: float | tuple[float, float] | None,
     layers: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-    """Cell size (hx, hy), cells across the bounding box, and layers."""
+    """Cell size (hx, hy), cells along the sides of the bounding box, and layers."""
     if (cells is None) == (pitch_mm is None):
-        raise MeshError("give exactly one of cells=(nx, ny, nz) and pitch_mm")
+        raise MeshError("give exactly one of cells=(nx, ny, nz) and pitch_mm", field="cells")
     if cells is not None:
         if len(cells) != 3 or any(int(c) != c or c < 1 for c in cells):
-            raise MeshError(f"cells = {cells}: must be three whole numbers >= 1")
+            raise MeshError(f"cells = {cells}: must be three whole numbers >= 1", field="cells")
         across = np.array(cells[:2], dtype=np.int64)
         return extent_mm / across, across, int(cells[2])
     if int(layers) != layers or layers < 1:
-        raise MeshError(f"layers = {layers!r}: must be a whole number >= 1")
+        raise MeshError(f"layers = {layers!r}: must be a whole number >= 1", field="layers")
     pitch = np.broadcast_to(np.asarray(pitch_mm, dtype=float), (2,)).copy()
     if not np.isfinite(pitch).all() or (pitch <= 0.0).any():
-        raise MeshError(f"pitch_mm = {pitch_mm!r}: must be finite and > 0")
+        raise MeshError(f"pitch_mm = {pitch_mm!r}: must be finite and > 0", field="pitch_mm")
     # Checked before the cast: a tiny pitch would overflow the count.
     _check_count(extent_mm / pitch, int(layers))
     return pitch, np.maximum(np.rint(extent_mm / pitch), 1).astype(np.int64), int(layers)
@@ -281,14 +299,16 @@ def _check_count(across: NDArray[Any], layers: int) -> None:
     if total > _MAX_CELLS:
         raise MeshError(
             f"the lattice would have {total:.3g} cells, the limit is {_MAX_CELLS}: "
-            "use a coarser pitch or fewer layers"
+            "use a coarser pitch or fewer layers",
+            field="pitch_mm",
+            value=total,
         )
 
 
 def _trim(
     occupancy: NDArray[np.bool_],
 ) -> tuple[tuple[slice, slice], NDArray[np.int64]]:
-    """Smallest x-y box that holds every cell, and its first cell (i, j)."""
+    """Smallest x-y box that contains all cells, and its first cell (i, j)."""
     along_x = np.flatnonzero(occupancy.any(axis=(1, 2)))
     along_y = np.flatnonzero(occupancy.any(axis=(0, 2)))
     window = (slice(along_x[0], along_x[-1] + 1), slice(along_y[0], along_y[-1] + 1))
@@ -296,7 +316,7 @@ def _trim(
 
 
 def _with_exact_faces(mesh: PadMesh, thickness_mm: float) -> PadMesh:
-    """The same mesh with its upper nodes at exactly z = 0 (they may be off by rounding)."""
+    """The same mesh with its upper nodes at exactly z = 0, without rounding."""
     nodes = np.array(mesh.nodes_mm)
     nz = mesh.layers
     level = np.rint((nodes[:, 2] + thickness_mm) / thickness_mm * nz)

@@ -1,8 +1,8 @@
 """Write a hexahedral mesh as VTK XML UnstructuredGrid (.vtu).
 
-Format: the VTK file formats chapter of the VTK user's guide; arrays inline, base64 of an
-8-byte length followed by the little-endian data, uncompressed, so that the same mesh always
-gives the same bytes.
+The format is that of the VTK User's Guide, chapter on file formats. Arrays are inline: base64 of
+an 8-byte length and the little-endian data, uncompressed, so that the same mesh always gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ def write_vtu(
 ) -> None:
     """Write the mesh, with fields on nodes and cells, atomically.
 
-    Node sets are always written as the point field `node_set` (bit 0 bonded, bit 1 surface,
-    bit 2 sides), and of a partly filled pad the fractions as the cell field `fill`.
+    The node sets are always written as the point field `node_set` (bit 0 bonded, bit 1 surface,
+    bit 2 sides), and the filled fractions of cut cells as the cell field `fill`.
 
     Args:
-        path: file to write.
-        mesh: the mesh.
-        point_data: fields by name, each (n,) or (n, c).
-        cell_data: fields by name, each (m,) or (m, c).
+        path: File to write.
+        mesh: The mesh.
+        point_data: Fields on the n nodes by name, each (n,) or (n, c).
+        cell_data: Fields on the m cells by name, each (m,) or (m, c).
 
     Raises:
-        MeshError: a field's length or type does not fit.
+        MeshError: The length, type or name of a field does not fit.
     """
     points = {"node_set": _node_set_bits(mesh), **(point_data or {})}
     cells = {**_fill(mesh), **(cell_data or {})}
@@ -107,14 +107,16 @@ def _checked_field(name: str, values: ArrayLike, count: int) -> NDArray[Any]:
         array = array.view(np.uint8)
     if array.ndim not in (1, 2) or len(array) != count:
         raise MeshError(
-            f"field {name!r} has shape {array.shape}: must be ({count},) or ({count}, c)"
+            f"field {name!r} has shape {array.shape}: must be ({count},) or ({count}, c)",
+            field=name,
         )
     if array.dtype.str[1:] not in _VTK_TYPES:
         raise MeshError(
-            f"field {name!r} has type {array.dtype}: must be one of {', '.join(_VTK_TYPES)}"
+            f"field {name!r} has type {array.dtype}: must be one of {', '.join(_VTK_TYPES)}",
+            field=name,
         )
     if not name.isascii():
-        raise MeshError(f"field name {name!r}: must be plain ASCII")
+        raise MeshError(f"field name {name!r}: must be plain ASCII", field=name)
     return array
 
 

@@ -1,4 +1,11 @@
-"""Surface operators of the infinite pad, whole or truncated, put right at the rim of a real one."""
+"""Surface operators of the infinite pad, complete or truncated, corrected at the rim of the pad.
+
+Fits of forces f on few nodes to a motion u of the whole surface, |C f - u|², need the compliance C
+only through the products CᵀC among those nodes. For a convolution these form a convolution again
+as long as the pad is not cropped. Cropping can only reduce them. The products kept here are
+therefore an upper bound: the steps of a fit that uses them never overshoot, and the products are
+exact far from the rim.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +16,47 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import IfemError
-from ifem_export.operators.compliance_gram import ComplianceGram
 from ifem_export.operators.layered_operator import LayeredOperator
-from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import inner_solver
-from ifem_export.operators.surface_field import checked
 
 Array = NDArray[np.float64]
 RESULTANT_RTOL = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class Convolved:
-    """Surface stiffness of the infinite pad: wrong near free edges, more so as ν nears 0.5.
+class ComplianceProducts:
+    """Upper bound of CᵀC for a cropped convolution C with blocks (ky, kx, 3, 3)."""
 
-    `missing` (c, 3, 3) in N/mm, where given, is added node by node.
+    def __init__(self, compliance: LayeredOperator) -> None:
+        self._compliance = compliance
+
+    @cached_property
+    def kernel(self) -> Array:
+        """(rows, columns, 3, 3) in mm²/N² for two nodes by their lattice distance, periodic."""
+        blocks, shape = self._compliance.blocks, self._compliance.shape
+        square = np.matmul(blocks.conj().swapaxes(-1, -2), blocks)
+        return np.ascontiguousarray(np.fft.irfft2(square, s=shape, axes=(0, 1)))
+
+    def block(self, nodes: NDArray[np.intp]) -> Array:
+        """Symmetric matrix (3n, 3n) of the products among the surface nodes (n,)."""
+        from ifem_export.operators.surface_kernel import gather_products
+
+        out = np.empty((3 * len(nodes), 3 * len(nodes)))
+        gather_products(self.kernel, np.ascontiguousarray(self._compliance.columns[nodes]), out)
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class ConvolvedOperator:
+    """Convolution with the surface stiffness of the infinite pad.
+
+    Near free edges it has an error, which grows as ν approaches 0.5.
+
+    Attributes:
+        name: Name of the rung.
+        system: Equations of the pad.
+        stiffness: Surface stiffness of the infinite pad, complete or truncated.
+        missing: (c, 3, 3) in N/mm, added node by node so that the resultant is exact; or None.
     """
 
     name: str
@@ -33,37 +66,38 @@ class Convolved:
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """Convolution with the surface stiffness."""
-        u = checked(displacement_mm, self.system.columns)
+        u = checked_field(displacement_mm, self.system.columns)
         force = np.asarray(self.stiffness(u[None])[0])
         if self.missing is not None:
             force += np.matmul(self.missing, u[:, :, None])[:, :, 0]
         return force
 
     def displacement(self, force_n: ArrayLike) -> Array:
-        """Convolution with the infinite pad's compliance, whichever the truncation."""
-        f = checked(force_n, self.system.columns)
-        return np.asarray(self.system.surface_compliance_guess(f[None])[0])
+        """Convolution with the compliance of the infinite pad, which is not truncated."""
+        f = checked_field(force_n, self.system.columns)
+        return np.asarray(self.system.infinite_compliance(f[None])[0])
 
     @cached_property
-    def gram(self) -> ComplianceGram:
-        """For fits of forces on few nodes."""
-        return ComplianceGram(self.system.surface_compliance_guess)
+    def compliance_products(self) -> ComplianceProducts:
+        """Products CᵀC for fits of forces on few nodes."""
+        return ComplianceProducts(self.system.infinite_compliance)
 
     @property
     def n_bytes(self) -> int:
         """Bytes of the blocks."""
-        return int(
-            self.stiffness.blocks.nbytes + (0 if self.missing is None else self.missing.nbytes)
-        )
+        missing = 0 if self.missing is None else self.missing.nbytes
+        return int(self.stiffness.blocks.nbytes + missing)
 
 
 def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
-    """The convolution cut off at `radius` nodes, what is cut lumped onto the diagonal.
+    """The convolution truncated at `radius` nodes, with the remainder lumped onto the diagonal.
 
     Lumping keeps the force of a uniform motion. Raises IfemError for a radius below 1.
     """
     if radius < 1:
-        raise IfemError(f"truncation radius = {radius}: must be at least 1 node")
+        raise IfemError(
+            f"truncation radius = {radius}: must be at least 1 node", field="radius", value=radius
+        )
     rows, columns = stiffness.shape
     kernel = np.fft.irfft2(stiffness.blocks, s=stiffness.shape, axes=(0, 1))
     away_y = np.minimum(np.arange(rows), rows - np.arange(rows))
@@ -76,22 +110,22 @@ def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
 
 
 def missing_resultant(system: PadSystem, stiffness: LayeredOperator) -> Array:
-    """Node by node, what the convolution lacks of the resultant.
+    """What the convolution lacks of the exact resultant, node by node.
 
-    The resultant of any motion u is Σ_j (Σ_i S_ij) u_j, and S is symmetric: three forces S e of
-    uniform motions e give the sums. With what is missing put on the diagonal, the resultant of
-    every motion is exact, wherever it is.
+    The resultant of a motion u is Σ_j (Σ_i S_ij) u_j, and S is symmetric. Therefore the three
+    forces S e of uniform unit motions e give the sums over i. With the missing part added to the
+    diagonal, the resultant of every motion is exact, also at the rim.
 
     Returns:
-        (c, 3, 3) in N/mm, force by displacement component.
+        (c, 3, 3) in N/mm, force component by displacement component.
     """
     solver = inner_solver(system)
-    lacking = np.empty((system.columns, 3, 3))
+    missing = np.empty((system.columns, 3, 3))
     for axis in range(3):
-        shift = np.zeros((system.columns, 3))
-        shift[:, axis] = 1.0
-        u = shift.reshape(-1)
-        held = solver.solve(-(system.surface_to_inner @ u), RESULTANT_RTOL).x
-        exact = (system.surface @ u + system.inner_to_surface @ held).reshape(-1, 3)
-        lacking[:, axis, :] = exact - stiffness(shift[None])[0]
-    return lacking
+        uniform = np.zeros((system.columns, 3))
+        uniform[:, axis] = 1.0
+        u = uniform.reshape(-1)
+        inner = solver.solve(-(system.surface_to_inner @ u), RESULTANT_RTOL).x
+        exact = (system.surface @ u + system.inner_to_surface @ inner).reshape(-1, 3)
+        missing[:, axis, :] = exact - stiffness(uniform[None])[0]
+    return missing

@@ -1,9 +1,10 @@
-"""What each surface operator costs in error and time, measured for one sensor.
+"""Measurement of the error and the time of each surface operator of one sensor.
 
-The reference is the same pad at half the pitch with eight B-bar layers, its inner nodes solved for
-to 1e-8; its forces are lumped to the coarse nodes by the bilinear functions. Fields are smooth
-bumps about a pad thickness wide, sideways and down: narrower ones no marker grid resolves. Those
-that reach the pad's edge err more and are told apart.
+The reference is the same pad at half the pitch with eight B-bar layers, whose inner nodes are
+solved for to 1e-8. Its forces are lumped to the coarse nodes by the bilinear shape functions. The
+test motions are smooth bumps about as wide as the pad is thick, tangential and normal, because no
+marker grid resolves narrower ones. Motions that reach the pad's edge have larger errors and are
+measured separately.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ FIELD_SEED = 7
 TIMED_S, TIMED_ROUNDS = 0.12, 3
 NOISE_SEED, NOISE_DRAWS = 11, 6
 _MARGIN = 4
-"""Nodes by which the boxes of a mesh and its reference may differ, and one more."""
+"""Largest difference in nodes between the boxes of a mesh and its reference, plus one."""
 Choice = tuple[Rung, dict[str, Any]]
 CHOICES: tuple[Choice, ...] = (
     ("paper", {}),
@@ -63,53 +64,62 @@ def measure_ladder(
     progress: Progress | None = None,
     reference: PadMesh | None = None,
 ) -> OperatorLadder:
-    """Measure every operator of a pad; `dense` adds the dense rung, which takes much longer.
+    """Measure error, noise gain and time of every surface operator of a pad.
 
-    `reference` is a finer mesh of the same gel on a lattice of half the pitch that has the nodes of
-    this one; by default `refined(mesh)`, which a crowned pad does not have.
-    Raises MeshError for a pad whose layers differ unless it is crowned.
+    Args:
+        mesh: The pad.
+        material: The gel.
+        formulation: Hex-8 formulation of the elements.
+        dense: Whether the dense operator is measured too, which takes much longer.
+        progress: Called with what is measured, the steps done and the steps in total.
+        reference: Finer mesh of the same gel, on a lattice of half the pitch that contains the
+            nodes of `mesh`. By default it is `refined(mesh)`; a crowned pad needs one.
+
+    Returns:
+        The ladder, with the operators in the order in which they were measured.
+
+    Raises:
+        MeshError: The pad is neither flat nor crowned, or it is crowned without a reference.
     """
-    tell = progress or (lambda text, done, total: None)
+    report = progress or (lambda text, done, total: None)
     choices = operator_choices(mesh, dense)
     fine = refined(mesh) if reference is None else reference
-    steps = len(choices) + 1
-    tell("reference", 0, steps)
-    fields = bumps(mesh)
-    at_edge = edge_bumps(mesh)
-    expected, expected_at_edge = (
-        [reference_force(mesh, material, field, fine) for field in some]
-        for some in (fields, at_edge)
-    )
+    report("reference", 0, len(choices) + 1)
     points = np.asarray(mesh.nodes_mm)[mesh.surface]
-    moved = [field(points) for field in fields]
-    moved_at_edge = [field(points) for field in at_edge]
+    motions, at_edge = bumps(mesh), edge_bumps(mesh)
+    fields = [motion(points) for motion in motions]
+    edge_fields = [motion(points) for motion in at_edge]
+    expected = [reference_force(mesh, material, motion, fine) for motion in motions]
+    edge_expected = [reference_force(mesh, material, motion, fine) for motion in at_edge]
     exact = surface_operator(mesh, material, formulation, "pcg", rtol=REFERENCE_RTOL)
-    condensed = [exact.force(u) for u in moved]
+    condensed = [exact.force(u) for u in fields]
     rungs = []
     for done, (rung, parameters) in enumerate(choices):
-        tell(rung, done + 1, steps)
+        report(rung, done + 1, len(choices) + 1)
         operator = surface_operator(mesh, material, formulation, rung, **parameters)
-        found = [operator.force(u) for u in moved]
-        found_at_edge = [operator.force(u) for u in moved_at_edge]
+        forces = [operator.force(u) for u in fields]
+        edge_forces = [operator.force(u) for u in edge_fields]
+        noise = noise_forces(operator, len(points))
         rungs.append(
             MeasuredRung(
                 rung=rung,
                 parameters=parameters,
-                error_field=max(map(_off, found, expected)),
-                error_operator=max(map(_off, found, condensed)),
-                error_resultant=max(map(_resultant_off, found, expected)),
-                noise_node_n_per_mm=float(np.std(noise := noisy(operator, len(points)))),
+                error_field=max(map(_relative_error, forces, expected)),
+                error_operator=max(map(_relative_error, forces, condensed)),
+                error_resultant=max(map(_resultant_error, forces, expected)),
+                noise_node_n_per_mm=float(np.std(noise)),
                 noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
-                milliseconds=_one_thread_ms(operator, moved),
+                milliseconds=_one_thread_ms(operator, fields),
                 n_bytes=operator.n_bytes,
-                error_edge=max(map(_off, found_at_edge, expected_at_edge)),
+                error_edge=max(map(_relative_error, edge_forces, edge_expected)),
             )
         )
-    told = (
+    description = (
         f"{fine.layers} {REFERENCE_ELEMENT} layers at half the pitch, inner solve to "
         f"{REFERENCE_RTOL:g}"
     )
-    return OperatorLadder(tuple(rungs), told, mesh.layers, formulation, material.poissons_ratio)
+    ratio = material.poissons_ratio
+    return OperatorLadder(tuple(rungs), description, mesh.layers, formulation, ratio)
 
 
 def operator_choices(mesh: PadMesh, dense: bool = False) -> tuple[Choice, ...]:
@@ -127,48 +137,48 @@ def time_operators(
     formulation: Formulation,
     progress: Progress | None = None,
 ) -> dict[str, float]:
-    """Times in ms of operators on this machine now, by label; errors need no measuring anew."""
-    tell = progress or (lambda text, done, total: None)
+    """Times in ms of operators on this machine, by label. Their errors do not depend on it."""
+    report = progress or (lambda text, done, total: None)
     points = np.asarray(mesh.nodes_mm)[mesh.surface]
-    moved = [field(points) for field in bumps(mesh)]
+    fields = [motion(points) for motion in bumps(mesh)]
     times: dict[str, float] = {}
     for done, (rung, parameters) in enumerate(choices):
         label = operator_label(rung, parameters)
-        tell(label, done, len(choices))
+        report(label, done, len(choices))
         operator = surface_operator(mesh, material, formulation, rung, **parameters)
-        # The least of several medians: another program can only make one of them longer.
-        times[label] = min(_one_thread_ms(operator, moved) for _ in range(TIMED_ROUNDS))
+        # The smallest of several medians, because another program can only make one longer.
+        times[label] = min(_one_thread_ms(operator, fields) for _ in range(TIMED_ROUNDS))
     return times
 
 
 def bumps(mesh: PadMesh) -> list[SurfaceMotion]:
-    """Smooth surface motions (n, 3) mm of points (n, 3), one per direction and one off the middle.
+    """Smooth motions (n, 3) in mm of surface points (n, 3): one per axis and an oblique one.
 
-    They fade before they reach the pad's edge.
+    They decay before they reach the pad's edge.
     """
     rng = np.random.default_rng(FIELD_SEED)
-    places = [*rng.uniform(-0.4, 0.4, (3, 2)), (0.75, 0.0)]
-    ways = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.3, 0.1, -0.7)]
-    return _bumps(mesh, places, ways)
+    centres = [*rng.uniform(-0.4, 0.4, (3, 2)), (0.75, 0.0)]
+    directions = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.3, 0.1, -0.7)]
+    return _bumps(mesh, centres, directions)
 
 
 def edge_bumps(mesh: PadMesh) -> list[SurfaceMotion]:
-    """Motions as those of `bumps`, but across an edge and at a corner: what errs most."""
+    """Motions as those of `bumps`, but at an edge and at a corner, where errors are largest."""
     return _bumps(mesh, [(0.95, 0.0), (-0.85, 0.85)], [(1.0, 0.0, 0.0), (0.8, 0.5, -0.3)])
 
 
 def _bumps(
-    mesh: PadMesh, places: Sequence[ArrayLike], ways: Sequence[ArrayLike]
+    mesh: PadMesh, centres: Sequence[ArrayLike], directions: Sequence[ArrayLike]
 ) -> list[SurfaceMotion]:
-    """Bumps at places in shares of the pad's half extent."""
+    """Bumps whose centres are given in half extents of the pad."""
     points = np.asarray(mesh.nodes_mm)[mesh.surface][:, :2]
     low, high = points.min(axis=0), points.max(axis=0)
     thickness = mesh.layers * mesh.cell_size_mm[2]
     width = max(thickness, 2.5 * max(mesh.cell_size_mm[:2]))
     middle, span = (low + high) / 2, (high - low) / 2
     return [
-        _bump(middle + np.asarray(place) * span, width, np.asarray(way, dtype=float))
-        for place, way in zip(places, ways, strict=True)
+        _bump(middle + np.asarray(centre) * span, width, np.asarray(direction, dtype=float))
+        for centre, direction in zip(centres, directions, strict=True)
     ]
 
 
@@ -178,7 +188,7 @@ def reference_force(
     field: SurfaceMotion,
     fine: PadMesh | None = None,
 ) -> Array:
-    """Forces (c, 3) on the coarse surface nodes, from the pad at half pitch and eight layers."""
+    """Forces (c, 3) in N on the surface nodes of `mesh`, computed on the finer mesh `fine`."""
     fine = refined(mesh) if fine is None else fine
     operator = surface_operator(fine, material, REFERENCE_ELEMENT, "pcg", rtol=REFERENCE_RTOL)
     force = operator.force(field(np.asarray(fine.nodes_mm)[fine.surface]))
@@ -186,12 +196,15 @@ def reference_force(
 
 
 def refined(mesh: PadMesh) -> PadMesh:
-    """The same pad, cut cells quartered as they are, at half the lateral pitch with eight layers.
+    """The same pad at half the lateral pitch with eight layers; cut cells keep their fraction.
 
-    Raises MeshError for a crowned pad: its cells do not say how the crown goes on between them.
+    Raises MeshError for a crowned pad, because its cells do not determine the crown between them.
     """
     if mesh.surface_shift is not None:
-        raise MeshError("a crowned pad has to be meshed anew for a reference: give one")
+        raise MeshError(
+            "a crowned pad cannot be refined from its cells: give a reference mesh",
+            field="reference",
+        )
     hx, hy, hz = mesh.cell_size_mm
     plan = np.asarray(mesh.occupancy)[:, :, 0].repeat(2, axis=0).repeat(2, axis=1)
     cells = np.repeat(plan[:, :, None], REFERENCE_LAYERS, axis=2)
@@ -205,11 +218,11 @@ def refined(mesh: PadMesh) -> PadMesh:
 
 
 def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
-    """Forces of fine surface nodes on coarse ones, by the coarse bilinear functions."""
+    """Forces of the fine surface nodes, lumped to the coarse ones by their bilinear functions."""
     offset = (np.array(coarse.origin_mm) - fine.origin_mm) / fine.cell_size_mm
     right, up = (int(n) + _MARGIN for n in np.rint(offset[:2]))
-    j, i = _places(fine)
-    rows, columns = _places(coarse)
+    j, i = _surface_positions(fine)
+    rows, columns = _surface_positions(coarse)
     extent = (max(j.max(), 2 * rows.max() + up), max(i.max(), 2 * columns.max() + right))
     lattice = np.zeros((extent[0] + 2 * _MARGIN, extent[1] + 2 * _MARGIN, 3))
     lattice[j + _MARGIN, i + _MARGIN] = force
@@ -220,14 +233,14 @@ def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
     return total
 
 
-def noisy(operator: SurfaceOperator, count: int) -> Array:
-    """Forces (draws, c, 3) in N for unit noise on every surface displacement, mm."""
+def noise_forces(operator: SurfaceOperator, count: int) -> Array:
+    """Forces (draws, c, 3) in N for independent noise of 1 mm on every surface displacement."""
     rng = np.random.default_rng(NOISE_SEED)
     return np.stack([operator.force(rng.normal(size=(count, 3))) for _ in range(NOISE_DRAWS)])
 
 
 def timed_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
-    """Median time of a call in ms, after a first one."""
+    """Median time of a call in ms, after a first call that is not timed."""
     operator.force(fields[0])
     times: list[float] = []
     while sum(times) < TIMED_S or len(times) < 3:
@@ -238,9 +251,9 @@ def timed_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
 
 
 def _one_thread_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
-    """`timed_ms` with one BLAS thread, as the force pipeline runs its frames.
+    """`timed_ms` with one BLAS thread, as the force pipeline processes its frames.
 
-    More of them wait for each other: on a busy machine up to forty times longer (pcg).
+    On a busy machine several threads wait for each other, which takes up to forty times longer.
     """
     from threadpoolctl import threadpool_limits
 
@@ -248,25 +261,25 @@ def _one_thread_ms(operator: SurfaceOperator, fields: list[Array]) -> float:
         return timed_ms(operator, fields)
 
 
-def _bump(place: Array, width: float, way: Array) -> SurfaceMotion:
+def _bump(centre: Array, width: float, direction: Array) -> SurfaceMotion:
     def field(points: Array) -> Array:
-        square = ((points[:, :2] - place) ** 2).sum(axis=1)
-        return np.asarray(0.1 * np.exp(-square / (2 * width**2))[:, None] * way)
+        square = ((points[:, :2] - centre) ** 2).sum(axis=1)
+        return np.asarray(0.1 * np.exp(-square / (2 * width**2))[:, None] * direction)
 
     return field
 
 
-def _places(mesh: PadMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _surface_positions(mesh: PadMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Lattice rows and columns of the surface nodes."""
     numbering = mesh.numbering
     _, j, i = np.unravel_index(numbering.positions[mesh.surface], numbering.shape)
     return j, i
 
 
-def _off(found: Array, expected: Array) -> float:
+def _relative_error(found: Array, expected: Array) -> float:
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 
-def _resultant_off(found: Array, expected: Array) -> float:
+def _resultant_error(found: Array, expected: Array) -> float:
     miss = np.linalg.norm(found.sum(axis=0) - expected.sum(axis=0))
     return float(miss / np.linalg.norm(expected.sum(axis=0)))

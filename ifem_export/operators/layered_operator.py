@@ -1,9 +1,9 @@
-"""Operators of the infinite layered pad, applied to a cropped one by FFT.
+"""Operators of the laterally infinite pad, applied to a cropped pad by FFT.
 
-Away from its rim the pad looks the same from every column of nodes, so its stiffness is a
-convolution: one Hermitian 3L x 3L block per lateral wavevector for L layers of free nodes. Padded
-with zeros and restricted to the columns that exist, its inverse preconditions the cropped pad:
-it is symmetric and positive definite, whatever the crop.
+Far from the rim all columns of nodes see the same neighbourhood, so the stiffness is a
+convolution: one Hermitian 3L x 3L block per lateral wave vector for L layers of free nodes. Its
+inverse, padded with zeros and restricted to the existing columns, is symmetric and positive
+definite for every crop, and preconditions the equations of the cropped pad.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
+from scipy import fft, sparse
 
 from ifem_export.assembly.occupancy_table import occupancy_table
 
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 Blocks = NDArray[np.complex128]
 PADDING_THICKNESSES = 1.7
 LEAST_PADDING, MOST_PADDING = 4, 2.0
-"""Columns at least, extents of the pad at most: beyond, a thick pad gains nothing."""
+"""Bounds of the padding: at least in columns, at most in extents of the pad."""
 INNER_NODE, TOP_NODE = 255, 15
 """Masks of a node with all eight cells, and of one on the outer surface with the lower four."""
 
@@ -31,8 +32,10 @@ INNER_NODE, TOP_NODE = 255, 15
 class LayeredOperator:
     """A convolution over the columns of a pad.
 
-    `blocks` (ky, kx, 3L, 3L) act on the half spectrum of (L, 3) values per column; `columns`
-    (c, 2) are the columns' lattice places (j, i) and `shape` the padded lattice.
+    Attributes:
+        blocks: (ky, kx, 3L, 3L), which act on the half spectrum of (L, 3) values per column.
+        columns: (c, 2) lattice positions (j, i) of the columns.
+        shape: Size (rows, columns) of the padded lattice.
     """
 
     blocks: Blocks
@@ -40,15 +43,15 @@ class LayeredOperator:
     shape: tuple[int, int]
 
     def __call__(self, field: Array) -> Array:
-        """Apply to a field (L, c, 3); the answer has its shape."""
+        """Apply to a field (L, c, 3); the result has the same shape."""
         layers, count, _ = field.shape
         j, i = self.columns[:, 0], self.columns[:, 1]
         lattice = np.zeros((3 * layers, *self.shape))
         lattice[:, j, i] = field.transpose(0, 2, 1).reshape(-1, count)
         waves = fft.rfft2(lattice, workers=1)
         mixed = np.matmul(self.blocks, waves.transpose(1, 2, 0)[..., None])[..., 0]
-        answer = fft.irfft2(mixed.transpose(2, 0, 1), s=self.shape, workers=1)
-        return np.ascontiguousarray(answer[:, j, i].reshape(layers, 3, count).transpose(0, 2, 1))
+        result = fft.irfft2(mixed.transpose(2, 0, 1), s=self.shape, workers=1)
+        return np.ascontiguousarray(result[:, j, i].reshape(layers, 3, count).transpose(0, 2, 1))
 
 
 def layered_operator(
@@ -56,27 +59,27 @@ def layered_operator(
     layers: int,
     columns: NDArray[np.int64],
     padding: tuple[int, int],
-    change: Callable[[Blocks], Blocks],
+    transform: Callable[[Blocks], Blocks],
 ) -> LayeredOperator:
-    """Operator whose blocks are `change` of the stiffness blocks of `layers` free layers.
+    """Operator whose blocks follow from the stiffness blocks of `layers` free layers.
 
     Args:
         element_matrix: (24, 24) in N/mm.
-        layers: layers of free nodes, the outer surface last.
-        columns: (c, 2) lattice places (j, i), from 0.
-        padding: columns of zeros beyond the lattice along (y, x).
-        change: from (ky, kx, 3L, 3L) blocks to the blocks wanted.
+        layers: Layers of free nodes, the outer surface last.
+        columns: (c, 2) lattice positions (j, i), from 0.
+        padding: Columns of zeros beyond the lattice along (y, x).
+        transform: Function from the (ky, kx, 3L, 3L) stiffness blocks to the operator's blocks.
     """
     extent = columns.max(axis=0) + 1
     shape = tuple(even_fast_length(int(n + p)) for n, p in zip(extent, padding, strict=True))
     symbol = stiffness_symbol(element_matrix, layers, (shape[0], shape[1]))
-    return LayeredOperator(change(symbol), columns, (shape[0], shape[1]))
+    return LayeredOperator(transform(symbol), columns, (shape[0], shape[1]))
 
 
 def padding_columns(
     cell_size_mm: tuple[float, float, float], layers: int, extent: tuple[int, int]
 ) -> tuple[int, int]:
-    """Columns of zeros along (y, x) that keep a pad of `extent` from meeting its own image."""
+    """Columns of zeros along (y, x) that separate a pad of `extent` from its periodic image."""
     reach = PADDING_THICKNESSES * layers * cell_size_mm[2]
     most = math.ceil(MOST_PADDING * max(extent))
     y, x = (max(LEAST_PADDING, min(most, math.ceil(reach / cell_size_mm[axis]))) for axis in (1, 0))
@@ -84,11 +87,11 @@ def padding_columns(
 
 
 def even_fast_length(least: int) -> int:
-    """Smallest even length >= `least` that transforms fast.
+    """Smallest even length >= `least` with a fast Fourier transform.
 
-    The alternating motion of neighbouring nodes changes no cell's mean volume, so it is soft near
-    ν = 0.5. A lattice of odd length has no such wave and takes it for a stiff one: at ν = 0.4999
-    that costs 80 to 110 iterations instead of 20 to 40.
+    An alternating displacement of neighbouring nodes does not change the mean volume of any cell,
+    so it is soft near ν = 0.5. A lattice of odd length cannot represent this wave and treats it as
+    stiff: at ν = 0.4999 this takes 80 to 110 iterations instead of 20 to 40.
     """
     length = int(fft.next_fast_len(least, real=True))
     while length % 2:
@@ -128,8 +131,8 @@ def surface_stiffness(blocks: Blocks) -> Blocks:
     inner, top = blocks[..., :-3, :-3], blocks[..., -3:, -3:]
     if inner.shape[-1] == 0:
         return top
-    across = blocks[..., :-3, -3:]
-    return np.asarray(top - across.conj().swapaxes(-1, -2) @ np.linalg.solve(inner, across))
+    coupling = blocks[..., :-3, -3:]
+    return np.asarray(top - coupling.conj().swapaxes(-1, -2) @ np.linalg.solve(inner, coupling))
 
 
 def surface_compliance(blocks: Blocks) -> Blocks:
@@ -138,5 +141,76 @@ def surface_compliance(blocks: Blocks) -> Blocks:
 
 
 def inner_compliance(blocks: Blocks) -> Blocks:
-    """Compliance blocks of the inner layers with the surface held."""
+    """Compliance blocks of the inner layers with the surface fixed."""
     return inverse(blocks[..., :-3, :-3])
+
+
+class Preconditioner(Protocol):
+    """An approximate inverse that acts on fields (L, n, 3)."""
+
+    @property
+    def blocks(self) -> Blocks:
+        """The spectral blocks that it stores."""
+
+    def __call__(self, field: Array) -> Array:
+        """Apply to a field."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledPreconditioner:
+    """D^-1/2 G D^-1/2 for a pad with cut cells, where D is the filled fraction around a node.
+
+    Attributes:
+        uniform: Preconditioner G of the pad without cut cells, for (L, c, 3) fields.
+        weight: (L, c) D^-1/2.
+    """
+
+    uniform: LayeredOperator
+    weight: Array
+
+    @property
+    def blocks(self) -> Blocks:
+        """Those of the uniform pad."""
+        return self.uniform.blocks
+
+    def __call__(self, field: Array) -> Array:
+        """Apply to a field (L, c, 3)."""
+        weight = self.weight[..., None]
+        return np.asarray(weight * self.uniform(weight * field))
+
+
+@dataclass(frozen=True, eq=False)
+class EmbeddedPreconditioner:
+    """The same where the unknowns are only some of the nodes of a full lattice (crowned pads).
+
+    Attributes:
+        uniform: Preconditioner of the full pad of `layers` layers over its columns.
+        layers: Layers of free nodes of the full pad.
+        columns: Its columns.
+        layer: (n,) layer of each unknown node there.
+        column: (n,) column of each unknown node there.
+        weight: (n,) D^-1/2.
+        transformation: (n, n), unknowns = transformation @ node values; None for the identity.
+    """
+
+    uniform: LayeredOperator
+    layers: int
+    columns: int
+    layer: NDArray[np.int64]
+    column: NDArray[np.int64]
+    weight: Array
+    transformation: sparse.csr_array | None = None
+
+    @property
+    def blocks(self) -> Blocks:
+        """Those of the uniform pad."""
+        return self.uniform.blocks
+
+    def __call__(self, field: Array) -> Array:
+        """Apply to a field (1, n, 3)."""
+        t = self.transformation
+        r = field[0] if t is None else t.T @ field[0]
+        lattice = np.zeros((self.layers, self.columns, 3))
+        lattice[self.layer, self.column] = self.weight[:, None] * r
+        u = self.weight[:, None] * self.uniform(lattice)[self.layer, self.column]
+        return np.asarray(u if t is None else t @ u)[None]

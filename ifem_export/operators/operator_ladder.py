@@ -1,4 +1,4 @@
-"""Surface operators of one sensor with their measured error and time, and the choice among them."""
+"""Surface operators of one sensor with measured error and time, and the choice among them."""
 
 from __future__ import annotations
 
@@ -25,13 +25,21 @@ def operator_label(rung: str, parameters: Mapping[str, float]) -> str:
 
 @dataclass(frozen=True)
 class MeasuredRung:
-    """One operator. Errors are relative: of the field (L2, worst of the fields) and resultant.
+    """One measured operator. All errors are relative and the largest of several test motions.
 
-    `error_edge` is that of fields that reach the pad's edge, which `error_field` leaves out; None
-    where nobody measured it. `error_operator` is against exact condensation on the same mesh,
-    without the mesh's own error.
-    `noise_…` are gains: standard deviation of a force component, at a node and of the resultant,
-    per mm of independent noise on every surface displacement.
+    Attributes:
+        rung: Name of the operator.
+        parameters: Its parameters.
+        error_field: L2 error of the force field, for motions that do not reach the pad's edge.
+        error_operator: The same against exact condensation on the same mesh, which leaves out the
+            error of the mesh.
+        error_resultant: Error of the resultant.
+        noise_node_n_per_mm: Standard deviation of a force component at a node per mm of
+            independent noise on every surface displacement.
+        noise_resultant_n_per_mm: The same for a component of the resultant.
+        milliseconds: Median time of a call on one thread.
+        n_bytes: Memory that a call reads.
+        error_edge: L2 error for motions that reach the pad's edge; None if it was not measured.
     """
 
     rung: OperatorName
@@ -53,7 +61,15 @@ class MeasuredRung:
 
 @dataclass(frozen=True)
 class OperatorLadder:
-    """Rungs of one sensor as they were measured, and what they were measured against."""
+    """The measured surface operators of one sensor.
+
+    Attributes:
+        rungs: The operators.
+        reference: Description of the reference solution.
+        layers: Layers of cells of the pad.
+        formulation: Hex-8 formulation.
+        poissons_ratio: Poisson's ratio of the gel.
+    """
 
     rungs: tuple[MeasuredRung, ...]
     reference: str
@@ -65,65 +81,72 @@ class OperatorLadder:
     def choices(self) -> Ladder:
         """The rungs by label, to choose from.
 
-        The work of an operator is the memory that a call goes through: it is counted, and orders
-        the operators as the clock does (`docs/data/stiffness_ladder.json`).
+        The work of an operator is the memory that a call reads. It is counted rather than timed,
+        and orders the operators as their times do (`docs/data/stiffness_ladder.json`).
         """
         rungs = tuple(Rung(r.label, r.error_field, r.milliseconds, r.n_bytes) for r in self.rungs)
         return Ladder(rungs, WORDING)
 
     def choose(self, budget: Budget) -> Choice:
-        """The operator's label for a budget, kept by motions that stay off the pad's edge.
+        """Choose the operator for a budget, which holds for motions that do not reach the edge.
 
-        Where the edge errs more than asked, a remark says so. Raises BudgetError where none keeps
-        the budget.
+        Args:
+            budget: Allowed error and time.
+
+        Returns:
+            The choice; a remark tells if the error at the pad's edge is larger than allowed.
+
+        Raises:
+            BudgetError: No operator keeps the budget.
         """
         choice = self.choices.choose(budget)
-        return replace(choice, remarks=(*choice.remarks, *self._at_edge(choice.rung, budget)))
+        return replace(choice, remarks=(*choice.remarks, *self._edge_remarks(choice.rung, budget)))
 
     def named(self, label: str) -> MeasuredRung | None:
-        """The rung called `label`, if there is one."""
+        """The rung with this label, or None."""
         return next((r for r in self.rungs if r.label == label), None)
 
     def balanced(self) -> MeasuredRung:
-        """What a bundle starts with: least work within 3 % or a tenth of the smallest error.
+        """Default rung of a bundle: the least work with a small error.
 
-        Markers a millimetre apart leave more than 3 % open, whatever the operator.
+        Small is an error of at most 3 %, or of at most 1.1 times the smallest error of the ladder.
+        With markers a millimetre apart the interpolation alone has an error above 3 %.
         """
         most = max(ENOUGH, BALANCE * min(r.error_field for r in self.rungs))
         return next(r for r in self._by_work() if r.error_field <= most)
 
     def timed(self, times_ms: Mapping[str, float]) -> OperatorLadder:
-        """The same rungs with other times, by label; errors stay. Others keep their times."""
+        """The same rungs with other times in ms, by label; rungs not named keep theirs."""
         rungs = (replace(r, milliseconds=times_ms.get(r.label, r.milliseconds)) for r in self.rungs)
         return replace(self, rungs=tuple(rungs))
 
     def to_record(self) -> dict[str, Any]:
-        """Plain data."""
+        """The ladder as plain data for JSON."""
         return {**asdict(self), "rungs": [asdict(r) for r in self.rungs]}
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any]) -> OperatorLadder:
-        """From plain data; raises IfemError where it is malformed."""
+        """The ladder from plain data. Raises IfemError if these are malformed."""
         try:
             rungs = tuple(MeasuredRung(**r) for r in record["rungs"])
             return cls(**{**record, "rungs": rungs})
         except (KeyError, TypeError) as error:
-            raise IfemError(f"the ladder is malformed ({error!r})") from error
+            raise IfemError(f"the ladder is malformed ({error!r})", field="ladder") from error
 
-    def _at_edge(self, rung: Rung, budget: Budget) -> tuple[str, ...]:
-        found = self.named(rung.name)
-        if found is None or found.error_edge is None or budget.allows_error(found.error_edge):
+    def _edge_remarks(self, rung: Rung, budget: Budget) -> tuple[str, ...]:
+        chosen = self.named(rung.name)
+        if chosen is None or chosen.error_edge is None or budget.allows_error(chosen.error_edge):
             return ()
-        told = (
+        remark = (
             f"where the motion reaches the gel's edge the field error of {rung.name} is "
-            f"{shown_share(found.error_edge)}, outside the calibrated range"
+            f"{shown_share(chosen.error_edge)}, outside the calibrated range"
         )
         edges = [(r.error_edge, r) for r in self._by_work() if r.error_edge is not None]
         for error, other in edges:
             if budget.allows(max(error, other.error_field), other.milliseconds):
-                return (f"{told}; {other.label} keeps the budget there too",)
+                return (f"{remark}; {other.label} keeps the budget there too",)
         least, best = min(edges, key=lambda pair: pair[0])
-        return (f"{told}; least there has {best.label}, {shown_share(least)}",)
+        return (f"{remark}; {best.label} has the smallest error there, {shown_share(least)}",)
 
     def _by_work(self) -> list[MeasuredRung]:
         return sorted(self.rungs, key=lambda r: r.n_bytes)
@@ -132,12 +155,15 @@ class OperatorLadder:
 def chosen_rung(
     ladder: OperatorLadder | None, label: str, budget: Budget | None = None
 ) -> MeasuredRung | None:
-    """Rung for a budget; without one the rung called `label`, else None.
+    """The rung for a budget; without a budget the rung with this label, or None.
 
-    Raises BudgetError where none keeps it, IfemError for a budget without a ladder.
+    Raises BudgetError if no rung keeps the budget, and IfemError for a budget without a ladder.
     """
     if budget is None or budget.unlimited:
         return ladder.named(label) if ladder else None
     if ladder is None:
-        raise IfemError("this bundle holds no measured ladder: build it with one, or name a rung")
+        raise IfemError(
+            "this bundle holds no measured ladder: build it with one, or name a rung",
+            field="ladder",
+        )
     return ladder.named(ladder.choose(budget).rung.name)

@@ -1,23 +1,27 @@
-"""The pad's equations, split into bonded, inner and surface unknowns.
+"""The equations of the pad, split into bonded, inner and surface unknowns.
 
-A pad of uniform thickness has the same columns of nodes in every layer, so layer l holds the nodes
-l·c … (l+1)·c - 1 and a field is an array (layers, c, 3): the split is by slices.
+A pad of uniform thickness has the same columns of nodes in every layer. Layer l therefore holds
+the nodes l·c to (l+1)·c - 1, a field is an array (layers, c, 3), and the blocks are slices.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from ifem_export.assembly.weighted_assembly import corner_fill, mesh_stiffness
-from ifem_export.errors import MeshError
+from ifem_export.assembly.assembly import corner_fill, mesh_stiffness
+from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.layered_operator import (
+    Blocks,
     LayeredOperator,
+    Preconditioner,
+    ScaledPreconditioner,
     inner_compliance,
     inverse,
     layered_operator,
@@ -25,14 +29,21 @@ from ifem_export.operators.layered_operator import (
     surface_compliance,
     surface_stiffness,
 )
-from ifem_export.operators.weighted_guess import Guess, WeightedGuess
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class PadSystem:
-    """Stiffness of a pad bonded at its lower face. Raises MeshError unless uniformly thick."""
+    """Equations of a pad that is bonded at its lower face.
+
+    Attributes:
+        mesh: The pad.
+        element_matrix: (24, 24) in N/mm.
+
+    Raises:
+        MeshError: The pad is not of uniform thickness.
+    """
 
     mesh: PadMesh
     element_matrix: Array
@@ -44,7 +55,8 @@ class PadSystem:
             even = (self.mesh.fill == self.mesh.fill[:, :, :1]).all()
         if not even or self.mesh.surface_shift is not None:
             raise MeshError(
-                "the pad's layers differ: condensation by layers needs a pad of uniform thickness"
+                "the pad's layers differ: condensation by layers needs a pad of uniform thickness",
+                field="mesh",
             )
 
     @property
@@ -59,17 +71,17 @@ class PadSystem:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the pad has cut cells or a crown, which the infinite pad does not foresee."""
+        """Whether the pad has cut cells or a crown, which the infinite pad does not have."""
         return self.mesh.fill is not None or self.mesh.surface_shift is not None
 
     @property
-    def guess_layers(self) -> tuple[int, int]:
-        """Layers in which `compliance_guess` and `inner_guess` take their fields."""
+    def preconditioner_layers(self) -> tuple[int, int]:
+        """Layers of the fields of `preconditioner` and of `inner_preconditioner`."""
         return self.layers, self.layers - 1
 
     @cached_property
-    def places(self) -> NDArray[np.int64]:
-        """Lattice places (c, 2) of the columns, (j, i)."""
+    def lattice_positions(self) -> NDArray[np.int64]:
+        """Lattice positions (c, 2) of the columns, (j, i)."""
         numbering = self.mesh.numbering
         _, j, i = np.unravel_index(numbering.positions[-self.columns :], numbering.shape)
         return np.stack([j, i], axis=1)
@@ -77,9 +89,9 @@ class PadSystem:
     @cached_property
     def stiffness(self) -> sparse.csr_array:
         """Free-free stiffness (3Lc, 3Lc) in N/mm."""
-        whole = mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
+        all_nodes = mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
         bonded = 3 * self.columns
-        return sparse.csr_array(whole[bonded:, bonded:])
+        return sparse.csr_array(all_nodes[bonded:, bonded:])
 
     @cached_property
     def inner(self) -> sparse.csr_array:
@@ -110,44 +122,64 @@ class PadSystem:
         return 3 * self.columns * (self.layers - 1)
 
     @cached_property
-    def compliance_guess(self) -> Guess:
-        """Inverse of the infinite pad: preconditioner of `stiffness`."""
-        return self._weighted(self._operator(inverse))
+    def preconditioner(self) -> Preconditioner:
+        """Inverse of the infinite pad's stiffness, which preconditions `stiffness`."""
+        return self._scaled(self._operator(inverse))
 
     @cached_property
-    def inner_guess(self) -> Guess:
+    def inner_preconditioner(self) -> Preconditioner:
         """The same for `inner`."""
-        return self._weighted(self._operator(inner_compliance))
+        return self._scaled(self._operator(inner_compliance))
 
     @cached_property
-    def surface_guess(self) -> LayeredOperator:
+    def infinite_stiffness(self) -> LayeredOperator:
         """Surface stiffness S of the infinite pad."""
         return self._operator(surface_stiffness)
 
     @cached_property
-    def surface_compliance_guess(self) -> LayeredOperator:
+    def infinite_compliance(self) -> LayeredOperator:
         """Surface compliance of the infinite pad."""
         return self._operator(surface_compliance)
 
-    def _weighted(self, guess: LayeredOperator) -> Guess:
+    def _scaled(self, uniform: LayeredOperator) -> Preconditioner:
         if self.mesh.fill is None:
-            return guess
+            return uniform
         weight = node_weight(self.mesh)[self.columns :].reshape(self.layers, -1)
-        inner = guess.blocks.shape[-1] < 3 * self.layers
-        return WeightedGuess(guess, weight[:-1] if inner else weight)
+        inner = uniform.blocks.shape[-1] < 3 * self.layers
+        return ScaledPreconditioner(uniform, weight[:-1] if inner else weight)
 
-    def _operator(self, change) -> LayeredOperator:  # type: ignore[no-untyped-def]
-        rows, columns = (int(n) + 1 for n in self.places.max(axis=0))
+    def _operator(self, transform: Callable[[Blocks], Blocks]) -> LayeredOperator:
+        rows, columns = (int(n) + 1 for n in self.lattice_positions.max(axis=0))
         padding = padding_columns(self.mesh.cell_size_mm, self.layers, (rows, columns))
         return layered_operator(
-            np.asarray(self.element_matrix), self.layers, self.places, padding, change
+            np.asarray(self.element_matrix), self.layers, self.lattice_positions, padding, transform
         )
 
 
 def node_weight(mesh: PadMesh) -> Array:
-    """D^-1/2 (n,) of every node, D the mean fill of the cells round it; 1 where all are full."""
+    """D^-1/2 (n,) of every node, with D the mean fill of the existing cells around it."""
     if mesh.fill is None:
         return np.ones(mesh.n_nodes)
     numbering = mesh.numbering
     around = corner_fill(np.asarray(mesh.occupancy), np.asarray(mesh.fill))[numbering.positions]
     return np.asarray(np.sqrt((around > 0.0).sum(axis=1) / around.sum(axis=1)))
+
+
+def checked_field(field: ArrayLike, columns: int) -> Array:
+    """A field (c, 3) on the surface. Raises IfemError for a wrong shape or a value not finite."""
+    values = np.asarray(field, dtype=float)
+    if values.shape != (columns, 3):
+        raise IfemError(
+            f"the field has shape {values.shape}: must be ({columns}, 3)",
+            field="shape",
+            value=values.shape,
+        )
+    if not np.isfinite(values).all():
+        node = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise IfemError(
+            f"the field holds a value that is not finite at surface node {node}: "
+            "interpolate lost markers first",
+            field="node",
+            value=node,
+        )
+    return values

@@ -1,8 +1,8 @@
-"""One thread for linear algebra: sums do not depend on how many there are, nor wait for each other.
+"""Linear algebra on one thread, so that results do not depend on the number of processors.
 
-BLAS splits sums by its threads, so their last bits differ with the number of processors; where a
-fit or a covariance is made of them, more than the last bits. Within a frame, waking other threads
-costs more than it saves.
+BLAS splits sums among its threads, so the last bits of a sum differ with the number of
+processors. In a fit or a covariance that is computed from such sums, more than the last bits
+differ. Within one frame, waking further threads also costs more time than it saves.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import cache, wraps
 from typing import Any, TypeVar
 
-import scipy.linalg  # noqa: F401  (brings its own BLAS, which has to be there to be held)
+import scipy.linalg  # noqa: F401  (loads its own BLAS, which must be there to be limited)
 from threadpoolctl import ThreadpoolController
 
 Wrapped = TypeVar("Wrapped", bound=Callable[..., Any])
@@ -23,11 +23,11 @@ def _controller() -> ThreadpoolController:
 
 
 def single_threaded(function: Wrapped) -> Wrapped:
-    """Run `function` with one BLAS thread, and give the others back after it."""
+    """Run `function` with one BLAS thread, and restore the number of threads after it."""
 
     @wraps(function)
-    def held(*args: Any, **kwargs: Any) -> Any:
+    def limited(*args: Any, **kwargs: Any) -> Any:
         with _controller().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
-    return held  # type: ignore[return-value]
+    return limited  # type: ignore[return-value]

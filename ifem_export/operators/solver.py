@@ -1,4 +1,4 @@
-"""Solvers of the pad's equations behind one interface; the true residual is always reported."""
+"""Solvers of the pad's equations behind one interface. They always report the true residual."""
 
 from __future__ import annotations
 
@@ -13,34 +13,53 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.errors import IfemError
+from ifem_export.operators.layered_operator import Preconditioner
 from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.sparse_factor import Backend, Factor, factored
-from ifem_export.operators.weighted_guess import Guess
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "pcg", "direct", "superlu", "cholmod", "pardiso"]
 METHODS: tuple[str, ...] = get_args(Method)
 MOST_ITERATIONS = 500
 DIRECT_BELOW = 2000
-"""Unknowns under which a factor is quicker than the first transform."""
+"""Number of unknowns below which a factor is faster than the first transform."""
 DIRECT_RESIDUAL = 1e-8
 MOST_FACTORED = 60_000
-"""Unknowns up to which a factor stands in for conjugate gradients that fail: some 2 GB."""
+"""Number of unknowns up to which a factor replaces failing conjugate gradients: about 2 GB."""
 LOOSE, FEW_STEPS = 1e-5, 8
-"""Tolerance and steps for which rounding is no matter: the residual followed is as good as new."""
+"""At this tolerance and number of steps, rounding in the updated residual does not matter."""
 STALLED = 0.1
-"""A restart that gains less than this factor has met the rounding floor."""
+"""A restart that reduces the residual by less than this factor has met the rounding floor."""
 
 
 class ConvergenceError(IfemError):
-    """No solution within the tolerance; the message says how far it got and what to try."""
+    """No solution within the tolerance.
+
+    Attributes:
+        residual: Relative residual reached.
+        rtol: Relative residual requested.
+        iterations: Iterations taken.
+    """
+
+    def __init__(
+        self, message: str, residual: float = np.nan, rtol: float = np.nan, iterations: int = 0
+    ) -> None:
+        super().__init__(message, field="rtol", value=rtol)
+        self.residual = residual
+        self.rtol = rtol
+        self.iterations = iterations
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """`x` of A x = b; `residual` is |b - A x| / |b|, computed afresh from x.
+    """Solution of A x = b.
 
-    After a few steps to a loose tolerance it is the one followed, which differs by rounding.
+    Attributes:
+        x: (n,).
+        residual: |b - A x| / |b|, computed from x. After few steps to a loose tolerance it is the
+            residual that the iteration updates, which differs by rounding only.
+        iterations: Iterations or back-substitutions taken.
+        seconds: Time taken.
     """
 
     x: Array
@@ -53,62 +72,67 @@ class Solver(Protocol):
     """Solves A x = b for one matrix."""
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
-        """Raise IfemError for a bad b, ConvergenceError where |b - A x| <= rtol |b| fails."""
+        """Solve to |b - A x| <= rtol |b|.
+
+        Raises IfemError for an unusable b and ConvergenceError if the tolerance is not reached.
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class ConjugateGradients:
-    """Conjugate gradients preconditioned by the infinite layered pad."""
+    """Conjugate gradients, preconditioned by the infinite pad."""
 
     matrix: sparse.csr_array
-    guess: Guess
+    preconditioner: Preconditioner
     layers: int
     most_iterations: int = MOST_ITERATIONS
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
-        """Solve to a relative residual; starts from the preconditioner's answer."""
+        """Solve to a relative residual, starting from the preconditioner's result."""
         started = time.perf_counter()
         right = _checked(b, self.matrix.shape[0])
         size = float(np.linalg.norm(right))
         if size == 0.0:
             return Solution(np.zeros_like(right), 0.0, 0, time.perf_counter() - started)
-        x, trail = _iterate(self.matrix, right, self._guess, rtol * size, self.most_iterations)
-        followed = len(trail) == 1 or (rtol >= LOOSE and len(trail) <= FEW_STEPS)
-        residual = (trail[-1] if followed else self._residual(right, x)) / size
+        x, norms = _iterate(
+            self.matrix, right, self._precondition, rtol * size, self.most_iterations
+        )
+        is_exact = len(norms) == 1 or (rtol >= LOOSE and len(norms) <= FEW_STEPS)
+        residual = (norms[-1] if is_exact else self._residual(right, x)) / size
         before = np.inf
-        # The updated residual drifts from the true one: go on from the true one where it did.
-        while rtol < residual < STALLED * before and len(trail) <= self.most_iterations:
-            left = self.most_iterations + 1 - len(trail)
+        # The updated residual drifts from the true one: restart from the true one if it did.
+        while rtol < residual < STALLED * before and len(norms) <= self.most_iterations:
+            left = self.most_iterations + 1 - len(norms)
             rest = right - self.matrix @ x
-            more, steps = _iterate(self.matrix, rest, self._guess, rtol * size, left)
-            x, trail = x + more, trail + steps
+            more, steps = _iterate(self.matrix, rest, self._precondition, rtol * size, left)
+            x, norms = x + more, norms + steps
             residual, before = self._residual(right, x) / size, residual
         if not residual <= rtol:
-            shown = [t / size for t in trail]
-            raise ConvergenceError(_diagnosis(residual, rtol, shown, self.most_iterations))
-        return Solution(x, residual, len(trail) - 1, time.perf_counter() - started)
+            relative = [norm / size for norm in norms]
+            raise _no_convergence(residual, rtol, relative, self.most_iterations)
+        return Solution(x, residual, len(norms) - 1, time.perf_counter() - started)
 
     def _residual(self, right: Array, x: Array) -> float:
         return float(np.linalg.norm(right - self.matrix @ x))
 
-    def _guess(self, r: Array) -> Array:
-        return self.guess(r.reshape(self.layers, -1, 3)).reshape(-1)
+    def _precondition(self, r: Array) -> Array:
+        return self.preconditioner(r.reshape(self.layers, -1, 3)).reshape(-1)
 
 
 @dataclass(frozen=True, eq=False)
 class SparseFactor:
-    """Sparse factor, made on the first use and kept."""
+    """Sparse factor, computed at the first use and kept."""
 
     matrix: sparse.csr_array
     backend: Backend = "auto"
 
     @cached_property
     def factor(self) -> Factor:
-        """The factor; raises IfemError for a matrix that has none."""
+        """The factor. Raises IfemError for a matrix that cannot be factored."""
         return factored(self.matrix, self.backend)
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
-        """Back-substitute, once more on the residual where that is not enough."""
+        """Back-substitute, and once more on the residual if that does not suffice."""
         started = time.perf_counter()
         right = _checked(b, self.matrix.shape[0])
         size = float(np.linalg.norm(right))
@@ -119,21 +143,21 @@ class SparseFactor:
             x = x + self.factor.solve(right - self.matrix @ x)
             residual, steps = float(np.linalg.norm(right - self.matrix @ x)) / size, 2
         if not residual <= max(rtol, DIRECT_RESIDUAL):
-            raise ConvergenceError(_diagnosis(residual, rtol, [residual], 1))
+            raise _no_convergence(residual, rtol, [residual], 1)
         return Solution(x, residual, steps, time.perf_counter() - started)
 
 
 @dataclass(frozen=True, eq=False)
-class WithFactor:
-    """Conjugate gradients, and once they fail a factor for good.
+class GradientsThenFactor:
+    """Conjugate gradients, replaced by a factor from the first failure on.
 
-    Cut cells of a nearly incompressible gel are what the infinite pad does not foresee.
+    The infinite pad is a poor preconditioner for cut cells of a nearly incompressible gel.
     """
 
     first: ConjugateGradients
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
-        """Raise as `Solver`; ConvergenceError where the matrix is too large to factor."""
+        """See `Solver`; raises ConvergenceError if the matrix is too large to factor."""
         if "factor" in self.__dict__:
             return self.factor.solve(b, rtol)
         try:
@@ -145,33 +169,43 @@ class WithFactor:
 
     @cached_property
     def factor(self) -> SparseFactor:
-        """The factor, made when it is needed."""
+        """The factor, computed when it is needed."""
         return SparseFactor(self.first.matrix)
 
 
 def pad_solver(system: PadSystem, method: Method = "auto") -> Solver:
-    """Solver of the free unknowns, K_ff u = f; IfemError for an unknown or missing method."""
+    """Solver of the free unknowns, K_ff u = f. Raises IfemError for an unknown method."""
     direct = _direct(system.stiffness, method)
     return direct or ConjugateGradients(
-        system.stiffness, system.compliance_guess, system.guess_layers[0]
+        system.stiffness, system.preconditioner, system.preconditioner_layers[0]
     )
 
 
 def inner_solver(system: PadSystem, method: Method = "auto") -> Solver:
-    """Solver of the inner unknowns with the surface held, K_ii u = f. At least two layers."""
+    """Solver of the inner unknowns with the surface fixed, K_ii u = f.
+
+    Raises IfemError for an unknown method and for a pad of one layer.
+    """
     if system.inner.shape[0] == 0:
-        raise IfemError("a pad of one layer has no inner nodes: nothing is left to solve")
+        raise IfemError(
+            "a pad of one layer has no inner nodes to solve for", field="layers", value=1
+        )
     direct = _direct(system.inner, method)
     if direct is not None:
         return direct
-    steps = ConjugateGradients(system.inner, system.inner_guess, system.guess_layers[1])
-    return WithFactor(steps) if method == "auto" and system.is_cut else steps
+    layers = system.preconditioner_layers[1]
+    gradients = ConjugateGradients(system.inner, system.inner_preconditioner, layers)
+    return GradientsThenFactor(gradients) if method == "auto" and system.is_cut else gradients
 
 
 def _direct(matrix: sparse.csr_array, method: Method) -> SparseFactor | None:
-    """The factor that `method` stands for; None for conjugate gradients."""
+    """The factor that `method` means; None for conjugate gradients."""
     if method not in METHODS:
-        raise IfemError(f"solver method {method!r}: must be one of {', '.join(METHODS)}")
+        raise IfemError(
+            f"solver method {method!r}: must be one of {', '.join(METHODS)}",
+            field="method",
+            value=method,
+        )
     if method == "pcg" or (method == "auto" and matrix.shape[0] >= DIRECT_BELOW):
         return None
     backend = "auto" if method in ("auto", "direct") else method
@@ -181,19 +215,19 @@ def _direct(matrix: sparse.csr_array, method: Method) -> SparseFactor | None:
 def _iterate(
     matrix: sparse.csr_array,
     b: Array,
-    guess: Callable[[Array], Array],
+    precondition: Callable[[Array], Array],
     tolerance: float,
     most: int,
 ) -> tuple[Array, list[float]]:
-    """Preconditioned conjugate gradients; x and the residual norms, the first at x = M⁻¹ b."""
-    x = guess(b)
+    """Preconditioned conjugate gradients: x and the residual norms, the first at x = M⁻¹ b."""
+    x = precondition(b)
     r = b - matrix @ x
-    trail = [float(np.linalg.norm(r))]
+    norms = [float(np.linalg.norm(r))]
     p, rho = np.zeros_like(b), 1.0
-    while trail[-1] > tolerance and len(trail) <= most and np.isfinite(trail[-1]):
-        z = guess(r)
+    while norms[-1] > tolerance and len(norms) <= most and np.isfinite(norms[-1]):
+        z = precondition(r)
         rho, last = float(r @ z), rho
-        p = z if len(trail) == 1 else z + rho / last * p
+        p = z if len(norms) == 1 else z + rho / last * p
         q = matrix @ p
         curvature = float(p @ q)
         if not (curvature > 0 and rho > 0):
@@ -201,37 +235,43 @@ def _iterate(
         step = rho / curvature
         x = x + step * p
         r = r - step * q
-        trail.append(float(np.linalg.norm(r)))
-    return x, trail
+        norms.append(float(np.linalg.norm(r)))
+    return x, norms
 
 
 def _checked(b: ArrayLike, n: int) -> Array:
     right = np.asarray(b, dtype=float).reshape(-1)
     if right.shape != (n,):
-        raise IfemError(f"the right-hand side has {right.size} values: must have {n}")
+        raise IfemError(
+            f"the right-hand side has {right.size} values: must have {n}",
+            field="b",
+            value=right.size,
+        )
     if not np.isfinite(right).all():
-        raise IfemError("the right-hand side holds a value that is not finite")
+        raise IfemError("the right-hand side holds a value that is not finite", field="b")
     return right
 
 
-def _diagnosis(residual: float, rtol: float, trail: list[float], most: int) -> str:
-    """What went wrong and what to do; `trail` holds the relative residuals."""
-    tail = ", ".join(f"{t:.2g}" for t in trail[-4:])
-    if len(trail) > most > 1 and trail[-1] > rtol:
-        slow = len(trail) > 20 and trail[-1] > 0.5 * trail[-20]
+def _no_convergence(
+    residual: float, rtol: float, norms: list[float], most: int
+) -> ConvergenceError:
+    """The error with its cause and remedy; `norms` holds the relative residuals."""
+    last = ", ".join(f"{norm:.2g}" for norm in norms[-4:])
+    if not len(norms) > most > 1 or norms[-1] <= rtol:
         why = (
-            "it hardly falls any more, the matrix is ill-conditioned: use method 'direct', cells "
-            "of an aspect nearer 1 or a Poisson's ratio further from 0.5"
-            if slow
-            else "allow more iterations or a looser tolerance"
-        )
-    else:
-        why = (
-            "rounding allows no less for this matrix and load: ask for a tolerance of "
-            f"{2 * residual:.0e} or more, or take cells of an aspect nearer 1 or a Poisson's "
+            "rounding allows no smaller residual for this matrix and load: request a tolerance of "
+            f"{2 * residual:.0e} or more, or use cells of an aspect nearer 1 or a Poisson's "
             "ratio further from 0.5"
         )
-    return (
-        f"no solution to {rtol:.1g} after {len(trail) - 1} iterations: residual {residual:.2g} "
-        f"(last: {tail}); {why}"
+    elif len(norms) > 20 and norms[-1] > 0.5 * norms[-20]:
+        why = (
+            "it hardly decreases any more, the matrix is ill-conditioned: use method 'direct', "
+            "cells of an aspect nearer 1 or a Poisson's ratio further from 0.5"
+        )
+    else:
+        why = "allow more iterations or a larger tolerance"
+    message = (
+        f"no solution to {rtol:.1g} after {len(norms) - 1} iterations: residual {residual:.2g} "
+        f"(last: {last}); {why}"
     )
+    return ConvergenceError(message, residual, rtol, len(norms) - 1)

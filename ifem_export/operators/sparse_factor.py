@@ -1,7 +1,7 @@
-"""Factors of symmetric positive definite sparse matrices, by whichever library is installed.
+"""Factors of symmetric positive definite sparse matrices by one of three libraries.
 
-SciPy's SuperLU is always there. CHOLMOD (scikit-sparse) and PARDISO (pypardiso) factor several
-times faster from some 20 000 unknowns on; they are loaded only when asked for or found.
+SciPy's SuperLU is always available. CHOLMOD (scikit-sparse) and PARDISO (pypardiso) are several
+times faster from about 20 000 unknowns on, and are used where they are installed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ifem_export.errors import IfemError
 Backend = Literal["auto", "superlu", "cholmod", "pardiso"]
 BACKENDS: tuple[str, ...] = get_args(Backend)
 PARDISO_FROM = 20_000
-"""Unknowns from which `auto` takes PARDISO: below, SuperLU's back-substitution is quicker."""
+"""Number of unknowns from which `auto` takes PARDISO; SuperLU solves smaller systems faster."""
 _MODULE = {"cholmod": "sksparse", "pardiso": "pypardiso"}
 _PACKAGE = {"cholmod": "scikit-sparse", "pardiso": "pypardiso"}
 
@@ -45,34 +45,45 @@ def installed_backends() -> tuple[str, ...]:
 def factored(matrix: sparse.csr_array, backend: Backend = "auto") -> Factor:
     """Factor a symmetric positive definite matrix.
 
-    `auto` takes CHOLMOD where installed, else PARDISO for a large matrix, else SuperLU.
+    `auto` takes CHOLMOD if it is installed, else PARDISO for a large matrix, else SuperLU.
 
     Raises:
-        IfemError: unknown backend, one that is not installed, or a matrix it cannot factor.
+        IfemError: The backend is unknown, not installed, or cannot factor the matrix.
     """
     if backend not in BACKENDS:
-        raise IfemError(f"sparse factor {backend!r}: must be one of {', '.join(BACKENDS)}")
+        raise IfemError(
+            f"sparse factor {backend!r}: must be one of {', '.join(BACKENDS)}",
+            field="backend",
+            value=backend,
+        )
     available = installed_backends()
     chosen = _automatic(matrix.shape[0], available) if backend == "auto" else backend
     if chosen not in available:
         raise IfemError(
             f"sparse factor {chosen!r} needs the package {_PACKAGE[chosen]}, which is not "
-            f"installed: install it or use {' or '.join(available)}"
+            f"installed: install it or use {' or '.join(available)}",
+            field="backend",
+            value=chosen,
         )
     maker = {"superlu": _superlu, "cholmod": _cholmod, "pardiso": _Pardiso}[chosen]
     try:
         factor: Factor = maker(matrix)
     except (ImportError, AttributeError) as error:
         raise IfemError(
-            f"the installed {_PACKAGE.get(chosen, chosen)} cannot be used ({error}): use 'superlu'"
+            f"the installed {_PACKAGE.get(chosen, chosen)} cannot be used ({error}): use 'superlu'",
+            field="backend",
+            value=chosen,
         ) from error
     except MemoryError as error:
         raise IfemError(
-            f"no memory to factor {matrix.shape[0]} unknowns by {chosen}: use method 'pcg'"
+            f"no memory to factor {matrix.shape[0]} unknowns by {chosen}: use method 'pcg'",
+            field="matrix",
         ) from error
     # Each library has errors of its own for a singular or indefinite matrix.
     except Exception as error:
-        raise IfemError(f"the stiffness matrix cannot be factored by {chosen} ({error})") from error
+        raise IfemError(
+            f"the stiffness matrix cannot be factored by {chosen} ({error})", field="matrix"
+        ) from error
     return factor
 
 
@@ -96,7 +107,7 @@ def _cholmod(matrix: sparse.csr_array) -> Any:
 
 
 class _Cholmod:
-    """A CHOLMOD factor behind the names of SuperLU's."""
+    """A CHOLMOD factor with the interface of SuperLU's."""
 
     def __init__(self, factor: Any) -> None:
         self._factor = factor
@@ -113,7 +124,7 @@ class _Pardiso:
     """A PARDISO factor of the upper triangle of a positive definite matrix."""
 
     def __init__(self, matrix: sparse.csr_array) -> None:
-        # Matrix type 2 is real, symmetric, positive definite; it reads the upper triangle only.
+        # Matrix type 2 is real, symmetric and positive definite; only the upper triangle is read.
         self._solver = import_module("pypardiso").PyPardisoSolver(mtype=2)
         self._upper = sparse.csr_matrix(sparse.triu(matrix, format="csr"))
         self._solver.factorize(self._upper)

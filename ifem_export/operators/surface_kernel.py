@@ -1,4 +1,4 @@
-"""Compiled loops of the surface operators. Import only where they run: this loads numba."""
+"""Compiled loops of the surface operators. Import this module only where they run (numba)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numba import njit
 
 @njit(cache=True, nogil=True, fastmath=False)
 def apply_stencil(types: Any, neighbours: Any, table: Any, u: Any, f: Any) -> None:
-    """f = K u for surface nodes that see their eight neighbours only.
+    """f = K u for surface nodes that are coupled to their eight neighbours only.
 
-    `types` (c,) chooses the blocks of `table` (t, 3, 3, 9) (row, column, neighbour);
-    `neighbours` (c, 9) are node numbers, c for an absent one; `u` (c + 1, 3) ends in zeros.
+    `types` (c,) selects the blocks of `table` (t, 3, 3, 9) (row, column, neighbour). `neighbours`
+    (c, 9) are node numbers, with c for an absent one. The last row of `u` (c + 1, 3) is zero.
     """
     for node in range(len(types)):
         blocks = table[types[node]]
@@ -27,14 +27,16 @@ def apply_stencil(types: Any, neighbours: Any, table: Any, u: Any, f: Any) -> No
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gathered(kernel: Any, places: Any, out: Any) -> None:
-    """Write the products (3n, 3n) of nodes at lattice `places` (n, 2) from a periodic `kernel`
-    (rows, columns, 3, 3)."""
+def gather_products(kernel: Any, positions: Any, out: Any) -> None:
+    """Write the products (3n, 3n) of nodes at lattice `positions` (n, 2).
+
+    They come from a periodic `kernel` (rows, columns, 3, 3).
+    """
     rows, columns = kernel.shape[0], kernel.shape[1]
-    for i in range(len(places)):
+    for i in range(len(positions)):
         for j in range(i + 1):
-            y = (places[i, 0] - places[j, 0]) % rows
-            x = (places[i, 1] - places[j, 1]) % columns
+            y = (positions[i, 0] - positions[j, 0]) % rows
+            x = (positions[i, 1] - positions[j, 1]) % columns
             for a in range(3):
                 for b in range(3):
                     value = kernel[y, x, a, b]

@@ -1,4 +1,7 @@
-"""A small complete bundle for the tests, and ways to damage a stored one."""
+"""A small complete bundle for the tests, and ways to damage a stored one.
+
+Cells are not square and the markers have two pitches, so that x and y cannot be exchanged.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,12 @@ from ifem_export.bundle.bundle import build_bundle
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import build_pad_mesh
 
-MARKERS = np.stack(np.meshgrid(np.arange(-3, 4) * 0.9, np.arange(-2, 3) * 0.9), -1).reshape(-1, 2)
+MARKERS = np.stack(np.meshgrid(np.arange(-3, 4) * 0.9, np.arange(-2, 3) * 0.7), -1).reshape(-1, 2)
 CAMERA = {"model": "OV5647", "matrix_px": [[600.0, 0, 320], [0, 600.0, 240], [0, 0, 1]]}
 
 
 def make_bundle(gel, **options):
-    mesh, _ = build_pad_mesh(RoundedRectangle(8.0, 6.0, 1.0), 2.0, pitch_mm=0.4)
+    mesh, _ = build_pad_mesh(RoundedRectangle(8.0, 6.0, 1.0), 2.0, pitch_mm=(0.4, 0.5))
     return build_bundle(
         mesh,
         gel,

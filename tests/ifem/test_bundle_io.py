@@ -12,10 +12,9 @@ from ifem_bundles import CAMERA, flip_byte, make_bundle
 import ifem_export
 from gelslim_core.files import replaced_folder
 from ifem_export.bundle import files as bundle_io
-from ifem_export.bundle.bundle import build_bundle, force
-from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.bundle.files import load_bundle, summarise_bundle, write_bundle
 from ifem_export.bundle.layout import bundle_arrays
-from ifem_export.bundle.summary import summarise_bundle
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import build_pad_mesh
@@ -43,9 +42,7 @@ def test_round_trip(bundle, stored):
     assert back.geometry_hash == bundle.geometry_hash
     assert back.mesh.cell_size_mm == bundle.mesh.cell_size_mm
     assert back.mesh.origin_mm == bundle.mesh.origin_mm
-    u = np.zeros((bundle.mesh.n_nodes, 3))
-    u[bundle.mesh.surface] = np.random.default_rng(0).normal(size=(len(bundle.mesh.surface), 3))
-    assert np.array_equal(force(back, u), force(bundle, u))
+    assert (back.stiffness_matrix != bundle.stiffness_matrix).nnz == 0
 
 
 def test_recipe_alone_rebuilds_the_same_matrix(gel, bundle, tmp_path):
@@ -72,16 +69,18 @@ def test_opening_is_lazy(stored):
     flip_byte(stored / "stiffness_data_n_per_mm.npy")
     back = load_bundle(stored, verify=False)
     assert is_mapped(back.stiffness.data)
-    with pytest.raises(BundleError, match=r"stiffness_data_n_per_mm\.npy: its SHA-256"):
+    with pytest.raises(BundleError) as caught:
         load_bundle(stored)
+    assert caught.value.file == "stiffness_data_n_per_mm.npy"
 
 
 def test_an_inconsistent_bundle_is_not_written(bundle, tmp_path):
     broken = bundle.stiffness.copy()
     broken.data[0] = np.nan
     changed = type(bundle)(**{**vars_of(bundle), "stiffness": broken})
-    with pytest.raises(BundleError, match="not finite"):
+    with pytest.raises(BundleError) as caught:
         write_bundle(tmp_path / "b", changed)
+    assert caught.value.file == "stiffness_data_n_per_mm.npy"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -96,8 +95,9 @@ def test_writing_replaces_a_bundle_and_only_a_bundle(gel, bundle, stored):
     other = stored.parent / "other"
     other.mkdir()
     (other / "thesis.txt").write_text("mine")
-    with pytest.raises(BundleError, match="is not a bundle"):
+    with pytest.raises(BundleError) as caught:
         write_bundle(other, bundle)
+    assert caught.value.file == str(other)
     assert (other / "thesis.txt").read_text() == "mine"
 
 
@@ -108,8 +108,10 @@ def test_a_failed_write_leaves_the_old_bundle(bundle, stored, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(bundle_io, "describe", full_disk)
-    with pytest.raises(BundleError, match="No space left"):
+    with pytest.raises(BundleError) as caught:
         write_bundle(stored, bundle)
+    assert caught.value.file == str(stored)
+    assert "No space left" in caught.value.reason
     assert {p.name: p.read_bytes() for p in stored.iterdir()} == before
     assert [p.name for p in stored.parent.iterdir()] == ["bundle"]
 
@@ -125,8 +127,9 @@ def test_a_failed_swap_puts_the_old_bundle_back(bundle, stored, monkeypatch):
     # As where the system cannot exchange two folders in one step.
     monkeypatch.setattr(replaced_folder, "_exchanged", lambda staging, place: False)
     monkeypatch.setattr(replaced_folder.os, "rename", refuse_new)
-    with pytest.raises(BundleError, match="Permission denied"):
+    with pytest.raises(BundleError) as caught:
         write_bundle(stored, bundle)
+    assert caught.value.file == str(stored)
     monkeypatch.undo()
     load_bundle(stored)
     assert [p.name for p in stored.parent.iterdir()] == ["bundle"]
@@ -153,7 +156,8 @@ def test_summary(stored, bundle):
     assert summary["format"] == "gelslim-bundle/1"
     assert summary["verification"] == {"ok": True}
     assert summary["mesh"]["nodes"] == bundle.mesh.n_nodes
-    assert summary["mesh"]["elements"] == 20 * 15 - 4 * cells_cut_per_corner()
+    assert summary["mesh"]["cells"] == [20, 12, 1]
+    assert summary["mesh"]["elements"] == 20 * 12 - 4 * cells_cut_per_corner()
     assert summary["markers"] == {
         "count": 35,
         "arrays": ["kind", "row"],
@@ -170,7 +174,7 @@ def test_summary(stored, bundle):
 
 def cells_cut_per_corner():
     """Cells of one corner whose centre lies beyond the 1 mm corner radius."""
-    x, y = np.meshgrid(0.2 + 0.4 * np.arange(3), 0.2 + 0.4 * np.arange(3))
+    x, y = np.meshgrid(0.2 + 0.4 * np.arange(3), 0.25 + 0.5 * np.arange(2))
     return int(((x < 1) & (y < 1) & (np.hypot(x - 1, y - 1) > 1)).sum())
 
 
@@ -209,5 +213,6 @@ def test_a_bundle_without_a_spline_says_so(bundle, tmp_path):
     write_bundle(tmp_path / "bare", bare)
     back = load_bundle(tmp_path / "bare").markers
     assert back.spline is None
-    with pytest.raises(IfemError, match="no thin-plate spline: rebuild"):
+    with pytest.raises(IfemError) as caught:
         _ = back.thin_plate
+    assert caught.value.field == "spline"

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ifem_shapes import Polygon, disc
 
 from ifem_export.bundle.bundle import build_bundle
 from ifem_export.elements.material import Material
-from ifem_export.mesh.outline import Disc, Outline, Polygon, RoundedRectangle
+from ifem_export.mesh.outline import Outline, RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.operators.ladder import measure_ladder
 from ifem_export.operators.surface_operator import surface_operator
 
 OUTLINES: dict[str, Outline] = {
     "rectangle": RoundedRectangle(12.0, 10.0, 2.0),
-    "disc": Disc(6.0),
+    "disc": disc(6.0),
     "polygon": Polygon([(-6, -5), (6, -5), (6, 1), (1, 1), (1, 5), (-6, 5)]),
+    "long": RoundedRectangle(22.0, 4.2, 0.5),
 }
 RUNGS = [("truncated", {"radius": 3}), ("truncated", {"radius": 6}), ("fft", {"lumped": True})]
 
@@ -24,8 +26,8 @@ def gel(nu: float) -> Material:
     return Material(0.147, nu, 1020.0)
 
 
-def pad(outline: Outline, pitch: float = 0.8) -> PadMesh:
-    return build_pad_mesh(outline, 2.0, pitch_mm=pitch, layers=4)[0]
+def pad(outline: Outline) -> PadMesh:
+    return build_pad_mesh(outline, 2.0, pitch_mm=(0.8, 0.7), layers=4)[0]
 
 
 @pytest.mark.parametrize("name", OUTLINES)

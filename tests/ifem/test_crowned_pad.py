@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 from ifem_bundles import edit, reseal
+from ifem_shapes import Sphere, disc
 from scipy import sparse
 
-from ifem_export.assembly.weighted_assembly import mesh_stiffness
+from ifem_export.assembly.assembly import mesh_stiffness
 from ifem_export.bundle.bundle import build_bundle, geometry_hash
 from ifem_export.bundle.files import load_bundle, write_bundle
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import BundleError, MeshError
-from ifem_export.mesh.crown import Paraboloid, Sphere
-from ifem_export.mesh.outline import Disc, RoundedRectangle
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.operators.crowned_system import CrownedSystem, pad_system
 from ifem_export.operators.ladder import measure_ladder, refined
@@ -35,7 +36,7 @@ class Level:
         return np.broadcast_arrays(x_mm, y_mm)[0] * 0.0 - self.depth_mm
 
 
-def domed(weighting="volume_fraction", cells=(8, 7, 4), crown=DOME, **options):
+def domed(weighting="volume_fraction", cells=(8, 9, 4), crown=DOME, **options):
     outline = RoundedRectangle(8.0, 7.0, 2.3)
     return build_pad_mesh(outline, 2.0, cells=cells, crown=crown, weighting=weighting, **options)[0]
 
@@ -149,7 +150,7 @@ def test_equations_are_symmetric_and_definite(weighting):
     assert (system.stiffness != system.stiffness.T).nnz == 0
     assert np.linalg.eigvalsh(system.stiffness.toarray())[0] > 0.0
     size = system.stiffness.shape[0]
-    guess = system.compliance_guess
+    guess = system.preconditioner
     columns = np.stack([guess(e.reshape(1, -1, 3)).reshape(-1) for e in np.eye(size)])
     assert columns == pytest.approx(columns.T, abs=1e-9 * np.abs(columns).max())
     assert np.linalg.eigvalsh((columns + columns.T) / 2)[0] > 0.0
@@ -194,7 +195,7 @@ def test_a_shallow_dome_gives_the_sum_of_its_columns():
     gel = Material(0.147, 0.0, 1070.0)
     crown, radius = Paraboloid(0.4, 10.0), 10.0
     mesh, _ = build_pad_mesh(
-        Disc(radius), 1.0, cells=(40, 40, 4), crown=crown, weighting="volume_fraction"
+        disc(radius), 1.0, cells=(40, 40, 4), crown=crown, weighting="volume_fraction"
     )
     r = np.linspace(0.0, radius, 20001)
     exact = np.trapezoid(2 * np.pi * r * 0.147 / (1.0 + crown.height_mm(r, 0.0)), r)
@@ -223,24 +224,25 @@ def test_bundles_of_crowned_pads_come_back(weighting, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "change", "reason"),
+    ("name", "change", "file"),
     [
-        ("surface_shift", lambda a: a + 0.6, "from -1/2 to 1/2"),
-        ("surface_shift", lambda a: np.full_like(a, np.nan), "from -1/2 to 1/2"),
-        ("surface_shift", lambda a: a * 0.5, "geometry hash"),
-        ("surface_nodes", lambda a: a[::-1].copy(), "off its columns"),
-        ("surface_nodes", lambda a: np.full_like(a, a[0]), "one per column"),
-        ("cell_fill", lambda a: a * 0.0, "fill must be"),
-        ("cell_fill", lambda a: a * 2.0, "above 1"),
-        ("cell_fill", lambda a: a * 0.9, "other forces"),
+        ("surface_shift", lambda a: a + 0.6, "surface_shift.npy"),
+        ("surface_shift", lambda a: np.full_like(a, np.nan), "surface_shift.npy"),
+        ("surface_shift", lambda a: a * 0.5, "manifest.json"),
+        ("surface_nodes", lambda a: a[::-1].copy(), "surface_nodes.npy"),
+        ("surface_nodes", lambda a: np.full_like(a, a[0]), "surface_nodes.npy"),
+        ("cell_fill", lambda a: a * 0.0, "cell_fill.npy"),
+        ("cell_fill", lambda a: a * 2.0, "cell_fill.npy"),
+        ("cell_fill", lambda a: a * 0.9, "self_test_force_n.npy"),
     ],
 )
-def test_a_damaged_crown_is_refused(name, change, reason, tmp_path):
+def test_a_damaged_crown_is_refused(name, change, file, tmp_path):
     write_bundle(tmp_path / "bad", build_bundle(domed(), GEL, "bbar"))
     edit(tmp_path / "bad", name, change)
     reseal(tmp_path / "bad")
-    with pytest.raises(BundleError, match=reason):
+    with pytest.raises(BundleError) as caught:
         load_bundle(tmp_path / "bad")
+    assert caught.value.file == file
 
 
 def test_the_ladder_of_a_dome_has_the_exact_rungs():
@@ -256,21 +258,24 @@ def test_the_ladder_of_a_dome_has_the_exact_rungs():
     assert best.error_operator < 1e-3
     assert best.error_field < 0.15
     assert best.error_resultant < 0.05
-    with pytest.raises(MeshError, match="meshed anew"):
+    with pytest.raises(MeshError) as caught:
         refined(mesh)
+    assert caught.value.field == "reference"
 
 
 def test_what_needs_one_thickness_says_so():
     mesh = domed()
     for rung in ("paper", "truncated", "fft"):
-        with pytest.raises(MeshError, match=r"crowned.*pcg, factor, dense32"):
+        with pytest.raises(MeshError) as caught:
             surface_operator(mesh, GEL, "bbar", rung)
-    with pytest.raises(MeshError, match="uniform thickness"):
+        assert (caught.value.field, caught.value.value) == ("rung", rung)
+    with pytest.raises(MeshError) as caught:
         PadSystem(mesh, hex8_stiffness(mesh.cell_size_mm, GEL, "bbar"))
-    with pytest.raises(MeshError, match=r"less than one layer.*more layers"):
-        domed(cells=(8, 7, 1))
-    with pytest.raises(MeshError, match="above z = 0"):
-        domed(crown=Level(-0.1))
+    assert caught.value.field == "mesh"
+    for options, field in (({"cells": (8, 7, 1)}, "layers"), ({"crown": Level(-0.1)}, "crown")):
+        with pytest.raises(MeshError) as caught:
+            domed(**options)
+        assert caught.value.field == field
 
 
 def test_columns_with_gaps_have_no_surface():
@@ -280,8 +285,9 @@ def test_columns_with_gaps_have_no_surface():
     assert pad.crowned(None).nodes_mm[pad.crowned(None).surface, 2].tolist() == [0.0] * 16
     cells[1, 1, 3] = True
     gap = PadMesh.from_occupancy(cells, (1.0, 1.0, 1.0), (0.0, 0.0, -4.0))
-    with pytest.raises(MeshError, match="a gap or hangs in the air"):
+    with pytest.raises(MeshError) as caught:
         gap.crowned(None)
+    assert caught.value.field == "occupancy"
 
 
 def test_the_trace_of_the_test_is_a_partition_of_one():

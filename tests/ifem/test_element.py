@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 from ifem_oracle import rigid_modes
 
-from ifem_export.elements.hex8 import (
-    FORMULATIONS,
+from ifem_export.elements.hex8 import FORMULATIONS, hex8_stiffness
+from ifem_export.elements.kinematics import (
     elasticity_matrix,
-    hex8_stiffness,
     shape_gradients,
     strain_displacement,
 )
@@ -89,10 +88,12 @@ def test_axis_permutation(gel, formulation, order):
 
 @pytest.mark.parametrize("size", [(0.0, 1.0, 1.0), (1.0, 1.0), (np.nan, 1.0, 1.0)])
 def test_impossible_cells_are_refused(gel, size):
-    with pytest.raises(MeshError, match="cell_size_mm"):
+    with pytest.raises(MeshError) as caught:
         hex8_stiffness(size, gel, "full")
+    assert caught.value.field == "cell_size_mm"
 
 
-def test_unknown_formulation_is_refused_with_the_choices(gel):
-    with pytest.raises(MeshError, match="full, bbar"):
+def test_unknown_formulation_is_refused(gel):
+    with pytest.raises(MeshError) as caught:
         hex8_stiffness(SIZE, gel, "reduced")
+    assert (caught.value.field, caught.value.value) == ("formulation", "reduced")

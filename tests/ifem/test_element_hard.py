@@ -14,10 +14,10 @@ from ifem_export.elements.hex8 import (
     FORMULATIONS,
     elasticity_matrix,
     hex8_stiffness,
+    mode_strains,
     shape_gradients,
     strain_displacement,
 )
-from ifem_export.elements.incompatible import mode_strains
 from ifem_export.elements.kinematics import GAUSS, TRACE, deviatoric_matrix
 from ifem_export.elements.material import Material
 from ifem_export.mesh.lattice import VTK_CORNERS

@@ -1,18 +1,16 @@
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
-from ifem_oracle import random_occupancy
+from ifem_oracle import neo_hookean_energy, neo_hookean_force, random_occupancy
 from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
-from ifem_export.assembly.assembly import assemble_bsr
+from ifem_export.assembly.assembly import assemble_csr
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.elements.material import Material
-from ifem_export.errors import IfemError, MeshError
-from ifem_export.finite_strain.neo_hookean import FiniteStrainError, NeoHookeanPad, internal_force
+from ifem_export.errors import MeshError
+from ifem_export.finite_strain.neo_hookean import FiniteStrainError, NeoHookeanPad
 from ifem_export.mesh.pad_mesh import PadMesh
 
 SIZE = (0.5, 0.7, 0.4)
@@ -42,31 +40,31 @@ def scale_of(material):
 def test_finite_rotations_and_translations_need_no_force(nu, seed):
     mesh, material = crop(seed), Material(0.147, nu, 1.0)
     moved = mesh.nodes_mm @ rotation(seed).T + [3.0, -2.0, 1.0]
-    F = internal_force(mesh, material, moved - mesh.nodes_mm)
+    F = NeoHookeanPad(mesh, material).force(moved - mesh.nodes_mm)
     assert np.abs(F).max() < 1e-12 * scale_of(material)
     shift = np.broadcast_to([0.3, -0.2, 5.0], mesh.nodes_mm.shape)
-    assert np.abs(internal_force(mesh, material, shift)).max() < 1e-13 * scale_of(material)
-    assert np.array_equal(internal_force(mesh, material, 0.0 * shift), 0.0 * shift)
+    assert np.abs(NeoHookeanPad(mesh, material).force(shift)).max() < 1e-13 * scale_of(material)
+    assert np.array_equal(NeoHookeanPad(mesh, material).force(0.0 * shift), 0.0 * shift)
 
 
-@pytest.mark.parametrize("engine", ["compiled", "numpy"])
 @pytest.mark.parametrize("nu", NUS)
-def test_objectivity(nu, engine):
+def test_objectivity(nu):
     """A rotated deformation has the rotated forces; the same one turned before has other ones."""
     mesh, material = crop(), Material(0.147, nu, 1.0)
-    body = NeoHookeanPad.of(mesh, material)
+    body = NeoHookeanPad(mesh, material)
     u, Q = wobble(mesh), rotation(4)
-    F = body.force(u, engine=engine)
+    F = body.force(u)
     turned = (mesh.nodes_mm + u) @ Q.T - mesh.nodes_mm
-    assert np.abs(body.force(turned, engine=engine) - F @ Q.T).max() < 1e-12 * scale_of(material)
+    assert np.abs(body.force(turned) - F @ Q.T).max() < 1e-12 * scale_of(material)
     assert np.abs(F).max() > 1e-3 * scale_of(material)
 
 
 @pytest.mark.parametrize("nu", NUS)
 def test_tangent_at_rest_is_the_bbar_stiffness(nu):
     mesh, material = crop(), Material(0.147, nu, 1.0)
-    K = assemble_bsr(mesh.occupancy, hex8_stiffness(SIZE, material, "bbar"))
-    body = NeoHookeanPad.of(mesh, material)
+    K = assemble_csr(mesh.occupancy, hex8_stiffness(SIZE, material, "bbar")).tobsr((3, 3))
+    K.sort_indices()
+    body = NeoHookeanPad(mesh, material)
     T = body.tangent(np.zeros((mesh.n_nodes, 3)))
     assert np.array_equal(T.indptr, K.indptr)
     assert np.array_equal(T.indices, K.indices)
@@ -78,7 +76,7 @@ def test_tangent_at_rest_is_the_bbar_stiffness(nu):
 @pytest.mark.parametrize("nu", NUS)
 def test_tangent_is_the_derivative_of_the_force_far_from_rest(nu):
     mesh = crop(2, (2, 2, 2))
-    body = NeoHookeanPad.of(mesh, Material(0.147, nu, 1.0))
+    body = NeoHookeanPad(mesh, Material(0.147, nu, 1.0))
     u = wobble(mesh, 0.06)
     T = body.tangent(u)
     assert np.array_equal(T.toarray(), T.toarray().T)
@@ -100,19 +98,19 @@ def finite_differences(force, u, step):
 @pytest.mark.parametrize("nu", NUS)
 def test_force_is_the_gradient_of_the_energy(nu):
     mesh, material = crop(), Material(0.147, nu, 1.0)
-    body = NeoHookeanPad.of(mesh, material)
+    body = NeoHookeanPad(mesh, material)
     u = wobble(mesh)
     F = body.force(u)
     for seed in range(5):
         d = np.random.default_rng(seed).normal(size=u.shape)
         e = [
-            body.energy_n_mm(u + k * 1e-4 * d) - body.energy_n_mm(u - k * 1e-4 * d)
+            neo_hookean_energy(body, u + k * 1e-4 * d) - neo_hookean_energy(body, u - k * 1e-4 * d)
             for k in (1, 2, 3)
         ]
         slope = (45.0 * e[0] - 9.0 * e[1] + e[2]) / 60.0 / 1e-4
         assert slope == pytest.approx((F * d).sum(), abs=1e-9 * np.abs(F * d).sum())
-    assert body.energy_n_mm(0.0 * u) == pytest.approx(0.0, abs=1e-14)
-    assert body.energy_n_mm(u) > 0.0
+    assert neo_hookean_energy(body, 0.0 * u) == pytest.approx(0.0, abs=1e-14)
+    assert neo_hookean_energy(body, u) > 0.0
 
 
 @pytest.mark.parametrize("nu", NUS)
@@ -131,7 +129,9 @@ def test_uniaxial_stretch_with_free_sides(nu, stretch):
 
     across = brentq(lambda s: nominal(stretch, s)[1], 0.3, 2.5, xtol=1e-15, rtol=1e-15)
     mesh = PadMesh.from_occupancy(np.ones((3, 2, 4), dtype=bool), SIZE, (0.0, 0.0, 0.0))
-    F = internal_force(mesh, material, mesh.nodes_mm * ([across, across, stretch] - np.ones(3)))
+    F = NeoHookeanPad(mesh, material).force(
+        mesh.nodes_mm * ([across, across, stretch] - np.ones(3))
+    )
     top = np.isclose(mesh.nodes_mm[:, 2], 4 * SIZE[2])
     area = 3 * SIZE[0] * 2 * SIZE[1]
     bound = 1e-12 * scale_of(material)
@@ -144,12 +144,12 @@ def test_uniaxial_stretch_with_free_sides(nu, stretch):
 def test_small_strain_limit_is_the_linear_law():
     """The difference to K u falls with the square of the displacement."""
     mesh, material = crop(), Material(0.147, 0.49, 1.0)
-    K = assemble_bsr(mesh.occupancy, hex8_stiffness(SIZE, material, "bbar"))
+    K = assemble_csr(mesh.occupancy, hex8_stiffness(SIZE, material, "bbar"))
     u = wobble(mesh)
     gaps = []
     for shrink in (1e-2, 1e-3, 1e-4):
         linear = (K @ (shrink * u).ravel()).reshape(-1, 3)
-        gaps.append(np.abs(internal_force(mesh, material, shrink * u) - linear).max())
+        gaps.append(np.abs(NeoHookeanPad(mesh, material).force(shrink * u) - linear).max())
     assert gaps[0] / gaps[1] == pytest.approx(100.0, rel=0.05)
     assert gaps[1] / gaps[2] == pytest.approx(100.0, rel=0.05)
 
@@ -158,7 +158,7 @@ def test_small_strain_limit_is_the_linear_law():
 def test_forces_balance_in_the_deformed_place(nu):
     mesh, material = crop(3), Material(0.147, nu, 1.0)
     u = wobble(mesh)
-    F = internal_force(mesh, material, u)
+    F = NeoHookeanPad(mesh, material).force(u)
     total = np.abs(F).sum()
     assert np.abs(F.sum(axis=0)).max() < 1e-14 * total
     assert np.abs(np.cross(mesh.nodes_mm + u, F).sum(axis=0)).max() < 1e-13 * total
@@ -169,15 +169,15 @@ def test_forces_balance_in_the_deformed_place(nu):
 @pytest.mark.parametrize("shape", [(1, 1, 1), (3, 1, 1), (5, 4, 3), (17, 9, 2)])
 def test_numpy_and_compiled_agree(nu, shape):
     mesh, material = crop(5, shape), Material(0.147, nu, 1.0)
-    body = NeoHookeanPad.of(mesh, material)
+    body = NeoHookeanPad(mesh, material)
     u = wobble(mesh)
-    gap = np.abs(body.force(u) - body.force(u, engine="numpy")).max()
-    assert gap < 1e-14 * scale_of(material)
+    gap = np.abs(body.force(u) - neo_hookean_force(body, u)).max()
+    assert gap < 2e-14 * scale_of(material)
 
 
 def test_threads_give_the_same_bits():
     mesh = crop(6, (20, 15, 4))
-    body = NeoHookeanPad.of(mesh, Material(0.147, 0.49, 1.0))
+    body = NeoHookeanPad(mesh, Material(0.147, 0.49, 1.0))
     u = wobble(mesh)
     one = body.force(u)
     for threads in (2, 3, 7, 10_000):
@@ -187,24 +187,27 @@ def test_threads_give_the_same_bits():
 def test_scaling_mirror_and_input_forms():
     mesh = crop(7)
     material, u = Material(0.147, 0.49, 1.0), wobble(mesh)
-    F = internal_force(mesh, material, u)
-    assert internal_force(mesh, Material(0.441, 0.49, 1.0), u) == pytest.approx(3.0 * F, rel=1e-12)
+    F = NeoHookeanPad(mesh, material).force(u)
+    assert NeoHookeanPad(mesh, Material(0.441, 0.49, 1.0)).force(u) == pytest.approx(
+        3.0 * F, rel=1e-12
+    )
     larger = tuple(2.0 * h for h in SIZE)
-    assert internal_force((mesh.occupancy, larger), material, 2.0 * u) == pytest.approx(4.0 * F)
+    twice = PadMesh.from_occupancy(mesh.occupancy, larger, (0.0, 0.0, 0.0))
+    assert NeoHookeanPad(twice, material).force(2.0 * u) == pytest.approx(4.0 * F)
     mirrored = PadMesh.from_occupancy(mesh.occupancy[:, ::-1].copy(), SIZE, (0.0, 0.0, 0.0))
     lookup = mirrored.numbering.node_index.reshape(mirrored.numbering.shape)[:, ::-1].ravel()
     image = lookup[mesh.numbering.positions]
     flip = np.array([1.0, -1.0, 1.0])
     v = np.empty_like(u)
     v[image] = u * flip
-    assert internal_force(mirrored, material, v)[image] * flip == pytest.approx(F, abs=1e-13)
+    assert NeoHookeanPad(mirrored, material).force(v)[image] * flip == pytest.approx(F, abs=1e-13)
 
 
 def test_newton_finds_the_pressed_pad_in_quadratic_steps():
     """A quarter of the thickness pressed in: stiffer than the linear law says."""
     material = Material(0.147, 0.45, 1.0)
     mesh = PadMesh.from_occupancy(np.ones((6, 6, 2), dtype=bool), (1.0, 1.0, 1.0), (0, 0, -2))
-    body = NeoHookeanPad.of(mesh, material)
+    body = NeoHookeanPad(mesh, material)
     held = np.zeros((mesh.n_nodes, 3), dtype=bool)
     held[mesh.bonded] = True
     centre = np.hypot(mesh.nodes_mm[:, 0] - 3.0, mesh.nodes_mm[:, 1] - 3.0)
@@ -236,53 +239,43 @@ def test_newton_finds_the_pressed_pad_in_quadratic_steps():
 
 def test_an_inverted_cell_is_named():
     mesh = PadMesh.from_occupancy(np.ones((4, 3, 2), dtype=bool), SIZE, (0.0, 0.0, 0.0))
-    body = NeoHookeanPad.of(mesh, Material(0.147, 0.49, 1.0))
+    body = NeoHookeanPad(mesh, Material(0.147, 0.49, 1.0))
     u = np.zeros((mesh.n_nodes, 3))
     top = np.flatnonzero(np.isclose(mesh.nodes_mm, [2.0, 2.1, 0.8]).all(axis=1))
     u[top, 2] = -3.0
-    for engine in ("compiled", "numpy"):
-        with pytest.raises(FiniteStrainError, match=r"cell 23 .*\(3, 2, 1\).* J .*> 0") as caught:
-            body.force(u, engine=engine)
-        assert caught.value.cell == (3, 2, 1)
-    for method in (body.tangent, body.energy_n_mm):
-        with pytest.raises(FiniteStrainError, match="cell 23"):
+    for method in (body.force, body.tangent):
+        with pytest.raises(FiniteStrainError) as caught:
             method(u)
+        assert caught.value.cell == (3, 2, 1)
+        assert caught.value.volume_ratio < 0.0
     again = pickle.loads(pickle.dumps(caught.value))
     assert (str(again), again.cell) == (str(caught.value), (3, 2, 1))
+    assert again.volume_ratio == caught.value.volume_ratio
     flat = mesh.nodes_mm * [1.0, 1.0, 0.0] - mesh.nodes_mm
-    with pytest.raises(FiniteStrainError, match=r"cell 0 .*J reaches -?(0|\d.*e-1\d)"):
+    with pytest.raises(FiniteStrainError) as caught:
         body.force(flat)
-    with pytest.raises(FiniteStrainError, match="cell 0"):
+    assert caught.value.cell == (0, 0, 0)
+    assert abs(caught.value.volume_ratio) < 1e-9
+    with pytest.raises(FiniteStrainError) as caught:
         body.force(mesh.nodes_mm * 1e200)
+    assert caught.value.cell == (0, 0, 0)
 
 
 def test_bad_input_is_refused():
     mesh, material = crop(), Material(0.147, 0.49, 1.0)
+    pad = NeoHookeanPad(mesh, material)
     u = wobble(mesh)
-    with pytest.raises(FiniteStrainError, match="shape"):
-        internal_force(mesh, material, u[:-1])
-    u[4, 1] = np.nan
-    with pytest.raises(FiniteStrainError, match="node 4"):
-        internal_force(mesh, material, u)
-    with pytest.raises(IfemError, match="threads"):
-        NeoHookeanPad.of(mesh, material).force(0.0 * wobble(mesh), threads=0)
-    with pytest.raises(IfemError, match="engine"):
-        NeoHookeanPad.of(mesh, material).force(0.0 * wobble(mesh), engine="gpu")
-    with pytest.raises(MeshError, match="cell_size_mm"):
-        internal_force((mesh.occupancy, (1.0, -1.0, 1.0)), material, u)
-    with pytest.raises(MeshError, match="cell_size_mm"):
-        internal_force((mesh.occupancy, 0.5), material, u)
-    with pytest.raises(FiniteStrainError, match="must be numbers"):
-        internal_force(mesh, material, [["a", "b", "c"]])
-
-
-def test_the_reference_runs_without_numba():
-    code = (
-        "import sys, numpy as np;"
-        "from ifem_export.finite_strain.neo_hookean import NeoHookeanPad;"
-        "from ifem_export.elements.material import Material;"
-        "pad = NeoHookeanPad.of((np.ones((2, 2, 1), bool), (1., 1., 1.)), Material(1., .4, 1.));"
-        "pad.force(np.zeros((18, 3)), engine='numpy'); print('numba' in sys.modules)"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "False"
+    lost = u.copy()
+    lost[4, 1] = np.nan
+    for displacement, options, field, value in (
+        (u[:-1], {}, "displacement_mm", (len(u) - 1, 3)),
+        (lost, {}, "node", 4),
+        (u, {"threads": 0}, "threads", None),
+        ([["a", "b", "c"]], {}, "displacement_mm", None),
+    ):
+        with pytest.raises(FiniteStrainError) as caught:
+            pad.force(displacement, **options)
+        assert (caught.value.field, caught.value.value) == (field, value)
+    with pytest.raises(MeshError) as refused:
+        PadMesh.from_occupancy(mesh.occupancy, (1.0, -1.0, 1.0), (0.0, 0.0, 0.0))
+    assert refused.value.field == "cell_size_mm"

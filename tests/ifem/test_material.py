@@ -31,8 +31,9 @@ def test_lame_constants_satisfy_their_defining_relations():
     ],
 )
 def test_constants_out_of_range_are_refused_by_name(values, field):
-    with pytest.raises(MaterialError, match=field):
+    with pytest.raises(MaterialError) as caught:
         Material(*values)
+    assert caught.value.field == field
 
 
 def test_auxetic_and_nearly_incompressible_are_allowed():

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 from ifem_oracle import random_occupancy
+from ifem_shapes import Polygon, disc
 
 from ifem_export.errors import MeshError
 from ifem_export.mesh.crop import keep_bonded_part
 from ifem_export.mesh.lattice import VTK_CORNERS
-from ifem_export.mesh.outline import Disc, Polygon, RoundedRectangle
+from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 
 
@@ -71,7 +72,7 @@ def test_node_sets_agree_with_a_face_count(seed):
 @pytest.mark.parametrize(
     ("outline", "limit"),
     [
-        (Disc(10.0), 0.006),
+        (disc(10.0), 0.006),
         (RoundedRectangle(20.0, 20.0, 4.0), 0.006),
         (Polygon(((-9.9, -7.3), (9.7, -6.1), (5.2, 8.8), (-7.4, 6.6))), 0.01),
     ],
@@ -89,7 +90,7 @@ def test_crop_area_error_falls_with_the_pitch():
     errors = [
         np.mean(
             [
-                abs(build_pad_mesh(Disc(r), 1.0, pitch_mm=h)[1].area_error)
+                abs(build_pad_mesh(disc(r), 1.0, pitch_mm=h)[1].area_error)
                 for r in (9.7, 9.8, 9.9, 10.0, 10.1)
             ]
         )
@@ -99,7 +100,7 @@ def test_crop_area_error_falls_with_the_pitch():
 
 
 def test_centred_outline_gives_a_mirror_symmetric_crop():
-    mesh, _ = build_pad_mesh(Disc(7.3), 2.0, pitch_mm=0.61)
+    mesh, _ = build_pad_mesh(disc(7.3), 2.0, pitch_mm=0.61)
     assert np.array_equal(mesh.occupancy, mesh.occupancy[::-1])
     assert np.array_equal(mesh.occupancy, mesh.occupancy[:, ::-1])
 
@@ -121,11 +122,12 @@ def test_markers_fall_on_surface_nodes():
 
 
 def test_misaligned_pitch_is_refused_with_one_that_fits():
-    markers = np.stack(np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0]), axis=-1).reshape(-1, 2)
-    with pytest.raises(MeshError, match=r"such as 0\.333333 x 0\.333333"):
-        build_pad_mesh(Disc(5.0), 2.0, pitch_mm=0.3, align_to_mm=markers)
+    markers = np.stack(np.meshgrid([0.0, 1.0, 2.0], [0.0, 0.7]), axis=-1).reshape(-1, 2)
+    with pytest.raises(MeshError) as caught:
+        build_pad_mesh(disc(5.0), 2.0, pitch_mm=0.3, align_to_mm=markers)
+    assert caught.value.value == pytest.approx((1.0 / 3.0, 0.35))
     _, report = build_pad_mesh(
-        Disc(5.0), 2.0, pitch_mm=0.3, align_to_mm=markers, alignment_tolerance_mm=None
+        disc(5.0), 2.0, pitch_mm=0.3, align_to_mm=markers, alignment_tolerance_mm=None
     )
     assert 0.05 < report.alignment_error_mm < 0.15
     assert report.aligned_points >= 1
@@ -184,36 +186,40 @@ def test_vertex_contact_islands_and_unbonded_parts():
 def test_the_largest_part_must_reach_the_bonded_face():
     occupancy = np.zeros((3, 3, 2), dtype=bool)
     occupancy[:, :, 1] = True
-    with pytest.raises(MeshError, match="bonded face"):
+    with pytest.raises(MeshError) as caught:
         keep_bonded_part(occupancy)
+    assert caught.value.field == "occupancy"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "field"),
     [
         ({"thickness_mm": 0.0, "pitch_mm": 1.0}, "thickness_mm"),
         ({"thickness_mm": float("nan"), "pitch_mm": 1.0}, "thickness_mm"),
-        ({"thickness_mm": 1.0}, "exactly one"),
-        ({"thickness_mm": 1.0, "pitch_mm": 1.0, "cells": (2, 2, 1)}, "exactly one"),
+        ({"thickness_mm": 1.0}, "cells"),
+        ({"thickness_mm": 1.0, "pitch_mm": 1.0, "cells": (2, 2, 1)}, "cells"),
         ({"thickness_mm": 1.0, "pitch_mm": -1.0}, "pitch_mm"),
-        ({"thickness_mm": 1.0, "pitch_mm": 1e-6}, "coarser pitch"),
-        ({"thickness_mm": 1.0, "pitch_mm": 1e-300}, "coarser pitch"),
+        ({"thickness_mm": 1.0, "pitch_mm": (1.0, -1.0)}, "pitch_mm"),
+        ({"thickness_mm": 1.0, "pitch_mm": 1e-6}, "pitch_mm"),
+        ({"thickness_mm": 1.0, "pitch_mm": 1e-300}, "pitch_mm"),
         ({"thickness_mm": 1.0, "pitch_mm": 1.0, "layers": 0}, "layers"),
         ({"thickness_mm": 1.0, "cells": (2, 2, 0)}, "cells"),
         ({"thickness_mm": 1.0, "cells": (2.5, 2, 1)}, "cells"),
-        ({"thickness_mm": 1.0, "pitch_mm": 1.0, "align_to_mm": [[0.0]]}, "points_mm has shape"),
-        ({"thickness_mm": 1.0, "pitch_mm": 1.0, "align_to_mm": [[0.0, np.nan]]}, "finite"),
+        ({"thickness_mm": 1.0, "pitch_mm": 1.0, "align_to_mm": [[0.0]]}, "align_to_mm"),
+        ({"thickness_mm": 1.0, "pitch_mm": 1.0, "align_to_mm": [[0.0, np.nan]]}, "align_to_mm"),
     ],
 )
-def test_impossible_meshes_are_refused(arguments, message):
-    with pytest.raises(MeshError, match=message):
-        build_pad_mesh(Disc(5.0), **arguments)
+def test_impossible_meshes_are_refused(arguments, field):
+    with pytest.raises(MeshError) as caught:
+        build_pad_mesh(disc(5.0), **arguments)
+    assert caught.value.field == field
 
 
 def test_outline_that_misses_every_cell_centre_is_refused():
     sliver = Polygon(((0, 0), (10, 0), (10, 0.2), (0.2, 0.2), (0.2, 10), (0, 10)))
-    with pytest.raises(MeshError, match="finer pitch"):
+    with pytest.raises(MeshError) as caught:
         build_pad_mesh(sliver, 1.0, cells=(1, 1, 1))
+    assert (caught.value.field, caught.value.value) == ("pitch_mm", (10.0, 10.0))
 
 
 def test_single_cell_pad():
@@ -231,7 +237,7 @@ def test_arrays_are_read_only(round_pad):
 @pytest.mark.parametrize(
     "outline",
     [
-        Disc(3.3),
+        disc(3.3),
         Polygon(((-3.0, -2.0), (3.1, -2.2), (0.4, 3.3))),
         Polygon(((-3, -2), (3, -2), (3, 2), (1, 2), (1, -1), (-1, -1), (-1, 2), (-3, 2))),
     ],
@@ -261,5 +267,6 @@ def test_a_spike_that_volume_fractions_join_at_an_edge_is_dropped():
 
 
 def test_nothing_filled_enough_is_refused():
-    with pytest.raises(MeshError, match="filled by 1"):
-        build_pad_mesh(Disc(0.4), 1.0, pitch_mm=1.0, weighting="volume_fraction", floor=1.0)
+    with pytest.raises(MeshError) as caught:
+        build_pad_mesh(disc(0.4), 1.0, pitch_mm=1.0, weighting="volume_fraction", floor=1.0)
+    assert (caught.value.field, caught.value.value) == ("pitch_mm", (1.0, 1.0))

@@ -9,12 +9,13 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from ifem_shapes import Polygon, disc
 from scipy import sparse
 
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
-from ifem_export.mesh.outline import Disc, Outline, Polygon, RoundedRectangle
+from ifem_export.mesh.outline import Outline, RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.operators.layered_operator import LEAST_PADDING, even_fast_length, padding_columns
 from ifem_export.operators.pad_system import PadSystem
@@ -23,8 +24,9 @@ from ifem_export.operators.sparse_factor import factored, installed_backends
 
 OUTLINES: dict[str, Outline] = {
     "rectangle": RoundedRectangle(16.0, 14.0, 3.0),
-    "disc": Disc(8.0),
+    "disc": disc(8.0),
     "polygon": Polygon([(-8, -8), (8, -8), (8, 2), (0, 2), (0, 8), (-8, 8)]),
+    "long": RoundedRectangle(30.0, 5.0, 1.0),
 }
 
 
@@ -36,14 +38,14 @@ def system(mesh: PadMesh, nu: float) -> PadSystem:
 def block(aspect: float, cells: int = 12, layers: int = 4) -> PadMesh:
     h = 0.5 * aspect
     occupancy = np.ones((cells, cells, layers), dtype=bool)
-    return PadMesh.from_occupancy(occupancy, (0.5, 0.5, h), (0.0, 0.0, -layers * h))
+    return PadMesh.from_occupancy(occupancy, (0.5, 0.4, h), (0.0, 0.0, -layers * h))
 
 
 @pytest.mark.parametrize("name", OUTLINES)
 @pytest.mark.parametrize("thickness", [0.05, 0.2, 2.0, 20.0])
 def test_iterations_at_near_incompressibility_at_most_double(name: str, thickness: float) -> None:
     """Thin pads too: an even transform and some padding keep theirs from quintupling."""
-    mesh, _ = build_pad_mesh(OUTLINES[name], thickness, pitch_mm=0.8, layers=4)
+    mesh, _ = build_pad_mesh(OUTLINES[name], thickness, pitch_mm=(0.8, 0.7), layers=4)
     rng = np.random.default_rng(1)
     for make in (pad_solver, inner_solver):
         counts = []
@@ -62,8 +64,9 @@ def test_any_cell_aspect_is_solved_or_says_what_rounding_allows(aspect: float, n
     b = np.random.default_rng(2).normal(size=pad.stiffness.shape[0])
     b[: len(b) * 3 // 4] = 0.0
     if (aspect, nu) == (50.0, 0.4999):
-        with pytest.raises(ConvergenceError, match="rounding allows no less"):
+        with pytest.raises(ConvergenceError) as caught:
             pad_solver(pad, "pcg").solve(b, 1e-9)
+        assert 1e-9 < caught.value.residual < 1e-6
         assert pad_solver(pad, "pcg").solve(b, 1e-6).residual <= 1e-6
         return
     found = pad_solver(pad, "pcg").solve(b, 1e-8)
@@ -78,9 +81,9 @@ def test_a_drifted_residual_is_never_reported() -> None:
     pad = system(block(50.0), 0.49)
     b = np.random.default_rng(3).normal(size=pad.stiffness.shape[0])
     assert pad_solver(pad, "pcg").solve(b, 1e-7).residual <= 1e-7
-    with pytest.raises(ConvergenceError, match="rounding allows no less") as caught:
+    with pytest.raises(ConvergenceError) as caught:
         pad_solver(pad, "pcg").solve(b, 1e-13)
-    assert "ask for a tolerance of" in str(caught.value)
+    assert 1e-13 < caught.value.residual < 1e-7
 
 
 @pytest.mark.parametrize("least", [1, 2, 21, 27, 43, 49, 75, 81, 125, 135])
@@ -104,8 +107,9 @@ def test_padding_has_a_floor_and_a_cap() -> None:
 def test_factor_backends_agree(backend: str) -> None:
     pad = system(block(1.0, cells=6), 0.49)
     if backend not in installed_backends():
-        with pytest.raises(IfemError, match=r"not installed: install it or use .*superlu"):
+        with pytest.raises(IfemError) as caught:
             factored(pad.stiffness, backend)  # type: ignore[arg-type]
+        assert (caught.value.field, caught.value.value) == ("backend", backend)
         return
     dense = pad.stiffness.toarray()
     b = np.random.default_rng(5).normal(size=(len(dense), 2))
@@ -118,11 +122,13 @@ def test_factor_backends_agree(backend: str) -> None:
 
 def test_a_matrix_without_a_factor_is_refused() -> None:
     singular = sparse.csr_array(np.diag([1.0, 0.0, 2.0]))
-    with pytest.raises(IfemError, match="cannot be factored by superlu"):
+    with pytest.raises(IfemError) as caught:
         factored(singular, "superlu")
+    assert caught.value.field == "matrix"
     pad = system(block(1.0, cells=2), 0.3)
-    with pytest.raises(IfemError, match="must be one of auto, superlu"):
+    with pytest.raises(IfemError) as caught:
         factored(pad.stiffness, "magic")  # type: ignore[arg-type]
+    assert (caught.value.field, caught.value.value) == ("backend", "magic")
     with pytest.raises(IfemError, match="must be one of auto, pcg"):
         pad_solver(pad, "magic")  # type: ignore[arg-type]
 
@@ -133,7 +139,7 @@ from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import Disc
 from ifem_export.mesh.pad_mesh import build_pad_mesh
 from ifem_export.operators.surface_operator import surface_operator
-mesh, _ = build_pad_mesh(Disc(10.0), 2.0, pitch_mm=0.6, layers=4)
+mesh, _ = build_pad_mesh(disc(10.0), 2.0, pitch_mm=0.6, layers=4)
 u = np.random.default_rng(0).normal(size=(len(mesh.surface), 3))
 gel = Material(0.147, 0.45, 1000.0)
 for rung in ("paper", "truncated", "fft", "pcg"):

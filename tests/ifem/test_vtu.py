@@ -49,15 +49,11 @@ def test_the_file_is_valid_xml_and_the_same_every_time(round_pad, tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["a.vtu", "b.vtu"]
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [(np.zeros(3), "shape"), (np.zeros((3, 3, 3)), "shape"), (None, "shape")],
-)
-def test_fields_that_do_not_fit_leave_no_file(round_pad, tmp_path, values, message):
-    with pytest.raises(MeshError, match=message):
-        write_vtu(tmp_path / "a.vtu", round_pad, point_data={"f": values})
-    with pytest.raises(MeshError, match="type complex128"):
-        write_vtu(
-            tmp_path / "a.vtu", round_pad, point_data={"f": np.zeros(round_pad.n_nodes, complex)}
-        )
+@pytest.mark.parametrize("shape", [(3,), (3, 3, 3), ()])
+def test_fields_that_do_not_fit_leave_no_file(round_pad, tmp_path, shape):
+    wrong_type = np.zeros(round_pad.n_nodes, complex)
+    for name, values in (("f", np.zeros(shape)), ("c", wrong_type), ("ü", wrong_type.real)):
+        with pytest.raises(MeshError) as caught:
+            write_vtu(tmp_path / "a.vtu", round_pad, point_data={name: values})
+        assert caught.value.field == name
     assert os.listdir(tmp_path) == []

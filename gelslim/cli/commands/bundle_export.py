@@ -28,21 +28,16 @@ def bundle_export(
     from gelslim.cli.answer import BAD_INPUT
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import spare_strangers
-    from ifem_export.bundle import export_matrix
+    from ifem_export.bundle.export_matrix import EXPORTS, export_matrix
     from ifem_export.bundle.files import load_bundle
 
-    writers = {
-        ".mtx": export_matrix.export_matrix_market,
-        ".mat": export_matrix.export_mat,
-        ".safetensors": export_matrix.export_safetensors,
-    }
-    if file.suffix not in writers:
+    if file.suffix not in EXPORTS:
         raise CommandError(
-            f"{file}: the ending {file.suffix!r} names no format; use {', '.join(writers)}",
+            f"{file}: the ending {file.suffix!r} names no format; use {', '.join(EXPORTS)}",
             BAD_INPUT,
         )
     # Each kind of file says where it comes from in its head.
     spare_strangers(file, MARKS[file.suffix], "export of a bundle")
-    writers[file.suffix](load_bundle(path), file)
+    export_matrix(load_bundle(path), file)
     print(f"Wrote {file} ({file.stat().st_size / 1e6:.2f} MB)")
     return 0

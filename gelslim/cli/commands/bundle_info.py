@@ -20,7 +20,7 @@ def bundle_info(
     (status 2 where something is wrong).
     """
     from gelslim.cli.answer import BAD_INPUT, print_json
-    from ifem_export.bundle.summary import summarise_bundle
+    from ifem_export.bundle.files import summarise_bundle
 
     found = summarise_bundle(path)
     if as_json:

@@ -16,13 +16,17 @@ from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
 from ifem_export.elements.material import Material
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
+from ifem_export.mesh.pad_mesh import PadMesh
 
 MATERIAL = Material(0.147, 0.4999, 1000.0)
 SPHERE = Sphere(shape="sphere", radius_mm=6)
 
 
 def pad() -> NeoHookeanPad:
-    return NeoHookeanPad.of((np.ones((2, 2, 2), dtype=bool), (0.5, 0.6, 0.4)), MATERIAL)
+    return NeoHookeanPad(
+        PadMesh.from_occupancy(np.ones((2, 2, 2), dtype=bool), (0.5, 0.6, 0.4), (0.0, 0.0, -0.8)),
+        MATERIAL,
+    )
 
 
 def wobble(size: float, seed: int = 5) -> np.ndarray:
@@ -32,15 +36,15 @@ def wobble(size: float, seed: int = 5) -> np.ndarray:
 def test_pressure_of_a_stretched_block() -> None:
     """κ (J - 1) of an even stretch, and its first order in a further one."""
     one, shear = pad(), np.array([[1.1, 0.2, 0.0], [0.0, 0.95, 0.1], [0.0, 0.0, 1.02]])
-    z, y, x = np.unravel_index(one.numbering.positions[np.arange(one.n_nodes)],
-                               one.numbering.shape)  # fmt: skip
-    corners = np.column_stack([x, y, z]) * one.cell_size_mm
+    z, y, x = np.unravel_index(one.mesh.numbering.positions[np.arange(one.n_nodes)],
+                               one.mesh.numbering.shape)  # fmt: skip
+    corners = np.column_stack([x, y, z]) * one.mesh.cell_size_mm
     u = corners @ (shear - np.eye(3)).T
     bulk = MATERIAL.bulk_modulus_mpa
-    still = one.ahead_pressure_mpa(u, np.zeros_like(u))
+    still = one.predicted_pressure_mpa(u, np.zeros_like(u))
     np.testing.assert_allclose(still, bulk * (np.linalg.det(shear) - 1), rtol=1e-9)
     more = 1e-6 * corners
-    ahead = one.ahead_pressure_mpa(u, more)
+    ahead = one.predicted_pressure_mpa(u, more)
     swollen = np.linalg.det(shear + 1e-6 * np.eye(3)) - 1
     np.testing.assert_allclose(
         (ahead - still) / bulk, swollen - np.linalg.det(shear) + 1, rtol=1e-4
@@ -50,12 +54,12 @@ def test_pressure_of_a_stretched_block() -> None:
 def test_tangent_under_a_given_pressure() -> None:
     """Its own is the plain tangent; another adds the pressure times the change of the volume."""
     one, u = pad(), wobble(0.02)
-    own = one.ahead_pressure_mpa(u, np.zeros_like(u))
+    own = one.predicted_pressure_mpa(u, np.zeros_like(u))
     plain = one.tangent(u).toarray()
     np.testing.assert_allclose(one.tangent(u, own).toarray(), plain, atol=1e-9 * plain.max())
     other = own + np.linspace(-1, 2, len(own))
     change = one.tangent(u, other).toarray() - plain
-    way, small, volume = wobble(1.0, 6), 1e-5, float(np.prod(one.cell_size_mm))
+    way, small, volume = wobble(1.0, 6), 1e-5, float(np.prod(one.mesh.cell_size_mm))
     slopes = []
     for sign in (1, -1):
         at = u + sign * small * way
@@ -63,7 +67,7 @@ def test_tangent_under_a_given_pressure() -> None:
         for k in range(len(slope)):
             step = np.zeros(len(slope))
             step[k] = 1.0
-            gain = one.ahead_pressure_mpa(at, step.reshape(-1, 3)) - one.ahead_pressure_mpa(
+            gain = one.predicted_pressure_mpa(at, step.reshape(-1, 3)) - one.predicted_pressure_mpa(
                 at, np.zeros_like(u)
             )
             slope[k] = ((other - own) * gain).sum() * volume / MATERIAL.bulk_modulus_mpa

@@ -1,13 +1,13 @@
-"""Neo-Hookean mean-dilatation Hex-8 in plain NumPy: energy, corner forces and tangents.
+"""Neo-Hookean mean-dilatation Hex-8: kinematics and tangent stiffness in NumPy.
 
-Energy per reference volume, with F the deformation gradient, J = det F, C = Fᵀ F and J̄ the mean
-of J over the element (its volume over its volume at rest):
+Energy per reference volume, with the deformation gradient F, J = det F, C = Fᵀ F and the mean J̄
+of J over the element (its volume divided by its volume at rest):
 
     Ψ = G/2 (J^(-2/3) tr C - 3) + κ/2 (J̄ - 1)².
 
 It is the energy of F̄ = (J̄/J)^(1/3) F (F-bar: Simo, Taylor & Pister 1985; de Souza Neto et al.
-1996), because J^(-2/3) tr C is the same for F̄ as for F. Forces are its exact gradient, and at
-rest its Hessian is the B-bar element's stiffness. Stress: first Piola-Kirchhoff,
+1996), because J^(-2/3) tr C is the same for F̄ as for F. The forces are its exact gradient, and
+at rest its Hessian is the stiffness of the B-bar element. Stress: first Piola-Kirchhoff,
 P = G J^(-2/3) (F - tr C/3 F⁻ᵀ) + κ (J̄ - 1) cof F.
 """
 
@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 class GaussStates:
     """Deformation at the 2x2x2 Gauss points of m cells.
 
-    Args:
+    Attributes:
         gradients: (8, 8, 3) in 1/mm, shape gradients by Gauss point and corner.
-        weight_mm3: volume of each Gauss point.
+        weight_mm3: Volume of each Gauss point.
         deformation: (m, 8, 3, 3) F.
         cofactor: (m, 8, 3, 3) cof F = J F⁻ᵀ.
         dilatation: (m, 8) J - 1, evaluated without cancellation.
@@ -81,39 +81,19 @@ def _cofactor(f: Array) -> Array:
     )
 
 
-def element_energies(state: GaussStates, material: Material) -> Array:
-    """Strain energy (m,) in N mm."""
-    iso = (1.0 + state.dilatation) ** (-2.0 / 3.0) * _trace_c(state) - 3.0
-    shear = 0.5 * material.shear_modulus_mpa * iso.sum(axis=1)
-    bulk = 0.5 * material.bulk_modulus_mpa * iso.shape[1] * state.mean_dilatation**2
-    return np.asarray(state.weight_mm3 * (shear + bulk))
-
-
-def element_forces(state: GaussStates, material: Material) -> Array:
-    """Corner forces (m, 8, 3) in N, the gradient of `element_energies`."""
-    j = 1.0 + state.dilatation
-    a = material.shear_modulus_mpa * j ** (-2.0 / 3.0)
-    pressure = material.bulk_modulus_mpa * state.mean_dilatation
-    b = pressure[:, None] - a * _trace_c(state) / (3.0 * j)
-    stress = a[..., None, None] * state.deformation + b[..., None, None] * state.cofactor
-    return np.asarray(
-        state.weight_mm3 * np.einsum("cgij,gaj->cai", stress, state.gradients, optimize=True)
-    )
-
-
-def ahead_pressures(state: GaussStates, material: Material, step_mm: Array) -> Array:
-    """Pressure κ (J̄ - 1) (m,) in MPa of cells whose corners go on by (m, 8, 3), to first order."""
-    swelling = np.einsum("cgij,gaj->cai", state.cofactor, state.gradients) / len(GAUSS)
-    ahead = state.mean_dilatation + (swelling * step_mm).sum(axis=(1, 2))
-    return np.asarray(material.bulk_modulus_mpa * ahead)
+def predicted_pressures(state: GaussStates, material: Material, step_mm: Array) -> Array:
+    """First-order pressure κ (J̄ - 1) (m,) in MPa after a step (m, 8, 3) of the cells' corners."""
+    gradient = np.einsum("cgij,gaj->cai", state.cofactor, state.gradients) / len(GAUSS)
+    dilatation = state.mean_dilatation + (gradient * step_mm).sum(axis=(1, 2))
+    return np.asarray(material.bulk_modulus_mpa * dilatation)
 
 
 def element_tangents(
     state: GaussStates, material: Material, pressure_mpa: Array | None = None
 ) -> Array:
-    """Tangent stiffness (m, 24, 24) in N/mm, the Hessian of `element_energies`.
+    """Tangent stiffness (m, 24, 24) in N/mm, the Hessian of the cells' energy Ψ.
 
-    `pressure_mpa` (m,) takes the place of the cells' own κ (J̄ - 1) where it acts on their shape.
+    `pressure_mpa` (m,) replaces the cells' own κ (J̄ - 1) in the geometric stiffness.
 
     With T = F⁻ᵀ, ∂P_iJ/∂F_kL = G J^(-2/3) (δ_ik δ_JL - 2/3 F_iJ T_kL - 2/3 T_iJ F_kL
     + 2/9 tr C T_iJ T_kL + 1/3 tr C T_iL T_kJ) + p J (T_iJ T_kL - T_iL T_kJ) at constant
@@ -124,7 +104,7 @@ def element_tangents(
     trace = _trace_c(state)
     own = material.bulk_modulus_mpa * state.mean_dilatation
     bulk_part = (own if pressure_mpa is None else pressure_mpa)[:, None] * j
-    # Gradients seen from the deformed cell (T ∇N) and F ∇N, both (m, 8 points, 8 corners, 3).
+    # Gradients in the deformed configuration, T ∇N, and F ∇N: both (m, 8 points, 8 corners, 3).
     inverse_t = state.cofactor / j[..., None, None]
     t = np.einsum("cgij,gaj->cgai", inverse_t, state.gradients)
     f = np.einsum("cgij,gaj->cgai", state.deformation, state.gradients)

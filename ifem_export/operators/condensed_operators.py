@@ -1,0 +1,147 @@
+"""Surface operators that condense the inner nodes of the pad's own equations, F = S u.
+
+`PaperOperator` is the single layer of the GelSlim 2.0 paper, which has no inner nodes.
+`CondensedOperator` solves for the inner nodes at each call. `DenseOperator` stores S.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from ifem_export.assembly.occupancy_table import occupancy_table
+from ifem_export.operators.pad_system import PadSystem, checked_field
+from ifem_export.operators.solver import Solver, SparseFactor, pad_solver
+
+Array = NDArray[np.float64]
+COMPLIANCE_RTOL = 1e-8
+DENSE_BATCH = 256
+
+
+@dataclass(frozen=True, eq=False)
+class _WithCompliance:
+    """Displacement under surface forces, by solving the equations of all free nodes."""
+
+    system: PadSystem
+
+    @cached_property
+    def pad_solver(self) -> Solver:
+        """Solver of all free nodes."""
+        return pad_solver(self.system)
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Surface part of the solution of K_ff u = f for forces (c, 3) on the surface alone."""
+        columns = self.system.columns
+        load = np.zeros((self.system.stiffness.shape[0] // 3, 3))
+        load[-columns:] = checked_field(force_n, columns)
+        u = self.pad_solver.solve(load, COMPLIANCE_RTOL).x.reshape(-1, 3)
+        return np.asarray(u[-columns:])
+
+
+@dataclass(frozen=True, eq=False)
+class PaperOperator(_WithCompliance):
+    """Surface stiffness of a pad of one layer, applied as a stencil of nine neighbours."""
+
+    name: str = "paper"
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """K_ss u."""
+        from ifem_export.operators.surface_kernel import apply_stencil
+
+        u = checked_field(displacement_mm, self.system.columns)
+        if self.system.mesh.fill is not None:
+            return np.asarray(self.system.stiffness @ u.reshape(-1)).reshape(-1, 3)
+        force = np.empty_like(u)
+        apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
+        return force
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the stencil, or of the matrix if cells are scaled."""
+        if self.system.mesh.fill is not None:
+            return _matrix_bytes(self.system.stiffness)
+        return int(sum(part.nbytes for part in self._stencil))
+
+    @cached_property
+    def _stencil(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Type of each node, its neighbours (c where absent) and the blocks of each type."""
+        s = self.system
+        masks = s.mesh.numbering.masks[-s.columns :]
+        kinds, types = np.unique(masks, return_inverse=True)
+        table = occupancy_table(np.asarray(s.element_matrix))[kinds][:, 9:18]
+        rows, columns = s.lattice_positions.T + 1
+        lattice = np.full((rows.max() + 2, columns.max() + 2), s.columns, dtype=np.int64)
+        lattice[rows, columns] = np.arange(s.columns)
+        around = [lattice[rows + dy, columns + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+        blocks = np.ascontiguousarray(table.transpose(0, 2, 3, 1))
+        return types.astype(np.int64), np.stack(around, axis=1), blocks
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedOperator(_WithCompliance):
+    """Exact condensation that solves for the inner nodes at each call, to a residual `rtol`."""
+
+    name: str
+    inner_solver: Solver
+    rtol: float
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """F = K_ss u + K_si u_i, where K_ii u_i = -K_is u."""
+        u = checked_field(displacement_mm, self.system.columns).reshape(-1)
+        inner = self.inner_solver.solve(-(self.system.surface_to_inner @ u), self.rtol).x
+        force = self.system.surface @ u + self.system.inner_to_surface @ inner
+        return np.asarray(force.reshape(-1, 3))
+
+    @cached_property
+    def pad_solver(self) -> Solver:
+        """Solver of all free nodes."""
+        return pad_solver(self.system, "direct" if self.name == "factor" else "auto")
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the blocks that a call reads."""
+        s = self.system
+        parts = (s.surface, s.inner, s.surface_to_inner, s.inner_to_surface)
+        kept = sum(map(_matrix_bytes, parts))
+        if isinstance(self.inner_solver, SparseFactor):
+            return int(kept + 12 * self.inner_solver.factor.nnz)
+        return int(kept + s.inner_preconditioner.blocks.nbytes)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseOperator(_WithCompliance):
+    """S as a dense float32 matrix, computed once in batches of columns."""
+
+    name: str = "dense32"
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float32]:
+        """S (3c, 3c) in N/mm, symmetric."""
+        s = self.system
+        factor = SparseFactor(s.inner).factor
+        n = s.surface.shape[0]
+        dense = np.empty((n, n), dtype=np.float32)
+        coupling = sparse.csc_array(s.surface_to_inner)
+        for first in range(0, n, DENSE_BATCH):
+            part = slice(first, min(first + DENSE_BATCH, n))
+            inner = factor.solve(coupling[:, part].toarray())
+            dense[:, part] = s.surface[:, part].toarray() - s.inner_to_surface @ inner
+        return np.asarray((dense + dense.T) / 2, dtype=np.float32)
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """One matrix-vector product."""
+        u = checked_field(displacement_mm, self.system.columns).astype(np.float32)
+        return np.asarray(self.matrix @ u.reshape(-1), dtype=float).reshape(-1, 3)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the matrix."""
+        return int(self.matrix.nbytes)
+
+
+def _matrix_bytes(matrix: sparse.csr_array) -> int:
+    return int(matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes)
