@@ -75,6 +75,8 @@ def _check_mesh(mesh: PadMesh) -> None:
         )
         if mesh.surface_shift is not None:
             built = replace(built, surface=_stored_surface(mesh))
+    except BundleError:
+        raise
     except IfemError as error:
         raise BundleError("occupancy.npy", str(error), REBUILD) from error
     if mesh.fill is not None:
