@@ -1,4 +1,4 @@
-"""Any marker sensor's frames followed in pixels: no bundle, no print, one picture at rest."""
+"""Tracking in pixels for any sensor with a grid of dots: it needs only one picture at rest."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ from gelslim_force.tracking.tracker import Tracker, TrackerSettings
 
 @dataclass(frozen=True, eq=False)
 class DotsAtRest:
-    """What the picture at rest shows: the dots, and how to find them again."""
+    """The dots in the picture at rest, and the settings with which they are found again."""
 
     settings: DetectorSettings
     reference: ReferenceLattice
     dots: Detections
-    """The reference's markers, in its order."""
+    """The dots of the reference, in its order."""
     found: int
-    """Dots found in the picture, those off the lattice too."""
+    """Number of all dots in the picture, also of those that are not on the lattice."""
     lattice_shape: tuple[int, int]
-    """Extent (rows, columns) of the lattice; which is which is arbitrary without a print."""
+    """Extent of the lattice; without a print, rows and columns may be exchanged."""
     pitch_px: float
     residual_px: float
-    """Median distance of the dots from the places their neighbours predict."""
+    """Median distance of the dots from the positions that their neighbours predict."""
     image_shape: tuple[int, ...]
 
 
 def dots_at_rest(image: NDArray[np.uint8], settings: DetectorSettings | None = None) -> DotsAtRest:
     """Return the lattice of dots in a picture without contact.
 
-    Without `settings` they are estimated from the picture. Raises LatticeError where no lattice
-    is seen, ValueError for what is no picture.
+    Without `settings` these are estimated from the picture. Raises LatticeError if no lattice is
+    found, ValueError if the array is no picture.
     """
     found = estimate_settings(image) if settings is None else _found(image, settings)
     reference = ReferenceLattice.from_lattice(found.lattice, found.detections)
     own = found.detections.take(found.lattice.dots)
-    # Dots without a neighbour are left out of the reference, so they are joined by their sites.
+    # The reference leaves out dots without a neighbour, so dots are assigned by their sites.
     index = {tuple(site): k for k, site in enumerate(found.lattice.sites.tolist())}
     order = [index[tuple(site)] for site in reference.sites.tolist()]
     residual = found.lattice.residual_px
@@ -64,7 +64,7 @@ def _found(image: NDArray[np.uint8], settings: DetectorSettings) -> DotEstimate:
     dots = Detector(settings).detect(image)
     lattice = grow_lattice(dots)
     if min(lattice.shape) < 3:
-        raise LatticeError(f"only a strip of {lattice.shape} dots is seen: it has no direction")
+        raise LatticeError(f"only a strip of {lattice.shape} dots is found; it has no direction")
     return DotEstimate(settings, dots, lattice, (np.nan, np.nan))
 
 
@@ -78,9 +78,10 @@ class DotTracking:
         )
 
     def follow(self, image: NDArray[np.uint8] | None, index: int, time_s: float) -> FrameResult:
-        """Return the tracks of the next frame; never raises for the frame's content.
+        """Return the tracks of the next frame; no content of a frame raises an error.
 
-        None, and a frame of another size than the picture at rest, has a problem and no tracks.
+        A frame that is None, or of another size than the picture at rest, has a problem and no
+        tracks.
         """
         if image is None:
             return FrameResult(index, time_s, problems=("the frame could not be read",))

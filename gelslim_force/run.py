@@ -1,4 +1,4 @@
-"""A stream of frames through the pipeline into its outputs."""
+"""Frames of a source through the force pipeline into outputs."""
 
 from __future__ import annotations
 
@@ -11,53 +11,34 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.forces.stage_clock import StageSummary, StageTimes
+from gelslim_force.frames.frame import Frame
 from gelslim_force.pipeline import ForcePipeline
 
 Progress = Callable[[str, int, int], None]
 
 
-class Frame(Protocol):
-    """One frame of a source."""
-
-    @property
-    def index(self) -> int:
-        """Number in the source."""
-
-    @property
-    def time_s(self) -> float:
-        """When it was taken."""
-
-    @property
-    def image(self) -> NDArray[np.uint8] | None:
-        """Picture, RGB or grey; None where it could not be read."""
-
-    @property
-    def problem(self) -> str:
-        """Why it could not be read."""
-
-
 class Sink(Protocol):
-    """Something that takes results as they come."""
+    """An output that takes results one by one."""
 
     def take(self, image: NDArray[np.uint8] | None, result: FrameResult) -> None:
-        """One frame with its picture."""
+        """Take the result of one frame, and its picture if it has one."""
 
 
 @dataclass
 class RunSummary:
-    """What a run came to."""
+    """Counts and extreme values of a run."""
 
     frames: int = 0
     with_forces: int = 0
     problems: dict[str, int] = field(default_factory=dict)
-    """How often each problem was met, numbers apart."""
+    """Number of frames with each problem; problems that differ in numbers only count as one."""
     least_coverage: float = 1.0
     largest_force_n: float = 0.0
     last: FrameResult | None = None
     stages: tuple[StageTimes, ...] = ()
 
     def add(self, result: FrameResult) -> None:
-        """Count a frame."""
+        """Add a frame."""
         self.frames += 1
         self.last = result
         for problem in result.problems:
@@ -78,12 +59,20 @@ def run_frames(
     count: int | None = None,
     progress: Progress | None = None,
 ) -> RunSummary:
-    """Process every frame; a frame that cannot be read is recorded as such.
+    """Process every frame and pass the results to all sinks.
 
-    `count` frames are expected, None where that is not known. What was taken by the sinks stays
-    when a later frame or sink raises.
+    A frame that cannot be read gives a result with a problem. If a frame or a sink raises an
+    error, the sinks keep what they took before.
+
+    Args:
+        pipeline: The pipeline of the sensor.
+        frames: Frames in order, such as those of `open_frames`.
+        sinks: Outputs that take each result.
+        count: Number of frames, for `progress`; None if it is not known.
+        progress: Called after each frame with the text "frames", the number of processed frames
+            and their total.
     """
-    tell = progress or (lambda text, done, total: None)
+    report = progress or (lambda text, done, total: None)
     clock = StageSummary()
     summary = RunSummary()
     for frame in frames:
@@ -95,6 +84,6 @@ def run_frames(
         summary.add(result)
         for sink in sinks:
             sink.take(frame.image, result)
-        tell("frames", summary.frames, count or summary.frames + 1)
+        report("frames", summary.frames, count or summary.frames + 1)
     summary.stages = clock.times()
     return summary

@@ -1,1 +1,1 @@
-"""What leaves the force pipeline: run folders, pictures, videos, ROS 2 recordings, live views."""
+"""Outputs of the force pipeline: run folders, pictures, videos, ROS 2 recordings, live views."""

@@ -1,4 +1,4 @@
-"""Some frames of a run in one file: `fields_00000.npz` or `fields_00000.parquet`."""
+"""Several frames of a run in one file, `fields_00000.npz` or `fields_00000.parquet`."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class FieldChunk:
     """n frames with the same m markers and c nodes."""
 
     arrays: Mapping[str, NDArray[Any]]
-    """(n, ...) by name; rows of what a frame lacks are NaN, -1 or false."""
+    """(n, ...) by name; rows that a frame does not have are NaN, -1 or false."""
     points_mm: NDArray[np.float64]
     """(c, 3) nodes at rest."""
     problems: tuple[tuple[str, ...], ...]
     extra: tuple[str, ...]
-    """JSON object per frame."""
+    """A JSON object per frame."""
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -48,7 +48,7 @@ class FieldChunk:
     def results(
         self, stage_ms: Mapping[int, Mapping[str, float]] | None = None
     ) -> Iterator[FrameResult]:
-        """Yield the frames in order, with the stage times given by frame index."""
+        """Yield the results in order, with the times of the stages by frame index."""
         times = stage_ms or {}
         for k in range(len(self)):
             frame = {name: array[k] for name, array in self.arrays.items()}
@@ -59,9 +59,10 @@ class FieldChunk:
 def fits(
     first: PackedFrame | None, points_mm: NDArray[np.float64] | None, new: PackedFrame
 ) -> bool:
-    """Whether a frame can join a chunk.
+    """Return whether a frame can be added to a chunk.
 
-    `first` is the chunk's first frame with markers, `points_mm` its nodes; None where it has none.
+    `first` is the first frame of the chunk that has markers, `points_mm` are its nodes; None if
+    the chunk has none yet.
     """
     if first is not None and new.markers and new.markers != first.markers:
         return False
@@ -71,7 +72,7 @@ def fits(
 
 
 def stack(frames: Sequence[PackedFrame]) -> FieldChunk:
-    """Join frames of equal markers and nodes. Raises ValueError where they disagree."""
+    """Join frames with the same markers and nodes. Raises ValueError if they differ."""
     markers = max((frame.markers for frame in frames), default=0)
     nodes = max((frame.nodes for frame in frames), default=0)
     arrays: dict[str, NDArray[Any]] = {}
@@ -93,9 +94,9 @@ def _filled(name: str, array: NDArray[Any], count: int | None) -> NDArray[Any]:
 
 
 def write_chunk(path: Path, chunk: FieldChunk) -> None:
-    """Write whole or not at all; the ending of `path` chooses the format.
+    """Write a chunk atomically, in the format that the suffix of `path` says.
 
-    Raises OutputError without pyarrow for Parquet, OSError where the disk refuses.
+    Raises MissingLibraryError if Parquet needs pyarrow, OSError if the disk refuses.
     """
     replace_file(path, parquet_bytes(chunk) if path.suffix == ".parquet" else npz_bytes(chunk))
 
@@ -111,7 +112,7 @@ def read_chunk(path: str | os.PathLike[str]) -> FieldChunk:
     except OutputError:
         raise
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise OutputError(f"{os.fspath(path)}: no chunk of fields ({error})") from error
+        raise OutputError(f"{os.fspath(path)}: not a chunk of fields ({error})") from error
 
 
 def npz_bytes(chunk: FieldChunk) -> bytes:
@@ -130,16 +131,16 @@ def _from_npz(path: str | os.PathLike[str]) -> FieldChunk:
     with np.load(path, allow_pickle=False) as file:
         if str(file["format"]) != FORMAT_NAME:
             raise OutputError(f"{os.fspath(path)}: format {file['format']}, not {FORMAT_NAME}")
-        apart = ("points_mm", "problems", "extra", "format")
-        arrays = {name: file[name] for name in file.files if name not in apart}
+        others = ("points_mm", "problems", "extra", "format")
+        arrays = {name: file[name] for name in file.files if name not in others}
         problems = tuple(tuple(json.loads(str(text))) for text in file["problems"])
         return FieldChunk(arrays, file["points_mm"], problems, tuple(str(t) for t in file["extra"]))
 
 
 def parquet_bytes(chunk: FieldChunk) -> bytes:
-    """Return a Parquet file: a row per frame, arrays as lists of fixed length, shapes as metadata.
+    """Return a Parquet file: a row per frame, arrays as lists of fixed size, shapes as metadata.
 
-    Raises OutputError without pyarrow.
+    Raises MissingLibraryError without pyarrow.
     """
     pa = optional_library.load("pyarrow", "Parquet")
     parquet = optional_library.load("pyarrow.parquet", "Parquet")

@@ -1,4 +1,4 @@
-"""A frame's result as plain arrays of fixed types, and back."""
+"""The result of a frame as arrays of fixed types, and back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gelslim_force.forces.wrench import Wrench
 from gelslim_force.tracking.tracks import Tracks
 
 Precision = Literal["float32", "float64"]
-"""Of places, motions and forces; times and wrenches are float64 always."""
+"""Precision of positions, displacements and forces; times and wrenches are always float64."""
 PER_MARKER = ("places_px", "displacement_px", "status", "dots", "marker_displacement_mm")
 PER_NODE = ("displacement_mm", "force_n", "traction_mpa", "contact")
 _NO_FIELD = (math.nan, math.nan, math.nan, math.nan)
@@ -25,15 +25,15 @@ _NO_FIELD = (math.nan, math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True, eq=False)
 class PackedFrame:
-    """One frame with m markers and c nodes; 0 of those that it does not have."""
+    """A frame with m markers and c nodes; m or c is 0 if it has none."""
 
     arrays: Mapping[str, NDArray[Any]]
-    """By name: `PER_MARKER`, `PER_NODE` and scalars such as `index` and `wrench`."""
+    """By name: those of `PER_MARKER` and `PER_NODE`, and others such as `index` and `wrench`."""
     points_mm: NDArray[np.float64] | None
     """(c, 3) nodes at rest; None without a field."""
     problems: tuple[str, ...]
     extra: str
-    """JSON object."""
+    """A JSON object."""
 
     @property
     def markers(self) -> int:
@@ -47,7 +47,7 @@ class PackedFrame:
 
 
 def pack(result: FrameResult, precision: Precision) -> PackedFrame:
-    """Copy a result into arrays. What a frame lacks has length 0, or NaN where it is a number."""
+    """Copy a result into arrays; missing arrays have length 0 and missing numbers are NaN."""
     real = np.dtype(precision)
     tracks, field, wrench = result.tracks, result.field, result.wrench
     motion = result.marker_displacement_mm
@@ -75,15 +75,15 @@ def _marker_arrays(
     tracks: Tracks | None, motion: NDArray[np.float64] | None, real: np.dtype[Any]
 ) -> dict[str, NDArray[Any]]:
     count = len(tracks) if tracks is not None else 0 if motion is None else len(motion)
-    nowhere = np.full((count, 3), np.nan)
+    unknown = np.full((count, 3), np.nan)
     return {
-        "places_px": np.array(nowhere[:, :2] if tracks is None else tracks.positions_px, real),
+        "places_px": np.array(unknown[:, :2] if tracks is None else tracks.positions_px, real),
         "displacement_px": np.array(
-            nowhere[:, :2] if tracks is None else tracks.displacement_px, real
+            unknown[:, :2] if tracks is None else tracks.displacement_px, real
         ),
         "status": np.array(np.full(count, -1) if tracks is None else tracks.status, np.int8),
         "dots": np.array(np.full(count, -1) if tracks is None else tracks.dots, np.int32),
-        "marker_displacement_mm": np.array(nowhere if motion is None else motion, real),
+        "marker_displacement_mm": np.array(unknown if motion is None else motion, real),
     }
 
 
@@ -111,7 +111,10 @@ def unpack(
     extra: str,
     stage_ms: Mapping[str, float] | None = None,
 ) -> FrameResult:
-    """Inverse of `pack`, up to its precision; arrays may be longer where a frame has none."""
+    """Return the result of a packed frame, in its precision.
+
+    Arrays of markers and nodes that the frame does not have may be of any length.
+    """
 
     def real(name: str) -> NDArray[np.float64]:
         return np.asarray(arrays[name], dtype=np.float64)
@@ -154,9 +157,9 @@ def unpack(
 
 
 def plain(value: Any) -> Any:
-    """Return a finding as JSON values: arrays as lists, records as objects, the rest as text.
+    """Return a value as JSON: arrays as lists, dataclasses as objects, other types as text.
 
-    NaN and infinities become null, "inf" and "-inf", which every reader of JSON takes.
+    NaN and the infinities, which JSON does not have, become null, "inf" and "-inf".
     """
     if isinstance(value, np.ndarray | np.generic):
         return plain(value.tolist())

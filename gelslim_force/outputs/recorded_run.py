@@ -1,4 +1,4 @@
-"""A run read back, whether it was finished, stopped or killed."""
+"""A recorded run read back, whether it was finished, stopped or killed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import numpy as np
 
 from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.forces.stage_clock import StageSummary, StageTimes
 from gelslim_force.outputs.field_chunk import FieldChunk, Format, read_chunk, stack
 from gelslim_force.outputs.frame_journal import read_journal
 from gelslim_force.outputs.packed_frame import PackedFrame
@@ -25,16 +24,16 @@ from gelslim_force.outputs.wrench_csv import NUMBERS, WrenchTable, read_wrenches
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """A run folder; wrenches are in memory, fields are read as they are asked for."""
+    """A run folder; its wrenches are in memory, its fields are read when they are needed."""
 
     folder: Path
     manifest: Mapping[str, Any]
-    """`run.json`; in a killed run its counts are those of the last chunk."""
+    """`run.json`; the counts of a killed run are those of its last chunk."""
     wrenches: WrenchTable
     stage_ms: Mapping[int, Mapping[str, float]]
     """Stage times by frame index."""
-    torn: tuple[str, ...]
-    """Files whose last piece was cut off while it was written."""
+    incomplete: tuple[str, ...]
+    """Files whose last line or record is incomplete."""
 
     @property
     def complete(self) -> bool:
@@ -42,11 +41,11 @@ class RecordedRun:
         return bool(self.manifest["state"] == "complete")
 
     def __len__(self) -> int:
-        """Return the number of frames with a line of wrenches."""
+        """Return the number of frames in `wrenches.csv`."""
         return len(self.wrenches)
 
     def chunks(self) -> Iterator[FieldChunk]:
-        """Yield the chunks of fields in order. Raises OutputError for a damaged one."""
+        """Yield the chunks of fields in order. Raises OutputError for a damaged chunk."""
         for path in field_files(self.folder):
             frames = _journal(path)[0] if path.suffix == ".part" else None
             if frames is None:
@@ -55,37 +54,30 @@ class RecordedRun:
                 yield stack(frames)
 
     def results(self) -> Iterator[FrameResult]:
-        """Yield the frames in order, as they were appended, up to the precision of the run."""
+        """Yield the results in order, in the precision of the recording."""
         for chunk in self.chunks():
             yield from chunk.results(self.stage_ms)
 
-    def stage_times(self, warm_up: int = 0) -> tuple[StageTimes, ...]:
-        """Return the times per stage, without the first `warm_up` frames."""
-        clock = StageSummary(window=max(1, len(self.stage_ms)))
-        for index in sorted(self.stage_ms)[warm_up:]:
-            clock.add(self.stage_ms[index])
-        return clock.times()
-
 
 def read_run(folder: str | os.PathLike[str]) -> RecordedRun:
-    """Open a run folder. Raises OutputError where there is none, or a file is damaged."""
+    """Open a run folder. Raises OutputError if there is no run or a file is damaged."""
     root = Path(folder)
     manifest = read_manifest(root)
     path = root / WRENCHES
     if path.exists():
         wrenches = read_wrenches(path)
-    else:  # killed before the first line
-        wrenches = WrenchTable(np.zeros((0, len(NUMBERS))), (), torn=True)
-    stage_ms, torn_stages = _read_stages(root / STAGES)
-    torn = [WRENCHES] * wrenches.torn + [STAGES] * torn_stages
+    else:  # the process was killed before the first line
+        wrenches = WrenchTable(np.zeros((0, len(NUMBERS))), (), incomplete=True)
+    stage_ms, stages_cut = _read_stages(root / STAGES)
+    incomplete = [WRENCHES] * wrenches.incomplete + [STAGES] * stages_cut
     for part in field_files(root):
         if part.suffix == ".part" and _journal(part)[1]:
-            torn.append(part.name)
-    return RecordedRun(root, manifest, wrenches, stage_ms, tuple(torn))
+            incomplete.append(part.name)
+    return RecordedRun(root, manifest, wrenches, stage_ms, tuple(incomplete))
 
 
 def field_files(folder: Path) -> list[Path]:
-    """Return the files of fields in order: the chunk where there is one, else its journal."""
+    """Return the files of fields in order: each chunk, or its journal if it has no chunk yet."""
     best: dict[int, Path] = {}
     try:
         names = sorted(folder.iterdir())
@@ -99,7 +91,7 @@ def field_files(folder: Path) -> list[Path]:
 
 
 def _now(path: Path) -> Path:
-    """The chunk that took a journal's place since it was listed, where the run still goes on."""
+    """The chunk that has replaced a journal since the folder was listed, in a run that goes on."""
     if path.suffix == ".part" and not path.exists():
         for suffix in get_args(Format):
             chunk = path.with_suffix(f".{suffix}")
@@ -109,7 +101,7 @@ def _now(path: Path) -> Path:
 
 
 def _journal(path: Path) -> tuple[list[PackedFrame] | None, bool]:
-    """Frames of a journal and whether its end is torn; None where its chunk has taken its place."""
+    """Frames of a journal and whether its end is incomplete; None if a chunk has replaced it."""
     try:
         return read_journal(path)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""`run.json`: what a run folder holds, how it was made and whether it was finished."""
+"""`run.json`, the manifest of a run: its contents, settings, versions and state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ifem_export.bundle.bundle import Bundle
 MANIFEST = "run.json"
 FORMAT_NAME = "gelslim-run/1"
 State = Literal["running", "complete", "stopped"]
-"""`running` also where the process was killed; `stopped` by an error, given in `reason`."""
+"""`running` also if the process was killed; `stopped` by the error in `reason`."""
 UNITS: Mapping[str, str] = {
     "length": "mm",
     "force": "N",
@@ -36,7 +36,7 @@ UNITS: Mapping[str, str] = {
 
 @dataclass
 class RunCounts:
-    """Frames of a run so far."""
+    """Counts of the frames of a run."""
 
     frames: int = 0
     with_tracks: int = 0
@@ -46,10 +46,10 @@ class RunCounts:
     first_time_s: float | None = None
     last_time_s: float | None = None
     problems: dict[str, int] = field(default_factory=dict)
-    """Frames by problem; at most `_KINDS` kinds are counted apart."""
+    """Number of frames by problem; beyond `_MAX_PROBLEMS` different ones they count as "other"."""
 
     def add(self, result: FrameResult) -> None:
-        """Count a frame."""
+        """Add a frame."""
         self.frames += 1
         self.with_tracks += result.tracks is not None
         self.with_field += result.field is not None
@@ -59,21 +59,21 @@ class RunCounts:
             self.first_time_s = plain(float(result.time_s))
         self.last_time_s = plain(float(result.time_s))
         for problem in result.problems:
-            known = problem in self.problems or len(self.problems) < _KINDS
+            known = problem in self.problems or len(self.problems) < _MAX_PROBLEMS
             name = problem if known else "other"
             self.problems[name] = self.problems.get(name, 0) + 1
 
 
-_KINDS = 50
+_MAX_PROBLEMS = 50
 
 
 def bundle_identity(bundle: Bundle) -> dict[str, str]:
-    """Return the hashes that tell which bundle a run was made with."""
+    """Return the hashes that identify the bundle of a run."""
     return {"geometry_hash": bundle.geometry_hash, "spec_hash": bundle.spec_hash}
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that make the numbers."""
+    """Return the versions of Python and of the packages that compute the results."""
     found = {"python": platform.python_version()}
     for name in ("gelslim-cad", "numpy", "scipy", "numba", "pyarrow", "opencv-python-headless"):
         try:
@@ -84,23 +84,23 @@ def versions() -> dict[str, str]:
 
 
 def write_manifest(folder: Path, record: Mapping[str, Any]) -> None:
-    """Write `run.json` whole or not at all. Raises OSError."""
+    """Replace `run.json` atomically. Raises OSError."""
     replace_file(folder / MANIFEST, json_bytes(record))
 
 
 def read_manifest(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read `run.json`. Raises OutputError where the folder holds no run."""
+    """Read `run.json`. Raises OutputError if the folder holds no run."""
     path = Path(folder) / MANIFEST
     try:
         record = json.loads(path.read_bytes())
     except FileNotFoundError as error:
         raise OutputError(
-            f"{os.fspath(folder)}: no run here; a run folder has a {MANIFEST}"
+            f"{os.fspath(folder)}: no run is in this folder; a run has a file {MANIFEST}"
         ) from error
     except OSError as error:
         raise disk_error(path, "reading the manifest", error) from error
     except ValueError as error:
         raise OutputError(f"{path}: damaged ({error})") from error
     if not isinstance(record, dict) or record.get("format") != FORMAT_NAME:
-        raise OutputError(f"{path}: not a run of the format {FORMAT_NAME}")
+        raise OutputError(f"{path}: it is not a run of the format {FORMAT_NAME}")
     return record

@@ -1,10 +1,10 @@
-"""A run on disk while it happens: what was appended survives a kill of the process.
+"""Recording of a run: what was appended survives a kill of the process.
 
-run.json               what, with what, how many; rewritten with each chunk
+run.json               manifest with settings, versions and counts; rewritten with each chunk
 wrenches.csv           a line per frame, see `wrench_csv`
-stages.jsonl           a JSON object per frame: index and ms by stage
-fields_00000.npz       frames with markers and nodes, see `field_chunk`
-fields_00001.part      the chunk in the making, see `frame_journal`
+stages.jsonl           a JSON object per frame: its index, and milliseconds by stage
+fields_00000.npz       chunk of frames with markers and nodes, see `field_chunk`
+fields_00001.part      journal of the present chunk, see `frame_journal`
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import json
 import os
 import re
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, get_args
 
 import numpy as np
@@ -49,10 +49,10 @@ FIELD_FILE = re.compile(r"fields_(\d{5,})\.(npz|parquet|part)")
 
 @dataclass(frozen=True)
 class RecorderSettings:
-    """What a run keeps. Raises ValueError for values that make no run."""
+    """What is recorded of a run. Raises ValueError for impossible values."""
 
     fields: Format | None = "npz"
-    """Format of markers and nodes per frame; None keeps the wrenches only."""
+    """Format of the markers and nodes of each frame; None records the wrenches only."""
     precision: Precision = "float32"
     frames_per_chunk: int = 64
 
@@ -67,16 +67,16 @@ class RecorderSettings:
 
 @dataclass
 class _OpenChunk:
-    """The chunk in the making; the journal is made with its first frame."""
+    """The present chunk; its journal is created with the first frame."""
 
     number: int
     frames: list[PackedFrame] = field(default_factory=list)
     journal: AppendFile | None = None
     first: PackedFrame | None = None
-    """First frame with markers."""
+    """The first frame that has markers."""
     points_mm: NDArray[np.float64] | None = None
 
-    def takes(self, frame: PackedFrame) -> bool:
+    def accepts(self, frame: PackedFrame) -> bool:
         return fits(self.first, self.points_mm, frame)
 
     def add(self, frame: PackedFrame) -> None:
@@ -87,7 +87,7 @@ class _OpenChunk:
             self.points_mm = frame.points_mm
 
 
-class RunRecorder:
+class RunRecorder(AbstractContextManager["RunRecorder"]):
     """Writes results in the order of their index.
 
     >>> with RunRecorder("out/run") as run:  # doctest: +SKIP
@@ -103,10 +103,18 @@ class RunRecorder:
         keep: RecorderSettings | None = None,
         overwrite: bool = False,
     ) -> None:
-        """`bundle` is `bundle_identity(...)`, `settings` those of the pipeline, for the record.
+        """Start a run.
 
-        Raises OutputError where the folder holds a run already (unless `overwrite`), cannot be
-        made, or pyarrow is missing for Parquet.
+        Args:
+            folder: Folder of the run.
+            bundle: `bundle_identity(...)`, for the manifest.
+            settings: Settings of the pipeline, for the manifest.
+            keep: What is recorded.
+            overwrite: Whether an earlier run in the folder is deleted.
+
+        Raises:
+            OutputError: The folder holds a run and `overwrite` is false, or it cannot be written.
+            MissingLibraryError: Parquet is asked for and pyarrow is not installed.
         """
         self.folder = Path(folder)
         self._keep = keep or RecorderSettings()
@@ -139,13 +147,13 @@ class RunRecorder:
         self._open = True
 
     def append(self, result: FrameResult) -> None:
-        """Write a frame. Raises OutputError; what was appended before stays readable."""
+        """Write a frame. Raises OutputError; the frames before it stay readable."""
         if not self._open:
-            raise OutputError(f"{self.folder}: the run is finished; begin another")
+            raise OutputError(f"{self.folder}: the run is already finished; start another one")
         if self._last_index is not None and result.index <= self._last_index:
             raise OutputError(
-                f"{self.folder}: frame {result.index} after frame {self._last_index}; "
-                "indices must increase"
+                f"{self.folder}: frame {result.index} comes after frame "
+                f"{self._last_index}; indices must increase"
             )
         try:
             self._writer.check()
@@ -161,9 +169,9 @@ class RunRecorder:
         self._counts.add(result)
 
     def finish(self, reason: str = "") -> None:
-        """Write what is left and say so in `run.json`; `reason` if the run was cut short.
+        """Write the last chunk and the state of the run; `reason` if it stopped early.
 
-        Raises OutputError; again is harmless.
+        A second call does nothing. Raises OutputError.
         """
         if not self._open:
             return
@@ -174,23 +182,19 @@ class RunRecorder:
         self._close("stopped" if reason else "complete", reason)
         self._writer.check()
 
-    def __enter__(self) -> RunRecorder:
-        """Return itself."""
-        return self
-
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
+        self, kind: type[BaseException] | None, error: BaseException | None, _: object
     ) -> None:
-        """Finish, with the reason where an error ended the block."""
+        """Finish; after an error in the block, that error is the reason and the one to report."""
         if kind is None:
             self.finish()
             return
-        with contextlib.suppress(OutputError):  # the first error is the one to tell
+        with contextlib.suppress(OutputError):
             self.finish(f"{kind.__name__}: {error}")
 
     def _append_fields(self, frame: PackedFrame) -> None:
         chunk = self._chunk
-        if len(chunk.frames) >= self._keep.frames_per_chunk or not chunk.takes(frame):
+        if len(chunk.frames) >= self._keep.frames_per_chunk or not chunk.accepts(frame):
             self._end_chunk()
             chunk = self._chunk
         if chunk.journal is None:
@@ -211,19 +215,19 @@ class RunRecorder:
         return self.folder / f"fields_{self._chunk.number:05d}.{suffix}"
 
     def _checkpoint(self) -> None:
-        """Before each chunk, on the writer's thread: lines and counts reach the disk too."""
+        """Force lines and counts to the disk before each chunk, on the thread of the writer."""
         self._csv.sync()
         self._stages.sync()
         self._write_manifest("running")
 
     def _failed(self, doing: str, error: OutputError | OSError) -> OutputError:
-        """Close the run; the error to raise."""
+        """Close the run and return the error to raise."""
         failure = disk_error(self.folder, doing, error) if isinstance(error, OSError) else error
         self._close("stopped", str(failure))
         return failure
 
     def _close(self, state: State, reason: str) -> None:
-        """End the run; where the disk refuses even this, `run.json` keeps its last state."""
+        """End the run; if the disk refuses that too, `run.json` keeps its last state."""
         self._open = False
         self._writer.close()
         try:
@@ -273,9 +277,9 @@ class RunRecorder:
         ]
         if found and not overwrite:
             raise OutputError(
-                f"{self.folder}: holds a run already; choose another folder or overwrite it"
+                f"{self.folder}: it already holds a run; choose another folder or overwrite the run"
             )
         if MANIFEST in (p.name for p in found):
-            read_manifest(self.folder)  # other programs have a run.json too: theirs stays
+            read_manifest(self.folder)  # the run.json of another program is not deleted
         for path in sorted(found):
             path.unlink()

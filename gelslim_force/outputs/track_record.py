@@ -1,4 +1,4 @@
-"""Tracks of a run in pixels: gathered frame by frame, written as one NumPy file and a table."""
+"""Tracks of a run in pixels, collected frame by frame; written as a NumPy file and a table."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ COLUMNS = (
     "index", "time_s", "coverage", "tracked", "predicted", "lost", "rejected",
     "median_displacement_px", "largest_displacement_px", "problem",
 )  # fmt: skip
-_NONE = 255
-"""Status of every marker in a frame that could not be read or searched."""
+_NO_TRACKS = 255
+"""Status of all markers in a frame without tracks."""
 
 
 class TrackRecord:
-    """Collects f frames of n markers; places are kept in single precision, 1e-4 px or better."""
+    """Collects f frames of n markers; positions have single precision, 1e-4 px or better."""
 
     def __init__(self, rest: DotsAtRest) -> None:
         self._rest = rest
@@ -41,12 +41,12 @@ class TrackRecord:
         return len(self._index)
 
     def take(self, result: FrameResult) -> None:
-        """Add a frame, with tracks or with problems."""
+        """Add the tracks or the problems of a frame."""
         count = len(self._rest.reference)
         tracks = result.tracks
         if tracks is None:
             self._places.append(np.full((count, 2), np.nan, dtype=np.float32))
-            self._status.append(np.full(count, _NONE, dtype=np.uint8))
+            self._status.append(np.full(count, _NO_TRACKS, dtype=np.uint8))
         else:
             self._places.append(tracks.positions_px.astype(np.float32))
             self._status.append(tracks.status.astype(np.uint8))
@@ -57,7 +57,7 @@ class TrackRecord:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of the NumPy file.
 
-        places_px and displacement_px (f, n, 2) float32, NaN where not known; status (f, n) uint8,
+        places_px and displacement_px (f, n, 2) float32, NaN where unknown; status (f, n) uint8,
         values of `MarkerStatus`, 255 where a frame has no tracks; coverage (f,); frame_index
         (f,); time_s (f,); sites (n, 2) row and column; rest_px (n, 2).
         """
@@ -76,7 +76,7 @@ class TrackRecord:
         }
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the NumPy file (compressed .npz), whole or not at all. Raises OutputError."""
+        """Write the compressed NumPy file (.npz) atomically. Raises OutputError."""
         target = Path(path)
         try:
             with replacement(target, parents=True) as stream:
@@ -85,7 +85,7 @@ class TrackRecord:
             raise disk_error(target, "writing the tracks", error) from error
 
     def table(self) -> bytes:
-        """Return the CSV: a header, then a line per frame."""
+        """Return the CSV file: a header, then a line per frame."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(COLUMNS)
@@ -105,9 +105,9 @@ class TrackRecord:
         return text.getvalue().encode("utf-8", "backslashreplace")
 
     def summary(self) -> dict[str, Any]:
-        """Return the run in a few numbers, fit for JSON."""
+        """Return a summary of the run as JSON values."""
         rest, settings = self._rest, self._rest.settings
-        read = [k for k, s in enumerate(self._status) if s[0] != _NONE]
+        read = [k for k, s in enumerate(self._status) if s[0] != _NO_TRACKS]
         seen = [float((self._status[k] == int(MarkerStatus.TRACKED)).mean()) for k in read]
         peaks = [float(m.max()) for m in (self._moved(k) for k in read) if len(m)]
         return {
@@ -139,6 +139,6 @@ class TrackRecord:
         }
 
     def _moved(self, k: int) -> NDArray[np.float64]:
-        """Lengths in px of the displacements of the markers seen in frame number k."""
+        """Lengths in px of the displacements of the markers that were seen in the k-th frame."""
         seen = self._status[k] == int(MarkerStatus.TRACKED)
         return np.hypot(*(self._places[k][seen] - self._rest.reference.positions_px[seen]).T)

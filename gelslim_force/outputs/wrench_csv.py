@@ -1,7 +1,8 @@
-"""One line of CSV per frame: wrench, its noise, contact, markers and what was wrong.
+"""One line of CSV per frame: the wrench and its noise, contact, markers and problems.
 
-UTF-8, comma, a header line, `\\n` at the end of each line; floats in the shortest form that reads
-back to the same double; `nan` for what is not known. A line is complete when its newline is there.
+The file is UTF-8, separated by commas, with a header line and `\\n` at the end of each line. Floats
+have the shortest form that reads back to the same double; `nan` means unknown. A line without its
+newline is incomplete.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _STATUS = {
     "rejected": MarkerStatus.REJECTED,
 }
 ESCAPE = "backslashreplace"
-"""What becomes of letters that UTF-8 has not, such as those of a file name in another code."""
+"""How undecodable bytes, such as those of a file name in another encoding, are written."""
 NUMBERS = (
     "index",
     "time_s",
@@ -43,21 +44,21 @@ NUMBERS = (
     "slip_margin",
     "misfit",
 )
-"""Columns of numbers; `normal_known` is 0 or 1, counts are nan where there is nothing to count."""
+"""Columns of numbers; `normal_known` is 0 or 1, counts are nan without markers or nodes."""
 COLUMNS = (*NUMBERS, "problems")
-"""All columns; problems are joined by "; "."""
+"""All columns; several problems are separated by "; "."""
 
 
 @dataclass(frozen=True, eq=False)
 class WrenchTable:
-    """Lines of a wrench file: n frames."""
+    """The n lines of a wrench file."""
 
     numbers: NDArray[np.float64]
     """(n, len(NUMBERS)), columns as in `NUMBERS`."""
     problems: tuple[str, ...]
-    """One text per frame, empty where nothing was wrong."""
-    torn: bool = False
-    """The last line was cut off while it was written, and is left out."""
+    """One text per frame; empty without a problem."""
+    incomplete: bool = False
+    """Whether the last line is incomplete; it is left out."""
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -66,7 +67,7 @@ class WrenchTable:
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         """(n,) values of a column of numbers. Raises KeyError for another name."""
         if column not in NUMBERS:
-            raise KeyError(f"{column!r} is no column of numbers; there are {', '.join(NUMBERS)}")
+            raise KeyError(f"{column!r} is not a column of numbers; these are {', '.join(NUMBERS)}")
         return self.numbers[:, NUMBERS.index(column)]
 
     @property
@@ -86,7 +87,7 @@ def header() -> str:
 
 
 def row(result: FrameResult) -> dict[str, float]:
-    """Return the numbers of a frame by column; NaN where not known."""
+    """Return the numbers of a frame by column; NaN where unknown."""
     return {
         name: value if isinstance(value, int) else float(value)
         for name, value in zip(NUMBERS, _numbers(result), strict=True)
@@ -94,7 +95,7 @@ def row(result: FrameResult) -> dict[str, float]:
 
 
 def line(result: FrameResult) -> str:
-    """Return the line of a frame, its newline included."""
+    """Return the line of a frame, with its newline."""
     numbers = [_text(value) for value in _numbers(result)]
     out = io.StringIO()
     problems = "; ".join(" ".join(problem.split()) for problem in result.problems)
@@ -103,7 +104,7 @@ def line(result: FrameResult) -> str:
 
 
 def read_wrenches(path: str | os.PathLike[str]) -> WrenchTable:
-    """Read a file, also one whose writer was killed. Raises OutputError for anything else."""
+    """Read a file, also an incomplete one. Raises OutputError if it is no wrench file."""
     try:
         data = Path(path).read_bytes()
     except OSError as error:
@@ -112,18 +113,22 @@ def read_wrenches(path: str | os.PathLike[str]) -> WrenchTable:
     try:
         rows = list(csv.reader(io.StringIO((whole + newline).decode("utf-8"), newline="")))
     except (UnicodeDecodeError, csv.Error) as error:
-        raise OutputError(f"{os.fspath(path)}: no wrench file ({error})") from error
+        raise OutputError(f"{os.fspath(path)}: not a wrench file ({error})") from error
     if not rows:
         if (header().encode()).startswith(rest):
-            return WrenchTable(np.zeros((0, len(NUMBERS))), (), torn=True)
-        raise OutputError(f"{os.fspath(path)}: no wrench file; its first line must be {header()!r}")
+            return WrenchTable(np.zeros((0, len(NUMBERS))), (), incomplete=True)
+        raise OutputError(
+            f"{os.fspath(path)}: not a wrench file; its first line must be {header()!r}"
+        )
     if tuple(rows[0]) != COLUMNS:
-        raise OutputError(f"{os.fspath(path)}: no wrench file; its first line must be {header()!r}")
+        raise OutputError(
+            f"{os.fspath(path)}: not a wrench file; its first line must be {header()!r}"
+        )
     numbers = np.array([_row(path, k + 2, row) for k, row in enumerate(rows[1:])])
     return WrenchTable(
         numbers.reshape(len(rows) - 1, len(NUMBERS)),
         tuple(row[-1] for row in rows[1:]),
-        torn=bool(rest),
+        incomplete=bool(rest),
     )
 
 
@@ -163,7 +168,7 @@ def _numbers(result: FrameResult) -> list[float]:
 
 
 def _sigma(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Round-off may leave a variance a little below zero."""
+    """(6,) standard deviations; rounding errors may make a variance slightly negative."""
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 

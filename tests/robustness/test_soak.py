@@ -34,6 +34,6 @@ def test_memory_stays_over_a_thousand_frames(tmp_path: Path) -> None:
     assert grown_kb < 2048, memory.tolist()
     run = read_run(tmp_path / "run")
     assert run.complete
-    assert run.torn == ()
+    assert run.incomplete == ()
     assert len(run) == 1000
     assert [result.index for result in run.results()] == list(range(1000))
