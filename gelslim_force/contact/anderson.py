@@ -13,16 +13,16 @@ class Anderson:
 
     def __init__(self, depth: int = 4) -> None:
         self.depth = depth
-        self.places: list[Array] = []
+        self.iterates: list[Array] = []
         self.steps: list[Array] = []
 
     def next(self, x: Array, step: Array) -> Array:
-        """The next x from this one and its plain step."""
-        self.places = [*self.places[-self.depth :], x.copy()]
+        """The next x, from this one and its step without acceleration."""
+        self.iterates = [*self.iterates[-self.depth :], x.copy()]
         self.steps = [*self.steps[-self.depth :], step]
         if len(self.steps) == 1:
             return np.asarray(x + step)
-        change = np.diff(np.array(self.steps), axis=0).T
-        moved = np.diff(np.array(self.places), axis=0).T
-        weights = np.linalg.lstsq(change, step, rcond=None)[0]
-        return np.asarray(x + step - (moved + change) @ weights)
+        step_changes = np.diff(np.array(self.steps), axis=0).T
+        x_changes = np.diff(np.array(self.iterates), axis=0).T
+        weights = np.linalg.lstsq(step_changes, step, rcond=None)[0]
+        return np.asarray(x + step - (x_changes + step_changes) @ weights)

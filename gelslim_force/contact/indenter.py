@@ -23,7 +23,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 class IndenterError(GelslimError, ValueError):
-    """An indenter that cannot be; the message says what is possible."""
+    """An impossible indenter; the message says what is possible."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Sphere:
 
     @property
     def patch_kind(self) -> PatchKind:
-        """What its contact patch looks like."""
+        """Shape of its contact patch."""
         return "disc"
 
     def profile(self, x_mm: ArrayLike, y_mm: ArrayLike) -> Array:
@@ -52,8 +52,9 @@ class Sphere:
 class Cylinder:
     """Cylinder of `radius_mm` lying on the gel, longer than the pad.
 
-    `axis_deg` is the direction of its axis from x towards y where it is known in advance; by
-    default the contact patch tells. Raises IndenterError for an impossible radius or angle.
+    `axis_deg` is the direction of its axis, from x towards y, if it is known in advance; by
+    default it is found from the contact patch. Raises IndenterError for an impossible radius or
+    angle.
     """
 
     radius_mm: float
@@ -66,7 +67,7 @@ class Cylinder:
 
     @property
     def patch_kind(self) -> PatchKind:
-        """What its contact patch looks like."""
+        """Shape of its contact patch."""
         return "strip"
 
     def profile(self, x_mm: ArrayLike, y_mm: ArrayLike) -> Array:
@@ -79,7 +80,7 @@ class Cylinder:
 class Flat:
     """Flat punch: a disc of `radius_mm`, or a rectangle of half-sizes (mm) along x and y.
 
-    Exactly one of the two is given; raises IndenterError otherwise and for impossible sizes.
+    Exactly one of the two must be given. Raises IndenterError otherwise, and for impossible sizes.
     """
 
     radius_mm: float | None = None
@@ -87,7 +88,7 @@ class Flat:
 
     def __post_init__(self) -> None:
         if (self.radius_mm is None) == (self.half_sizes_mm is None):
-            raise IndenterError("a flat punch has a radius or two half-sizes, one of them")
+            raise IndenterError("a flat punch has either a radius or two half-sizes")
         if self.radius_mm is not None:
             _check_length("the flat punch's radius", self.radius_mm)
         for half in self.half_sizes_mm or ():
@@ -95,11 +96,11 @@ class Flat:
 
     @property
     def patch_kind(self) -> PatchKind:
-        """What its contact patch looks like."""
+        """Shape of its contact patch."""
         return "disc" if self.half_sizes_mm is None else "outline"
 
     def profile(self, x_mm: ArrayLike, y_mm: ArrayLike) -> Array:
-        """0 (n,) under the punch, infinite beside it, at offsets (n,) from its middle."""
+        """0 (n,) under the punch and infinite outside it, at offsets (n,) from its middle."""
         x, y = np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float)
         if self.radius_mm is not None:
             outside = np.hypot(x, y) > self.radius_mm * (1 + 1e-12)

@@ -1,8 +1,8 @@
-"""How far the pad's surface sinks under normal forces, column by column, kept.
+"""Normal compliance of the pad's surface, computed column by column and kept.
 
-A column holds the normal displacement of all c surface nodes under 1 N on one of them. A pad that
-is its own mirror image needs columns for one of each set of equivalent nodes only: an eighth of
-them on a square pad. Columns are made when first asked for, in batches.
+A column holds the normal displacement of all c surface nodes under 1 N on one of them. On a pad
+with mirror symmetries one column of each set of equivalent nodes is enough: an eighth of them on a
+square pad. Columns are computed when first needed, in batches.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 BATCH = 32
 REVERSALS: tuple[tuple[int, ...], ...] = ((), (0,), (1,), (0, 1))
-"""Axes to reverse."""
+"""Axes to reverse, for each reflection."""
 
 
 class Compliant(Protocol):
-    """What is needed of a surface operator."""
+    """The part of a surface operator that is needed here."""
 
     def displacement(self, force_n: ArrayLike) -> Array:
         """Displacement (c, 3) in mm under forces (c, 3) in N."""
@@ -31,8 +31,8 @@ class Compliant(Protocol):
 class NormalCompliance:
     """C_zz of a surface operator: float32 columns in mm/N.
 
-    `displacement` makes them, or, for an operator that carries the pad's whole system and solves
-    it, one factor with many right-hand sides (the same numbers, several times faster).
+    They come from `displacement`. For an operator that holds the full system of the pad, they come
+    from one factorisation with many right-hand sides: the same numbers, several times faster.
     """
 
     def __init__(self, operator: Compliant, columns: int) -> None:
@@ -41,39 +41,33 @@ class NormalCompliance:
         self._values = np.zeros((columns, columns), dtype=np.float32)
         self._known = np.zeros(columns, dtype=bool)
         self._factor: Factor | None = None
-        self._twins = _symmetries(operator, columns)
+        self._permutations = _symmetries(operator, columns)
         """(g, c) permutations of the nodes that leave the pad unchanged, the identity first."""
-        images = self._twins.min(axis=0)
-        self._original: Nodes = images
-        self._by: Nodes = self._twins.argmin(axis=0)
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes of the table, whole from the start."""
-        return int(self._values.nbytes)
+        self._original: Nodes = self._permutations.min(axis=0)
+        self._symmetry: Nodes = self._permutations.argmin(axis=0)
 
     @property
     def ready(self) -> float:
-        """Share of the columns that are made."""
+        """Share of the columns that are computed."""
         return float(self._known.mean())
 
     def prepare(self) -> None:
-        """Make all columns now."""
-        self._make(np.arange(self._columns))
+        """Compute all columns now."""
+        self._compute(np.arange(self._columns))
 
     def block(self, nodes: Nodes) -> Array:
         """C_zz (n, n) among `nodes` (n,), symmetric."""
-        self._make(nodes)
+        self._compute(nodes)
         block = self._values[np.ix_(nodes, nodes)].astype(float)
         return np.asarray((block + block.T) / 2)
 
     def apply(self, nodes: Nodes, force_n: Array) -> Array:
         """Normal displacement (c,) or (c, k) in mm under forces (n,) or (n, k) on `nodes`."""
-        self._make(nodes)
-        # Rows stand for columns: the compliance is symmetric.
+        self._compute(nodes)
+        # Rows may be used as columns: the compliance is symmetric.
         return np.asarray(self._values[nodes].T @ force_n.astype(np.float32), dtype=float)
 
-    def _make(self, nodes: Nodes) -> None:
+    def _compute(self, nodes: Nodes) -> None:
         if self._known[nodes].all():
             return
         missing = np.asarray(nodes)[~self._known[nodes]]
@@ -84,8 +78,8 @@ class NormalCompliance:
             self._values[part] = self._solved(part).T
             self._known[part] = True
         for node in missing[~self._known[missing]]:
-            twin = self._twins[self._by[node]]
-            self._values[node] = self._values[self._original[node], twin]
+            permutation = self._permutations[self._symmetry[node]]
+            self._values[node] = self._values[self._original[node], permutation]
             self._known[node] = True
 
     def _solved(self, nodes: Nodes) -> Array:
@@ -108,7 +102,7 @@ class NormalCompliance:
 
 
 def _symmetries(operator: Compliant, columns: int) -> Nodes:
-    """Node permutations of the mirror images, and quarter turns, that the pad is equal to."""
+    """Node permutations of the reflections and quarter rotations that leave the pad unchanged."""
     identity = np.arange(columns)
     system = getattr(operator, "system", None)
     if system is None:

@@ -10,23 +10,24 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
-from gelslim_force.contact.patch import ContactPatch, turned
+from gelslim_force.contact.patch import ContactPatch, rotated
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SELF_SHARE = 0.5
-"""Part of a node's own compliance that grows as only a share of its area is loaded."""
-LEAST_SHARE = 0.02
-SHIFTS = ((0.25, 0.25), (0.25, -0.25), (-0.25, 0.25), (-0.25, -0.25))
-STEPS = 40
-DISCRETE = 0.2
-"""Relative error of the depth at a patch one node spacing in size; falls with the square."""
+_LOCAL_SHARE = 0.5
+"""Part of a node's own compliance that increases where only a share of its area is loaded."""
+_LEAST_SHARE = 0.02
+_SHIFTS = ((0.25, 0.25), (0.25, -0.25), (-0.25, 0.25), (-0.25, -0.25))
+_MOST_STEPS = 40
+_DISCRETE = 0.2
+"""Relative error of the depth for a patch as large as the node spacing; it falls with the square
+of the size."""
 
 
 @dataclass(frozen=True, eq=False)
 class NormalMotion:
-    """Normal displacement at the c surface nodes; NaN throughout where unknown."""
+    """Normal displacement at the c surface nodes; all values are NaN if it is unknown."""
 
     w_mm: Array
     """(c,) negative where the gel is pressed in."""
@@ -38,9 +39,9 @@ class NormalMotion:
     """Of the indenter's lowest point below the rest surface; NaN where unknown."""
     depth_sigma_mm: float
     force_n: Array
-    """(c,) push on the nodes, positive into the gel, of this contact without friction."""
+    """(c,) normal force on the nodes, positive into the gel, of this contact without friction."""
     problem: str = ""
-    """Why it is unknown, in words."""
+    """Why it is unknown; empty otherwise."""
 
     @property
     def known(self) -> bool:
@@ -56,11 +57,12 @@ class NormalMotion:
 class NormalModel:
     """Frictionless contact of a rigid indenter on a pad's surface operator.
 
-    Inside the patch the surface follows the indenter, w = profile - depth; beside it the surface
-    is free and bulges as the pad's elasticity asks. The depth is the one at which the pressure
-    falls to zero at the rim seen: the contact area is that of the greatest force (Barber, J.
-    Elasticity 4, 1974), so dF/da = depth k'(a) - Φ'(a) = 0, with k the stiffness of a flat punch
-    of the patch's outline and Φ the force that the profile saves. It needs no modulus.
+    Inside the patch the surface follows the indenter, w = profile - depth. Outside it the surface
+    is free and bulges according to the elasticity of the pad. The depth is the one at which the
+    pressure falls to zero at the rim seen: of all contact areas the true one has the largest force
+    (Barber, J. Elasticity 4, 1974), so that dF/da = depth k'(a) - Φ'(a) = 0, where k is the
+    stiffness of a flat punch with the outline of the patch and Φ is the reduction of its force by
+    the profile. This needs no modulus.
 
     `points_mm` (c, 3) are the surface nodes in the operator's order, on a lattice of `pitch_mm`.
     Not safe for use from two threads at once.
@@ -75,7 +77,7 @@ class NormalModel:
         self.compliance = NormalCompliance(operator, len(points))
 
     def prepare(self) -> None:
-        """Make the whole compliance now, so that no frame waits for a part of it."""
+        """Compute the full compliance now, so that no frame waits for a part of it."""
         self.compliance.prepare()
 
     def motion(
@@ -85,18 +87,21 @@ class NormalModel:
         depth_mm: float | None = None,
         depth_sigma_mm: float = 0.0,
     ) -> NormalMotion:
-        """Motion under `indenter` with the patch seen; `depth_mm` where it is known otherwise.
+        """Motion under `indenter` for the patch seen.
 
-        A flat punch's depth does not show in its patch: without `depth_mm` it stays unknown.
+        `depth_mm` is given where the depth is known from elsewhere. The depth of a flat punch does
+        not follow from its patch: without `depth_mm` the motion is unknown.
         Raises ValueError for a depth that is not positive and finite.
         """
         if depth_mm is None:
             if isinstance(indenter, Flat):
-                return self.unknown("a flat punch's patch does not tell its depth: supply it")
+                return self.unknown(
+                    "the depth of a flat punch does not follow from its patch: give the depth"
+                )
             patch, depth, spread = self._settled(patch, indenter)
             if not np.isfinite(depth):
                 return self.unknown(_why_no_depth(patch, indenter))
-            # To first order a smooth indenter's depth goes as the square of its patch.
+            # To first order the depth is proportional to the square of the patch's size.
             growth = 2 * depth / patch.size_mm
         else:
             if not (np.isfinite(depth_mm) and depth_mm > 0):
@@ -106,7 +111,7 @@ class NormalModel:
         gap = depth - self._profile(patch, indenter)
         touched, push, factor = self._contact(gap, patch)
         if not len(touched):
-            return self.unknown("the patch lies beside the pad's surface nodes")
+            return self.unknown("the patch contains no surface node of the pad")
         sensitivity = self._sensitivity(patch, indenter, touched)
         moved = self.compliance.apply(
             touched, np.column_stack([push, cho_solve(factor, sensitivity)])
@@ -123,9 +128,9 @@ class NormalModel:
         return NormalMotion(w, np.sqrt(np.maximum(variance, 0)), mask, depth, total, force)
 
     def cap_only(self, patch: ContactPatch, indenter: Indenter) -> NormalMotion:
-        """The paper's model: the indenter's cap below the patch's rim, no motion beside it.
+        """The paper's model: the indenter's cap below the rim of the patch, and no motion outside.
 
-        Its depth is the cap's height, profile(size): the rim is taken to be at rest.
+        The depth is the height of the cap, profile(size): the rim is assumed to be at rest.
         """
         if isinstance(indenter, Flat):
             return self.unknown("a flat punch has no cap")
@@ -139,15 +144,15 @@ class NormalModel:
         return NormalMotion(w, np.where(inside, spread, 0.0), inside, depth, spread, zero)
 
     def unknown(self, problem: str) -> NormalMotion:
-        """A motion that is not known, and why."""
+        """A motion that is not known, with the reason."""
         nan, none = np.full(len(self.points_mm), np.nan), np.zeros(len(self.points_mm), bool)
         return NormalMotion(nan, nan, none, np.nan, np.nan, nan, problem)
 
     def depth_mm(self, patch: ContactPatch, indenter: Indenter) -> float:
         """Depth at which the pressure falls to zero at the patch's rim; NaN where there is none.
 
-        Taken with the patch shifted by a quarter of the node spacing in four directions, which
-        evens out where the rim passes between the nodes.
+        It is the mean over shifts of the patch by a quarter of the node spacing in four
+        directions, which reduces the effect of where the rim passes between the nodes.
         """
         if not np.isfinite(self._rim_profile(patch, indenter)):
             return np.nan
@@ -157,32 +162,32 @@ class NormalModel:
         near = np.flatnonzero(patch.outside_mm(*self.points_mm.T) < 2 * self.pitch_mm)
         x, y = self.points_mm[near].T
         shares, profiles = [], []
-        for shift in SHIFTS:
+        for shift in _SHIFTS:
             moved = replace(patch, centre_mm=patch.centre_mm + self.pitch_mm * np.array(shift))
             outside = moved.outside_mm(x, y)
             shares += [0.5 - (outside - sign * half) / self.pitch_mm for sign in (1, -1)]
             profiles += 2 * [np.asarray(indenter.profile(*moved.local(x, y)), dtype=float)]
         block = self.compliance.block(near)
-        # A force on a part of a node's area sinks in further, as 1/side of the loaded square.
-        own = SELF_SHARE * float(np.median(np.diag(block))) if len(near) else 0.0
+        # The compliance under a partly loaded area is proportional to 1/side of the loaded square.
+        own = _LOCAL_SHARE * float(np.median(np.diag(block))) if len(near) else 0.0
         found = np.empty((len(shares), 2))
         shares_of = np.clip(shares, 0.0, 1.0)
-        punches(block, own, shares_of, np.array(profiles), LEAST_SHARE, found)
-        gained, saved = found[0::2].sum(axis=0) - found[1::2].sum(axis=0)
-        return float(saved / gained) if gained > 0 else np.nan
+        punches(block, own, shares_of, np.array(profiles), _LEAST_SHARE, found)
+        stiffness, reduction = found[0::2].sum(axis=0) - found[1::2].sum(axis=0)
+        return float(reduction / stiffness) if stiffness > 0 else np.nan
 
     def _settled(
         self, patch: ContactPatch, indenter: Indenter
     ) -> tuple[ContactPatch, float, float]:
-        """Patch at the height its depth puts it, depth and its error from the mesh."""
+        """The patch at the height that follows from its depth, the depth, and the mesh's error."""
         depth = self.depth_mm(patch, indenter)
         if not np.isfinite(depth):
             return patch, np.nan, np.nan
         seen = patch.size_mm
         patch = patch.at_height(self._rim_height(patch, indenter, depth))
-        # The shift moves the patch by less than a node: the depth follows its size alone.
+        # The patch moves by less than a node: the depth changes with its size only.
         depth *= (patch.size_mm / seen) ** 2
-        return patch, depth, DISCRETE * (self.pitch_mm / patch.size_mm) ** 2 * depth
+        return patch, depth, _DISCRETE * (self.pitch_mm / patch.size_mm) ** 2 * depth
 
     def _rim_profile(self, patch: ContactPatch, indenter: Indenter) -> float:
         if isinstance(indenter, Flat):
@@ -201,12 +206,12 @@ class NormalModel:
     def _contact(
         self, gap: Array, patch: ContactPatch
     ) -> tuple[NDArray[np.intp], Array, tuple[Array, bool]]:
-        """Nodes touched, the push on them and the factor of their compliance, by active set."""
+        """Nodes in contact, their forces, and the Cholesky factor of their compliance."""
         active = (patch.outside_mm(*self.points_mm.T) < 0) & np.isfinite(gap)
         active |= (gap > 0) & ~active.any()
         slack = 1e-6 * max(float(gap.max()), 1e-9)
         nodes, push, factor = np.flatnonzero(active), np.zeros(0), None
-        for step in range(STEPS):
+        for step in range(_MOST_STEPS):
             if not len(nodes):
                 break
             try:
@@ -221,8 +226,8 @@ class NormalModel:
                 continue
             within = gap - self.compliance.apply(nodes, push) > slack
             within[nodes] = False
-            # Nodes on the brink could take turns for ever: a push, however small, may stay.
-            if not within.any() or step > STEPS - 10:
+            # Nodes at the limit could alternate for ever: in the last steps none is added.
+            if not within.any() or step > _MOST_STEPS - 10:
                 break
             active |= within
             nodes = np.flatnonzero(active)
@@ -231,13 +236,13 @@ class NormalModel:
     def _sensitivity(
         self, patch: ContactPatch, indenter: Indenter, nodes: NDArray[np.intp]
     ) -> Array:
-        """Change (n, 4) of the gap at the nodes per depth, x, y and angle."""
+        """Derivative (n, 4) of the gap at the nodes by depth, x, y and angle."""
         x, y = self.points_mm[nodes].T
         turn, small = np.deg2rad(patch.angle_deg), 1e-5
 
         def profile(dx: float, dy: float, dt: float) -> Array:
-            place = patch.centre_mm + np.array([dx, dy])
-            return np.asarray(indenter.profile(*turned(x, y, place, turn + dt)), dtype=float)
+            centre = patch.centre_mm + np.array([dx, dy])
+            return np.asarray(indenter.profile(*rotated(x, y, centre, turn + dt)), dtype=float)
 
         columns = [np.ones(len(nodes))]
         for move in ((small, 0.0, 0.0), (0.0, small, 0.0), (0.0, 0.0, small)):
@@ -249,7 +254,7 @@ class NormalModel:
 
 
 def _pitch(points_mm: Array) -> float:
-    """Node spacing: the geometric mean of the least steps along x and y."""
+    """Node spacing: the geometric mean of the smallest steps along x and y."""
     steps = []
     for values in points_mm.T:
         gaps = np.diff(np.unique(np.round(values, 9)))
@@ -264,6 +269,6 @@ def _why_no_depth(patch: ContactPatch, indenter: Indenter) -> str:
     if radius is not None and patch.size_mm > radius:
         return (
             f"the patch of {patch.size_mm:.2f} mm is wider than the indenter of {radius:g} mm "
-            "radius: another indenter, or another thing, touches the gel"
+            "radius: something else than this indenter touches the gel"
         )
     return "the patch holds too few surface nodes"

@@ -1,4 +1,4 @@
-"""Finds the contact patch in a frame by its change of shading against the reference."""
+"""Finds the contact patch in a frame by its change of shading relative to the reference."""
 
 from __future__ import annotations
 
@@ -15,44 +15,54 @@ from gelslim_force.contact.patch import ContactPatch
 from gelslim_force.contact.patch_place import rim_share, strip_covariance, strip_patch
 from gelslim_force.contact.patch_region import PatchSettings, changed_region
 from gelslim_force.contact.patch_shading import (
-    AFRESH,
-    STARTS,
-    STEADY,
+    REFRESH_FRAMES,
+    STEADY_CHANGE,
     Followed,
     Region,
     ShadingFit,
+    SlopeLaw,
     Window,
     best_shading_fit,
-    leaves_less,
-    moved_on,
+    continued_start,
+    first_starts,
+    fits_better,
     settled,
-    values_of,
+    start_values,
 )
 from gelslim_force.contact.region_outline import region_patch
 from gelslim_force.contact.shading_change import (
     ShadingChange,
     ShadingReference,
+    bin_positions,
     bin_sizes,
-    gel_places,
     near_surface,
 )
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-PASSES = 3
-CUT_ERROR = 0.05
-"""Relative error of a size of which all of the rim is hidden, over that of none."""
+_MOST_PASSES = 3
+_HIDDEN_RIM_ERROR = 0.05
+"""Relative error of the size of a patch whose rim is hidden completely."""
 
 
 class PatchFinder:
-    """Contact patches of one camera against one reference frame.
+    """Finds contact patches in the frames of one camera, relative to one reference picture.
 
-    `camera` is None for pictures of an unknown sensor: then `mm_per_px` gives the scale and the
-    picture's middle is the origin. `markers_px` (m, 2) are the reference's markers and
-    `marker_radius_px` one radius for all, or (m,); ink is masked out with a margin of a half.
-    `surface_mm` (c, 2 or 3) are the pad's surface nodes: only bins on them count. `indenter` says
-    what the patch looks like, a disc where it is None. Raises ValueError for an unusable reference.
+    Args:
+        camera: The sensor's camera. None for pictures of an unknown sensor: `mm_per_px` then gives
+            the scale, and the picture's middle is the origin.
+        reference: (h, w, 3) or (h, w) uint8 picture without contact.
+        markers_px: (m, 2) markers in the reference.
+        marker_radius_px: One radius for all markers, or (m,). Pixels within 1.5 times the radius
+            are left out.
+        surface_mm: (c, 2 or 3) surface nodes of the pad; only bins near one of them count.
+        indenter: Determines the shape of the patch, which is a disc if None.
+        mm_per_px: Scale for an unknown sensor.
+        settings: How certain a patch must be.
+
+    Raises:
+        ValueError: The reference cannot be used.
     """
 
     def __init__(
@@ -70,14 +80,15 @@ class PatchFinder:
         self.settings = settings or PatchSettings()
         self.indenter = indenter
         self._last: Followed | None = None
-        self._asked: tuple[Array, tuple[int, int]] | None = None
+        self._found_bin: tuple[Array, tuple[int, int]] | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
         picture = np.asarray(reference)
         bin_px = max(2, round(picture.shape[1] / 160)) if picture.ndim >= 2 else 2
         self._radius = np.ascontiguousarray(radius * 1.5 + 1.0)
         self._light = ShadingReference(picture, markers, self._radius, bin_px)
-        self._x, self._y, self._lean, self._growth = gel_places(self._light, camera, mm_per_px)
+        bins = bin_positions(self._light, camera, mm_per_px)
+        self._x, self._y, self._parallax, self._growth = bins
         self._bin_mm = bin_sizes(self._x, self._y)
         self._light.on_pad &= np.isfinite(self._x)
         if surface_mm is not None:
@@ -104,11 +115,19 @@ class PatchFinder:
     def find(
         self, image: NDArray[np.uint8], markers_px: ArrayLike | None = None
     ) -> ContactPatch | None:
-        """The patch in a frame, or None without contact.
+        """Find the patch in a frame.
 
-        The last frame's patch is followed where it fits as well as it did, for speed.
-        `markers_px` (m, 2; NaN for a lost one) are the frame's markers, masked as well.
-        Raises ValueError for an image of another shape than the reference.
+        The patch of the last frame is followed, for speed, as long as it fits as well as before.
+
+        Args:
+            image: The frame, of the shape of the reference.
+            markers_px: (m, 2) markers in the frame, which are left out too; NaN for lost ones.
+
+        Returns:
+            The patch, None without contact.
+
+        Raises:
+            ValueError: The frame has another shape than the reference.
         """
         light = self.change(image, markers_px)
         region, contrast = changed_region(light, self.settings)
@@ -129,35 +148,35 @@ class PatchFinder:
         )
         if found is None:
             return None
-        lean, growth = self._sight(found.centre_mm)
-        # A flat punch's size is known, not seen: it does not grow with the height it is taken at.
+        parallax, growth = self._sight(found.centre_mm)
+        # The size of a flat punch is known, not seen: it does not depend on the assumed height.
         flat = isinstance(self.indenter, Flat)
-        return replace(found, lean=lean, growth_per_mm=0.0 if flat else growth)
+        return replace(found, parallax=parallax, growth_per_mm=0.0 if flat else growth)
 
     def _tracked(self, region: Mask, light: ShadingChange) -> ContactPatch | None:
-        """The last frame's patch followed, one sought afresh, or the better of both.
+        """The followed patch of the last frame, a new one, or the better of both.
 
-        A rim that moved far may be missed by a fit that starts from where it was, and is then
-        missed in all frames that follow: now and then, and where what is seen grows or shrinks,
-        the patch is sought afresh as well.
+        A fit that starts from the last position may miss a rim that moved far, and would then miss
+        it in all frames that follow. Therefore the patch is also searched for anew after some
+        frames, and whenever the changed region grows or shrinks.
         """
         last, self._last = self._last, None
         now = self._measured(region)
         followed = None
         if last is not None:
             followed = self._followed(last, now, light)
-            steady = abs(now.reach_mm / last.region.reach_mm - 1) < STEADY
-            if followed is not None and steady and last.age < AFRESH:
+            steady = abs(now.radius_mm / last.region.radius_mm - 1) < STEADY_CHANGE
+            if followed is not None and steady and last.age < REFRESH_FRAMES:
                 self._last = Followed(*followed, now, last.age + 1)
                 return followed[0]
         start = self._outline(region)
         if start is None or isinstance(self.indenter, Flat):
             return start if followed is None else followed[0]
-        fresh = self._refined(start, light)
-        best = fresh or followed
-        if fresh is not None and followed is not None:
-            law = self._strip, self._curvature, self._blur_mm(fresh[1].window.bin_mm)
-            best = followed if leaves_less(followed[1], fresh[1], *law) else fresh
+        new = self._refined(start, light)
+        best = new or followed
+        if new is not None and followed is not None:
+            law = self._law(new[1].window.bin_mm)
+            best = followed if fits_better(followed[1], new[1], law) else new
         if best is None:
             return start
         self._last = Followed(*best, now, 0)
@@ -166,10 +185,10 @@ class PatchFinder:
     def _followed(
         self, last: Followed, now: Region, light: ShadingChange
     ) -> tuple[ContactPatch, ShadingFit] | None:
-        """The last frame's patch moved on, where the shading is explained as well as it was."""
+        """The patch of the last frame moved on, if it explains the shading as well as before."""
         size = last.patch.size_mm
-        beside = last.patch.outside_mm(*now.middle_mm) > -0.3 * size
-        if beside or not 0.6 < now.reach_mm / size < 2.5:
+        outside = last.patch.outside_mm(*now.middle_mm) > -0.3 * size
+        if outside or not 0.6 < now.radius_mm / size < 2.5:
             return None
         found = self._shading(last.patch, [last.fit.values], light, (last.region, now))
         if found is None or found[1].explained < last.fit.explained - 0.03:
@@ -183,18 +202,19 @@ class PatchFinder:
     def _refined(
         self, start: ContactPatch, light: ShadingChange
     ) -> tuple[ContactPatch, ShadingFit] | None:
-        """The outline's patch moved to where the shading puts its rim, if it tells."""
+        """The patch of the outline with its rim moved to where the shading has it, if possible."""
         patch, found = start, None
-        begins = [values_of(start, k, q) for k, q in STARTS]
-        for _ in range(PASSES):
-            found = self._shading(patch, begins, light)
+        starts = first_starts(start)
+        for _ in range(_MOST_PASSES):
+            found = self._shading(patch, starts, light)
             if found is None:
                 return None
             before, patch = patch, found[0]
             if settled(before, patch):
                 break
-            # What the edge cuts looks small at first: look again, further out.
-            begins = [found[1].values, values_of(patch, 1.0, 1.5), values_of(patch, 1.3, 1.5)]
+            # A patch that the edge cuts looks too small at first: larger ones are tried too.
+            larger = [start_values(patch, scale, 1.5) for scale in (1.0, 1.3)]
+            starts = [found[1].values, *larger]
         if found is None or found[1].explained < self.settings.least_explained:
             return None
         return found
@@ -202,24 +222,26 @@ class PatchFinder:
     def _shading(
         self,
         patch: ContactPatch,
-        begins: list[Array],
+        starts: list[Array],
         light: ShadingChange,
         change: tuple[Region, Region] | None = None,
     ) -> tuple[ContactPatch, ShadingFit] | None:
-        """The fit to the shading about a patch, if it stays of that size; with the regions of
-        both frames it is taken up from the fit of the frame before."""
+        """The fit to the shading around a patch, if the size remains similar.
+
+        With `change`, the regions of the last frame and of this one, it continues the last fit.
+        """
         window = self._window(patch, light)
         if window is None:
             return None
-        curvature, blur = self._curvature, self._blur_mm(window.bin_mm)
+        law = self._law(window.bin_mm)
         if change is not None:
             shift = change[1].middle_mm - change[0].middle_mm
-            growth = change[1].reach_mm / change[0].reach_mm
-            begins = [moved_on(window, begins[0], shift, growth, self._strip, curvature, blur)]
-        fit = best_shading_fit(window, begins, self._strip, curvature, blur)
+            growth = change[1].radius_mm / change[0].radius_mm
+            starts = [continued_start(window, starts[0], shift, growth, law)]
+        fit = best_shading_fit(window, starts, law)
         if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
             return None
-        return self._from_fit(fit, patch, curvature, window.bin_mm), fit
+        return self._from_fit(fit, patch, law.curvature_per_mm, window.bin_mm), fit
 
     def _from_fit(
         self, fit: ShadingFit, start: ContactPatch, curvature: float, bin_mm: float
@@ -239,18 +261,18 @@ class PatchFinder:
             covariance = np.zeros((4, 4))
             covariance[:3, :3] = fit.covariance[:3, :3]
             covariance += extra
-        lean, growth = self._sight(patch.centre_mm)
+        parallax, growth = self._sight(patch.centre_mm)
         height = -0.1 * size * size * curvature
         return replace(
-            patch, covariance=covariance, method="shading", lean=lean, growth_per_mm=growth,
-            z_mm=height,
+            patch, covariance=covariance, method="shading", parallax=parallax,
+            growth_per_mm=growth, z_mm=height,
         )  # fmt: skip
 
     def _window(self, start: ContactPatch, light: ShadingChange) -> Window | None:
         s = self.settings
-        live = np.flatnonzero(light.valid)
-        apart = start.outside_mm(self._x.ravel()[live], self._y.ravel()[live])
-        near = live[apart < (s.window - 1) * start.size_mm]
+        valid = np.flatnonzero(light.valid)
+        apart = start.outside_mm(self._x.ravel()[valid], self._y.ravel()[valid])
+        near = valid[apart < (s.window - 1) * start.size_mm]
         rows, columns = np.divmod(near, light.valid.shape[1])
         skip = 1 + len(rows) // s.most_bins
         kept = (rows + columns) % skip == 0
@@ -265,7 +287,7 @@ class PatchFinder:
         return Window(
             self._x[rows, columns],
             self._y[rows, columns],
-            self._lean[rows, columns],
+            self._parallax[rows, columns],
             (
                 most
                 * np.tanh(light.change[:, rows, columns].astype(float) / most)
@@ -281,45 +303,46 @@ class PatchFinder:
         known = getattr(self.indenter, "radius_mm", None)
         return 1 / known if known else 0.0
 
-    def _blur_mm(self, bin_mm: float) -> float:
-        return float(np.hypot(bin_mm / 2, self.settings.blur_px / self._light.bin_px * bin_mm))
+    def _law(self, bin_mm: float) -> SlopeLaw:
+        blur_mm = float(np.hypot(bin_mm / 2, self.settings.blur_px / self._light.bin_px * bin_mm))
+        return SlopeLaw(self._strip, self._curvature, blur_mm)
 
     @property
     def _strip(self) -> bool:
         return self.indenter is not None and self.indenter.patch_kind == "strip"
 
     def _well_inside(self, patch: ContactPatch) -> bool:
-        """Whether all of a disc's rim is on the pad, without a look at its points."""
+        """Whether the whole rim of a disc is on the pad, without a test of its points."""
         return patch.kind == "disc" and bool(
             self._inside_mm[self._nearest(patch.centre_mm)] > patch.size_mm
         )
 
     @cached_property
     def _inside_mm(self) -> Array:
-        """Distance of each bin from the nearest that is not on the pad, in its smallest bins."""
+        """Lower bound of the distance of each bin from the nearest one that is not on the pad."""
         on = np.pad(self._light.on_pad, 1)
         steps = ndimage.distance_transform_edt(on)[1:-1, 1:-1]
         return np.asarray((steps - 1) * self._bin_mm[self._light.on_pad].min() / np.sqrt(2))
 
-    def _nearest(self, place: Array) -> tuple[int, int]:
-        if self._asked is None or not np.array_equal(self._asked[0], place):
-            _, at = self._pad.query(place)
+    def _nearest(self, point_mm: Array) -> tuple[int, int]:
+        if self._found_bin is None or not np.array_equal(self._found_bin[0], point_mm):
+            _, at = self._pad.query(point_mm)
             row, column = divmod(int(self._on[at]), self._x.shape[1])
-            self._asked = place.copy(), (row, column)
-        return self._asked[1]
+            self._found_bin = point_mm.copy(), (row, column)
+        return self._found_bin[1]
 
-    def _sight(self, place: Array) -> tuple[Array, float]:
-        at = self._nearest(place)
-        return self._lean[at].copy(), float(self._growth[at])
+    def _sight(self, point_mm: Array) -> tuple[Array, float]:
+        at = self._nearest(point_mm)
+        return self._parallax[at].copy(), float(self._growth[at])
 
     def _local_bin(self, patch: ContactPatch) -> float:
         return float(self._bin_mm[self._nearest(patch.centre_mm)])
 
 
 def _finished(patch: ContactPatch, share: float, contrast: float) -> ContactPatch:
-    """With what a hidden part of the rim adds to the errors: it bends place and size together."""
+    """The patch with the errors that a hidden part of the rim adds to its position and size."""
     covariance = patch.covariance.copy()
     if np.any(covariance[2, 2] > 0):
-        hidden = (CUT_ERROR * share * patch.size_mm) ** 2
+        hidden = (_HIDDEN_RIM_ERROR * share * patch.size_mm) ** 2
         covariance[:3, :3] += np.diag([hidden / 2, hidden / 2, hidden])
     return replace(patch, covariance=covariance, rim_share=share, contrast=contrast)

@@ -1,8 +1,9 @@
-"""Compiled fit of a patch's place and size to the change of shading. Import only where it runs.
+"""Compiled fit of a patch's position and size to the change of shading. Import only where it runs.
 
-Gauss-Newton on four values with the gains of the light projected out. The derivative is taken by
-differences at the start and where a step fails, and kept up by Broyden's rank-one update between:
-a fit that starts near its end then costs eight evaluations instead of twenty.
+The fit takes Gauss-Newton steps in four values, with the gains of the light projected out. The
+derivative is computed by differences at the start and where a step fails. In between it is updated
+by Broyden's rank-one formula: a fit that starts near its solution needs eight evaluations instead
+of twenty.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ RIDGE = 1e-9
 TRIES = 6
 MOST_DECAY = 5.0
 SETTLED = 3e-3
-"""Move, over the patch's size, that ends the fit."""
+"""Change, over the size of the patch, at which the fit ends."""
 
 
 @njit(**COMPILED)
 def settle(
     x: Any,
     y: Any,
-    lean: Any,
+    parallax: Any,
     change: Any,
     theta: Any,
     strip: Any,
@@ -41,16 +42,16 @@ def settle(
     residual: Any,
     jacobian: Any,
 ) -> Any:
-    """Improve `theta` (4,) in place by up to `steps` steps; returns the squares left.
+    """Improve `theta` (4,) in place by up to `steps` steps; returns the remaining sum of squares.
 
-    Differences are taken anew after a move of more than `near`, over the patch's size.
-    Bins x, y (n,), `lean` (n, 2) and their `change` (n, c) over the noise; what the fit leaves is
-    written to `residual` (n, c), its derivative to `jacobian` (n c, 4).
+    The bins are at x, y (n,), with `parallax` (n, 2) and `change` (n, c) over the noise. The
+    residual is written to `residual` (n, c), its derivative to `jacobian` (n c, 4). Differences
+    are computed anew after a change of more than `near`, over the size of the patch.
     """
     scale = np.array([1.0, 0.2 if strip else 1.0, 1.0, 2.0])
     basis = np.empty((len(x), GAINS))
     tried, trial = np.empty_like(residual), theta.copy()
-    bins, shape = (x, y, lean, change), (strip, curvature, blur)
+    bins, shape = (x, y, parallax, change), (strip, curvature, blur)
     cost = _residual(bins, shape, theta, basis, residual)
     damping, far, fresh, settled = 1e-3, True, False, False
     for _ in range(steps):
@@ -96,7 +97,7 @@ def settle(
 def squares_left(
     x: Any,
     y: Any,
-    lean: Any,
+    parallax: Any,
     change: Any,
     theta: Any,
     strip: Any,
@@ -106,7 +107,7 @@ def squares_left(
 ) -> Any:
     """Squares that a trial of `theta` (4,) leaves; arguments as for `settle`."""
     basis = np.empty((len(x), GAINS))
-    return _residual((x, y, lean, change), (strip, curvature, blur), theta, basis, residual)
+    return _residual((x, y, parallax, change), (strip, curvature, blur), theta, basis, residual)
 
 
 @njit(**COMPILED)
@@ -130,13 +131,13 @@ def _bounded_step(
 def _residual(bins: Any, shape: Any, theta: Any, basis: Any, out: Any) -> Any:
     """Write what the best gains leave of the change to `out` (n, c); returns its squares.
 
-    `bins` are x, y, lean and change, `shape` strip, curvature and blur, as for `settle`.
+    `bins` are x, y, parallax and change, `shape` strip, curvature and blur, as for `settle`.
     """
-    (x, y, lean, change), (strip, curvature, blur) = bins, shape
+    (x, y, parallax, change), (strip, curvature, blur) = bins, shape
     count, layers = change.shape
     at = theta.copy()
     at[2] = max(at[2], 1e-3)
-    slope_basis(x, y, lean, at, strip, curvature, blur, basis)
+    slope_basis(x, y, parallax, at, strip, curvature, blur, basis)
     normal, sides = np.zeros((GAINS, GAINS)), np.zeros((GAINS, layers))
     for k in range(count):
         for i in range(GAINS):

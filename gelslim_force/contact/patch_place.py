@@ -1,4 +1,4 @@
-"""Known outlines laid on what is seen, and how much of a rim is seen."""
+"""Patches of known shape fitted to an outline, and the share of a rim that is visible."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from gelslim_force.contact.indenter import Flat
 from gelslim_force.contact.patch import ContactPatch
 
 Array = NDArray[np.float64]
-RIM_POINTS = 180
-OUTLINE_SHIFT = 0.05
-"""Error of a flat punch's place over its size, from light that changes unevenly beside it."""
+_RIM_POINTS = 180
+_OUTLINE_SHIFT = 0.05
+"""Error of a flat punch's position over its size, from light that changes unevenly around it."""
 
 
 def flat_patch(punch: Flat, rim_mm: Array, inside_mm: Array) -> ContactPatch | None:
-    """Place (and turn, of a rectangle) of a punch of known size.
+    """Patch of a punch of known size: its position, and the angle of a rectangle.
 
-    `rim_mm` (n, 2) are outline points of what changed, which is wider by an unknown margin: the
-    margin is fitted with the place. None where the fit fails.
+    `rim_mm` (n, 2) are points on the outline of the changed region, which is larger than the punch
+    by an unknown margin. The margin is fitted together with the position. None where the fit fails.
     """
     middle = inside_mm.mean(axis=0)
     round_punch = punch.half_sizes_mm is None
@@ -39,22 +39,21 @@ def flat_patch(punch: Flat, rim_mm: Array, inside_mm: Array) -> ContactPatch | N
         a, b = punch.half_sizes_mm or (0.0, 0.0)
         return ContactPatch("outline", p[:2], a, float(np.rad2deg(p[3])), b)
 
-    def apart(p: Array) -> Array:
+    def distance(p: Array) -> Array:
         return np.asarray(shape(p).outside_mm(*rim_mm.T) - p[2])
 
-    fits = [least_squares(apart, s, loss="soft_l1", f_scale=0.2, max_nfev=60) for s in starts]
+    fits = [least_squares(distance, s, loss="soft_l1", f_scale=0.2, max_nfev=60) for s in starts]
     best = min(fits, key=lambda f: float(f.cost))
     if not np.isfinite(best.x).all():
         return None
     patch = shape(best.x)
-    left = apart(best.x)
+    left = distance(best.x)
     variance = 2 * float(left @ left) / max(len(left) - len(best.x), 1)
     found = np.linalg.pinv(best.jac.T @ best.jac) * variance
     covariance = np.zeros((4, 4))
-    kept = [0, 1] if round_punch else [0, 1, 3]
-    into = [0, 1] if round_punch else [0, 1, 3]
-    covariance[np.ix_(into, into)] = found[np.ix_(kept, kept)]
-    covariance[:2, :2] += np.eye(2) * (OUTLINE_SHIFT * patch.size_mm) ** 2
+    fitted = [0, 1] if round_punch else [0, 1, 3]
+    covariance[np.ix_(fitted, fitted)] = found[np.ix_(fitted, fitted)]
+    covariance[:2, :2] += np.eye(2) * (_OUTLINE_SHIFT * patch.size_mm) ** 2
     angle = (patch.angle_deg + 90.0) % 180.0 - 90.0
     return ContactPatch(
         patch.kind,
@@ -68,14 +67,14 @@ def flat_patch(punch: Flat, rim_mm: Array, inside_mm: Array) -> ContactPatch | N
 
 
 def strip_patch(offset: float, half: float, angle: float, near: Array) -> ContactPatch:
-    """Strip whose centre is the point of its middle line next to `near` (2,)."""
+    """Strip whose centre is the point of its middle line nearest to `near` (2,)."""
     across = np.array([-np.sin(angle), np.cos(angle)])
     centre = near + (offset - near @ across) * across
     return ContactPatch("strip", centre, float(half), float(np.rad2deg(angle)))
 
 
 def strip_covariance(found: Array, angle: float) -> Array:
-    """(4, 4) from that (3, 3) of offset, half-width and angle: nothing is known along the strip."""
+    """(4, 4) from that (3, 3) of offset, half-width and angle; the position along it has none."""
     across = np.array([-np.sin(angle), np.cos(angle)])
     spread = np.zeros((4, 3))
     spread[:2, 0] = across
@@ -86,14 +85,14 @@ def strip_covariance(found: Array, angle: float) -> Array:
 def rim_points(patch: ContactPatch, reach_mm: float) -> Array:
     """Points (n, 2) along the rim; of a strip, within `reach_mm` of its centre."""
     if patch.kind == "disc":
-        turn = np.linspace(0, 2 * np.pi, RIM_POINTS, endpoint=False)
+        turn = np.linspace(0, 2 * np.pi, _RIM_POINTS, endpoint=False)
         local = patch.size_mm * np.column_stack([np.cos(turn), np.sin(turn)])
     elif patch.kind == "strip":
-        along = np.linspace(-reach_mm, reach_mm, RIM_POINTS // 2)
+        along = np.linspace(-reach_mm, reach_mm, _RIM_POINTS // 2)
         side = np.full_like(along, patch.size_mm)
         local = np.vstack([np.column_stack([along, side]), np.column_stack([along, -side])])
     else:
-        a, b, t = patch.size_mm, patch.length_mm, np.linspace(-1, 1, RIM_POINTS // 4)
+        a, b, t = patch.size_mm, patch.length_mm, np.linspace(-1, 1, _RIM_POINTS // 4)
         sides = [(a * t, b + 0 * t), (a * t, -b + 0 * t), (a + 0 * t, b * t), (-a + 0 * t, b * t)]
         local = np.vstack([np.column_stack(s) for s in sides])
     c, s = np.cos(np.deg2rad(patch.angle_deg)), np.sin(np.deg2rad(patch.angle_deg))
@@ -101,14 +100,14 @@ def rim_points(patch: ContactPatch, reach_mm: float) -> Array:
 
 
 def rim_share(patch: ContactPatch, pad: cKDTree, near_mm: float) -> float:
-    """Share of the rim further than `near_mm` from every bin of the pad (a tree of places in mm).
+    """Share of the rim that is farther than `near_mm` from every bin of the pad (a tree, in mm).
 
-    Of a strip, whose ends always lie beyond the pad, the share of its long sides of which the
-    pad's other side is seen at the same place.
+    The ends of a strip are always outside the pad. Of a strip only those parts of the long sides
+    count where at least one of the two sides is on the pad.
     """
     rim = rim_points(patch, float((pad.maxes - pad.mins).max()) / 2)
-    apart, _ = pad.query(rim, distance_upper_bound=near_mm)
-    seen = np.isfinite(apart)
+    distance, _ = pad.query(rim, distance_upper_bound=near_mm)
+    seen = np.isfinite(distance)
     if patch.kind == "strip":
         half = len(seen) // 2
         either = seen[:half] | seen[half:]

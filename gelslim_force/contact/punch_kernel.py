@@ -1,4 +1,4 @@
-"""Compiled flat punches of several outlines on one pad. Import only where it runs: numba."""
+"""Compiled model of flat punches with several outlines. Import only where it runs: numba."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"
 
 @njit(**COMPILED)
 def punches(compliance: Any, extra: Any, shares: Any, profiles: Any, least: Any, out: Any) -> None:
-    """Write stiffness and saved force (k, 2) of `k` punches to `out`.
+    """Write the stiffness of `k` punches, and the force that the profile removes, (k, 2) to `out`.
 
-    `compliance` (n, n) among the nodes about them, of which a punch loads the `shares` (k, n) of
-    each node's area; a share under `least` counts as none. A node's own compliance grows by
-    `extra` times 1/√share - 1. `profiles` (k, n) are the indenter's heights, not finite where it
-    does not reach.
+    `compliance` (n, n) is that among the nodes around them. A punch loads the `shares` (k, n) of
+    each node's area; a share under `least` counts as none. A node's own compliance increases by
+    `extra` times 1/√share - 1. `profiles` (k, n) are the heights of the indenter's surface, not
+    finite where the indenter ends.
     """
     for p in range(len(shares)):
         nodes = np.flatnonzero((shares[p] > least) & np.isfinite(profiles[p]))

@@ -1,4 +1,4 @@
-"""A first patch from the outline of what changed in the picture."""
+"""A first estimate of the patch, from the outline of the changed region."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from gelslim_force.contact.patch_region import PatchSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-FEWEST = 6
-"""Points of an outline that tell its shape."""
+_FEWEST = 6
+"""Smallest number of points of an outline that determine its shape."""
 
 
 def region_patch(
@@ -28,27 +28,27 @@ def region_patch(
     indenter: Indenter | None,
     settings: PatchSettings,
 ) -> ContactPatch | None:
-    """Patch of a region's outline, from the part that the pad's edge does not cut.
+    """Fit a patch to the outline of a region, where the edge of the pad does not cut it.
 
     Args:
         region: (rows, columns) bins whose light changed.
         on_pad: (rows, columns) bins on the pad.
-        x_mm: (rows, columns) places of the bins on the gel.
-        y_mm: likewise.
-        indenter: says what the patch looks like; a disc where it is None.
-        settings: for the error of a size that rests on an outline.
+        x_mm: (rows, columns) positions of the bins on the gel.
+        y_mm: (rows, columns) likewise.
+        indenter: Determines the shape of the patch, which is a disc if None.
+        settings: Give the error of a size from an outline.
 
     Returns:
-        The patch with its covariance; None where the outline tells none.
+        The patch with its covariance; None where the outline does not determine it.
     """
     closed = ndimage.binary_closing(np.pad(region, 3), iterations=3)[3:-3, 3:-3]
     filled = ndimage.binary_fill_holes(closed | region)
     rim = filled & ~ndimage.binary_erosion(filled, border_value=1)
-    # Where the pad or the picture ends, the region's end is not the patch's.
+    # Where the region ends with the pad or the picture, its edge is not the rim of the patch.
     rim &= ndimage.binary_erosion(on_pad, iterations=2, border_value=0)
     points = np.column_stack([x_mm[rim], y_mm[rim]])
     inside = np.column_stack([x_mm[filled], y_mm[filled]])
-    if len(points) < FEWEST:
+    if len(points) < _FEWEST:
         return None
     if isinstance(indenter, Flat):
         return flat_patch(indenter, points, inside)
@@ -75,8 +75,9 @@ def region_patch(
 
 
 def circle_start(points_mm: Array) -> Array:
-    """Centre and radius (3,) by Taubin's algebraic fit (IEEE PAMI 13, 1991), which a short arc
-    does not shrink as much as the plain one.
+    """Centre and radius (3,) by Taubin's algebraic fit (IEEE PAMI 13, 1991).
+
+    For short arcs its radius is less biased than that of the ordinary algebraic fit.
 
     Raises ValueError for points (n, 2) on a line, or fewer than three.
     """
@@ -99,21 +100,21 @@ def circle_start(points_mm: Array) -> Array:
 
 
 def fit_circle(points_mm: Array) -> tuple[Array, Array]:
-    """Centre and radius (3,) of least squared distances, robustly, with covariance (3, 3)."""
+    """Centre and radius (3,) by a robust fit of the distances, with covariance (3, 3)."""
     start = circle_start(points_mm)
 
-    def apart(p: Array) -> Array:
+    def distance(p: Array) -> Array:
         return np.asarray(np.hypot(points_mm[:, 0] - p[0], points_mm[:, 1] - p[1]) - p[2])
 
-    scale = max(float(1.4826 * np.median(np.abs(apart(start)))), 1e-6)
-    found = least_squares(apart, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
-    return found.x, _covariance(found.jac, apart(found.x), 3)
+    scale = max(float(1.4826 * np.median(np.abs(distance(start)))), 1e-6)
+    found = least_squares(distance, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
+    return found.x, _covariance(found.jac, distance(found.x), 3)
 
 
 def fit_strip(points_mm: Array) -> tuple[Array, Array]:
     """Offset, half-width and angle (rad) (3,) of two parallel lines, with covariance (3, 3).
 
-    The lines are {p : n·p = offset ± half-width}, n at right angles to the angle's direction.
+    The lines are {p : n·p = offset ± half-width}, with n perpendicular to the strip's direction.
     """
     if len(points_mm) < 4:
         raise ValueError("a strip needs four points")
@@ -123,12 +124,12 @@ def fit_strip(points_mm: Array) -> tuple[Array, Array]:
     across = points_mm @ _normal(angle)
     start = np.array([across.mean(), across.std(), angle])
 
-    def apart(p: Array) -> Array:
+    def distance(p: Array) -> Array:
         return np.asarray(np.abs(points_mm @ _normal(p[2]) - p[0]) - p[1])
 
-    scale = max(float(1.4826 * np.median(np.abs(apart(start)))), 1e-6)
-    found = least_squares(apart, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
-    return found.x, _covariance(found.jac, apart(found.x), 3)
+    scale = max(float(1.4826 * np.median(np.abs(distance(start)))), 1e-6)
+    found = least_squares(distance, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
+    return found.x, _covariance(found.jac, distance(found.x), 3)
 
 
 def _normal(angle: float) -> Array:
@@ -136,6 +137,6 @@ def _normal(angle: float) -> Array:
 
 
 def _covariance(jacobian: Array, residual: Array, unknowns: int) -> Array:
-    """Of the solution; neighbours on an outline of bins err together, by about two."""
+    """Covariance of the solution; about two neighbouring points of an outline have one error."""
     variance = 2 * float(residual @ residual) / max(len(residual) - unknowns, 1)
     return np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance)

@@ -1,8 +1,8 @@
 """How the light on the gel changes from the reference to a frame, in coarse bins.
 
-The change is logarithmic: where red and green come from opposite sides, log R/G follows the
-surface's slope across the finger, whatever the paint and the lamps' fall-off; the brightness that
-is left carries the slope along it.
+The change is logarithmic. Where red and green light come from opposite sides, log R/G follows the
+slope of the surface across the finger, independent of the paint and of the fall-off of the light.
+The remaining change of brightness follows the slope along the finger.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LEAST_LEVEL = 8.0
-"""Mean grey value of the reference under which a channel says nothing."""
+"""Smallest mean grey value of the reference with which a channel is used."""
 FLOOR = 5.0
 LEAST_FREE = 0.34
-"""Share of a bin's pixels that must be free of ink and glare."""
+"""Smallest share of a bin's pixels that must be free of ink and glare."""
 MEDIAN_OF = 1500
 ROBUST = 1.4826
-"""Standard deviation of a normal law over its median absolute deviation."""
+"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +37,14 @@ class ShadingChange:
     valid: Mask
     """(rows, columns) bins on the pad with enough free pixels."""
     noise: NDArray[np.floating]
-    """(c, rows, columns) standard deviation of each bin, from the spread off the patch; where there
-    is little light, or few free pixels, it is larger."""
+    """(c, rows, columns) standard deviation of each bin, from the spread outside the patch; it is
+    larger where there is little light, or few free pixels."""
 
 
 class ShadingReference:
     """Reference frame (h, w, 3) or (h, w) uint8 with its markers, and the bins' layout.
 
-    `on_pad` (rows, columns) is set later by who knows where the bins lie on the gel.
+    The owner sets `on_pad` (rows, columns) once the positions of the bins on the gel are known.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ShadingReference:
         self.shape = (height // bin_px, width // bin_px)
         self.on_pad = np.ones(self.shape, dtype=bool)
         self._radius = radius_px
-        from gelslim_force.contact.shading_kernel import block_discs, whole_sums
+        from gelslim_force.contact.shading_kernel import bin_sums, block_discs
 
         self._blocked = np.zeros((height, width), dtype=np.uint8)
         self._touched = np.zeros(self.shape, dtype=np.uint8)
@@ -64,7 +64,7 @@ class ShadingReference:
         self._scratch = np.empty_like(self._blocked), np.empty_like(self._touched)
         self._sums = np.zeros((2, *self.shape, channels), dtype=np.int64)
         self._glaring = np.zeros((2, *self.shape), dtype=np.uint8)
-        whole_sums(self.image, bin_px, self._sums[0], self._glaring[0])
+        bin_sums(self.image, bin_px, self._sums[0], self._glaring[0])
         self._ratios = np.ones((channels, *self.shape), dtype=np.float32)
         self._counts = np.zeros(self.shape, dtype=np.int64)
         levels = self._levels()
@@ -72,12 +72,12 @@ class ShadingReference:
         self._used = np.flatnonzero(level >= LEAST_LEVEL)
         if not len(self._used):
             raise ValueError(
-                f"the reference frame is dark (mean {level.max():.0f} of 255): no shading"
+                f"the reference picture is dark (mean {level.max():.0f} of 255) and has no shading"
             )
-        self._unrest = _unrest(levels[self._used])
+        self._noise_level = _noise_level(levels[self._used])
 
     def _levels(self) -> NDArray[np.float32]:
-        """Mean grey value (c, rows, columns) of the free pixels of each bin; 0 where none is."""
+        """Mean grey value (c, rows, columns) of the free pixels of each bin; 0 without any."""
         rows, columns = self.shape
         size = self.bin_px
         cut = slice(0, rows * size), slice(0, columns * size)
@@ -93,17 +93,17 @@ class ShadingReference:
     def centres_px(self) -> Array:
         """Centres (rows * columns, 2) of the bins."""
         y, x = np.mgrid[: self.shape[0], : self.shape[1]]
-        places = np.column_stack([x.ravel(), y.ravel()])
-        return places * self.bin_px + (self.bin_px - 1) / 2
+        indices = np.column_stack([x.ravel(), y.ravel()])
+        return indices * self.bin_px + (self.bin_px - 1) / 2
 
     def change(
         self, image: NDArray[np.uint8], markers_px: Array | None, radius_px: Array | None = None
     ) -> ShadingChange:
-        """Change from the reference to `image`, both without the markers of either.
+        """Change from the reference to `image`, without the markers of either picture.
 
         Raises ValueError for an image of another shape.
         """
-        from gelslim_force.contact.shading_kernel import block_discs, light_ratios, whole_sums
+        from gelslim_force.contact.shading_kernel import bin_sums, block_discs, light_ratios
 
         picture = as_picture(image)
         if picture.shape != self.image.shape:
@@ -119,18 +119,18 @@ class ShadingReference:
             if radius is None:
                 radius = np.full(len(markers_px), float(np.median(self._radius)))
             block_discs(blocked, np.asarray(markers_px, dtype=float), radius, self.bin_px, touched)
-        whole_sums(picture, self.bin_px, self._sums[1], self._glaring[1])
+        bin_sums(picture, self.bin_px, self._sums[1], self._glaring[1])
         glaring = self._glaring[0] | self._glaring[1]
-        # A few grey values keep a channel that goes black from outweighing all others.
+        # The constant keeps a channel that turns black from dominating all others.
         light_ratios(
             self.image, picture, blocked, touched, glaring, self.bin_px, self._sums, FLOOR,
             self._ratios, self._counts,
         )  # fmt: skip
         free = self._counts >= LEAST_FREE * self.bin_px**2
         share = np.sqrt(np.float32(self.bin_px**2) / np.maximum(self._counts, 1))
-        unrest = self._unrest * share.astype(np.float32)
-        return _about_median(
-            _combined(np.log(self._ratios[self._used])), free & self.on_pad, unrest
+        noise_level = self._noise_level * share.astype(np.float32)
+        return _relative_to_median(
+            _combined(np.log(self._ratios[self._used])), free & self.on_pad, noise_level
         )
 
 
@@ -149,7 +149,7 @@ def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Log R/G first, then the brightness, then what further channels add; (c, rows, columns)."""
+    """(c, rows, columns): log R/G, log brightness, then the further channels minus brightness."""
     if len(log) == 1:
         return log
     out = np.empty_like(log)
@@ -160,11 +160,11 @@ def _combined(log: NDArray[np.floating]) -> NDArray[np.floating]:
     return out
 
 
-def _unrest(levels: NDArray[np.float32]) -> NDArray[np.float32]:
-    """How noisy each bin of each layer of `_combined` is, up to a factor per layer.
+def _noise_level(levels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Relative noise of each bin of each layer of `_combined`, up to a factor per layer.
 
-    Noise of one size in grey values, whatever the light (gamma takes away most of what shot noise
-    adds to bright pixels), makes a logarithm err as 1 over the level.
+    The noise is taken to be the same at all grey values, because gamma removes most of the shot
+    noise of bright pixels. The error of a logarithm is then proportional to 1 over the level.
     """
     square = 1 / np.square(levels + np.float32(FLOOR))
     if len(square) == 1:
@@ -173,20 +173,20 @@ def _unrest(levels: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.sqrt(np.concatenate([both, both / 4, square[2:] + both / 4]))
 
 
-def _about_median(
-    change: NDArray[np.floating], valid: Mask, unrest: NDArray[np.floating]
+def _relative_to_median(
+    change: NDArray[np.floating], valid: Mask, noise_level: NDArray[np.floating]
 ) -> ShadingChange:
     layers = len(change)
     used = np.flatnonzero(valid)
     if not len(used):
         return ShadingChange(np.zeros_like(change), valid, np.full_like(change, np.inf))
     some = used[:: max(1, len(used) // MEDIAN_OF)]
-    seen, scale = (a.reshape(layers, -1)[:, some] for a in (change, unrest))
+    seen, scale = (a.reshape(layers, -1)[:, some] for a in (change, noise_level))
     middle = _middles(seen)
     spread = ROBUST * _middles(np.abs(seen - middle) / scale)
     change -= middle[:, :, None]
     change *= valid
-    return ShadingChange(change, valid, np.maximum(spread[:, :, None] * unrest, 1e-4))
+    return ShadingChange(change, valid, np.maximum(spread[:, :, None] * noise_level, 1e-4))
 
 
 def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -195,10 +195,14 @@ def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.partition(rows, half, axis=1)[:, half : half + 1]
 
 
-def gel_places(
+def bin_positions(
     light: ShadingReference, camera: VirtualCamera | None, mm_per_px: float
 ) -> tuple[Array, Array, Array, Array]:
-    """x, y (rows, columns) of the bins on the rest surface, lean (…, 2) and growth per mm."""
+    """Where the bins are on the gel.
+
+    Returns x and y (rows, columns) on the rest surface, the parallax (rows, columns, 2) of the line
+    of sight per mm of height, and the relative change of lengths per mm of height.
+    """
     pixels = light.centres_px()
     if camera is None:
         height, width = light.image.shape[:2]
@@ -208,34 +212,34 @@ def gel_places(
     expected = (camera.image_height_px, camera.image_width_px)
     if light.image.shape[:2] != expected:
         raise ValueError(
-            f"the reference frame is {light.image.shape[1]} x {light.image.shape[0]} px, the "
+            f"the reference is {light.image.shape[1]} x {light.image.shape[0]} px, the "
             f"camera's pictures are {expected[1]} x {expected[0]} px: use frames of this camera"
         )
     depth = 0.2
     at_rest = camera.backproject(pixels, 0.0)[:, :2]
     below = camera.backproject(pixels, -depth)[:, :2]
-    lean = ((at_rest - below) / depth).reshape(*light.shape, 2)
+    parallax = ((at_rest - below) / depth).reshape(*light.shape, 2)
     x, y = (at_rest[:, k].reshape(light.shape) for k in (0, 1))
     sunk = below.reshape(*light.shape, 2)
     before = bin_sizes(sunk[..., 0], sunk[..., 1])
     growth = (1 - before / bin_sizes(x, y)) / depth
-    return x, y, lean, growth
+    return x, y, parallax, growth
 
 
 def bin_sizes(x: Array, y: Array) -> Array:
-    """Side (rows, columns) of the square of a bin's area on the gel."""
+    """Side (rows, columns) of a square with the area of the bin on the gel."""
     xi, xj = np.gradient(x)
     yi, yj = np.gradient(y)
     return np.sqrt(np.abs(xi * yj - xj * yi))
 
 
 def near_surface(x: Array, y: Array, surface_mm: Array) -> Mask:
-    """Bins within half a node spacing, along both axes, of a surface node."""
+    """Bins (rows, columns) within half a node spacing, along both axes, of a surface node."""
     nodes = surface_mm[:, :2]
     steps = [np.diff(np.unique(np.round(v, 9))).min() for v in nodes.T]
-    places = np.column_stack([x.ravel(), y.ravel()]) / steps
-    finite = np.isfinite(places).all(axis=1)
-    out = np.zeros(len(places), dtype=bool)
-    apart, _ = cKDTree(nodes / steps).query(places[finite], p=np.inf)
-    out[finite] = apart <= 0.5
-    return out.reshape(x.shape)
+    points = np.column_stack([x.ravel(), y.ravel()]) / steps
+    finite = np.isfinite(points).all(axis=1)
+    near = np.zeros(len(points), dtype=bool)
+    distance, _ = cKDTree(nodes / steps).query(points[finite], p=np.inf)
+    near[finite] = distance <= 0.5
+    return near.reshape(x.shape)

@@ -1,4 +1,4 @@
-"""Compiled pass over two frames for the change of shading. Import only where it runs: numba."""
+"""Compiled change of shading between two frames. Import only where it runs: numba."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ SATURATED = 253
 
 @njit(**COMPILED)
 def block_discs(blocked: Any, centres: Any, radius: Any, size: Any, touched: Any) -> None:
-    """Set `blocked` (h, w) in discs of `radius` (n,) px about `centres` (n, 2); NaN is passed.
+    """Set `blocked` (h, w) in discs of `radius` (n,) px around `centres` (n, 2); NaN is skipped.
 
-    `touched` (rows, columns) is set for the bins of `size` px that a disc's box meets.
+    `touched` (rows, columns) is set for the bins of `size` px that the box of a disc overlaps.
     """
     height, width = blocked.shape
     rows, columns = touched.shape
@@ -35,15 +35,15 @@ def block_discs(blocked: Any, centres: Any, radius: Any, size: Any, touched: Any
 
 
 @njit(**COMPILED)
-def whole_sums(image: Any, size: Any, sums: Any, glaring: Any) -> None:
-    """Sums (rows, columns, c) of an image (h, w, c) over whole bins, and where some pixel may
-    glare: where every channel reaches SATURATED somewhere."""
+def bin_sums(image: Any, size: Any, sums: Any, glaring: Any) -> None:
+    """Sums (rows, columns, c) of an image (h, w, c) over bins, and the bins in which a pixel may be
+    saturated: those where every channel reaches SATURATED somewhere."""
     rows, channels = sums.shape[0], sums.shape[2]
     width = image.shape[1] * channels
     flat = image.reshape(image.shape[0], width)
     down, most = np.zeros(width, dtype=np.uint16), np.zeros(width, dtype=np.uint8)
     for row in range(rows):
-        # Along whole rows first: that runs on the vector unit.
+        # Down the columns of full rows first: that runs on the vector unit.
         down[:] = 0
         most[:] = 0
         for i in range(row * size, (row + 1) * size):
@@ -102,9 +102,10 @@ def light_ratios(
 ) -> None:
     """Ratios (c, rows, columns) of the light of two images (h, w, c) uint8, `floor` added to both.
 
-    Blocked pixels, and those where every channel glares in one of the two, are left out of both;
-    `counts` (rows, columns) are those left in. `sums` (2, rows, columns, c) are those of whole
-    bins; they stand where no pixel is blocked, `touched`, and none may glare, `glaring`.
+    Blocked pixels, and those that are saturated in all channels of one image, are left out of both
+    images; `counts` (rows, columns) are the remaining ones. `sums` (2, rows, columns, c) are those
+    of all pixels of a bin. They are used where no pixel is blocked (`touched`) and none may be
+    saturated (`glaring`).
     """
     channels, rows, columns = ratios.shape
     g, b = min(1, channels - 1), channels - 1

@@ -1,8 +1,9 @@
-"""Compiled law of the slope under and beside an indenter. Import only where it runs: numba.
+"""Compiled law of the slope under and around an indenter. Import only where it runs: numba.
 
-Under it the slope grows evenly to the rim. Beside it, Hertz's half-space, for a disc
-(2/π)(ρ asin 1/ρ - √(1 - 1/ρ²)) and for a strip ρ - √(ρ² - 1), times exp(-decay (ρ - 1)) for the
-nearness of the layer's base; what that misses is a second term, (ρ - 1) exp(-(1 + decay)(ρ - 1)).
+Inside the patch the slope grows linearly to the rim. Outside, at ρ times the size of the patch, it
+is that of Hertz's half-space: (2/π)(ρ asin 1/ρ - √(1 - 1/ρ²)) for a disc and ρ - √(ρ² - 1) for a
+strip. A factor exp(-decay (ρ - 1)) accounts for the rigid base of the layer. A second term,
+(ρ - 1) exp(-(1 + decay)(ρ - 1)), takes up the remaining difference.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"
 GAUSS_AT = 0.7745966692414834
 GAUSS_OUTER, GAUSS_MIDDLE = 5 / 18, 8 / 18
 TABLE, STEP = 160, 0.015
-"""Steps of the table, to a ratio of 6.8."""
+"""Number and size of the table's steps, up to a ratio of 6.8."""
 RIM_SINKING = 0.1
 MIDDLE_SINKING = 0.6
-"""Sinking at the rim and in the middle, in a²/R: rough, to place what is seen."""
+"""Approximate depth of the surface at the rim and in the middle, in a²/R."""
 
 
 @njit(**COMPILED)
 def law(ratio: Any, decay: Any, strip: Any) -> Any:
-    """The slope's two terms at a distance `ratio` from the middle, over the patch's size."""
+    """The two terms of the slope, at `ratio` times the patch's size from its middle."""
     if ratio < 1.0:
         return ratio, 0.0
     if strip:
@@ -40,8 +41,9 @@ def law(ratio: Any, decay: Any, strip: Any) -> Any:
 
 @njit(**COMPILED)
 def _tabulated(decay: Any, strip: Any) -> Any:
-    """Both terms and the rim's sinking (n, 3) at even steps of √(ratio - 1), in which they are
-    smooth."""
+    """Both terms and the decay of the depth outside the rim (n, 3), at equal steps of √(ratio - 1).
+
+    They are smooth functions of that root."""
     table = np.empty((TABLE + 2, 3))
     for k in range(TABLE + 2):
         beyond = (k * STEP) ** 2
@@ -52,7 +54,7 @@ def _tabulated(decay: Any, strip: Any) -> Any:
 
 @njit(**COMPILED)
 def _looked_up(ratio: Any, table: Any, column: Any) -> Any:
-    """A column by linear interpolation, its end beyond; `ratio` from 1."""
+    """A column by linear interpolation, for `ratio` >= 1; constant beyond the table."""
     at = min(math.sqrt(ratio - 1) * (1 / STEP), TABLE)
     k = int(at)
     return table[k, column] + (at - k) * (table[k + 1, column] - table[k, column])
@@ -73,15 +75,16 @@ def _both(ratio: Any, table: Any) -> Any:
 
 @njit(**COMPILED)
 def slope_basis(
-    x: Any, y: Any, lean: Any, theta: Any, strip: Any, curvature: Any, blur: Any, out: Any
+    x: Any, y: Any, parallax: Any, theta: Any, strip: Any, curvature: Any, blur: Any, out: Any
 ) -> None:
-    """Write the functions (n, 6) that the shading of bins at x, y (n,) mm is made of to `out`.
+    """Write the basis (n, 6) of the shading of bins at x, y (n,) in mm to `out`.
 
     `theta` (4,) are x, y, radius, decay of a disc, or offset, angle, half-width, decay of a strip.
-    Where the curvature 1/R of the indenter is known, bins are placed where the line of sight,
-    moving by `lean` (n, 2) per mm of height, meets the sunken gel. `blur` (mm) widens the crease
-    at the rim. Columns: slope along x and y (a strip: across, 0), the second term of both, the
-    slope squared, 1. The law is interpolated to 1e-5 of the slope at the rim.
+    Where the curvature 1/R of the indenter is known, bins are moved to where the line of sight
+    meets the deformed gel; it moves by `parallax` (n, 2) per mm of height. `blur` (mm) widens the
+    crease at the rim. The columns are: slope along x and y (for a strip: across it, and 0), the
+    second term of both, the slope squared, and 1. The error of the interpolation is 1e-5 of the
+    slope at the rim.
     """
     size, decay = theta[2], theta[3]
     sine, cosine, over_size = math.sin(theta[1]), math.cos(theta[1]), 1 / size
@@ -98,11 +101,11 @@ def slope_basis(
                 break
             ratio = r * over_size
             if ratio < 1:
-                sunk = MIDDLE_SINKING - 0.5 * ratio * ratio
+                depth = MIDDLE_SINKING - 0.5 * ratio * ratio
             else:
-                sunk = RIM_SINKING * _looked_up(ratio, table, 2)
-            z = -size * size * curvature * sunk
-            px, py = px + lean[k, 0] * z, py + lean[k, 1] * z
+                depth = RIM_SINKING * _looked_up(ratio, table, 2)
+            z = -size * size * curvature * depth
+            px, py = px + parallax[k, 0] * z, py + parallax[k, 1] * z
         slope, second = _both(r * over_size, table)
         slope, second = slope * GAUSS_MIDDLE, second * GAUSS_MIDDLE
         for side in (-GAUSS_AT, GAUSS_AT):

@@ -15,9 +15,9 @@ from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 @cache
 def small_bundle(layers: int = 4, poissons_ratio: float = 0.3223) -> Bundle:
-    """A pad of 12 x 10 x 2 mm with cells of 0.5 mm and 10 x 8 markers."""
+    """A pad of 12 x 10 x 2 mm with cells of 0.5 x 0.42 mm and 10 x 8 markers."""
     outline = RoundedRectangle(length_mm=12.0, width_mm=10.0, corner_radius_mm=1.0)
-    mesh, _ = build_pad_mesh(outline, 2.0, pitch_mm=0.5, layers=layers)
+    mesh, _ = build_pad_mesh(outline, 2.0, cells=(24, 24, layers))
     grid = build_marker_grid(10, 8, 1.1, 0.45)
     return build_bundle(
         mesh,

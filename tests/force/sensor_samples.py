@@ -41,9 +41,9 @@ def sensor_grid() -> MarkerGrid:
 
 @cache
 def sensor_bundle() -> Bundle:
-    """19 x 18 dots on 22 x 20.5 mm, 2 mm thick, four layers of cells of about 0.77 mm."""
+    """19 x 18 dots on 22 x 20.5 mm, 2 mm thick, four layers of cells of 0.76 x 0.85 mm."""
     outline = RoundedRectangle(length_mm=22.0, width_mm=20.5, corner_radius_mm=1.0)
-    mesh, _ = build_pad_mesh(outline, 2.0, cells=(29, 27, 4))
+    mesh, _ = build_pad_mesh(outline, 2.0, cells=(29, 24, 4))
     grid = sensor_grid()
     return build_bundle(
         mesh,

@@ -214,8 +214,10 @@ def test_uncertainty_is_that_of_drawn_patches():
 
 def test_height_of_the_rim_moves_the_patch_along_the_line_of_sight():
     model = wide_model()
-    leaning = ContactPatch("disc", np.zeros(2), 2.0, lean=np.array([3.0, 0.0]), growth_per_mm=0.04)
-    motion = model.motion(leaning, BALL)
+    tilted = ContactPatch(
+        "disc", np.zeros(2), 2.0, parallax=np.array([3.0, 0.0]), growth_per_mm=0.04
+    )
+    motion = model.motion(tilted, BALL)
     rim = float(BALL.profile(2.0, 0.0)) - motion.depth_mm
     plain = model.motion(disc(3.0 * rim, 0.0, 2.0 * (1 + 0.04 * rim)), BALL, motion.depth_mm)
     np.testing.assert_allclose(motion.w_mm, plain.w_mm, atol=0.01 * motion.depth_mm)

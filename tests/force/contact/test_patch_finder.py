@@ -12,7 +12,7 @@ from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded
 from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.contact.patch_region import PatchSettings
-from gelslim_force.contact.patch_shading import AFRESH
+from gelslim_force.contact.patch_shading import REFRESH_FRAMES
 from gelslim_force.contact.region_outline import circle_start, fit_circle, fit_strip
 from gelslim_force.frames.read_only import read_only
 
@@ -159,7 +159,7 @@ def test_a_patch_that_was_lost_to_a_wrong_size_comes_back():
     wrong = replace(last.fit, values=last.fit.values * [1, 1, 0.75, 1] + [0, 0, 0, 2.0])
     smaller = replace(last.patch, size_mm=0.75 * last.patch.size_mm)
     follow._last = replace(last, fit=wrong, patch=smaller)
-    sizes = [follow.find(images[k % 3]).size_mm for k in range(AFRESH + 2)]
+    sizes = [follow.find(images[k % 3]).size_mm for k in range(REFRESH_FRAMES + 2)]
     assert abs(sizes[-1] - true) < 0.05
 
 
@@ -261,7 +261,7 @@ def test_circle_and_strip_fits_have_honest_errors():
 
 
 def test_light_ratios_are_those_of_numpy():
-    from gelslim_force.contact.shading_kernel import block_discs, light_ratios, whole_sums
+    from gelslim_force.contact.shading_kernel import bin_sums, block_discs, light_ratios
 
     rng = np.random.default_rng(0)
     for channels in (1, 3):
@@ -276,7 +276,7 @@ def test_light_ratios_are_those_of_numpy():
         assert touched[blocked[:48, :68].reshape(12, 4, 17, 4).any(axis=(1, 3))].all()
         sums, glaring = np.ones((2, 12, 17, channels), np.int64), np.ones((2, 12, 17), np.uint8)
         for image, total, may in zip(pair, sums, glaring, strict=True):
-            whole_sums(image, 4, total, may)
+            bin_sums(image, 4, total, may)
         ratios, counts = np.ones((channels, 12, 17), np.float32), np.ones((12, 17), np.int64)
         light_ratios(*pair, blocked, touched, glaring[0] | glaring[1], 4, sums, 5.0, ratios, counts)
         free = (blocked == 0) & (pair.min(axis=3) < 253).all(axis=0)

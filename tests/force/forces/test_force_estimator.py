@@ -46,9 +46,11 @@ def test_shares_of_the_surface_sum_to_its_cells(case) -> None:
     mesh = case[0].mesh
     share = surface_share_mm2(mesh)
     cells = np.asarray(mesh.occupancy)[:, :, -1].sum()
-    assert share.sum() == pytest.approx(cells * 0.25, rel=1e-12)
-    assert share.max() == pytest.approx(0.25)
-    assert share.min() >= 0.0625 - 1e-12
+    hx, hy, _ = mesh.cell_size_mm
+    assert abs(hx / hy - 1) > 0.1
+    assert share.sum() == pytest.approx(cells * hx * hy, rel=1e-12)
+    assert share.max() == pytest.approx(hx * hy)
+    assert share.min() >= hx * hy / 4 - 1e-12
 
 
 def test_low_pass_keeps_the_resultant(case) -> None:

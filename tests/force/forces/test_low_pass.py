@@ -22,7 +22,7 @@ from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.tracking.marker_noise import quiet_sigma
 from ifem_export.bundle.bundle import Bundle
 
-CELL_MM = np.array([0.5, 0.5])
+CELL_MM = np.asarray(small_bundle().mesh.cell_size_mm[:2])
 PARTS = (slice(0, 2), slice(2, 3))
 
 
@@ -157,4 +157,6 @@ def test_fixed_width_and_direct_do_as_told(case) -> None:
         found = estimator.estimate(moved, noise_px=0.5)
         assert found.low_pass_mm is not None
         assert found.low_pass_mm == pytest.approx([width, width])
-    assert passes.widths_mm == pytest.approx(0.5 * np.array(WIDTHS_IN_CELLS))
+    assert passes.widths_mm == pytest.approx(
+        np.sqrt(CELL_MM[0] * CELL_MM[1]) * np.array(WIDTHS_IN_CELLS)
+    )

@@ -1,0 +1,83 @@
+"""The normal motion that an indenter source gives for a patch, on cells that are not square."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gelslim_force.contact.indenter import Sphere
+from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_motion import NormalModel
+from gelslim_force.contact.patch import ContactPatch
+from ifem_export.elements.material import Material
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.surface_operator import surface_operator
+
+BALL = Sphere(10.0)
+CENTRE_MM = np.array([1.1, -0.7])
+LATERAL_MM = np.array([0.4, -0.25])
+PATCH = ContactPatch("disc", CENTRE_MM, 1.6, covariance=np.diag([1e-4, 1e-4, 4e-4, 0.0]))
+
+
+class Finder:
+    """Finds always the same patch."""
+
+    def find(self, image, markers_px=None):
+        return PATCH
+
+
+@pytest.fixture(scope="module")
+def source() -> IndenterSource:
+    mesh = PadMesh.from_occupancy(
+        np.ones((22, 16, 3), dtype=bool), (0.45, 0.6, 0.6), (-4.95, -4.8, -1.8)
+    )
+    operator = surface_operator(mesh, Material(0.147, 0.45, 1000.0), "bbar", "factor")
+    return IndenterSource(Finder(), NormalModel(operator, mesh.surface_mm), BALL)
+
+
+def test_the_gel_is_pressed_in_under_the_ball(source) -> None:
+    seen = source.look(np.zeros((4, 4), np.uint8), np.zeros((0, 2)))
+    found = source.motion(seen)
+    away = np.hypot(*(source.model.points_mm - CENTRE_MM).T)
+    deepest = np.argmin(found.w_mm)
+    assert away[deepest] < 0.45
+    assert found.w_mm[deepest] == pytest.approx(-found.depth_mm, rel=0.05)
+    inside = away < 1.3
+    exact = BALL.profile(away[inside], 0 * away[inside]) - found.depth_mm
+    assert found.w_mm[inside] == pytest.approx(exact, abs=1e-9)
+    assert found.w_mm[inside].max() < 0
+    assert found.touched[inside].all()
+    assert not found.touched[away > 2.3].any()
+    assert found.patch is PATCH
+    assert 0 < found.sigma_mm[deepest] < 0.2 * found.depth_mm
+
+
+def test_the_patch_is_moved_back_by_the_lateral_motion(source) -> None:
+    """The nodes that touch now were elsewhere at rest, by the motion of the gel."""
+    found = source.motion(PATCH, LATERAL_MM)
+    at_rest = source.motion(replace(PATCH, centre_mm=CENTRE_MM - LATERAL_MM))
+    np.testing.assert_array_equal(found.w_mm, at_rest.w_mm)
+    np.testing.assert_array_equal(found.touched, at_rest.touched)
+    assert found.patch is PATCH
+    centre = found.w_mm @ source.model.points_mm / found.w_mm.sum()
+    still = source.motion(PATCH)
+    before = still.w_mm @ source.model.points_mm / still.w_mm.sum()
+    assert centre - before == pytest.approx(-LATERAL_MM, abs=0.1)
+
+
+def test_without_a_patch_nothing_moves(source) -> None:
+    found = source.motion(None)
+    assert found.known
+    assert not found.w_mm.any()
+    assert not found.touched.any()
+    assert found.summary() == {"touched": False}
+
+
+def test_the_papers_model_moves_nothing_outside_the_cap(source) -> None:
+    found = replace(source, cap_only=True).motion(PATCH)
+    away = np.hypot(*(source.model.points_mm - CENTRE_MM).T)
+    assert found.depth_mm == pytest.approx(float(BALL.profile(1.6, 0.0)))
+    assert not found.w_mm[away > 1.6].any()
+    assert (found.w_mm[away < 1.4] < 0).all()
