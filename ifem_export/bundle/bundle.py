@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +22,7 @@ from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
 from ifem_export.markers.field import MarkerField, marker_field
+from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.operator_ladder import OperatorLadder, chosen_rung
 from ifem_export.operators.surface_operator import Rung, SurfaceOperator, surface_operator
@@ -45,7 +46,7 @@ class SelfTest:
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """Mesh, stiffness, markers and camera of one sensor.
+    """All that force pipeline and twin need of one sensor.
 
     Attributes:
         mesh: The cropped pad.
@@ -59,6 +60,11 @@ class Bundle:
         spec_hash: SHA-256 of the spec from which the bundle was made.
         ladder: Surface operators with their measured error and time, or None.
         operator: Label of the default rung of the ladder, or "".
+        outline: The gel seen from above; None where only the mesh is known.
+        tolerances: Standard deviations of what the maker states, by name: `youngs_modulus_mpa`,
+            `poissons_ratio`, `thickness_mm`.
+        light: Arrays of the light on the untouched gel by name, as
+            `gelslim_optics.light.light_map.LightMap` has them; empty where it was not traced.
     """
 
     mesh: PadMesh
@@ -72,6 +78,9 @@ class Bundle:
     spec_hash: str
     ladder: OperatorLadder | None = None
     operator: str = ""
+    outline: RoundedRectangle | None = None
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+    light: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def surface_operator(
         self,
@@ -135,6 +144,9 @@ def build_bundle(
     with_stiffness: bool = True,
     ladder: OperatorLadder | None = None,
     operator: str = "",
+    outline: RoundedRectangle | None = None,
+    tolerances: Mapping[str, float] | None = None,
+    light: Mapping[str, ArrayLike] | None = None,
 ) -> Bundle:
     """Make the bundle of one sensor.
 
@@ -149,6 +161,9 @@ def build_bundle(
         with_stiffness: Whether the stiffness matrix is stored.
         ladder: Measured surface operators of this pad.
         operator: Label of the default rung of the ladder.
+        outline: The gel seen from above.
+        tolerances: Standard deviations of material and thickness by name.
+        light: Arrays of the light on the untouched gel by name.
 
     Returns:
         The bundle.
@@ -172,6 +187,9 @@ def build_bundle(
         spec_hash=spec_hash,
         ladder=ladder,
         operator=operator,
+        outline=outline,
+        tolerances=_plain_json(tolerances or {}),
+        light={name: np.asarray(values) for name, values in (light or {}).items()},
     )
 
 

@@ -60,6 +60,7 @@ def _check_finite(bundle: Bundle) -> None:
             arrays["thin_plate_bending"] = bundle.markers.spline.bending
         for name, values in bundle.markers.arrays.items():
             arrays[f"marker_{name}"] = values
+    arrays |= {f"light_{name}": values for name, values in bundle.light.items()}
     for name, array in arrays.items():
         if array.dtype.kind != "f":
             continue

@@ -13,6 +13,7 @@ from ifem_export.elements.material import Material
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.markers.field import MarkerField
 from ifem_export.markers.thin_plate import ThinPlate
+from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.operator_ladder import OperatorLadder
 
@@ -50,6 +51,8 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
             arrays["thin_plate_bending"] = bundle.markers.spline.bending
         for name, values in bundle.markers.arrays.items():
             arrays[f"marker_{name}"] = values
+    for name, values in bundle.light.items():
+        arrays[f"light_{name}"] = values
     return arrays
 
 
@@ -110,7 +113,20 @@ def bundle_from(
         spec_hash=manifest["spec_hash"],
         ladder=ladder[0],
         operator=ladder[1],
+        outline=_outline_from(manifest),
+        tolerances=dict(manifest.get("tolerances") or {}),
+        light={name: take(f"light_{name}") for name in manifest.get("light") or ()},
     )
+
+
+def _outline_from(manifest: dict[str, Any]) -> RoundedRectangle | None:
+    section = manifest.get("outline")
+    if section is None:
+        return None
+    try:
+        return RoundedRectangle(**section)
+    except (TypeError, IfemError) as error:
+        raise BundleError(MANIFEST, f"section 'outline': {error}", REBUILD) from error
 
 
 def _markers_from(manifest: dict[str, Any], take: _Arrays, n_surface: int) -> MarkerField | None:

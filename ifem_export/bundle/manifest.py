@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,9 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
             "thin_plate": markers.spline is not None,
         },
         "camera": dict(bundle.camera),
+        "outline": None if bundle.outline is None else asdict(bundle.outline),
+        "tolerances": dict(bundle.tolerances),
+        "light": sorted(bundle.light) or None,
         "ladder": _ladder_section(bundle),
         "arrays": arrays,
     }
