@@ -56,6 +56,11 @@ def number(value: Any, unit: str = "") -> str:
     return f"{text}{gap}{unit}"
 
 
+def shown_ms(milliseconds: float | None) -> str:
+    """Return a time of the ladder; a dash where it was not measured."""
+    return "-" if milliseconds is None else f"{milliseconds:.3f} ms"
+
+
 def given(value: Any, unit: str = "") -> str:
     """A value of the spec as it stands there, up to six digits, then its unit."""
     if isinstance(value, tuple | list) and not value:

@@ -8,6 +8,7 @@ picked.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -21,7 +22,7 @@ class Rung:
     Attributes:
         name: Name of the rung.
         error: Relative error.
-        time_ms: Time in milliseconds.
+        time_ms: Time in milliseconds; NaN where it was not measured.
         work: Counted cost, which orders the rungs of a ladder: bytes read, rays, or predicted
             operations. It is the same on every machine and in every run.
         measured: Whether error and time were measured; False where they are extrapolated.
@@ -33,8 +34,14 @@ class Rung:
     work: float
     measured: bool = True
 
+    @property
+    def timed(self) -> bool:
+        """Whether its time was measured."""
+        return not math.isnan(self.time_ms)
+
     def __str__(self) -> str:
-        return f"{self.name} ({shown_share(self.error)}, {shown_time(self.time_ms)})"
+        time = f", {shown_time(self.time_ms)}" if self.timed else ""
+        return f"{self.name} ({shown_share(self.error)}{time})"
 
 
 @dataclass(frozen=True)
@@ -46,12 +53,14 @@ class Wording:
         error: Which error a rung has, such as `field error`.
         per: What its time is measured for, such as `per frame`.
         remedy: What makes smaller errors possible, such as `use more layers`.
+        bench: The command that measures the times on this machine.
     """
 
     rung: str = "rung"
     error: str = "error"
     per: str = ""
     remedy: str = ""
+    bench: str = "gelslim bench"
 
 
 @dataclass(frozen=True)
@@ -101,8 +110,14 @@ class Ladder:
             The rung with remarks.
 
         Raises:
-            BudgetError: No rung keeps the budget; the message names the nearest rungs.
+            BudgetError: No rung keeps the budget; the message names the nearest rungs. Or the
+                budget limits the time, and the times were not measured.
         """
+        if budget.time_ms is not None and not all(r.timed for r in self.rungs):
+            raise BudgetError(
+                f"the time of each {self.wording.rung} was not measured yet; "
+                f"`{self.wording.bench}` measures it on this machine"
+            )
         allowed = [r for r in self.by_work if budget.allows(r.error, r.time_ms)]
         if not allowed:
             raise BudgetError(self._refusal(budget))
@@ -131,7 +146,7 @@ class Ladder:
 
     @staticmethod
     def _fastest(rungs: tuple[Rung, ...] | list[Rung]) -> Rung:
-        return min(rungs, key=lambda r: r.time_ms)
+        return min(rungs, key=lambda r: r.time_ms if r.timed else r.work)
 
     def _refusal(self, budget: Budget) -> str:
         w = self.wording

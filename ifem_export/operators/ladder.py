@@ -63,6 +63,7 @@ def measure_ladder(
     dense: bool = False,
     progress: Progress | None = None,
     reference: PadMesh | None = None,
+    timed: bool = True,
 ) -> OperatorLadder:
     """Measure error, noise gain and time of every surface operator of a pad.
 
@@ -74,6 +75,7 @@ def measure_ladder(
         progress: Called with what is measured, the steps done and the steps in total.
         reference: Finer mesh of the same gel, on a lattice of half the pitch that contains the
             nodes of `mesh`. By default it is `refined(mesh)`; a crowned pad needs one.
+        timed: Whether times are measured. Without them the ladder is the same on every machine.
 
     Returns:
         The ladder, with the operators in the order in which they were measured.
@@ -109,7 +111,7 @@ def measure_ladder(
                 error_resultant=max(map(_resultant_error, forces, expected)),
                 noise_node_n_per_mm=float(np.std(noise)),
                 noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
-                milliseconds=_one_thread_ms(operator, fields),
+                milliseconds=_one_thread_ms(operator, fields) if timed else None,
                 n_bytes=operator.n_bytes,
                 error_edge=max(map(_relative_error, edge_forces, edge_expected)),
             )
@@ -119,7 +121,8 @@ def measure_ladder(
         f"{REFERENCE_RTOL:g}"
     )
     ratio = material.poissons_ratio
-    return OperatorLadder(tuple(rungs), description, mesh.layers, formulation, ratio)
+    ladder = OperatorLadder(tuple(rungs), description, mesh.layers, formulation, ratio)
+    return ladder if timed else ladder.untimed()
 
 
 def operator_choices(mesh: PadMesh, dense: bool = False) -> tuple[Choice, ...]:

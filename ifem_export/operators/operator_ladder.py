@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -15,6 +16,17 @@ BALANCE, ENOUGH = 1.1, 0.03
 WORDING = Wording(
     "operator", "field error", "per frame", "more layers or a finer pitch make smaller errors"
 )
+
+
+_ERRORS = ("error_field", "error_operator", "error_resultant", "error_edge")
+_GAINS = ("noise_node_n_per_mm", "noise_resultant_n_per_mm")
+
+
+def _rounded(rung: MeasuredRung) -> dict[str, Any]:
+    """Errors to 1e-6 and gains to four digits, by name."""
+    errors = {name: getattr(rung, name) for name in _ERRORS}
+    gains = {name: float(f"{getattr(rung, name):.4g}") for name in _GAINS}
+    return gains | {n: None if v is None else round(v, 6) for n, v in errors.items()}
 
 
 def operator_label(rung: str, parameters: Mapping[str, float]) -> str:
@@ -49,9 +61,14 @@ class MeasuredRung:
     error_resultant: float
     noise_node_n_per_mm: float
     noise_resultant_n_per_mm: float
-    milliseconds: float
+    milliseconds: float | None
     n_bytes: int
     error_edge: float | None = None
+
+    @property
+    def time_ms(self) -> float:
+        """Time of one call in ms; NaN where it was not measured."""
+        return math.nan if self.milliseconds is None else self.milliseconds
 
     @property
     def label(self) -> str:
@@ -84,7 +101,7 @@ class OperatorLadder:
         The work of an operator is the memory that a call reads. It is counted rather than timed,
         and orders the operators as their times do (`docs/data/stiffness_ladder.json`).
         """
-        rungs = tuple(Rung(r.label, r.error_field, r.milliseconds, r.n_bytes) for r in self.rungs)
+        rungs = tuple(Rung(r.label, r.error_field, r.time_ms, r.n_bytes) for r in self.rungs)
         return Ladder(rungs, WORDING)
 
     def choose(self, budget: Budget) -> Choice:
@@ -115,6 +132,16 @@ class OperatorLadder:
         most = max(ENOUGH, BALANCE * min(r.error_field for r in self.rungs))
         return next(r for r in self._by_work() if r.error_field <= most)
 
+    def untimed(self) -> OperatorLadder:
+        """Return the ladder as every machine finds it: without times, errors and gains rounded.
+
+        The last digits are round-off, which differs between processors.
+        """
+        return replace(
+            self,
+            rungs=tuple(replace(r, milliseconds=None, **_rounded(r)) for r in self.rungs),
+        )
+
     def timed(self, times_ms: Mapping[str, float]) -> OperatorLadder:
         """The same rungs with other times in ms, by label; rungs not named keep theirs."""
         rungs = (replace(r, milliseconds=times_ms.get(r.label, r.milliseconds)) for r in self.rungs)
@@ -143,7 +170,7 @@ class OperatorLadder:
         )
         edges = [(r.error_edge, r) for r in self._by_work() if r.error_edge is not None]
         for error, other in edges:
-            if budget.allows(max(error, other.error_field), other.milliseconds):
+            if budget.allows(max(error, other.error_field), other.time_ms):
                 return (f"{remark}; {other.label} keeps the budget there too",)
         least, best = min(edges, key=lambda pair: pair[0])
         return (f"{remark}; {best.label} has the smallest error there, {shown_share(least)}",)

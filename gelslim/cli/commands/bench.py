@@ -123,7 +123,7 @@ def bench_operators(bundle: Bundle, progress: Progress | None = None) -> Part:
     choices = operator_choices(bundle.mesh)
     if bundle.ladder is not None:
         choices = tuple((r.rung, dict(r.parameters)) for r in bundle.ladder.rungs)
-        given = {r.label: r.milliseconds for r in bundle.ladder.rungs}
+        given = {r.label: r.milliseconds for r in bundle.ladder.rungs if r.milliseconds is not None}
     now = time_operators(choices, bundle.mesh, bundle.material, bundle.formulation, progress)
     return _kept("force operators, per frame", MS, bundle.times_key, now, given)
 

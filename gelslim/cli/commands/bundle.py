@@ -88,7 +88,7 @@ def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
     """A table of the rungs, the chosen one marked."""
     from rich.table import Table
 
-    from gelslim.cli.answer import console
+    from gelslim.cli.answer import console, shown_ms
 
     columns = ("operator", "field error", "at the edge", "resultant", "per frame", "memory", "")
     table = Table(*columns, box=None)
@@ -98,7 +98,7 @@ def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
             f"{rung.error_field:.2%}",
             "" if rung.error_edge is None else f"{rung.error_edge:.2%}",
             f"{rung.error_resultant:.2%}",
-            f"{rung.milliseconds:.3f} ms",
+            shown_ms(rung.milliseconds),
             f"{rung.n_bytes / 1e6:.1f} MB",
             "chosen" if rung.label == chosen else "",
         )

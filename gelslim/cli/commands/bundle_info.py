@@ -31,7 +31,7 @@ def bundle_info(
 
 
 def _describe(path: Path, found: dict[str, Any]) -> None:
-    from gelslim.cli.answer import say
+    from gelslim.cli.answer import say, shown_ms
 
     mesh, material = found["mesh"], found["material"]
     cells = " x ".join(str(c) for c in mesh["cells"])
@@ -53,7 +53,7 @@ def _describe(path: Path, found: dict[str, Any]) -> None:
         label = f"{rung['rung']} ({inside})" if inside else rung["rung"]
         mark = ", chosen" if label == ladder.get("operator") else ""
         print(f"  operator   {label}: field error {rung['error_field']:.2%}, "
-              f"{rung['milliseconds']:.3f} ms{mark}")  # fmt: skip
+              f"{shown_ms(rung['milliseconds'])}{mark}")  # fmt: skip
     verdict = found["verification"]
     if verdict["ok"]:
         print("  verified   all hashes, values and the self-test pair")
