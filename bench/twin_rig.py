@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from twin_effects import MECHANICS, Bench
 
-from gelslim.scene_sensor import spec_sensor
+from gelslim.scene_sensor import spec_bundle
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.plan import Plan
@@ -37,7 +37,7 @@ Use = Mapping[str, str]
 
 def kept_sensor(folder: Path) -> TwinSensor:
     """The design's sensor with its traced light, stored in `folder`."""
-    store_sensor(spec_sensor(SPEC), folder, True)
+    store_sensor(TwinSensor(spec_bundle(SPEC)), folder)
     return stored_sensor(folder)
 
 

@@ -92,19 +92,20 @@ def simulate(
         SimulationError: The folder holds something else or cannot be written.
         ContactError: A contact was not solved.
     """
-    from gelslim.scene_sensor import require_within_gel, twin_sensor
+    from gelslim.scene_sensor import require_within_gel, scene_bundle
     from gelslim_twin.simulation.stored_sensor import store_sensor
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
 
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
     if progress:
         progress("sensor", 0, 1)
-    sensor = twin_sensor(loaded)
+    sensor = TwinSensor(scene_bundle(loaded, with_light="image" in loaded.scene.observe))
     mesh = sensor.bundle.mesh
     require_within_gel(loaded, mesh.layers * mesh.cell_size_mm[2])
     with contextlib.suppress(FileNotFoundError):
         folder.stat()  # A name that is too long is refused before anything is written.
-    store_sensor(sensor, _sensor_folder(folder), "image" in loaded.scene.observe)
+    store_sensor(sensor, _sensor_folder(folder))
     if count is None:
         return _one(loaded, folder, overwrite, progress)
     return _data_set(loaded, folder, count, (jobs, scheduler), overwrite, progress)
@@ -138,13 +139,15 @@ def validate(
     """
     from dataclasses import replace
 
-    from gelslim.design import chosen_operator, measured_ladder, spec_of
-    from gelslim.scene_sensor import spec_sensor
+    from gelslim.design import chosen_operator, spec_of
+    from gelslim.scene_sensor import spec_bundle
     from gelslim_cad.dimensions import derive
+    from gelslim_cad.sensor.pad import measured_ladder
     from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
     from gelslim_twin.validation.validate import validate as validated
 
-    sensor = spec_sensor(Path(spec))
+    sensor = TwinSensor(spec_bundle(Path(spec)))
     ladder, label = None, ""
     remarks: tuple[str, ...] = ()
     if budget is not None and not budget.unlimited:
@@ -153,7 +156,7 @@ def validate(
         ladder = measured_ladder(design, derive(design), sensor.bundle.mesh, progress=progress)
         label, remarks = chosen_operator(ladder, budget)
     if folder is not None:
-        store_sensor(sensor, Path(folder), True)
+        store_sensor(sensor, Path(folder))
         sensor = stored_sensor(Path(folder))
     if label:
         sensor = replace(sensor, bundle=replace(sensor.bundle, ladder=ladder, operator=label))

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from gelslim_cad.spec.reader import LoadedSpec
     from gelslim_core.budget.budget import Budget
     from ifem_export.bundle.bundle import Bundle
-    from ifem_export.mesh.pad_mesh import PadMesh
     from ifem_export.operators.operator_ladder import OperatorLadder
 
     SpecLike = Spec | LoadedSpec | str | os.PathLike[str]
@@ -164,34 +163,12 @@ def make_bundle(
     ladder, label = None, ""
     remarks: tuple[str, ...] = ()
     if measure:
-        ladder = measured_ladder(found, d, mesh, dense=dense, progress=progress)
+        ladder = pad.measured_ladder(found, d, mesh, dense=dense, progress=progress)
         label, remarks = chosen_operator(ladder, budget)
     bundle = pad.make_bundle(
         found, d, mesh, grid, with_stiffness=with_stiffness, ladder=ladder, operator=label
     )
     return MeasuredBundle(bundle, ladder, label, remarks)
-
-
-def measured_ladder(
-    spec: Spec,
-    d: Dimensions,
-    mesh: PadMesh,
-    *,
-    dense: bool = False,
-    progress: Progress | None = None,
-) -> OperatorLadder:
-    """Measure error and time of every force operator on one pad, here and now."""
-    from gelslim_cad.sensor.pad import gel_material, reference_mesh
-    from ifem_export.operators.ladder import measure_ladder
-
-    return measure_ladder(
-        mesh,
-        gel_material(spec),
-        spec.mesh.element,
-        dense=dense,
-        progress=progress,
-        reference=reference_mesh(d, mesh),
-    )
 
 
 def chosen_operator(ladder: OperatorLadder, budget: Budget | None) -> tuple[str, tuple[str, ...]]:

@@ -7,21 +7,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from gelslim_cad.dimensions import Dimensions
     from gelslim_core.yaml.errors import InputError
-    from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.effects.circumstances import SensorFigures
     from gelslim_twin.scene.reader import LoadedScene
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
     from ifem_export.bundle.bundle import Bundle
 
 DEEPEST_SHARE = 0.9
-"""Of the gel's thickness: what lies deeper is no contact with a gel that is still whole."""
-RAYS = 1 << 16
-RED_SHARE = 0.45
-"""Red is seen weaker than green on published frames of this finger."""
-ELEVATION_DEG = 25.0
-"""At which light rises through the gel on the mean; the tracer bins no directions."""
+"""Largest depth of a contact, as a part of the gel's thickness."""
 
 
 def sensor_figures(loaded: LoadedScene) -> SensorFigures:
@@ -38,8 +30,8 @@ def sensor_figures(loaded: LoadedScene) -> SensorFigures:
     return _spec_figures(loaded)
 
 
-def sensor_bundle(loaded: LoadedScene) -> Bundle:
-    """The stiffness bundle of the scene's sensor: read, or made from the spec without a ladder.
+def scene_bundle(loaded: LoadedScene, with_light: bool = True) -> Bundle:
+    """The bundle of the scene's sensor: read, or made from the spec without a ladder.
 
     Raises as `sensor_figures`.
     """
@@ -48,67 +40,22 @@ def sensor_bundle(loaded: LoadedScene) -> Bundle:
         from ifem_export.bundle.files import load_bundle
 
         return load_bundle(loaded.sensor_path)
-    from gelslim_cad.dimensions import derive
-    from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
-    from gelslim_cad.spec.reader import read_spec
-
-    spec = read_spec(loaded.sensor_path).spec
-    d = derive(spec)
-    grid = marker_grid(d)
-    return make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
+    return spec_bundle(loaded.sensor_path, with_light)
 
 
-def twin_sensor(loaded: LoadedScene) -> TwinSensor:
-    """The sensor to simulate: bundle, outline and, from a spec, the light of its guide.
-
-    Raises as `sensor_figures`.
-    """
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
-
-    if loaded.scene.sensor.bundle is not None:
-        return TwinSensor(sensor_bundle(loaded))
-    _require_present(loaded)
-    return spec_sensor(loaded.sensor_path)
-
-
-def spec_sensor(path: Path) -> TwinSensor:
-    """The sensor of a spec: bundle without a ladder, outline, and its guide's light when asked.
+def spec_bundle(path: Path, with_light: bool = True) -> Bundle:
+    """The bundle of a spec without a ladder; light is traced only when it is asked for.
 
     Raises `InputError` for a spec with faults.
     """
     from gelslim_cad.dimensions import derive
     from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
     from gelslim_cad.spec.reader import read_spec
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
 
     spec = read_spec(path).spec
     d = derive(spec)
     grid = marker_grid(d)
-    bundle = make_bundle(spec, d, pad_mesh(d, grid)[0], grid)
-    length, width = float(d["design.gel.length_mm"]), float(d["design.gel.width_mm"])
-    corner = float(d["design.gel.corner_radius_mm"])
-    return TwinSensor(bundle, lambda: _traced(d), length, width, corner)
-
-
-def _traced(d: Dimensions) -> LightMap:
-    """The guide's light on the pad, traced."""
-    import numpy as np
-
-    from gelslim_cad.geometry.guide_section import guide_profile
-    from gelslim_cad.light.scene import light_scene
-    from gelslim_optics.light.light_map import LED_COLOURS, LightMap
-    from gelslim_optics.light.trace import trace_light
-
-    traced = trace_light(light_scene(d, guide_profile(d)), RAYS, seed=0)
-    return LightMap.from_bins(
-        np.stack([RED_SHARE * traced.irradiance("red"), traced.irradiance("green")]),
-        float(d["design.gel.length_mm"]),
-        float(d["design.gel.width_mm"]),
-        azimuth_deg=np.array([90.0, -90.0]),
-        elevation_deg=np.full(2, ELEVATION_DEG),
-        colour=LED_COLOURS,
-        smooth_mm=0.6,
-    )
+    return make_bundle(spec, d, pad_mesh(d, grid)[0], grid, with_light=with_light)
 
 
 def require_within_gel(loaded: LoadedScene, thickness_mm: float) -> None:

@@ -15,10 +15,9 @@ from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.light.inputs import light_inputs
 from gelslim_cad.report.view_figures import view_inputs
-from gelslim_cad.sensor.pad import make_bundle, marker_grid, marker_print, pad_mesh, spec_hash
+from gelslim_cad.sensor.pad import marker_grid, marker_print, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_core.files.held_interrupt import interrupts_held
-from gelslim_core.files.scratch import scratch_folder
 from ifem_export.markers.grid import MarkerGrid
 
 
@@ -94,6 +93,7 @@ class Stages:
             self._mould_unit(packed["gel_pad"]),
             Unit("view", "view", (), tuple(view_inputs(self.dimensions).items())),
             Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
+            Unit("bundle", "bundle", (), (("spec", self.loaded.spec.model_dump_json()),), cost=18),
         ]
         units += [
             Unit(f"part {p.name}", "part", (packed[p.name],), cost=len(packed[p.name].shape) / 1e5)
@@ -120,7 +120,7 @@ class Stages:
         """Everything that is quick to write: markers, bundle, tables, instructions, report."""
         from gelslim_cad.build.documents import data_documents, report_document
 
-        made = self._marker_files() | self._bundle_files()
+        made = self._marker_files()
         parts = (*plan.finger, *plan.tooling)
         bom = bill_of_materials(parts, self.loaded.spec.material.gel.density_kg_m3)
         made |= data_documents(self, plan, bom)
@@ -134,21 +134,6 @@ class Stages:
 
         rendered = render_marker_files(self.grid, *marker_print(self.dimensions, self.grid))
         return {f"markers/{n}": (data, "marker print, 1:1") for n, data in rendered.items()}
-
-    def _bundle_files(self) -> dict[str, tuple[bytes, str]]:
-        from ifem_export.bundle.files import load_bundle, write_bundle
-        from ifem_export.mesh.vtu import write_vtu
-
-        mesh, _ = pad_mesh(self.dimensions, self.grid)
-        with scratch_folder() as scratch:
-            folder = scratch / "bundle"
-            write_bundle(folder, make_bundle(self.loaded.spec, self.dimensions, mesh, self.grid))
-            load_bundle(folder, verify=True)
-            write_vtu(folder / "pad.vtu", mesh)
-            return {
-                f"bundle/{p.name}": (p.read_bytes(), "stiffness bundle")
-                for p in sorted(folder.iterdir())
-            }
 
 
 def _entries(made: Mapping[str, tuple[bytes, str]]) -> dict[str, FileEntry]:

@@ -87,8 +87,7 @@ class Unit:
 
 def run(unit: Unit) -> Written:
     """Do a unit of work in this process. Raises ExportError and its kin when a file fails."""
-    from gelslim_cad.build import writers
+    from gelslim_cad.build.writers import WRITERS
 
-    work = getattr(writers, f"write_{unit.kind}")
-    written: Written = work(tuple(p.unpacked() for p in unit.parts), **dict(unit.options))
-    return written
+    parts = tuple(p.unpacked() for p in unit.parts)
+    return WRITERS[unit.kind](parts, **dict(unit.options))

@@ -7,8 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from gelslim_cad.build.light_writer import write_light  # noqa: F401
-from gelslim_cad.build.view_writer import write_view  # noqa: F401
+from gelslim_cad.build.light_writer import write_light
+from gelslim_cad.build.view_writer import write_view
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
 from gelslim_cad.geometry.part import Part
 from gelslim_core.files.scratch import scratch_folder
@@ -92,6 +92,29 @@ def write_mould(parts: Sequence[Part], scale: float) -> Written:
     return Written({}, {}, _recorded(results))
 
 
+def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
+    """The sensor's bundle with its ladder, read back, and the pad for ParaView."""
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.sensor.pad import make_bundle, marker_grid, measured_ladder, pad_mesh
+    from gelslim_cad.spec import Spec
+    from ifem_export.bundle.files import load_bundle, write_bundle
+    from ifem_export.mesh.vtu import write_vtu
+
+    found = Spec.model_validate_json(spec)
+    d = derive(found)
+    grid = marker_grid(d)
+    mesh, _ = pad_mesh(d, grid)
+    ladder = measured_ladder(found, d, mesh, timed=False)
+    bundle = make_bundle(found, d, mesh, grid, ladder=ladder, operator=ladder.balanced().label)
+    with scratch_folder() as scratch:
+        folder = scratch / "bundle"
+        write_bundle(folder, bundle)
+        load_bundle(folder, verify=True)
+        write_vtu(folder / "pad.vtu", mesh)
+        files = {f"bundle/{p.name}": p.read_bytes() for p in sorted(folder.iterdir())}
+    return Written(files, dict.fromkeys(files, "sensor bundle"))
+
+
 def _meshes(
     part: Part, files: Files, purposes: dict[str, str]
 ) -> dict[str, Callable[[Path], Proofs]]:
@@ -144,3 +167,16 @@ def _on_disk(files: Files, prove: Callable[[Path], Proofs]) -> tuple[dict[str, A
 def _recorded(results: Proofs) -> tuple[dict[str, Any], ...]:
     """Proofs as the manifest keeps them: the kernel's last bits differ from run to run."""
     return tuple(asdict(replace(r, value=round(r.value, PROOF_DECIMALS))) for r in results)
+
+
+WRITERS: dict[str, Callable[..., Written]] = {
+    "part": write_part,
+    "assembly": write_assembly,
+    "glb": write_glb,
+    "pictures": write_pictures,
+    "mould": write_mould,
+    "view": write_view,
+    "light": write_light,
+    "bundle": write_bundle_files,
+}
+"""What writes each kind of unit."""

@@ -12,7 +12,9 @@ from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.sight import camera_record
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline
+from gelslim_cad.sensor.light import pad_light
 from gelslim_cad.spec import Spec
+from gelslim_optics.light.light_map import light_arrays
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
 from ifem_export.markers.grid import MarkerGrid, build_marker_grid
@@ -20,7 +22,7 @@ from ifem_export.mesh.crop import CropReport
 from ifem_export.mesh.crown import Paraboloid
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.operators.ladder import REFERENCE_LAYERS
+from ifem_export.operators.ladder import REFERENCE_LAYERS, Progress, measure_ladder
 from ifem_export.operators.operator_ladder import OperatorLadder
 
 
@@ -117,10 +119,26 @@ def make_bundle(
     grid: MarkerGrid,
     *,
     with_stiffness: bool = False,
+    with_light: bool = True,
     ladder: OperatorLadder | None = None,
     operator: str = "",
 ) -> Bundle:
-    """The stiffness bundle of this sensor; K itself only `with_stiffness`: its recipe is there."""
+    """Make the bundle of a sensor: all that force pipeline and twin need of it.
+
+    Args:
+        spec: The finger.
+        d: Its dimensions.
+        mesh: The pad's mesh.
+        grid: The marker grid.
+        with_stiffness: Store the stiffness matrix itself; its recipe is stored in any case.
+        with_light: Trace the light of the guide, which only pictures need.
+        ladder: Error and time of the force operators.
+        operator: Label of the operator that the force pipeline starts with.
+
+    Returns:
+        The bundle.
+    """
+    light = light_arrays(pad_light(d)) if with_light else {}
     return build_bundle(
         mesh,
         gel_material(spec),
@@ -137,4 +155,50 @@ def make_bundle(
         with_stiffness=with_stiffness,
         ladder=ladder,
         operator=operator,
+        outline=pad_outline(d),
+        tolerances=tolerances(spec),
+        light=light,
+    )
+
+
+def tolerances(spec: Spec) -> dict[str, float]:
+    """Standard deviations of what the spec states of the gel, by name of the bundle."""
+    gel = spec.material.gel
+    return {
+        "youngs_modulus_mpa": gel.youngs_modulus_tolerance_ratio * gel.youngs_modulus_mpa,
+        "poissons_ratio": gel.poissons_ratio_tolerance,
+        "thickness_mm": spec.manufacturing.gel_thickness_tolerance_mm,
+    }
+
+
+def measured_ladder(
+    spec: Spec,
+    d: Dimensions,
+    mesh: PadMesh,
+    *,
+    timed: bool = True,
+    dense: bool = False,
+    progress: Progress | None = None,
+) -> OperatorLadder:
+    """Measure the force operators of a pad.
+
+    Args:
+        spec: The finger.
+        d: Its dimensions.
+        mesh: The pad's mesh.
+        timed: Measure times on this machine too; without them the ladder is the same everywhere.
+        dense: Measure the dense operator too, which takes up to a minute.
+        progress: Called as the work goes on.
+
+    Returns:
+        Error, counted work and time of each operator.
+    """
+    return measure_ladder(
+        mesh,
+        gel_material(spec),
+        spec.mesh.element,
+        dense=dense,
+        progress=progress,
+        reference=reference_mesh(d, mesh),
+        timed=timed,
     )

@@ -31,6 +31,9 @@ class Manufacturing(Block):
     gel_shrinkage_percent: float = Field(
         default=0.1, ge=0, le=10, description="Linear shrinkage of the gel while curing"
     )
+    gel_thickness_tolerance_mm: float = Field(
+        default=0.05, gt=0, le=1, description="Standard deviation of the cast gel's thickness"
+    )
     marking_process: MarkingProcess = Field(
         default="laser_opened_paint", description="How the markers get onto the gel"
     )

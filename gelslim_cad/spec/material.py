@@ -16,6 +16,15 @@ class GelMaterial(Block):
     name: str = Field(default="XP-565 silicone", max_length=80, description="Gel, for the BOM")
     youngs_modulus_mpa: float = Field(default=0.147, gt=0, le=2000, description="Young's modulus E")
     poissons_ratio: float = Field(default=0.3223, ge=0, lt=0.5, description="Poisson's ratio")
+    youngs_modulus_tolerance_ratio: float = Field(
+        default=0.1,
+        gt=0,
+        le=1,
+        description="Standard deviation of Young's modulus between batches, as a part of it",
+    )
+    poissons_ratio_tolerance: float = Field(
+        default=0.02, gt=0, le=0.2, description="Standard deviation of Poisson's ratio"
+    )
     density_kg_m3: float = Field(default=1020.0, ge=200, le=4000, description="Density")
     refractive_index: float = Field(default=1.41, ge=1, le=2, description="Refractive index")
     coat_reflectance: float = Field(

@@ -108,6 +108,14 @@ class LightMap:
         return found
 
 
+LIGHT_FIELDS = ("x_mm", "y_mm", "irradiance", "azimuth_deg", "elevation_deg", "colour")
+
+
+def light_arrays(light: LightMap) -> dict[str, Array]:
+    """Return the arrays of a light map by name, as a bundle stores them."""
+    return {name: np.asarray(getattr(light, name)) for name in LIGHT_FIELDS}
+
+
 def red_green_sides(
     length_mm: float,
     width_mm: float,

@@ -53,7 +53,7 @@ def measure_paces(
     """
     tell = progress or (lambda text, done, total: None)
     with scratch_folder() as folder:
-        store_sensor(sensor, folder / "sensor", True)
+        store_sensor(sensor, folder / "sensor")
         runs = {}
         # The first run computes the compliance of the pad and compiles what is not compiled yet.
         for step, (name, strain) in enumerate(

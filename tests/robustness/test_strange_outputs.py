@@ -10,12 +10,13 @@ from sweep_commands import MINI20
 
 from gelslim.cli import main
 from gelslim.cli.commands.validate import PLOTS, picture_name, picture_names
-from gelslim.scene_sensor import spec_sensor
+from gelslim.scene_sensor import spec_bundle
 from gelslim_cad.build.folder import OutputError, require_ours
 from gelslim_core.files.output_error import OutputError as RunError
 from gelslim_force.outputs.run_recorder import RunRecorder
 from gelslim_twin.simulation.run_folder import RunFolder, SimulationError
 from gelslim_twin.simulation.stored_sensor import store_sensor
+from gelslim_twin.simulation.twin_sensor import TwinSensor
 from gelslim_twin.validation.case import other_contacts
 from gelslim_twin.validation.experiment import sphere_experiment
 
@@ -96,7 +97,7 @@ def test_pictures_of_others_stop_a_validation_before_it_starts(
 
 
 def test_every_picture_of_a_validation_was_looked_for() -> None:
-    sensor = spec_sensor(MINI20)
+    sensor = TwinSensor(spec_bundle(MINI20, with_light=False))
     mesh = sensor.bundle.mesh
     thickness = mesh.layers * mesh.cell_size_mm[2]
     slides = len(sphere_experiment(thickness, *sensor.size_mm).tests)
@@ -104,11 +105,11 @@ def test_every_picture_of_a_validation_was_looked_for() -> None:
     assert picture_names(sensor) == [*PLOTS, *(picture_name(name) for name in names)]
 
 
-@pytest.mark.parametrize("name", ["sensor.json", "light.npz"])
+@pytest.mark.parametrize("name", ["sensor.json"])
 def test_a_sensor_spares_files_of_others(name: str, tmp_path: Path) -> None:
-    sensor = spec_sensor(MINI20)
+    sensor = TwinSensor(spec_bundle(MINI20, with_light=False))
     (tmp_path / name).write_text("mine")
     with pytest.raises(SimulationError, match=f"{name} of other origin"):
-        store_sensor(sensor, tmp_path, False)
+        store_sensor(sensor, tmp_path)
     assert (tmp_path / name).read_text() == "mine"
     assert {p.name for p in tmp_path.iterdir()} <= {name, ".lock"}

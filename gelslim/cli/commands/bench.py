@@ -91,9 +91,10 @@ def _parts(sensor: Path, simulation: bool, tell: Progress | None) -> Iterator[Pa
         if simulation and bundle.markers is not None and bundle.camera:
             yield bench_simulation(TwinSensor(bundle), tell)
         return
-    from gelslim.scene_sensor import spec_sensor
+    from gelslim.scene_sensor import spec_bundle
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
 
-    made = spec_sensor(sensor)
+    made = TwinSensor(spec_bundle(sensor))
     yield bench_operators(made.bundle, tell)
     yield bench_light(sensor, tell)
     if simulation:

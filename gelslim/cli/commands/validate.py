@@ -44,17 +44,21 @@ def validate(
     from gelslim.cli.output import replace_file, spare_strangers_in
     from gelslim.cli.validate_report import print_validation
     from gelslim.contacts import validate as validated
-    from gelslim.scene_sensor import spec_sensor
+    from gelslim.scene_sensor import spec_bundle
     from gelslim_cad.spec.reader import read_spec
     from gelslim_core.files.atomic_file import json_bytes
     from gelslim_force.outputs.packed_frame import plain
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
 
     started = time.monotonic()
     budget = budget_of(error, within)
     name = read_spec(spec).spec.name
     folder = out or Path("out") / f"{name}-validation"
     with progress_bar(quiet=as_json) as tell:
-        names = [RECORD, *(picture_names(spec_sensor(spec)) if pictures else [])]
+        names = [
+            RECORD,
+            *(picture_names(TwinSensor(spec_bundle(spec, with_light=False))) if pictures else []),
+        ]
         spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
         found = validated(spec, folder / "sensor", budget, seed=seed, progress=tell)
     for remark in found.remarks:

@@ -162,12 +162,12 @@ def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path:
     from ifem_export.elements.material import Material
 
     bundle = load_bundle(place / "bundle")
-    store_sensor(TwinSensor(bundle), tmp_path / "kept", True)
+    store_sensor(TwinSensor(bundle), tmp_path / "kept")
     stiffer = build_bundle_of(bundle, Material(0.3, 0.3223, 1000.0))
-    store_sensor(TwinSensor(stiffer), tmp_path / "kept", True)
+    store_sensor(TwinSensor(stiffer), tmp_path / "kept")
     assert stored_sensor(tmp_path / "kept").bundle.material.youngs_modulus_mpa == 0.3
     camera = {**bundle.camera, "focal_px": 650.0}
-    store_sensor(TwinSensor(replace(stiffer, camera=camera)), tmp_path / "kept", True)
+    store_sensor(TwinSensor(replace(stiffer, camera=camera)), tmp_path / "kept")
     assert stored_sensor(tmp_path / "kept").bundle.camera["focal_px"] == 650.0
 
 
