@@ -10,8 +10,7 @@ from camera_rig import finger_view
 from synthetic import centroids, grid_of_dots, outlines
 
 from gelslim_force.calibration.camera_deviation import PARAMETERS, CameraTolerance, deviated_camera
-from gelslim_force.calibration.fit import fit_camera
-from gelslim_force.detection.disc_centroid import centroid_offset_px
+from gelslim_force.calibration.fit import centroid_offset_px, fit_camera
 from ifem_export.markers.grid import build_marker_grid
 
 DESIGN = finger_view()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from synthetic import grid_of_dots
 
+from gelslim_force.calibration.checks import picture_turn
 from gelslim_force.calibration.residual_bump import split_residuals
-from gelslim_force.detection.picture_turn import picture_turn
 
 GRID = grid_of_dots()
 AT = GRID.positions_mm

@@ -19,7 +19,7 @@ from render_rig import (
 )
 from shapely.geometry import Polygon, box
 
-from gelslim_force.detection.disc_centroid import centroid_offset_px
+from gelslim_force.calibration.fit import centroid_offset_px
 from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_twin.render.coverage_kernel import draw_dots
 from gelslim_twin.render.defocus import Defocus
