@@ -1,12 +1,13 @@
 """Surface forces of a neo-Hookean pad from the motion of its outer surface.
 
-No force acts on inner nodes: their motion is found by Newton steps with the linear stiffness,
+No external force acts on inner nodes. Their motion is found by Newton steps with the linear
+stiffness,
 
     u_i <- u_i - K_ii⁻¹ F_i(u),
 
-with Anderson's acceleration, from the linear extension of the surface motion; the rest left after
-the last evaluation is condensed onto the surface. A pad of one layer has no inner nodes and needs
-one evaluation.
+with Anderson acceleration. The iteration starts from the linear extension of the surface motion.
+The residual of the last evaluation is condensed onto the surface. A pad of one layer has no inner
+nodes and needs one evaluation.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class FiniteStrainForce:
 
     bundle: Bundle
     tolerance: float = 0.01
-    """Rest on the inner nodes, relative to the surface forces."""
+    """Residual force on the inner nodes, relative to the surface forces."""
     most_steps: int = 12
     inner_rtol: float = 1e-3
 
@@ -54,36 +55,37 @@ class FiniteStrainForce:
     def force(self, displacement_mm: ArrayLike) -> Array:
         """Forces that hold the surface in a motion (c, 3).
 
-        Raises IfemError for a wrong shape, FiniteStrainError for a motion that turns a cell
-        inside out, ConvergenceError where the inner nodes find no balance.
+        Raises IfemError for a wrong shape, FiniteStrainError for a motion that inverts a cell,
+        ConvergenceError if the iteration does not converge.
         """
         u = checked_field(displacement_mm, self.system.columns)
-        whole = np.zeros((self.bundle.mesh.n_nodes, 3))
-        whole[-self.system.columns :] = u
+        motion = np.zeros((self.bundle.mesh.n_nodes, 3))
+        motion[-self.system.columns :] = u
         if self.system.layers == 1:
-            return np.asarray(self.pad.force(whole)[-self.system.columns :])
-        return self._balanced(whole, u)
+            return np.asarray(self.pad.force(motion)[-self.system.columns :])
+        return self._condensed(motion, u)
 
-    def _balanced(self, whole: Array, u: Array) -> Array:
+    def _condensed(self, motion: Array, u: Array) -> Array:
         columns = self.system.columns
         inside = slice(columns, -columns)
-        pull = self.system.surface_to_inner @ u.reshape(-1)
-        whole[inside] = self.inner.solve(-pull, self.inner_rtol).x.reshape(-1, 3)
-        memory = Anderson()
-        trail: list[float] = []
+        coupling = self.system.surface_to_inner @ u.reshape(-1)
+        motion[inside] = self.inner.solve(-coupling, self.inner_rtol).x.reshape(-1, 3)
+        anderson = Anderson()
+        residuals: list[float] = []
         for _ in range(self.most_steps):
-            found = self.pad.force(whole)
-            rest, force = found[inside], found[-columns:]
+            found = self.pad.force(motion)
+            residual, force = found[inside], found[-columns:]
             size = float(np.linalg.norm(force))
-            trail.append(float(np.linalg.norm(rest)))
-            done = trail[-1] <= self.tolerance * size or size == 0.0
-            step = self.inner.solve(-rest.reshape(-1), 0.05 if done else self.inner_rtol).x
+            residuals.append(float(np.linalg.norm(residual)))
+            done = residuals[-1] <= self.tolerance * size or size == 0.0
+            step = self.inner.solve(-residual.reshape(-1), 0.05 if done else self.inner_rtol).x
             if done:
-                carried = self.system.inner_to_surface @ step
-                return np.asarray(force + carried.reshape(-1, 3))
-            whole[inside] = memory.next(whole[inside].reshape(-1), step).reshape(-1, 3)
-        shown = ", ".join(f"{t:.2g}" for t in trail)
+                condensed = self.system.inner_to_surface @ step
+                return np.asarray(force + condensed.reshape(-1, 3))
+            motion[inside] = anderson.next(motion[inside].reshape(-1), step).reshape(-1, 3)
+        shown = ", ".join(f"{t:.2g}" for t in residuals)
         raise ConvergenceError(
-            f"inner nodes of the neo-Hookean pad are not balanced after {self.most_steps} steps "
-            f"(rest {shown} N): the motion strains the gel too far for the linear stiffness"
+            f"the inner nodes of the neo-Hookean pad are out of balance after {self.most_steps} "
+            f"steps (residuals {shown} N): the strain is too large for steps with the linear "
+            "stiffness"
         )

@@ -53,8 +53,8 @@ def test_snippets_of_the_guide_run(place: Path, capsys: pytest.CaptureFixture[st
     assert len(list((place / "out" / "press" / "pictures").glob("*.png"))) > 0
     # What the guide says is unknown without a normal source is unknown, and known with one.
     assert np.isnan(names["tangential"].wrench.force_n).tolist() == [False, False, True]
-    assert np.isfinite(names["whole"].wrench.vector).all()
-    assert names["whole"].wrench.force_n[2] == pytest.approx(-1.0, abs=0.05)
+    assert np.isfinite(names["known"].wrench.vector).all()
+    assert names["known"].wrench.force_n[2] == pytest.approx(-1.0, abs=0.05)
     assert names["tracked"].tracks.coverage == 1.0
 
 

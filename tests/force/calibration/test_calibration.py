@@ -77,7 +77,8 @@ def _deviation_of(camera):
     focal = 100 * (camera.focal_px / design.focal_px - 1)
     shift = camera.position_mm - design.position_mm
     bent = (lens.k1, lens.k2, lens.p1, lens.p2)
-    return np.array([*turn, *shift, focal, *bent, *camera.principal_offset_px])
+    offset = np.subtract(camera.principal_offset_px, design.principal_offset_px)
+    return np.array([*turn, *shift, focal, *bent, *offset])
 
 
 def test_truth_of_these_tests():
