@@ -33,6 +33,6 @@ def finger_view(tilt_deg: float = 30.0, height_mm: float = 22.0, focal_px: float
     )
     return dataclasses.replace(
         view,
-        principal_offset_px=(6.0, -4.0),
+        principal_offset_px=(6.0, 4.0),
         position_mm=view.position_mm + np.array([0.0, 0.6, 0.0]),
     )
