@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,33 +41,29 @@ class Frame:
     name: str = ""
 
 
-class FrameSource(Protocol):
-    """Frames in order; `close`, or the end of a `with` block, frees files and cameras."""
+class FrameSource(AbstractContextManager[Any]):
+    """Frames in order; `close`, or the end of a `with` block, frees files and cameras.
 
-    @property
-    def count(self) -> int | None:
-        """Number of frames; None if it is not known."""
+    Attributes:
+        count: Number of frames; None if it is not known.
+        frames_per_s: Rate; None if it is not known.
+        live: Whether frames arrive in real time, so that old ones may be dropped.
+    """
 
-    @property
-    def frames_per_s(self) -> float | None:
-        """Rate; None if it is not known."""
+    count: int | None = None
+    frames_per_s: float | None = None
+    live: bool = False
 
-    @property
-    def live(self) -> bool:
-        """Whether frames arrive in real time, so that old ones may be dropped."""
-
+    @abstractmethod
     def __iter__(self) -> Iterator[Frame]:
         """Yield every frame, also those that cannot be read."""
 
     def close(self) -> None:
         """Free files and cameras; a second call does nothing."""
 
-
-class SourceContext(AbstractContextManager[Any]):
-    """The `with` block of a source."""
-
-    def close(self) -> None:
-        """Free files and cameras."""
+    def __enter__(self) -> Self:
+        """Return the source."""
+        return self
 
     def __exit__(self, *_: object) -> None:
         """Close the source."""

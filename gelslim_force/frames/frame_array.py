@@ -12,17 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext
+from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError
 from gelslim_force.frames.picture import as_picture
 
 _KEYS = ("frames", "images", "image", "frame")
 _TIMES = ("time_s", "times_s")
 
 
-class FrameArray(SourceContext):
+class FrameArray(FrameSource):
     """Frames of an array (n, h, w[, 1 | 3 | 4]) or of one picture (h, w[, 3 | 4]), uint8."""
-
-    live = False
 
     def __init__(
         self,
@@ -43,7 +41,8 @@ class FrameArray(SourceContext):
                 f"{name}: an array of {frames.dtype} {frames.shape} holds no frames; give uint8 "
                 "(n, h, w) or (n, h, w, 3), levels 0 ... 255"
             )
-        self._frames, self.frames_per_s = stack, frames_per_s
+        self._frames = stack
+        self.count, self.frames_per_s = len(stack), frames_per_s
         self._times = None if time_s is None else np.asarray(time_s)
         if self._times is not None and (
             self._times.shape != (len(stack),)
@@ -54,11 +53,6 @@ class FrameArray(SourceContext):
                 f"{name}: times of {self._times.dtype} {self._times.shape} for {len(stack)} "
                 f"frames; need ({len(stack)},) finite numbers"
             )
-
-    @property
-    def count(self) -> int:
-        """Number of frames."""
-        return len(self._frames)
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield each frame, copied."""

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gelslim_core import optional_library
-from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext, size_problem
+from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError, size_problem
 
 VIDEO_ENDINGS = (
     ".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg", ".mjpg", ".mjpeg", ".wmv",
@@ -63,10 +63,8 @@ def _known_rate(frames_per_s: float) -> float | None:
     return float(frames_per_s) if known else None
 
 
-class VideoFile(SourceContext):
+class VideoFile(FrameSource):
     """Frames of a video, in colour. A second iteration starts at the beginning again."""
-
-    live = False
 
     def __init__(
         self,
@@ -127,14 +125,13 @@ class VideoFile(SourceContext):
         return Frame(index, index / (self.frames_per_s or 1.0), image, text)
 
 
-class LiveCamera(SourceContext):
+class LiveCamera(FrameSource):
     """Frames of a camera until `close`, or until the camera gives no more frames.
 
     Read it through `ThreadedReader`, which drops frames that arrive during the work on another.
     """
 
     live = True
-    count: int | None = None
 
     def __init__(
         self,

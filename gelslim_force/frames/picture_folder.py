@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext, size_problem
+from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError, size_problem
 from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
 
 _SAMPLE = 5
@@ -16,10 +16,8 @@ _SAMPLE = 5
 _NUMBER = re.compile(r"(\d+)")
 
 
-class PictureFolder(SourceContext):
+class PictureFolder(FrameSource):
     """Pictures of a folder, or one picture; a damaged file gives a frame with a problem."""
-
-    live = False
 
     def __init__(self, path: str | os.PathLike[str], frames_per_s: float | None = None) -> None:
         """List the pictures; their size is the most frequent one of the first five readable ones.
@@ -29,12 +27,8 @@ class PictureFolder(SourceContext):
         place = Path(path)
         self.frames_per_s = frames_per_s
         self.files = [place] if place.is_file() else _pictures(place)
+        self.count = len(self.files)
         self.shape = self._usual_shape(place)
-
-    @property
-    def count(self) -> int:
-        """Number of files."""
-        return len(self.files)
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield a frame per file."""

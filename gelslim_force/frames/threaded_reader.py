@@ -6,12 +6,12 @@ from collections import deque
 from collections.abc import Iterator
 from threading import Condition, Thread
 
-from gelslim_force.frames.frame import Frame, FrameSource, SourceContext
+from gelslim_force.frames.frame import Frame, FrameSource
 
 _JOIN_S = 5.0
 
 
-class ThreadedReader(SourceContext):
+class ThreadedReader(FrameSource):
     """Reads a source in a thread of its own, so that decoding and computing overlap.
 
     The latest frame of a live source replaces one that has not been taken yet; a recorded source
@@ -22,7 +22,8 @@ class ThreadedReader(SourceContext):
         """Reading starts with the first `next`. Raises ValueError for `ahead` < 1."""
         if ahead < 1:
             raise ValueError(f"ahead = {ahead}: must be at least 1")
-        self.source = source
+        self.source, self.live = source, source.live
+        self.count, self.frames_per_s = source.count, source.frames_per_s
         self._ahead = 1 if source.live else ahead
         self._buffer: deque[Frame] = deque()
         self._changed = Condition()
@@ -31,21 +32,6 @@ class ThreadedReader(SourceContext):
         self._thread: Thread | None = None
         self.dropped = 0
         """Number of frames that were dropped."""
-
-    @property
-    def count(self) -> int | None:
-        """Number of frames; None if it is not known."""
-        return self.source.count
-
-    @property
-    def frames_per_s(self) -> float | None:
-        """Rate; None if it is not known."""
-        return self.source.frames_per_s
-
-    @property
-    def live(self) -> bool:
-        """Whether old frames are dropped."""
-        return self.source.live
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield frames; an error of the source is raised after the frames before it."""

@@ -34,6 +34,8 @@ from gelslim_force.outputs.surface_view import Projection, SurfaceView
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 _DARK = (18, 20, 22)
+_BRIGHTNESS, _COLOUR_SHARE = 0.8, 0.6
+"""What is kept of the brightness and colour of a frame, so that the arrows stand out."""
 _SHADES = np.array([shade_share(k / 255.0) for k in range(256)])
 
 
@@ -43,23 +45,17 @@ class OverlaySettings:
 
     markers: bool = True
     motion: bool = True
-    force: bool = True
     column: bool = True
     zoom: int | None = None
     """Enlargement of the picture; None enlarges it until it is at least 640 px high."""
     cell_mm: float = 1.1
     """Side of the square whose nodes share one force arrow."""
-    brightness: float = 0.8
-    colourfulness: float = 0.6
-    """Share of the frame's colour that is kept, so that the arrows stand out."""
 
     def __post_init__(self) -> None:
         if self.zoom is not None and not 1 <= self.zoom <= 8:
             raise ValueError(f"zoom = {self.zoom}: must be in 1 ... 8")
         if not self.cell_mm > 0:
             raise ValueError(f"cell_mm = {self.cell_mm}: must be > 0")
-        if not (0 <= self.brightness <= 1 and 0 <= self.colourfulness <= 1):
-            raise ValueError("brightness and colourfulness must be in 0 ... 1")
 
 
 class Overlay:
@@ -103,7 +99,7 @@ class Overlay:
         `image` is RGB (h, w, 3) or grey (h, w). Without one, or with one of another size, the
         picture stays dark. Raises MissingLibraryError without OpenCV.
         """
-        field = result.field if self._settings.force and self._project is not None else None
+        field = result.field if self._project is not None else None
         view = None if field is None else self._view_of(field)
         ground = self._ground(image)
         if field is not None and view is not None:
@@ -127,8 +123,7 @@ class Overlay:
         if colour.shape[2] != 3:
             colour = np.repeat(colour[:, :, :1], 3, axis=2)
         grey = colour.mean(axis=2, keepdims=True)
-        share = self._settings.colourfulness
-        return np.asarray((grey + share * (colour - grey)) * self._settings.brightness)
+        return np.asarray((grey + _COLOUR_SHARE * (colour - grey)) * _BRIGHTNESS)
 
     def _view_of(self, field: ForceField) -> SurfaceView:
         view = self._view

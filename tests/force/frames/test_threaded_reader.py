@@ -5,12 +5,12 @@ from threading import Event
 import numpy as np
 import pytest
 
-from gelslim_force.frames.frame import Frame, FrameSourceError, SourceContext
+from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError
 from gelslim_force.frames.opencv_frames import LiveCamera
 from gelslim_force.frames.threaded_reader import ThreadedReader
 
 
-class Scripted(SourceContext):
+class Scripted(FrameSource):
     """Frames 0 ... count-1; tells when so many were read, and waits to be told to go on."""
 
     def __init__(self, count, live, fails_at=None, holds_at=None):
