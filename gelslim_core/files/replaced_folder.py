@@ -34,7 +34,7 @@ def replaced_folder(target: Path, ours: Collection[str]) -> Iterator[Path]:
     """
     place = Path(os.path.realpath(target))
     _require_movable(place, target)
-    staging = beside(place, ".building")
+    staging = _staging(place)
     with interrupts_held() as let_through:
         try:
             with let_through():
@@ -48,11 +48,17 @@ def replaced_folder(target: Path, ours: Collection[str]) -> Iterator[Path]:
 
 
 def recover(target: Path) -> None:
-    """Bring back the old folder if a writer died between its two renames."""
+    """Remove what a killed writer left beside `target`, for a caller that may write nothing anew.
+
+    The old folder is brought back if the writer was killed between its two renames. The caller
+    holds the lock that every writer of `target` holds. Raises OSError.
+    """
     place = Path(os.path.realpath(target))
     retired = _retired(place)
     if retired.is_dir() and not place.exists():
         os.rename(retired, place)
+    for left in (retired, _staging(place)):
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def _require_movable(place: Path, told: Path) -> None:
@@ -105,6 +111,10 @@ def _swap(staging: Path, place: Path) -> None:
         os.rename(retired, place)
         raise
     shutil.rmtree(retired, ignore_errors=True)
+
+
+def _staging(place: Path) -> Path:
+    return beside(place, ".building")
 
 
 def _retired(place: Path) -> Path:

@@ -12,6 +12,7 @@ from gelslim_core.files.file_lock import locked
 from gelslim_core.files.shared_use import use, used_elsewhere
 from gelslim_twin.simulation.run_folder import SimulationError
 from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_core.files.replaced_file import sweep
 from ifem_export.bundle.files import load_bundle, write_bundle
 
 BUNDLE, RECORD = "bundle", "sensor.json"
@@ -22,13 +23,16 @@ MOST_COMPLIANCES = 4
 def store_sensor(sensor: TwinSensor, folder: Path) -> None:
     """Write the sensor's bundle unless it is there; another sensor there is replaced.
 
-    A bundle with light also serves simulations that need none. The sensor is in use by this
-    process from then on. Raises SimulationError where another process uses another sensor there,
-    files of other origin are in the way, or the folder cannot be written.
+    A bundle with light also serves simulations that need none. What killed processes left
+    half-written there is removed, even where nothing is written: another one may have stored their
+    compliance. The sensor is in use by this process from then on. Raises SimulationError where
+    another process uses another sensor there, files of other origin are in the way, or the folder
+    cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with locked(folder / ".lock"):
+            sweep(folder, again=True)
             _store(sensor, folder)
             use(folder / USE)
     except OSError as error:

@@ -247,6 +247,16 @@ def test_a_writer_killed_between_its_renames_is_made_good(tmp_path: Path) -> Non
     assert [p.name for p in tmp_path.iterdir()] == ["made"]
 
 
+@pytest.mark.parametrize("left", [".made.building", ".made.old"])
+def test_the_old_folder_of_a_writer_killed_after_its_swap_goes(left: str, tmp_path: Path) -> None:
+    for name, text in (("made", "new"), (left, "old")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a").write_text(text)
+    recover(tmp_path / "made")
+    assert (tmp_path / "made" / "a").read_text() == "new"
+    assert [p.name for p in tmp_path.iterdir()] == ["made"]
+
+
 SCRATCH = """
 import sys
 from gelslim_core.files.scratch import scratch_folder

@@ -171,6 +171,29 @@ def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path:
     assert stored_sensor(tmp_path / "kept").bundle.camera["focal_px"] == 650.0
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX locks")
+def test_a_stored_sensor_that_is_kept_is_swept_of_a_killed_writer_only(
+    place: Path, tmp_path: Path
+) -> None:
+    """A process killed in storing a compliance that another one has stored since."""
+    from gelslim_twin.simulation.stored_sensor import store_sensor
+    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from ifem_export.bundle_io import load_bundle
+    from whole_files.replaced_file import is_part, replacement
+
+    kept, sensor = tmp_path / "kept", TwinSensor(load_bundle(place / "bundle"))
+    store_sensor(sensor, kept, False)
+    whole = {path.name for path in kept.iterdir()}
+    with replacement(kept / "compliance-0.npy") as living:
+        living.write(b"half")
+        own = {path.name for path in kept.iterdir()} - whole
+        (kept / ".0123456789abcdef.part").write_bytes(b"left")
+        store_sensor(sensor, kept, False)
+        assert {path.name for path in kept.iterdir()} == whole | own
+    assert all(is_part(name) for name in own)
+    assert {path.name for path in kept.iterdir()} == whole | {"compliance-0.npy"}
+
+
 def build_bundle_of(bundle, material):
     from ifem_export.bundle.bundle import build_bundle
 
