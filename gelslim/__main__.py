@@ -31,15 +31,15 @@ def main() -> int:
 def run(command: Callable[..., int]) -> int:
     """Run a command line, which is to call what it is given as `begun` as its work begins."""
     try:
-        status = command(begun=_ending.begin)
-        if status <= 128:
-            return _ending.end(status)
+        status = _ending.end(command(begun=_ending.begin))
     except KeyboardInterrupt as error:
         # In the middle of the command's last words.
-        status = 128 + number_of(error)
+        status = _ending.end(128 + number_of(error))
         say(status - 128)
-    _tidy()
-    return _ending.end(status)
+    if status > 128:
+        _tidy()
+        _ending.leave(status)
+    return status
 
 
 def _tidy() -> None:

@@ -1,9 +1,11 @@
 """What Ctrl-C and SIGTERM do to `gelslim`, from its first line to its last.
 
 Nothing is begun while the command line itself loads: the program says so and ends. Later a
-KeyboardInterrupt is raised, so that whatever is open is closed and removed on the way out; not
-within the import of a library, which may crash or call itself missing, but after it. Whoever asks
-again meanwhile waits for that, PATIENCE_S at most.
+KeyboardInterrupt is raised, so that whatever is open is closed and removed on the way out. It is
+raised neither within the import of a library, which may crash or call itself missing, nor within
+llvmlite, which would free memory twice, but after them. Whoever asks again meanwhile waits for
+that, PATIENCE_S at most. An interrupted process ends without the teardown of the interpreter:
+threads of compiled code may still be running, and would meet what is freed under them.
 """
 
 from __future__ import annotations
@@ -18,12 +20,12 @@ import threading
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 PATIENCE_S = 3.0
 """After the first signal or the end of the work; the next one then ends the process as it is."""
 RETRY_S = 0.02
-"""Between looks at whether an import is over."""
+"""Between looks at whether an import or a call into llvmlite is over."""
 SAID = {
     signal.SIGINT: ("interrupted", "Interrupted; every file that is there is whole."),
     signal.SIGTERM: ("terminated", "Terminated; every file that is there is whole."),
@@ -32,6 +34,8 @@ SAID = {
 SHOWN_AGAIN = b"\r\x1b[2K\x1b[?25h"
 """Clears a progress bar's line on a terminal and shows the cursor that it has hidden."""
 _IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
+_LLVMLITE = os.sep.join(("", "llvmlite", "binding", ""))
+"""In the paths of its modules. A line of Python after a call of LLVM notes who frees an object."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -73,13 +77,21 @@ class Ending:
         self._status = status
         return status
 
+    def leave(self, status: int) -> NoReturn:
+        """End after an interrupt: run the exit functions, flush, and tear nothing down."""
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(status)
+
     def _asked(self, number: int, frame: FrameType | None) -> None:
         if self._since is not None:
             if time.monotonic() - self._since > PATIENCE_S:
                 self._leave(number)
         elif not self._begun:
             self._leave(number)
-        elif _importing(frame):
+        elif _not_to_be_cut(frame):
             self._ask_again(number)
         else:
             self._since = time.monotonic()
@@ -182,9 +194,11 @@ def number_of(error: BaseException) -> int:
     return signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT
 
 
-def _importing(frame: FrameType | None) -> bool:
+def _not_to_be_cut(frame: FrameType | None) -> bool:
+    """Whether an import or a call into llvmlite is under way."""
     while frame is not None:
-        if frame.f_code.co_filename in _IMPORTS:
+        file = frame.f_code.co_filename
+        if file in _IMPORTS or _LLVMLITE in file:
             return True
         frame = frame.f_back
     return False

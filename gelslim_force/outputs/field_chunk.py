@@ -199,12 +199,14 @@ class ChunkWriter:
             _MAX_WAITING
         )
         self._error: OutputError | None = None
-        self._thread = threading.Thread(target=self._work, name="chunk-writer", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
 
     def submit(self, target: Path, journal: Path, frames: Sequence[PackedFrame]) -> None:
         """Queue a closed journal and its frames. Raises OutputError if an earlier chunk failed."""
         self.check()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="chunk-writer", daemon=True)
+            self._thread.start()
         self._queue.put((target, journal, frames))
 
     def check(self) -> None:
@@ -214,7 +216,7 @@ class ChunkWriter:
 
     def close(self) -> None:
         """Wait until all chunks are written; `check` tells about errors."""
-        if self._thread.is_alive():
+        if self._thread is not None and self._thread.is_alive():
             self._queue.put(None)
             self._thread.join()
 

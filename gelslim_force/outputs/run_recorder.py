@@ -41,6 +41,7 @@ from gelslim_force.outputs.run_manifest import (
     versions,
     write_manifest,
 )
+from gelslim_core.files.held_interrupt import interrupts_held
 
 LOCK = ".lock"
 WRENCHES, STAGES = "wrenches.csv", "stages.jsonl"
@@ -227,7 +228,14 @@ class RunRecorder(AbstractContextManager["RunRecorder"]):
         return failure
 
     def _close(self, state: State, reason: str) -> None:
-        """End the run; if the disk refuses that too, `run.json` keeps its last state."""
+        """End the run; where the disk refuses even this, `run.json` keeps its last state.
+
+        An interrupt takes effect at its end: the second thread must not be left to write alone.
+        """
+        with interrupts_held():
+            self._end(state, reason)
+
+    def _end(self, state: State, reason: str) -> None:
         self._open = False
         self._writer.close()
         try:

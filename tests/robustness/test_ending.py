@@ -146,6 +146,43 @@ def test_one_within_an_import_waits_for_its_end(tmp_path: Path) -> None:
     assert done.stderr == LINES[signal.SIGINT]
 
 
+def test_one_within_llvmlite_waits_for_its_end(tmp_path: Path) -> None:
+    """Linking frees the second module, and the next line of Python notes that."""
+    pytest.importorskip("llvmlite")
+    work = """
+from llvmlite import binding
+from llvmlite.binding import ffi
+real, linking = ffi._lib_fn_wrapper.__call__, ffi.lib.LLVMPY_LinkModules
+ffi._lib_fn_wrapper.__call__ = lambda f, *a: (real(f, *a), f is linking and interrupt())[0]
+first, second = (binding.parse_assembly("") for _ in range(2))
+try:
+    first.link_in(second)
+    time.sleep(60)
+finally:
+    assert second.closed
+    print("linked")
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "linked\n", LINES[signal.SIGINT])
+
+
+def test_an_interrupted_process_runs_its_exit_functions_and_tears_nothing_down(
+    tmp_path: Path,
+) -> None:
+    """Threads of compiled code that still run would crash on what is freed under them."""
+    work = """
+import atexit
+class Late:
+    def __del__(self, leave=os._exit):
+        leave(99)
+sys.late = Late()
+atexit.register(print, "at exit")
+interrupt()
+"""
+    done = program(tmp_path, work)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "at exit\n", LINES[signal.SIGINT])
+
+
 def test_one_amidst_the_last_words_is_one_line(tmp_path: Path) -> None:
     """Outside of what turns errors into messages."""
     done = program(tmp_path, "import builtins\nbuiltins.print = lambda *words: interrupt()")

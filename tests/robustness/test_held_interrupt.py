@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,6 +13,11 @@ import pytest
 
 from gelslim_core.files import file_lock, replaced_file, replaced_folder, scratch
 from gelslim_core.files.held_interrupt import interrupts_held
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.outputs import field_chunk
+from gelslim_force.outputs.field_chunk import FieldChunk
+from gelslim_force.outputs.recorded_run import read_run
+from gelslim_force.outputs.run_recorder import RunRecorder
 
 
 @pytest.fixture(autouse=True)
@@ -105,6 +111,25 @@ def test_other_threads_hold_nothing() -> None:
     thread.start()
     thread.join()
     assert seen == [signal.default_int_handler]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals a thread")
+def test_one_at_the_end_of_a_recorded_run_waits_for_the_thread_that_writes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    main, real = threading.get_ident(), field_chunk.write_chunk
+
+    def interrupted(path: Path, chunk: FieldChunk) -> None:
+        signal.pthread_kill(main, signal.SIGINT)
+        time.sleep(0.1)  # the main thread hears it now, in its wait for this one
+        real(path, chunk)
+
+    monkeypatch.setattr(chunk_writer, "write_chunk", interrupted)
+    with pytest.raises(KeyboardInterrupt), RunRecorder(tmp_path / "run") as run:
+        run.append(FrameResult(0, 0.0, problems=("unreadable",)))
+    assert read_run(tmp_path / "run").complete
+    names = {path.name for path in (tmp_path / "run").iterdir()}
+    assert names == {"run.json", "wrenches.csv", "stages.jsonl", "fields_00000.npz"}
 
 
 def write_file(place: Path) -> None:
