@@ -11,7 +11,10 @@ from importlib import metadata
 
 from gelslim_core.extras import EXTRAS, installed
 
-REQUIRED = ("numpy", "scipy", "numba", "pydantic", "ruamel.yaml", "typer", "rich", "threadpoolctl")
+REQUIRED = (
+    *("numpy", "scipy", "numba", "pydantic", "ruamel.yaml", "typer", "rich", "threadpoolctl"),
+    "filelock",
+)
 DISTRIBUTIONS = {
     "cv2": "opencv-python-headless",
     "PIL": "pillow",

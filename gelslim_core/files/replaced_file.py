@@ -17,10 +17,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from gelslim_core.files.file_lock import locked_new, orphaned, released
+from filelock import lock_descriptor
+
 from gelslim_core.files.held_interrupt import interrupts_held
 
 PART = re.compile(r"\.[0-9a-f]{16}\.part")
+_BINARY = getattr(os, "O_BINARY", 0)
 _swept: set[tuple[int, str]] = set()
 
 
@@ -73,9 +75,8 @@ def sweep(folder: Path, again: bool = False) -> None:
     _swept.add(key)
     with contextlib.suppress(OSError):
         for name in [entry.name for entry in os.scandir(folder) if is_part(entry.name)]:
-            with orphaned(folder / name) as free:
-                if free:
-                    (folder / name).unlink()
+            with contextlib.suppress(OSError):
+                _remove_orphan(folder / name)
 
 
 @contextlib.contextmanager
@@ -88,8 +89,8 @@ def _part_beside(target: Path) -> Iterator[IO[bytes]]:
                 yield stream
                 stream.flush()
                 os.fsync(descriptor)
-            if sys.platform == "win32":
-                released(descriptor)
+            if sys.platform == "win32":  # which moves no open file
+                os.close(descriptor)
                 descriptor = -1
             os.replace(part, target)
         except BaseException:
@@ -98,16 +99,34 @@ def _part_beside(target: Path) -> Iterator[IO[bytes]]:
             raise
         finally:
             if descriptor >= 0:
-                released(descriptor)
+                os.close(descriptor)
 
 
 def _new_part(folder: Path) -> tuple[Path, int]:
     while True:
         part = folder / f".{os.urandom(8).hex()}.part"
-        with contextlib.suppress(FileExistsError):
-            descriptor = locked_new(part)
-            if descriptor is not None:
-                return part, descriptor
+        descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | _BINARY, 0o666)
+        # A sweeper that found it before it was locked removes it.
+        if _locked(descriptor) is not False and os.fstat(descriptor).st_nlink:
+            return part, descriptor
+        os.close(descriptor)
+
+
+def _remove_orphan(part: Path) -> None:
+    descriptor = os.open(part, os.O_RDWR | _BINARY)
+    try:
+        if _locked(descriptor):
+            part.unlink()
+    finally:
+        os.close(descriptor)
+
+
+def _locked(descriptor: int) -> bool | None:
+    """Lock the file until the descriptor is closed; None where the file system has no locks."""
+    try:
+        return lock_descriptor(descriptor, blocking=False)
+    except OSError:
+        return None
 
 
 def _kind(target: Path) -> int:

@@ -11,8 +11,9 @@ import threading
 from pathlib import Path
 
 import pytest
+from filelock import lock_descriptor
 
-from gelslim_core.files import file_lock, replaced_file, replaced_folder
+from gelslim_core.files import replaced_file, replaced_folder
 from gelslim_core.files.file_lock import locked
 from gelslim_core.files.replaced_file import is_part, replace_file, replacement, sweep
 from gelslim_core.files.replaced_folder import FolderError, recover
@@ -165,6 +166,26 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path: Path) -> None:
         assert told == []
 
 
+@POSIX
+def test_without_locks_of_the_file_system_work_goes_on_and_nothing_is_swept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import fcntl
+
+    def unsupported(*_: object) -> None:
+        raise OSError(errno.ENOTSUP, "Operation not supported")
+
+    monkeypatch.setattr(fcntl, "flock", unsupported)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with locked(tmp_path / ".lock") as held, scratch_folder() as folder:
+        assert not held
+        with scratch_folder(), replacement(tmp_path / "a") as stream:
+            stream.write(b"whole")
+            sweep(tmp_path, again=True)
+        assert folder.is_dir()
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [("a", b"whole")]
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_forked_child_does_not_keep_the_lock(tmp_path: Path) -> None:
     lock = tmp_path / ".lock"
@@ -180,7 +201,7 @@ def test_a_forked_child_does_not_keep_the_lock(tmp_path: Path) -> None:
     holder.wait()
     try:
         descriptor = os.open(lock, os.O_RDWR)
-        assert file_lock.try_lock(descriptor) is True
+        assert lock_descriptor(descriptor, blocking=False)
         os.close(descriptor)
     finally:
         os.killpg(holder.pid, signal.SIGKILL)
