@@ -42,7 +42,7 @@ def test_an_interrupt_amidst_writing_leaves_nothing(
     events = random.Random(f"writing {command.name}")
     for k in range(6):
         out, scratch = tmp_path / f"out_{k}" / "out", tmp_path / f"tmp_{k}"
-        at = f"change:{round(2 ** events.uniform(0, 7))}"
+        at = f"change:{round(2 ** events.uniform(0, 6))}"
         number = signal.SIGTERM if k % 3 == 2 else signal.SIGINT
         run = interrupted(command.argv(place, out), scratch, number=number, at=at)
         run.was_one_line()

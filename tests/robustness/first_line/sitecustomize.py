@@ -2,7 +2,8 @@
 
 With FIRST_LINE, a file of that name is made as `gelslim.__main__` is about to run. With
 SIGNAL_AT, such as `change:7:2`, signal 2 is sent to the whole group at the seventh call after it
-that opens a file for writing, makes, moves or removes one; `import:7:2` at the seventh import.
+that opens a file for writing, makes, moves or removes one, caches of compiled code apart;
+`import:7:2` at the seventh import.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ MARK = os.environ.get("FIRST_LINE", "")
 ENTRY = os.path.join("gelslim", "__main__.py")
 KIND, _, WHEN = os.environ.get("SIGNAL_AT", "").partition(":")
 CHANGES = ("os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.link")
+CACHED = ("__pycache__", ".nbi", ".nbc", MARK)
 seen = {"first line": 0, "calls": 0}
 
 
@@ -26,11 +28,10 @@ def _first_line(event, args):  # type: ignore[no-untyped-def]
 
 
 def _counts(event, args):  # type: ignore[no-untyped-def]
-    if KIND == "import" or event in CHANGES:
-        return event == "import" or KIND == "change"
-    return (
-        event == "open" and isinstance(args[2], int) and bool(args[2] & (os.O_WRONLY | os.O_RDWR))
-    )
+    if KIND == "import":
+        return event == "import"
+    writes = event == "open" and isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR)
+    return (writes or event in CHANGES) and not any(word in str(args[0]) for word in CACHED)
 
 
 def _signal(event, args):  # type: ignore[no-untyped-def]
