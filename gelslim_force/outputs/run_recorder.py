@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from gelslim_core import optional_library
 from gelslim_core.files.file_lock import locked
+from gelslim_core.files.held_interrupt import interrupts_held
 from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_core.files.replaced_file import sweep
 from gelslim_force.forces.frame_result import FrameResult
@@ -41,7 +42,6 @@ from gelslim_force.outputs.run_manifest import (
     versions,
     write_manifest,
 )
-from gelslim_core.files.held_interrupt import interrupts_held
 
 LOCK = ".lock"
 WRENCHES, STAGES = "wrenches.csv", "stages.jsonl"

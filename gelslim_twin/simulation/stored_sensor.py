@@ -9,10 +9,10 @@ from typing import Any
 
 from gelslim_core.files.atomic_file import json_bytes, replace_file
 from gelslim_core.files.file_lock import locked
+from gelslim_core.files.replaced_file import sweep
 from gelslim_core.files.shared_use import use, used_elsewhere
 from gelslim_twin.simulation.run_folder import SimulationError
 from gelslim_twin.simulation.twin_sensor import TwinSensor
-from gelslim_core.files.replaced_file import sweep
 from ifem_export.bundle.files import load_bundle, write_bundle
 
 BUNDLE, RECORD = "bundle", "sensor.json"

@@ -124,7 +124,7 @@ def test_one_at_the_end_of_a_recorded_run_waits_for_the_thread_that_writes_it(
         time.sleep(0.1)  # the main thread hears it now, in its wait for this one
         real(path, chunk)
 
-    monkeypatch.setattr(chunk_writer, "write_chunk", interrupted)
+    monkeypatch.setattr(field_chunk, "write_chunk", interrupted)
     with pytest.raises(KeyboardInterrupt), RunRecorder(tmp_path / "run") as run:
         run.append(FrameResult(0, 0.0, problems=("unreadable",)))
     assert read_run(tmp_path / "run").complete
