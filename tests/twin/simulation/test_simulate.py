@@ -182,13 +182,13 @@ def test_a_stored_sensor_that_is_kept_is_swept_of_a_killed_writer_only(
     from ifem_export.bundle.files import load_bundle
 
     kept, sensor = tmp_path / "kept", TwinSensor(load_bundle(place / "bundle"))
-    store_sensor(sensor, kept, False)
+    store_sensor(sensor, kept)
     whole = {path.name for path in kept.iterdir()}
     with replacement(kept / "compliance-0.npy") as living:
         living.write(b"half")
         own = {path.name for path in kept.iterdir()} - whole
         (kept / ".0123456789abcdef.part").write_bytes(b"left")
-        store_sensor(sensor, kept, False)
+        store_sensor(sensor, kept)
         assert {path.name for path in kept.iterdir()} == whole | own
     assert all(is_part(name) for name in own)
     assert {path.name for path in kept.iterdir()} == whole | {"compliance-0.npy"}
