@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.calibration.error import CalibrationError
-from gelslim_force.frames.frame import FrameSourceError
 from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
 
 MOST_PICTURES = 100
@@ -28,7 +27,8 @@ def read_reference(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
         (h, w) or (h, w, 3) uint8, channels in the order red, green, blue.
 
     Raises:
-        CalibrationError: The file cannot be read, or OpenCV is needed and not installed.
+        CalibrationError: The file cannot be read.
+        MissingLibraryError: A picture file needs Pillow, which is not installed.
     """
     place = Path(path)
     if place.is_dir():
@@ -68,7 +68,7 @@ def _array(file: Path) -> NDArray[Any]:
 def _picture(file: Path) -> NDArray[np.uint8]:
     try:
         return read_picture(file)
-    except (PictureError, FrameSourceError) as error:
+    except PictureError as error:
         raise CalibrationError("file", f"{file}: {error}") from error
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import sys
 
 import numpy as np
 import pytest
 from calibration_samples import BUILD, seen_by, small_bundle
 
 from gelslim_force.calibration.calibration import calibrate
+from gelslim_core.errors import GelslimError
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.calibration.file import (
     calibration_of,
@@ -153,11 +155,9 @@ def test_half_a_picture_is_no_reference(tmp_path):
         read_reference(tmp_path / "half.jpg")
 
 
-def test_missing_readers_of_pictures_name_the_extra(tmp_path, monkeypatch):
-    import sys
-
+def test_a_missing_reader_of_pictures_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
+    monkeypatch.setitem(sys.modules, "PIL.Image", None)
     (tmp_path / "picture.png").write_bytes(b"x")
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(CalibrationError, match="install"):
+    with pytest.raises(GelslimError, match="install"):
         read_reference(tmp_path / "picture.png")
