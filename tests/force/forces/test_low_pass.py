@@ -19,7 +19,7 @@ from gelslim_force.forces.low_pass import (
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.surface_lattice import curvature_operator, neighbour_matrix
 from gelslim_force.motion.surface_motion import SurfaceMotion
-from gelslim_force.tracking.marker_noise import quiet_sigma
+from gelslim_force.tracking.marker_noise import robust_sigma
 from ifem_export.bundle.bundle import Bundle
 
 CELL_MM = np.asarray(small_bundle().mesh.cell_size_mm[:2])
@@ -143,7 +143,7 @@ def test_noise_of_the_normal_motion_is_told_from_a_contact(case) -> None:
 
 
 def test_too_few_rows_tell_no_noise() -> None:
-    assert quiet_sigma(np.ones((7, 2))) == 0.0
+    assert robust_sigma(np.ones((7, 2))) == 0.0
 
 
 def test_fixed_width_and_direct_do_as_told(case) -> None:

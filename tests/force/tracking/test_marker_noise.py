@@ -8,7 +8,7 @@ import pytest
 from gelslim_force.forces.low_pass import normal_noise_mm
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.motion.surface_lattice import curvature_operator, neighbour_matrix
-from gelslim_force.tracking.marker_noise import noise_px, quiet_sigma
+from gelslim_force.tracking.marker_noise import noise_px, robust_sigma
 
 ROWS, COLUMNS = 40, 55
 SITES = np.stack(np.mgrid[:ROWS, :COLUMNS], axis=-1).reshape(-1, 2)
@@ -40,7 +40,7 @@ def test_too_few_markers_give_no_noise() -> None:
         sites=SITES[:9], positions_px=LATTICE.positions_px[:9], markers=np.arange(9)
     )
     assert noise_px(small, np.ones((9, 2))) == 0.0
-    assert quiet_sigma(np.ones(7)) == 0.0
+    assert robust_sigma(np.ones(7)) == 0.0
 
 
 def test_normal_noise_is_the_one_that_was_added() -> None:
