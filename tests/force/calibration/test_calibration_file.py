@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from calibration_samples import BUILD, seen_by, small_bundle
 
-from gelslim_force.calibration.calibration import calibrate
 from gelslim_core.errors import GelslimError
+from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.calibration.file import (
     calibration_of,
