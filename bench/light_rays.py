@@ -22,11 +22,10 @@ from light_rays_figure import draw
 from machine import machine
 
 from gelslim_cad.light.study import RAYS
-from gelslim_optics.guide.facets import facetted_profile
-from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment, facetted_profile
 from gelslim_optics.guide.shapes import CurvedGuide, GelSection, curved_profile
 from gelslim_optics.guide.tir_certificate import certify_tir
-from gelslim_optics.light.points import Sampling
+from gelslim_optics.light.launch import Sampling
 from gelslim_optics.light.scene import LightScene
 from gelslim_optics.light.source import EdgeLaunch, LedRow
 from gelslim_optics.light.trace import TraceOptions, trace_light

@@ -6,9 +6,8 @@ import math
 
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_optics.guide.profile import GuideProfile
-from gelslim_optics.light.law import AngularLaw, Dome, Lambertian, MeasuredLaw
 from gelslim_optics.light.scene import PMMA_SELLMEIER, LightScene, Medium, Surface
-from gelslim_optics.light.source import LedRow
+from gelslim_optics.light.source import AngularLaw, Dome, Lambertian, LedRow, MeasuredLaw
 
 MIRROR_REFLECTANCE = 0.9
 """Aluminium on acrylic, unprotected; silver reaches 0.95."""

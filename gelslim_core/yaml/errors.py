@@ -118,7 +118,7 @@ class FieldError(ValueError):
     def __init__(
         self, field: str, message: str, remedy: str = "", related: tuple[str, ...] = ()
     ) -> None:
-        super().__init__(message)
+        super().__init__(f"{field}: {message}" if field else message)
         self.field = field
         self.message = message
         self.remedy = remedy

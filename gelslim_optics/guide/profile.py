@@ -1,15 +1,15 @@
-"""Cross-section of a light guide: segments and arcs, each with the media on its two sides.
+"""Cross-section of a light guide: segments and arcs with the media on both sides.
 
 The plane is (y, z): y across the finger, z out of the gel. The same profile is certified, traced
-and extruded to the CAD solid. A face that two bodies share is one edge with (left, right) media,
-never two coincident ones.
+and extruded to the CAD solid. A face that two bodies share is one edge with a left and a right
+medium, never two coincident edges.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 Point = tuple[float, float]
 CLOSED_MM = 1e-9
@@ -24,22 +24,18 @@ class Segment:
 
     @property
     def length_mm(self) -> float:
-        """Distance of the ends."""
+        """Distance of the two ends."""
         return math.dist(self.start, self.end)
 
     def at(self, part: float) -> Point:
-        """Point at `part` (0 to 1) of the way."""
+        """Point at the fraction `part` (0 to 1) of the length."""
         (a, b), (c, d) = self.start, self.end
         return (a + part * (c - a), b + part * (d - b))
-
-    def mapped(self, move: Callable[[Point], Point], mirrored: bool) -> Segment:
-        """The edge under a similarity map of the plane."""
-        return Segment(move(self.start), move(self.end))
 
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular edge about `centre` from `start` through `sweep_rad` (> 0: counter-clockwise)."""
+    """Circular edge about `centre` through `sweep_rad`, which is above 0 counter-clockwise."""
 
     centre: Point
     radius_mm: float
@@ -68,22 +64,15 @@ class Arc:
         return self.radius_mm * abs(self.sweep_rad)
 
     def at(self, part: float) -> Point:
-        """Point at `part` (0 to 1) of the way."""
+        """Point at the fraction `part` (0 to 1) of the length."""
         angle = self.start_rad + part * self.sweep_rad
         y, z = self.centre
         return (y + self.radius_mm * math.cos(angle), z + self.radius_mm * math.sin(angle))
 
-    def mapped(self, move: Callable[[Point], Point], mirrored: bool) -> Arc:
-        """The edge under a similarity map of the plane."""
-        centre, start = move(self.centre), move(self.start)
-        angle = math.atan2(start[1] - centre[1], start[0] - centre[0])
-        sweep = -self.sweep_rad if mirrored else self.sweep_rad
-        return Arc(centre, math.dist(centre, start), angle, sweep)
-
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge with the names of the media on its left and right, looking along it."""
+    """An edge with the names of the media on its left and right, seen along its direction."""
 
     name: str
     curve: Segment | Arc
@@ -91,7 +80,7 @@ class Edge:
     right: str
 
     def reversed(self) -> Edge:
-        """The same face, run the other way: its media change sides."""
+        """The same face in the opposite direction; its media change sides."""
         c = self.curve
         if isinstance(c, Segment):
             turned: Segment | Arc = Segment(c.end, c.start)
@@ -102,7 +91,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class Bend:
-    """Two concentric arcs that bound the guide: inner radius R, thickness t = outer - R."""
+    """Two concentric arcs that bound the guide, with inner radius R and thickness t."""
 
     centre: Point
     inner_radius_mm: float
@@ -111,7 +100,7 @@ class Bend:
 
     @property
     def thickness_mm(self) -> float:
-        """t."""
+        """Thickness t, outer less inner radius."""
         return self.outer_radius_mm - self.inner_radius_mm
 
     @property
@@ -122,7 +111,14 @@ class Bend:
 
 @dataclass(frozen=True)
 class GuideProfile:
-    """All edges of a cross-section; media are names, their indices belong to the scene."""
+    """All edges of a cross-section. Media are names; the scene gives their refractive indices.
+
+    Attributes:
+        edges: The edges, in any order.
+
+    Raises:
+        ValueError: An edge has the same medium on both sides, or no length.
+    """
 
     edges: tuple[Edge, ...]
 
@@ -134,20 +130,20 @@ class GuideProfile:
                 raise ValueError(f"edge {edge.name} has no length")
 
     def edge(self, name: str) -> Edge:
-        """The edge of a name; KeyError when there is none."""
+        """The edge with the given name. Raises KeyError where there is none."""
         for edge in self.edges:
             if edge.name == name:
                 return edge
         raise KeyError(f"the profile has no edge called {name}")
 
     def outline(self, medium: str) -> tuple[Edge, ...]:
-        """Edges around `medium`, end to start, with the medium on their left (counter-clockwise).
+        """The closed loop of edges around `medium`, counter-clockwise, the medium on the left.
 
-        Raises ValueError where they do not form one closed loop.
+        Raises ValueError where the edges do not form one closed loop.
         """
         free = [e if e.left == medium else e.reversed() for e in self.edges if touches(e, medium)]
         if not free:
-            raise ValueError(f"the profile holds no {medium}")
+            raise ValueError(f"the profile contains no {medium}")
         loop = [free.pop(0)]
         while free:
             end = loop[-1].curve.end
@@ -161,11 +157,11 @@ class GuideProfile:
         return tuple(loop)
 
     def area_mm2(self, medium: str) -> float:
-        """Area of a medium's region, arcs exact (Green's theorem)."""
+        """Area of the region of a medium, exact for arcs (Green's theorem)."""
         return sum(_swept(edge.curve) for edge in self.outline(medium))
 
     def bends(self, medium: str = "acrylic") -> tuple[Bend, ...]:
-        """Pairs of concentric arcs of equal sweep about `medium`, in the order of the edges."""
+        """Pairs of concentric arcs of equal sweep around `medium`, in the order of the edges."""
         arcs = [
             (e, e.curve if e.left == medium else e.reversed().curve)
             for e in self.edges
@@ -182,27 +178,9 @@ class GuideProfile:
             and i.radius_mm < o.radius_mm
         )
 
-    def moved(self, dy_mm: float, dz_mm: float) -> GuideProfile:
-        """The profile shifted."""
-        return self._mapped(lambda p: (p[0] + dy_mm, p[1] + dz_mm), mirrored=False)
-
-    def scaled(self, factor: float) -> GuideProfile:
-        """The profile grown about the origin."""
-        return self._mapped(lambda p: (p[0] * factor, p[1] * factor), mirrored=False)
-
-    def reflected(self) -> GuideProfile:
-        """The profile with y reversed; media change sides as the plane is mirrored."""
-        turned = self._mapped(lambda p: (-p[0], p[1]), mirrored=True)
-        return GuideProfile(tuple(replace(e, left=e.right, right=e.left) for e in turned.edges))
-
-    def _mapped(self, move: Callable[[Point], Point], mirrored: bool) -> GuideProfile:
-        return GuideProfile(
-            tuple(replace(e, curve=e.curve.mapped(move, mirrored)) for e in self.edges)
-        )
-
 
 def touches(edge: Edge, medium: str) -> bool:
-    """Whether a medium lies on one side of the edge."""
+    """Whether a medium is on one side of the edge."""
     return medium in (edge.left, edge.right)
 
 
@@ -213,3 +191,47 @@ def _swept(curve: Segment | Arc) -> float:
         return (a * d - b * c) / 2
     (y, z), r = curve.centre, curve.radius_mm
     return (y * (d - b) - z * (c - a) + r * r * curve.sweep_rad) / 2
+
+
+def facetted_profile(
+    profile: GuideProfile, facet_deg: float, margin_deg: float, *, allow: bool = False
+) -> GuideProfile:
+    """The profile with each arc of acrylic replaced by equal chords, as in a mesh.
+
+    The normal of a facet differs from that of the arc by up to half the angle of the facet.
+    Light that the arc guides with a smaller margin θ - θc than this may leak, however small the
+    distance between chord and arc is.
+
+    Args:
+        profile: The profile with arcs.
+        facet_deg: Largest angle of one chord, above 0 and at most 90.
+        margin_deg: Margin of total reflection of the light that the arcs guide.
+        allow: Whether facets above twice the margin are allowed.
+
+    Returns:
+        The profile; the chords of an arc keep its name.
+
+    Raises:
+        ValueError: `facet_deg` is out of range, or above twice the margin without `allow`.
+    """
+    if not 0 < facet_deg <= 90:
+        raise ValueError(f"facet_deg = {facet_deg!r}: must be over 0 and at most 90")
+    if facet_deg / 2 > margin_deg and not allow:
+        raise ValueError(
+            f"facets of {facet_deg:g}° turn the normal by up to {facet_deg / 2:g}°, more than the "
+            f"margin of total reflection of {margin_deg:g}°, and would leak light that the arc "
+            "guides; trace the exact arcs, or use smaller facets"
+        )
+    edges: list[Edge] = []
+    for edge in profile.edges:
+        edges.extend(_chords(edge, facet_deg))
+    return GuideProfile(tuple(edges))
+
+
+def _chords(edge: Edge, facet_deg: float) -> list[Edge]:
+    arc = edge.curve
+    if not isinstance(arc, Arc) or not touches(edge, "acrylic"):
+        return [edge]
+    count = max(1, math.ceil(math.degrees(abs(arc.sweep_rad)) / facet_deg - 1e-9))
+    corners: list[Point] = [arc.at(i / count) for i in range(count + 1)]
+    return [replace(edge, curve=Segment(a, b)) for a, b in pairwise(corners)]

@@ -1,10 +1,11 @@
 """Total internal reflection in one bend, in closed form.
 
-About the bend's centre h = n ρ cos ψ is constant along a ray in the section's plane (ρ: distance
-from the centre, ψ: angle to the tangent), whatever walls it meets and whatever the bend's angle.
-The outer wall is met at sin θ = h / (n R_o), the inner one, if at all, at sin θ = h / (n R): more
-grazingly, so the outer wall governs. Light fills the entry evenly in position and in the
-transverse n d (étendue), as from a Lambertian LED that covers the foot.
+About the centre of the bend h = n ρ cos ψ is constant along a ray in the plane of the section
+(ρ: distance from the centre, ψ: angle to the tangent), whatever walls it meets and whatever the
+angle of the bend. It meets the outer wall at sin θ = h / (n R_o) and the inner wall, if at all, at
+sin θ = h / (n R), which is more grazing, so that the outer wall governs. Light fills the entry
+uniformly in position and in the transverse n d (étendue), as from a Lambertian LED that covers the
+foot.
 """
 
 from __future__ import annotations
@@ -26,17 +27,23 @@ TIE_DEG = 1e-10
 
 @dataclass(frozen=True)
 class BendCertificate:
-    """One bend, for the light that enters it with numerical aperture up to `na` (in air).
+    """One bend, for light that enters it with a given numerical aperture.
 
-    ratio: R / t. least_ratio: least R / t that guides all this light; None where none does.
-    margin_deg: least angle of incidence at the outer wall less the critical angle; negative
-    where light leaks. inner_margin_deg: the same at the inner wall; never the smaller of the two.
-    guided_2d, guided_3d: share that the outer wall keeps of light that fills the entry, for rays
-    in the section's plane (even in n sin ψ) and in the whole cone (even over the disc of
-    transverse n d). error_3d bounds the quadrature's error (difference of two orders).
-    largest_na: largest aperture at the bend that is fully guided; None where not even collimated
-    light is. sweep_deg: the bend's angle. full_sweep_deg: the angle from which on every ray that
-    can leak does meet the outer wall; in a shorter bend less leaks than stated.
+    Attributes:
+        ratio: R / t.
+        least_ratio: Smallest R / t that guides all this light; None where none does.
+        margin_deg: Smallest angle of incidence at the outer wall less the critical angle; negative
+            where light leaks.
+        inner_margin_deg: The same at the inner wall, which is never the smaller of the two.
+        guided_2d: Share that the outer wall keeps of rays in the plane of the section, uniform in
+            n sin ψ.
+        guided_3d: The same for the whole cone, uniform over the disc of transverse n d.
+        error_3d: Bound of the error of the quadrature, the difference of two orders.
+        largest_na: Largest NA at the bend that is fully guided; None where not even collimated
+            light is.
+        sweep_deg: Angle of the bend.
+        full_sweep_deg: Angle from which on every ray that can leak meets the outer wall; a shorter
+            bend leaks less than stated.
     """
 
     ratio: float
@@ -52,39 +59,30 @@ class BendCertificate:
 
     @property
     def exact(self) -> bool:
-        """Whether the shares are exact; else the bend is so short that they are lower bounds."""
+        """Whether the shares are exact; in a short bend they are lower bounds."""
         return self.sweep_deg >= self.full_sweep_deg - 1e-9
 
 
 def least_ratio(na: float, guide_index: float, outside_index: float = 1.0) -> float:
-    """Least R/t that guides all light of numerical aperture `na`; inf where none does.
+    """Smallest R/t that guides all light of numerical aperture `na`; inf where none does.
 
     R/t >= n_out / (√(n² - NA²) - n_out), from h >= n_out R_o at ρ = R.
     """
-    spare = math.sqrt(max(guide_index**2 - na**2, 0.0)) - outside_index
-    return outside_index / spare if spare > 0 else math.inf
+    excess = math.sqrt(max(guide_index**2 - na**2, 0.0)) - outside_index
+    return outside_index / excess if excess > 0 else math.inf
 
 
 def largest_na(inner: float, guide_index: float, outside_index: float = 1.0) -> float | None:
-    """Largest NA guided fully by a bend with R / R_o = `inner`; None if not even 0 is."""
+    """Largest NA that a bend with R / R_o = `inner` guides fully; None where there is none."""
     square = guide_index**2 - (outside_index / inner) ** 2
-    # The threshold itself must count as guided, whatever its rounding.
+    # The threshold itself counts as guided, whatever the rounding.
     return math.sqrt(max(square, 0.0)) if square >= -1e-12 * guide_index**2 else None
-
-
-def local_acceptance(rho: Array, guide_index: float, outside_index: float = 1.0) -> Array:
-    """Largest guided NA of light that enters at ρ (in units of R_o); NaN where none is guided.
-
-    NA(ρ) = √(n² - (n_out R_o / ρ)²).
-    """
-    square = guide_index**2 - (outside_index / np.asarray(rho, dtype=float)) ** 2
-    return np.sqrt(np.where(square >= 0, square, np.nan))
 
 
 def certify_bend(
     bend: Bend, na: float, guide_index: float, outside_index: float
 ) -> BendCertificate:
-    """Certificate of one bend for light that fills its entry with `na` (0 to the guide's index)."""
+    """Certificate of a bend for light that fills its entry with `na` (0 to the guide's index)."""
     inner = bend.inner_radius_mm / bend.outer_radius_mm
     cosine = math.sqrt(max(guide_index**2 - na * na, 0.0)) / guide_index
     critical = math.asin(outside_index / guide_index)
@@ -108,11 +106,12 @@ def certify_bend(
 
 
 def full_sweep_deg(inner: float, cosine: float, sine_critical: float) -> float:
-    """Least angle of a bend in which every ray with h < n_out R_o meets the outer wall.
+    """Smallest angle of a bend in which every ray with h < n_out R_o meets the outer wall.
 
-    A ray that sets out inwards turns by β(ρ) + β(R_o) - 2 β(R) until then, β(r) = arccos(h / nr).
-    This rises with h up to h = n R and falls from there, so the longest way is known; rays out of
-    the plane turn less. 0 where no ray leaks. Lengths in R_o; `cosine`: least cos ψ at the entry.
+    A ray that starts inwards turns by β(ρ) + β(R_o) - 2 β(R) until then, β(r) = arccos(h / n r).
+    This increases with h up to h = n R and decreases from there, so that the longest path is known;
+    rays out of the plane turn less. The angle is 0 where no ray leaks. Lengths are in units of R_o;
+    `cosine` is the smallest cos ψ at the entry.
     """
     if inner * cosine >= sine_critical:
         return 0.0
@@ -123,7 +122,7 @@ def full_sweep_deg(inner: float, cosine: float, sine_critical: float) -> float:
 
 
 def guided_2d(inner: float, na: float, index: float) -> float:
-    """Guided share of rays in the plane; lengths in outer radii, indices over the outside's.
+    """Guided share of rays in the plane; lengths in R_o, indices relative to the outside.
 
     (1 / t) ∫ min(1, NA(ρ) / NA) dρ with NA(ρ) = √(n² - 1/ρ²), whose antiderivative is
     √(n²ρ² - 1) - arccos(1 / (n ρ)).
@@ -141,20 +140,20 @@ def guided_3d(
 ) -> float:
     """Guided share of the whole cone, by Gauss-Legendre between the kinks of the integrand.
 
-    With κ = ρ² (in outer radii), p = n d_⊥ and q = n d_x, over the outside's index, a ray is
-    guided iff p² <= n² - 1/κ + q² (1 - κ)/κ; (p, q) fill the disc of radius NA evenly.
+    With κ = ρ² (ρ in R_o), p = n d_⊥ and q = n d_x, relative to the outside index, a ray is guided
+    if and only if p² <= n² - 1/κ + q² (1 - κ)/κ; (p, q) fill the disc of radius NA uniformly.
     """
     na, index = na / outside, guide / outside
     if na == 0:
         return guided_2d(inner, 0.0, index)
-    # First the axial rays are kept, then meridional ones too, last the whole cone.
+    # With growing ρ the axial rays are guided first, then the meridional ones, then the whole cone.
     kinks = [1 / index, _full_from(na, index)]
     if na < 1:
         kinks.append(math.sqrt((1 - na * na) / (index**2 - na * na)))
     ends = sorted({inner, 1.0, *(k for k in kinks if inner < k < 1)})
     total = 0.0
     for low, high in itertools.pairwise(ends):
-        rho, weight = _bunched(low, high, nodes)
+        rho, weight = _clustered(low, high, nodes)
         share = np.array([_guided_at(float(r), na, index, nodes) for r in rho])
         total += float(weight @ share)
     return min(total / (1 - inner), 1.0)
@@ -185,7 +184,7 @@ def _guided_at(rho: float, na: float, index: float, nodes: int) -> float:
     if start >= na:
         return 0.0
     meet = math.sqrt((na * na - a) / (1 + b))
-    q, weight = _bunched(start, meet, nodes)
+    q, weight = _clustered(start, meet, nodes)
     area = float(weight @ np.sqrt(np.maximum(a + b * q * q, 0.0)))
     # Beyond `meet` the cone itself is the limit: a segment of the disc.
     chord = math.sqrt(max(na**2 - meet**2, 0.0))
@@ -193,8 +192,8 @@ def _guided_at(rho: float, na: float, index: float, nodes: int) -> float:
     return area * 4 / (math.pi * na * na)
 
 
-def _bunched(low: float, high: float, nodes: int) -> tuple[Array, Array]:
-    """Nodes and weights on [low, high] bunched at both ends, where roots have steep slopes."""
+def _clustered(low: float, high: float, nodes: int) -> tuple[Array, Array]:
+    """Nodes and weights on [low, high], clustered at the ends, where square roots are steep."""
     x, w = _gauss(nodes)
     angle = (x + 1) * math.pi / 4
     slope = np.sin(2 * angle) * math.pi / 4

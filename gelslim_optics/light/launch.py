@@ -1,12 +1,16 @@
-"""First rays of a source: points of the unit cube to places, directions and weights.
+"""The rays that a source launches: positions, directions and weights from random points.
 
-A launched ray is a row (x, y, z, dx, dy, dz, weight, reflected): the weight that enters its
-medium and what the foot reflects at once, of a flux of 1 per ray. Both are 0 if the foot is missed.
+A launched ray is a row (x, y, z, dx, dy, dz, weight, reflected): the weight that enters its medium
+and the weight that the foot reflects, of a flux of 1 per ray. Both are 0 for a ray that misses the
+foot. The points are a scrambled Sobol sequence or pseudo-random.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +20,39 @@ from gelslim_optics.light.scene import AIR, GEL, LightScene
 from gelslim_optics.light.source import EdgeLaunch, LedRow, Source
 
 Array = NDArray[np.float64]
-COLUMNS = 8
+Sampling = Literal["sobol", "random"]
+DIMENSIONS = 4
+
+
+def point_batches(
+    count: int, batch: int, *, seed: int, replicate: int, source: int, sampling: Sampling
+) -> Iterator[NDArray[np.float64]]:
+    """`count` points of the unit cube (n, 4) in batches; the batch size never changes a point.
+
+    A Sobol sequence is scrambled independently for every replicate and source, so that replicates
+    are independent and each is unbiased. For Sobol `count` should be a power of 2.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([seed, replicate, source]))
+    if sampling == "sobol":
+        from scipy.stats import qmc
+
+        engine = qmc.Sobol(DIMENSIONS, scramble=True, seed=rng)
+        draw = engine.random
+    else:
+
+        def draw(n: int) -> NDArray[np.float64]:
+            return rng.random((n, DIMENSIONS))
+
+    for start in range(0, count, batch):
+        with warnings.catch_warnings():
+            # Only the whole set needs a power of 2 of points, not each batch.
+            warnings.simplefilter("ignore", UserWarning)
+            points = draw(min(batch, count - start))
+        yield points
 
 
 def launch_medium(scene: LightScene, source: Source) -> str:
-    """Medium that the source's rays start in.
+    """The medium in which the rays of a source start.
 
     Raises ValueError where the source's edge is missing, curved, or does not meet that medium.
     """
@@ -37,9 +69,9 @@ def launch_medium(scene: LightScene, source: Source) -> str:
 
 
 def launch(scene: LightScene, source: Source, points: Array) -> Array:
-    """Rays (n, 8) for `points` (n, 4) in [0, 1): two for the place, two for the direction.
+    """Rays (n, 8) for `points` (n, 4) in [0, 1): two for the position, two for the direction.
 
-    Refraction and reflection at the foot are Fresnel's for unpolarised light.
+    Refraction and reflection at the foot follow Fresnel's equations for unpolarised light.
     """
     edge = _source_edge(scene, source)
     medium = launch_medium(scene, source)

@@ -1,20 +1,103 @@
-"""Emitters: rows of LEDs under a foot, and launches from an edge straight into a medium."""
+"""Light sources: rows of LEDs under a foot, and launches from an edge, with their emission laws."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
-from gelslim_optics.light.law import AngularLaw, Lambertian
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+TABLE_STEPS = 8192
+
+
+@dataclass(frozen=True)
+class Lambertian:
+    """Intensity ∝ cos θ: a bare LED behind a flat window."""
+
+    def cosine(self, u: Array) -> Array:
+        """cos θ of the cone about the axis that contains the share u of the flux."""
+        return np.sqrt(1 - u)
+
+
+@dataclass(frozen=True)
+class Dome:
+    """Intensity ∝ cosᵐ θ within `half_angle_deg` and none outside: an LED with a lens."""
+
+    half_angle_deg: float = 60.0
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.half_angle_deg <= 90:
+            raise ValueError(f"half_angle_deg = {self.half_angle_deg!r}: must be in (0, 90]")
+        if not (math.isfinite(self.exponent) and self.exponent >= 0):
+            raise ValueError(f"exponent = {self.exponent!r}: must be >= 0")
+
+    def cosine(self, u: Array) -> Array:
+        """cos θ of the cone about the axis that contains the share u of the flux."""
+        power = self.exponent + 1
+        last = math.cos(math.radians(self.half_angle_deg)) ** power
+        return (1 - u * (1 - last)) ** (1 / power)
+
+
+@dataclass(frozen=True)
+class MeasuredLaw:
+    """Relative intensity per solid angle at increasing angles, linear between them."""
+
+    angle_deg: tuple[float, ...]
+    intensity: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        angles, values = np.asarray(self.angle_deg), np.asarray(self.intensity)
+        if angles.size < 2 or angles.size != values.size:
+            raise ValueError("a measured law needs two or more angles and as many intensities")
+        if not (angles[0] == 0 and angles[-1] <= 90 and np.all(np.diff(angles) > 0)):
+            raise ValueError("angle_deg must start at 0, rise, and end at 90 or below")
+        if not (np.all(np.isfinite(values)) and np.all(values >= 0) and np.any(values > 0)):
+            raise ValueError("intensity must be finite, >= 0 and not all zero")
+
+    def cosine(self, u: Array) -> Array:
+        """cos θ of the cone about the axis that contains the share u of the flux."""
+        cosines, shares = _cumulative(self)
+        return np.interp(u, shares, cosines)
+
+
+@lru_cache(maxsize=32)
+def _cumulative(law: MeasuredLaw) -> tuple[Array, Array]:
+    """cos θ on a fine grid from the axis outwards, and the share of flux within each cone."""
+    theta = np.linspace(0.0, math.radians(law.angle_deg[-1]), TABLE_STEPS)
+    density = np.interp(theta, np.radians(law.angle_deg), law.intensity)
+    cosines = np.cos(theta)
+    steps = (density[1:] + density[:-1]) / 2 * -np.diff(cosines)
+    shares = np.concatenate(([0.0], np.cumsum(steps)))
+    return cosines, shares / shares[-1]
+
+
+AngularLaw = Lambertian | Dome | MeasuredLaw
 
 
 @dataclass(frozen=True)
 class LedRow:
-    """Square LEDs facing a foot from outside, their faces parallel to it at `gap_mm`.
+    """A row of square LEDs that face a foot from outside, parallel to it.
 
-    `x_mm` are the LEDs' centres; `offset_mm` shifts them along the foot's start-to-end direction
-    (placement). Light crosses the air to the foot and refracts in; what passes the foot is
-    booked as missed. `power` is the row's share of the flux relative to other sources.
+    Light crosses the air to the foot and is refracted into it; light beside the foot is counted as
+    missed.
+
+    Attributes:
+        edge: Name of the edge of the foot.
+        x_mm: Centres of the LEDs along x.
+        size_mm: Side of an LED.
+        gap_mm: Air between LED and foot.
+        law: Emission law.
+        colour: Name of the colour.
+        wavelength_um: Wavelength; None uses the index of the colour.
+        power: Flux relative to the other sources.
+        offset_mm: Shift along the foot, from its start to its end.
+
+    Raises:
+        ValueError: There is no LED, or a value is out of range.
     """
 
     edge: str
@@ -39,11 +122,11 @@ class LedRow:
 
 @dataclass(frozen=True)
 class EdgeLaunch:
-    """Light that starts on a whole edge, inside the medium `into`, for checks.
+    """Light that starts on a whole edge inside the medium `into`, for comparison with theory.
 
-    `na`: numerical aperture n sin θ of the cone about the edge's normal, filled evenly in
-    projected solid angle; None fills the half space (Lambertian), 0 is collimated. `planar`
-    keeps the rays in the profile's plane, evenly in n sin θ.
+    `na` is the numerical aperture n sin θ of the cone about the normal of the edge, filled
+    uniformly in projected solid angle; None fills the half space (Lambertian), 0 is collimated.
+    `planar` keeps the rays in the plane of the profile, uniform in n sin θ.
     """
 
     edge: str

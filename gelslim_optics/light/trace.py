@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.kernel_cache import drop_stale
-from gelslim_optics.light.launch import launch, launch_medium
-from gelslim_optics.light.points import Sampling, point_batches
+from gelslim_optics.light.launch import Sampling, launch, launch_medium, point_batches
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.scene import LightScene
 from gelslim_optics.light.source import Source

@@ -1,8 +1,9 @@
-"""Scenes that several light tests share."""
+"""Profiles and scenes that several light tests share."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
 from gelslim_optics.guide.shapes import (
@@ -46,6 +47,33 @@ def slab(half_mm: float, thick_mm: float, top: str = "air", side: str = "air") -
         ("top", top),
         ("left", side),
     )
+
+
+def transformed(
+    profile: GuideProfile,
+    dy_mm: float = 0.0,
+    dz_mm: float = 0.0,
+    factor: float = 1.0,
+    *,
+    mirrored: bool = False,
+) -> GuideProfile:
+    """The profile mirrored in y, scaled about the origin, then moved; media keep their sides."""
+    sign = -1.0 if mirrored else 1.0
+
+    def move(point: tuple[float, float]) -> tuple[float, float]:
+        return sign * factor * point[0] + dy_mm, factor * point[1] + dz_mm
+
+    edges = []
+    for edge in profile.edges:
+        c, curve = edge.curve, edge.curve
+        if isinstance(c, Segment):
+            curve = Segment(move(c.start), move(c.end))
+        else:
+            start = math.pi - c.start_rad if mirrored else c.start_rad
+            curve = Arc(move(c.centre), factor * c.radius_mm, start, sign * c.sweep_rad)
+        left, right = (edge.right, edge.left) if mirrored else (edge.left, edge.right)
+        edges.append(replace(edge, curve=curve, left=left, right=right))
+    return GuideProfile(tuple(edges))
 
 
 INNER_PART = 0.02

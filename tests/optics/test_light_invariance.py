@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from light_cases import bend_scene, finger
+from light_cases import bend_scene, finger, transformed
 
 from gelslim_optics.guide.profile import GuideProfile
 from gelslim_optics.light.result import LightResult
@@ -33,7 +33,7 @@ def assert_same(a: LightResult, b: LightResult, within: float) -> None:
 @pytest.mark.parametrize("mirror", ["", "glued", "gap"])
 def test_moving_by_a_metre(mirror: str) -> None:
     scene = finger(1.5, mirror=mirror)
-    moved = replace(scene, profile=scene.profile.moved(1000.0, -700.0))
+    moved = replace(scene, profile=transformed(scene.profile, 1000.0, -700.0))
     # A ray within rounding of a branch may go the other way: one weighs 1 / RAYS.
     assert_same(trace_light(scene, RAYS), trace_light(moved, RAYS), 2e-4)
 
@@ -56,7 +56,7 @@ def test_scaling_by_a_thousand_with_absorption_per_length() -> None:
         for name, m in scene.media.items()
     }
     big = LightScene(
-        scene.profile.scaled(f),
+        transformed(scene.profile, factor=f),
         (f * scene.x_mm[0], f * scene.x_mm[1]),
         (f * scene.gel_x_mm[0], f * scene.gel_x_mm[1]),
         rows,
@@ -70,7 +70,7 @@ def test_scaling_by_a_thousand_with_absorption_per_length() -> None:
 
 def test_mirroring_mirrors_the_map() -> None:
     scene = finger(1.5, crown_mm=0.5)
-    turned = replace(scene, profile=scene.profile.reflected())
+    turned = replace(scene, profile=transformed(scene.profile, mirrored=True))
     a, b = trace_light(scene, RAYS), trace_light(turned, RAYS)
     assert_same(a, b, 2e-4)
     assert np.allclose(a.irradiance("red"), b.irradiance("red")[:, ::-1], atol=1e-6)

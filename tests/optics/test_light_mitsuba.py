@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 from shapely.geometry.polygon import orient
 
-from gelslim_optics.guide.facets import facetted_profile
-from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
+from gelslim_optics.guide.profile import Edge, GuideProfile, Segment, facetted_profile
 from gelslim_optics.guide.tir_certificate import certify_tir
 from gelslim_optics.light.result import estimate
 from gelslim_optics.light.scene import LightScene

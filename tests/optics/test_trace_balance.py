@@ -11,9 +11,8 @@ import pytest
 from light_cases import COATS, N_ACRYLIC, N_GEL, finger, loop, media, slab
 
 from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
-from gelslim_optics.light.law import Dome
 from gelslim_optics.light.scene import LightScene, Medium, Surface
-from gelslim_optics.light.source import EdgeLaunch, LedRow
+from gelslim_optics.light.source import Dome, EdgeLaunch, LedRow
 from gelslim_optics.light.trace import TraceOptions, trace_light
 from gelslim_optics.light.trace_face import fresnel
 

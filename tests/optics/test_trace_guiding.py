@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from light_cases import COATS, N_ACRYLIC, bend_scene, lone_bend, loop, media, slab
 
-from gelslim_optics.guide.facets import facetted_profile
+from gelslim_optics.guide.profile import facetted_profile
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.scene import LightScene, Surface
 from gelslim_optics.light.source import EdgeLaunch

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gelslim_optics.light.law import Dome, Lambertian, MeasuredLaw
-from gelslim_optics.light.points import point_batches
-from gelslim_optics.light.source import EdgeLaunch, LedRow
+from gelslim_optics.light.launch import point_batches
+from gelslim_optics.light.scene import default_media
+from gelslim_optics.light.source import Dome, EdgeLaunch, Lambertian, LedRow, MeasuredLaw
 
 U = (np.arange(100_000) + 0.5) / 100_000
 
@@ -57,6 +57,14 @@ def test_bad_sources_are_refused() -> None:
         Dome(0.0)
     with pytest.raises(ValueError, match="na"):
         EdgeLaunch("foot_left", na=-1.0)
+
+
+def test_acrylic_has_its_published_index_at_the_colours_of_the_leds() -> None:
+    """Sultanova, Kasarova and Nikolov (2009) measured PMMA from 0.437 to 1.052 µm."""
+    acrylic = default_media()["acrylic"]
+    found = [acrylic.index_for("white", wavelength) for wavelength in (0.525, 0.59, 0.625)]
+    assert found == pytest.approx([1.494, 1.4906, 1.489], abs=6e-4)
+    assert acrylic.index_for("white") == 1.4906
 
 
 def test_pieces_of_a_batch_join_up_and_replicates_differ() -> None:
