@@ -20,7 +20,13 @@ Precision = Literal["float32", "float64"]
 """Precision of positions, displacements and forces; times and wrenches are always float64."""
 PER_MARKER = ("places_px", "displacement_px", "status", "dots", "marker_displacement_mm")
 PER_NODE = ("displacement_mm", "force_n", "traction_mpa", "contact")
-_NO_FIELD = (math.nan, math.nan, math.nan, math.nan)
+_NO_NODES = np.zeros((0, 3))
+NO_FIELD = ForceField(
+    _NO_NODES, _NO_NODES, _NO_NODES, _NO_NODES, np.zeros(0, np.bool_), np.full(2, np.nan),
+    slip_margin=math.nan, misfit=math.nan,
+)  # fmt: skip
+"""What stands for the field of a frame that has none; `NO_WRENCH` for its wrench."""
+NO_WRENCH = Wrench(np.full(3, np.nan), np.full(3, np.nan), np.full((6, 6), np.nan))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,59 +55,43 @@ class PackedFrame:
 def pack(result: FrameResult, precision: Precision) -> PackedFrame:
     """Copy a result into arrays; missing arrays have length 0 and missing numbers are NaN."""
     real = np.dtype(precision)
-    tracks, field, wrench = result.tracks, result.field, result.wrench
+    field, wrench = result.field or NO_FIELD, result.wrench or NO_WRENCH
     motion = result.marker_displacement_mm
+    count = 0 if motion is None else len(motion)
+    tracks = _no_tracks(count) if result.tracks is None else result.tracks
+    if motion is None:
+        motion = np.full((len(tracks), 3), np.nan)
     arrays: dict[str, NDArray[Any]] = {
-        "index": np.array(result.index, dtype=np.int64),
-        "time_s": np.array(result.time_s, dtype=np.float64),
-        "normal_known": np.array(result.normal_known, dtype=np.bool_),
-        "has_tracks": np.array(tracks is not None),
-        "has_marker_displacement": np.array(motion is not None),
-        "has_field": np.array(field is not None),
-        "has_wrench": np.array(wrench is not None),
+        "index": np.array(result.index, np.int64),
+        "time_s": np.array(result.time_s, np.float64),
+        "normal_known": np.array(result.normal_known, np.bool_),
+        "has_tracks": np.array(result.tracks is not None),
+        "has_marker_displacement": np.array(result.marker_displacement_mm is not None),
+        "has_field": np.array(result.field is not None),
+        "has_wrench": np.array(result.wrench is not None),
+        "places_px": np.array(tracks.positions_px, real),
+        "displacement_px": np.array(tracks.displacement_px, real),
+        "status": np.array(tracks.status, np.int8),
+        "dots": np.array(tracks.dots, np.int32),
+        "marker_displacement_mm": np.array(motion, real),
+        "displacement_mm": np.array(field.displacement_mm, real),
+        "force_n": np.array(field.force_n, real),
+        "traction_mpa": np.array(field.traction_mpa, real),
+        "contact": np.array(field.contact, np.bool_),
+        "centre_of_pressure_mm": np.array(field.centre_of_pressure_mm, np.float64),
+        "slip_margin": np.array(field.slip_margin, np.float64),
+        "misfit": np.array(field.misfit, np.float64),
+        "wrench": np.array(wrench.vector, np.float64),
+        "wrench_covariance": np.array(wrench.covariance, np.float64),
     }
-    arrays |= _marker_arrays(tracks, motion, real)
-    arrays |= _node_arrays(field, real)
-    torque = np.full(6, np.nan) if wrench is None else wrench.vector
-    covariance = np.full((6, 6), np.nan) if wrench is None else wrench.covariance
-    arrays["wrench"] = np.array(torque, dtype=np.float64)
-    arrays["wrench_covariance"] = np.array(covariance, dtype=np.float64)
-    points = None if field is None else np.array(field.points_mm, dtype=np.float64)
+    points = None if result.field is None else np.array(field.points_mm, dtype=np.float64)
     extra = json.dumps({str(key): plain(value) for key, value in result.extra.items()})
     return PackedFrame(arrays, points, tuple(result.problems), extra)
 
 
-def _marker_arrays(
-    tracks: Tracks | None, motion: NDArray[np.float64] | None, real: np.dtype[Any]
-) -> dict[str, NDArray[Any]]:
-    count = len(tracks) if tracks is not None else 0 if motion is None else len(motion)
-    unknown = np.full((count, 3), np.nan)
-    return {
-        "places_px": np.array(unknown[:, :2] if tracks is None else tracks.positions_px, real),
-        "displacement_px": np.array(
-            unknown[:, :2] if tracks is None else tracks.displacement_px, real
-        ),
-        "status": np.array(np.full(count, -1) if tracks is None else tracks.status, np.int8),
-        "dots": np.array(np.full(count, -1) if tracks is None else tracks.dots, np.int32),
-        "marker_displacement_mm": np.array(unknown if motion is None else motion, real),
-    }
-
-
-def _node_arrays(field: ForceField | None, real: np.dtype[Any]) -> dict[str, NDArray[Any]]:
-    none = np.zeros((0, 3))
-    scalars = _NO_FIELD
-    if field is not None:
-        x, y = (float(value) for value in field.centre_of_pressure_mm)
-        scalars = (x, y, float(field.slip_margin), float(field.misfit))
-    return {
-        "displacement_mm": np.array(none if field is None else field.displacement_mm, real),
-        "force_n": np.array(none if field is None else field.force_n, real),
-        "traction_mpa": np.array(none if field is None else field.traction_mpa, real),
-        "contact": np.array(np.zeros(0) if field is None else field.contact, np.bool_),
-        "centre_of_pressure_mm": np.array(scalars[:2], dtype=np.float64),
-        "slip_margin": np.array(scalars[2], dtype=np.float64),
-        "misfit": np.array(scalars[3], dtype=np.float64),
-    }
+def _no_tracks(markers: int) -> Tracks:
+    unknown, nothing = np.full((markers, 2), np.nan), np.full(markers, -1)
+    return Tracks(unknown, unknown, nothing, nothing)
 
 
 def unpack(

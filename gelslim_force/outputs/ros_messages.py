@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.forces.wrench import Wrench
+from gelslim_force.outputs.packed_frame import NO_FIELD, NO_WRENCH
 
 WRENCH_STAMPED = "geometry_msgs/msg/WrenchStamped"
 FORCE_FIELD = "gelslim_msgs/msg/ForceField"
@@ -57,32 +58,26 @@ def wrench_stamped(result: FrameResult, frame_id: str) -> Message | None:
 
 def force_field(result: FrameResult, frame_id: str) -> Message:
     """Return a gelslim_msgs/msg/ForceField; what the frame does not have is NaN or empty."""
-    field, tracks = result.field, result.tracks
-    message: Message = {
+    field, wrench = result.field or NO_FIELD, result.wrench or NO_WRENCH
+    tracks = result.tracks
+    return {
         "header": _header(result, frame_id),
         "frame_index": int(result.index) % 2**32,
         "normal_known": result.normal_known,
-        "wrench": _wrench(result.wrench),
-        "wrench_covariance": _covariance(result.wrench),
-        "centre_of_pressure": [math.nan] * 2,
-        "slip_margin": math.nan,
-        "misfit": math.nan,
+        "wrench": _wrench(wrench),
+        "wrench_covariance": (wrench.covariance * np.outer(_SI_UNITS, _SI_UNITS)).ravel().tolist(),
+        "centre_of_pressure": (np.asarray(field.centre_of_pressure_mm) / 1e3).tolist(),
+        "slip_margin": field.slip_margin,
+        "misfit": field.misfit,
+        "points": _float32(field.points_mm * 1e-3),
+        "displacement": _float32(field.displacement_mm * 1e-3),
+        "force": _float32(field.force_n),
+        "traction": _float32(field.traction_mpa * 1e6),
+        "contact": field.contact.tolist(),
         "markers": 0 if tracks is None else len(tracks),
         "markers_tracked": 0 if tracks is None else int(tracks.tracked.sum()),
         "problems": [_text(problem) for problem in result.problems],
     }
-    if field is not None:
-        message |= {
-            "centre_of_pressure": (np.asarray(field.centre_of_pressure_mm) / 1e3).tolist(),
-            "slip_margin": field.slip_margin,
-            "misfit": field.misfit,
-            "points": _float32(field.points_mm * 1e-3),
-            "displacement": _float32(field.displacement_mm * 1e-3),
-            "force": _float32(field.force_n),
-            "traction": _float32(field.traction_mpa * 1e6),
-            "contact": field.contact.tolist(),
-        }
-    return message
 
 
 def _header(result: FrameResult, frame_id: str) -> Message:
@@ -90,19 +85,10 @@ def _header(result: FrameResult, frame_id: str) -> Message:
     return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": _text(frame_id)}
 
 
-def _wrench(wrench: Wrench | None) -> Message:
-    values = np.full(6, np.nan) if wrench is None else wrench.vector * _SI_UNITS
-    force, torque = (dict(zip("xyz", part, strict=True)) for part in np.split(values, 2))
+def _wrench(wrench: Wrench) -> Message:
+    parts = np.split(wrench.vector * _SI_UNITS, 2)
+    force, torque = (dict(zip("xyz", part, strict=True)) for part in parts)
     return {"force": force, "torque": torque}
-
-
-def _covariance(wrench: Wrench | None) -> list[float]:
-    """36 numbers in N and N m, row by row."""
-    if wrench is None:
-        return [math.nan] * 36
-    scale = np.outer(_SI_UNITS, _SI_UNITS)
-    values: list[float] = (wrench.covariance * scale).ravel().tolist()
-    return values
 
 
 def _float32(values: ArrayLike) -> list[float]:
