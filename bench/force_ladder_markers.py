@@ -16,8 +16,8 @@ from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.matching import MatchMode, match
 from gelslim_twin.render.defocus import Defocus
+from gelslim_twin.render.frame_renderer import RenderedFrame
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.rendered_frame import RenderedFrame
 from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 

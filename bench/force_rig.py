@@ -17,9 +17,8 @@ from gelslim_force.contact.indenter import Sphere
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 from gelslim_optics.light.light_map import red_green_sides
 from gelslim_twin.render.defocus import Defocus
-from gelslim_twin.render.frame_renderer import FrameRenderer
+from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.rendered_frame import RenderedFrame
 from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState

@@ -30,10 +30,8 @@ from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.light.light_map import LED_COLOURS, LightMap, red_green_sides
 from gelslim_twin.render.compression import Compression
 from gelslim_twin.render.defocus import Defocus
-from gelslim_twin.render.frame_renderer import FrameRenderer
-from gelslim_twin.render.look import Look
-from gelslim_twin.render.rendered_frame import RenderedFrame
-from gelslim_twin.render.sensor_look import sensor_look
+from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
+from gelslim_twin.render.look import Look, sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
 
@@ -174,8 +172,8 @@ def rms(errors: Array) -> float:
 
 def stage_rows(sensor: Sensor, repeats: int) -> list[dict[str, Any]]:
     """A frame with everything but compression, stage by stage."""
-    from gelslim_twin.render.compose_kernel import develop
-    from gelslim_twin.render.dot_outlines import centroids_px, outlines_px
+    from gelslim_twin.render.image_kernel import develop
+    from gelslim_twin.render.printed_dots import centroids_px, outlines_px
 
     look = sensor_look(sensor.aperture_mm, sensor.focus_mm)
     r, now, before = sensor.renderer(look), pressed(0.1), pressed()
@@ -248,7 +246,7 @@ def even_light(sensor: Sensor) -> LightMap:
 
 def ink_centres(r: FrameRenderer, state: SurfaceState) -> Array:
     """Centroids (m, 2) of each dot's coverage, drawn alone, from the pixels' values."""
-    from gelslim_twin.render.dot_outlines import centroids_px, outlines_px
+    from gelslim_twin.render.printed_dots import centroids_px, outlines_px
 
     outlines = outlines_px(r.camera, r.dots, state)
     centres, area = centroids_px(outlines)

@@ -20,12 +20,11 @@ from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.scene.question import plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
-from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.simulation.stored_sensor import BUNDLE
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.mesh.pad_mesh import PadMesh
 

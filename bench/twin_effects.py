@@ -18,16 +18,15 @@ from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.effect import OBSERVABLES, Bound, Effect
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.plan import Plan
-from gelslim_twin.planner import Question, make_plan
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import Question, make_plan
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import LoadedScene
-from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.stored_sensor import BUNDLE
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 
 Array = NDArray[np.float64]
 MECHANICS = ("friction", "nonlinearity", "relaxation")

@@ -20,7 +20,7 @@ from twin_rig import KeptBench, plan_key, turns_ms
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.plan import Plan
+from gelslim_twin.planning.plan import Plan
 
 Array = NDArray[np.float64]
 Rows = list[dict[str, Any]]

@@ -29,7 +29,7 @@ from twin_overhead import overhead
 from twin_rig import SPEC, KeptBench, gallery, kept_sensor
 
 from gelslim_twin.scene.reader import LoadedScene
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import TwinSensor
 
 NAME = "twin_ladders"
 POSES = 4

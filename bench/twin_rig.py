@@ -15,15 +15,14 @@ from twin_effects import MECHANICS, Bench
 from gelslim.scene_sensor import spec_bundle
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.plan import Plan
-from gelslim_twin.planner import make_plan
-from gelslim_twin.scene.question import question
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import make_plan
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene, read_scene
-from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.stored_sensor import BUNDLE, store_sensor, stored_sensor
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, store_sensor, stored_sensor
 
 ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "designs" / "gelslim2.yaml"

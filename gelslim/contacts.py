@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gelslim_core.budget.budget import Budget
     from gelslim_core.budget.ladder import Choice
     from gelslim_twin.effects.circumstances import SensorFigures
-    from gelslim_twin.plan import Plan
+    from gelslim_twin.planning.plan import Plan
     from gelslim_twin.scene.reader import LoadedScene
     from gelslim_twin.validation.validation import Validation
 
@@ -48,7 +48,7 @@ def plan(scene: SceneLike, budget: Budget | None = None) -> Plan:
         BudgetError: No plan keeps the budget.
     """
     from gelslim.scene_sensor import require_within_gel, sensor_figures
-    from gelslim_twin.scene.question import plan_scene
+    from gelslim_twin.planning.question import plan_scene
 
     loaded, _ = with_budget(scene_of(scene), budget)
     figures = sensor_figures(loaded)
@@ -93,8 +93,7 @@ def simulate(
         ContactError: A contact was not solved.
     """
     from gelslim.scene_sensor import require_within_gel, scene_bundle
-    from gelslim_twin.simulation.stored_sensor import store_sensor
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor, store_sensor
 
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
@@ -143,8 +142,7 @@ def validate(
     from gelslim.scene_sensor import spec_bundle
     from gelslim_cad.dimensions import derive
     from gelslim_cad.sensor.pad import measured_ladder
-    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor, store_sensor, stored_sensor
     from gelslim_twin.validation.validate import validate as validated
 
     sensor = TwinSensor(spec_bundle(Path(spec)))
@@ -180,8 +178,8 @@ def with_budget(
     if budget is None or budget.unlimited:
         return loaded, None
     from gelslim.scene_sensor import sensor_figures
-    from gelslim_twin.scene.question import question
-    from gelslim_twin.tolerance_ladder import choose_tolerance
+    from gelslim_twin.planning.question import question
+    from gelslim_twin.planning.tolerance_ladder import choose_tolerance
 
     figures = sensor_figures(loaded)
     paces = machine_paces(figures)
@@ -219,8 +217,8 @@ def _one(
     from threadpoolctl import threadpool_limits
 
     from gelslim_twin.simulation.scene_task import job_of
+    from gelslim_twin.simulation.sensor import stored_sensor
     from gelslim_twin.simulation.simulate import simulate as simulated
-    from gelslim_twin.simulation.stored_sensor import stored_sensor
 
     place = _sensor_folder(folder)
     job = job_of(loaded, stored_sensor(place), place)

@@ -49,8 +49,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "forces", "dot_tracking", "outputs", "settings", "pipeline", "sensor", "run",
     ),
     "gelslim_twin": (
-        "effects", "plan", "planner", "scene", "sensor_figures", "tolerance_ladder",
-        "relaxation", "contact", "render", "view", "simulation", "validation",
+        "effects", "scene", "planning", "contact", "render", "simulation", "validation",
     ),
     "gelslim_cad": (
         "spec", "markers", "geometry", "light", "dimensions", "checks", "export", "proof",
@@ -165,8 +164,8 @@ def f():
         "gelslim_cad.geometry.sight",
         "gelslim_optics.camera.virtual_camera",
         "ifem_export.bundle.files",
-        "gelslim_twin.planner",
-        "gelslim_twin.scene.question",
+        "gelslim_twin.planning.planner",
+        "gelslim_twin.planning.question",
     ],
 )
 def test_light_modules_load_no_cad(module: str) -> None:

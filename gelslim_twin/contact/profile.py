@@ -20,6 +20,7 @@ from gelslim_twin.scene.indenter import (
     TexturedPlane,
     Wedge,
 )
+from gelslim_twin.scene.stl_extent import stl_corners
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]
@@ -59,8 +60,6 @@ def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
         case TexturedPlane():
             return _texture(indenter, seed)
         case Stl():
-            from gelslim_twin.contact.relief import stl_profile
-
             return stl_profile(indenter, folder)
 
 
@@ -83,8 +82,6 @@ def _texture(plane: TexturedPlane, seed: int) -> Profile:
         return np.asarray(relief / 4 * (2 - np.cos(wave * x) - np.cos(wave * y)))
 
     if plane.texture == "rough":
-        from gelslim_twin.contact.relief import rough_profile
-
         relief_of: Profile = rough_profile(plane, seed)
     else:
         relief_of = ridges if plane.texture == "ridges" else bumps
@@ -124,3 +121,103 @@ def _flat(inside: NDArray[np.bool_]) -> Array:
 
 def _within(inside: NDArray[np.bool_], height: Array) -> Array:
     return np.where(inside, height, np.inf)
+
+
+_WAVES = 64
+_MOST_CELLS = 4_000_000
+NEGLIGIBLE = 1e-9
+"""Weight of a grid point that counts as none."""
+
+
+def stl_profile(shape: Stl, folder: Path) -> Profile:
+    """Lower surface of a mesh, centred on the middle of its extents, its lowest point at 0.
+
+    Raises ValueError for a file that is no STL, or a grid of more than four million cells.
+    """
+    corners = _down(stl_corners(folder / shape.file) * shape.scale, shape.down)
+    points = corners.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    corners = corners - [*((low + high) / 2)[:2], low[2]]
+    half = (high - low)[:2] / 2
+    count = np.ceil(2 * half / shape.resolution_mm).astype(int) + 1
+    if count.prod() > _MOST_CELLS or count.min() < 2:
+        raise ValueError(
+            f"a height map of {count[0]} x {count[1]} cells is no good; change resolution_mm"
+        )
+    x, y = (np.linspace(-h, h, n) for h, n in zip(half, count, strict=True))
+    return _interpolated(x, y, _lowest(corners, x, y))
+
+
+def rough_profile(plane: TexturedPlane, seed: int) -> Profile:
+    """A sum of waves of random directions about the correlation length.
+
+    The relief is four standard deviations; what is beyond is cut off there.
+    """
+    rng = np.random.Generator(np.random.Philox(key=[seed, 0x7E47]))
+    angle = rng.uniform(0, 2 * math.pi, _WAVES)
+    number = 2 * math.pi / plane.pitch_mm * np.sqrt(rng.uniform(0.25, 2.0, _WAVES))
+    phase = rng.uniform(0, 2 * math.pi, _WAVES)
+    kx, ky = number * np.cos(angle), number * np.sin(angle)
+
+    def height(x: Array, y: Array) -> Array:
+        total = np.zeros(np.broadcast(x, y).shape)
+        for a, b, p in zip(kx, ky, phase, strict=True):
+            total += np.cos(a * x + b * y + p)
+        unit = total / math.sqrt(_WAVES / 2)
+        return np.asarray(plane.relief_mm * (0.5 + np.clip(unit, -2, 2) / 4))
+
+    return height
+
+
+def _down(corners: Array, direction: str) -> Array:
+    """Turn the mesh so that `direction` points to -z."""
+    axis = "xyz".index(direction[-1])
+    turned = corners[..., [(axis + 1) % 3, (axis + 2) % 3, axis]]
+    if direction.startswith("-"):
+        return np.asarray(turned)
+    return np.asarray(turned * np.array([1.0, -1.0, -1.0]))
+
+
+def _lowest(corners: Array, x: Array, y: Array) -> Array:
+    """Lowest height (nx, ny) of the facets over the grid's points; infinite where there is none."""
+    height = np.full((len(x), len(y)), np.inf)
+    for a, b, c in corners:
+        i0, i1 = np.searchsorted(x, [min(a[0], b[0], c[0]) - 1e-9, max(a[0], b[0], c[0]) + 1e-9])
+        j0, j1 = np.searchsorted(y, [min(a[1], b[1], c[1]) - 1e-9, max(a[1], b[1], c[1]) + 1e-9])
+        double = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+        if i1 <= i0 or j1 <= j0 or abs(double) < 1e-15:
+            continue
+        dx, dy = x[i0:i1, None] - a[0], y[None, j0:j1] - a[1]
+        u = (dx * (c[1] - a[1]) - dy * (c[0] - a[0])) / double
+        v = (dy * (b[0] - a[0]) - dx * (b[1] - a[1])) / double
+        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+        z = np.where(inside, a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2]), np.inf)
+        height[i0:i1, j0:j1] = np.minimum(height[i0:i1, j0:j1], z)
+    return height
+
+
+def _interpolated(x: Array, y: Array, height: Array) -> Profile:
+    """Bilinear; infinite where a corner is, and beside the grid."""
+    sx, sy = x[1] - x[0], y[1] - y[0]
+
+    def profile(px: Array, py: Array) -> Array:
+        u, v = (px - x[0]) / sx, (py - y[0]) / sy
+        inside = (u >= 0) & (v >= 0) & (u <= len(x) - 1) & (v <= len(y) - 1)
+        u, v = np.where(inside, u, 0.0), np.where(inside, v, 0.0)
+        i = np.minimum(u.astype(int), len(x) - 2)
+        j = np.minimum(v.astype(int), len(y) - 2)
+        p, q = u - i, v - j
+        total = np.zeros(np.shape(u))
+        for a, b, w in (
+            (0, 0, (1 - p) * (1 - q)),
+            (1, 0, p * (1 - q)),
+            (0, 1, (1 - p) * q),
+            (1, 1, p * q),
+        ):
+            corner = height[i + a, j + b]
+            # Rounding must not let a grid point feel a neighbour that is beside the shape.
+            felt = w > NEGLIGIBLE
+            total += np.where(felt, w * np.where(felt, corner, 0.0), 0.0)
+        return np.where(inside, total, np.inf)
+
+    return profile

@@ -25,16 +25,46 @@ from gelslim_twin.contact.coulomb_balance import STICK
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.halved_path import between, reached, rests
 from gelslim_twin.contact.held_state import HeldState, held_mm
-from gelslim_twin.contact.reach import Reach, reach_of
 from gelslim_twin.contact.settling import Settled, Settling, room_to_tool, slack_mm
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
 
+Nodes = NDArray[np.intp]
+SPARE = 1.5
+"""How much larger than needed a kept block may be before a smaller one is gathered."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Nodes (n,) in reach, in the order they came, and their compliance (3n, 3n)."""
+
+    nodes: Nodes
+    block: NDArray[np.float32]
+
+    def including(self, wanted: NDArray[np.bool_], compliance: SurfaceCompliance) -> Reach:
+        """One that has all `wanted` (c,) nodes, and not too many others."""
+        count = int(wanted.sum())
+        inside = np.zeros(len(wanted), dtype=bool)
+        inside[self.nodes] = True
+        new = np.flatnonzero(wanted & ~inside)
+        if len(self.nodes) + len(new) > SPARE * count:
+            return reach_of(wanted, compliance)
+        if len(new) == 0:
+            return self
+        nodes = np.concatenate([self.nodes, new])
+        return Reach(nodes, compliance.block(nodes, self.block))
+
+
+def reach_of(wanted: NDArray[np.bool_], compliance: SurfaceCompliance) -> Reach:
+    """One that has the `wanted` (c,) nodes only."""
+    nodes = np.flatnonzero(wanted)
+    return Reach(nodes, compliance.block(nodes))
+
+
 __all__ = ["ContactError", "ContactSettings", "ContactSolver"]
 
 Array = NDArray[np.float64]
-Nodes = NDArray[np.intp]
 REACH = 0.2
 """Share of the depth by which the tool may stand over a node in reach: the gel bulges."""
 GROWTH_STEPS = 12

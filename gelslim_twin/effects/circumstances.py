@@ -6,10 +6,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Literal, TypeVar
 
-from gelslim_twin.effects.parameters import EffectParameters
+from pydantic import Field
+
+from gelslim_core.yaml.base import Block
 from gelslim_twin.effects.touch import RIDGES, Footprint, Touch, touch
+
+Use = Literal["auto", "on", "off"]
+
+
+class EffectParameters(Block):
+    """Whether to simulate an effect, beside its own parameters."""
+
+    use: Use = Field(
+        default="auto", description="Let the planner decide, always simulate, or never"
+    )
+
 
 P = TypeVar("P", bound=EffectParameters)
 

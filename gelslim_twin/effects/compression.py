@@ -6,10 +6,9 @@ import math
 
 from pydantic import Field
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.dot_contrast import grey_shift_px
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
-from gelslim_twin.effects.parameters import EffectParameters
 
 RMS_STEP = 67.1
 """Root mean square of the 64 luminance steps in table K.1 of ITU-T T.81."""

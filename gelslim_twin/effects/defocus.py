@@ -6,9 +6,8 @@ import math
 
 from pydantic import Field
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class DefocusParameters(EffectParameters):

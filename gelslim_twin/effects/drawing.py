@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, never_null, picture
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class DrawingParameters(EffectParameters):

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from gelslim_twin.effects.circumstances import Circumstances
-from gelslim_twin.effects.parameters import EffectParameters
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 
 OBSERVABLES = ("displacement", "force", "markers", "image")
 """Data that a scene may observe."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from gelslim_twin.effects.circumstances import Circumstances
-from gelslim_twin.effects.contact_rungs import RUNGS
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
-from gelslim_twin.effects.parameters import EffectParameters
+from gelslim_twin.effects.normal_contact import RUNGS
 from gelslim_twin.effects.touch import RIDGES
 
 
@@ -69,7 +68,7 @@ EFFECT = Effect(
     formula="hypot(min(mu F, (G A/h + 8 G a/(2-nu)) s), min(mu, 1) (F_stick - F)); s + depth",
     ladder=ladder,
     is_null=lambda c: c.friction == 0,
-    implementation="gelslim_twin.contact.friction",
+    implementation="gelslim_twin.contact.coulomb_kernel",
     needs=("poses",),
     refines=("displacement", "force"),
 )

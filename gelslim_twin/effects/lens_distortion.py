@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, optics
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class LensDistortionParameters(EffectParameters):
@@ -32,7 +31,7 @@ EFFECT = Effect(
     formula="f (|k1| rho³ + |k2| rho⁵ + |k3| rho⁷ + 3 |p| rho²) at the farthest point of the gel",
     ladder=lambda c: (Rung("exact", Bound(), 0.02 * c.sensor.markers / 575),),
     is_null=lambda c: not any(value for _, value in c.sensor.lens_distortion),
-    implementation="gelslim_twin.view.lens_distortion",
+    implementation="gelslim_twin.render.scene_camera",
     refines=("markers",),
     after=("refraction",),
 )

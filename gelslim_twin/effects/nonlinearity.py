@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
 from gelslim_twin.effects.friction import moved_mm
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class NonlinearityParameters(EffectParameters):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, never_null, optics
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class PerspectiveParameters(EffectParameters):
@@ -24,7 +23,7 @@ EFFECT = Effect(
     formula="width of the gel's image",
     ladder=lambda c: (Rung("pinhole", Bound(), 0.05 * c.sensor.markers / 575),),
     is_null=never_null,
-    implementation="gelslim_twin.view.perspective",
+    implementation="gelslim_twin.render.scene_camera",
     needs=("displacement",),
     provides=("markers",),
 )

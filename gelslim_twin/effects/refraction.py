@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung, optics
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class RefractionParameters(EffectParameters):
@@ -45,6 +44,6 @@ EFFECT = Effect(
     formula="f/Z lift (sin tilt + r/f), lift = sum of h (1 - cos/sqrt(n² - sin²)) of the ray",
     ladder=ladder,
     is_null=lambda c: all(h == 0 or n == 1 for h, n in c.sensor.layers_mm),
-    implementation="gelslim_twin.view.refraction",
+    implementation="gelslim_twin.render.scene_camera",
     refines=("markers",),
 )

@@ -9,9 +9,8 @@ from pydantic import Field, model_validator
 
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.effect import Bound, Effect, Rung
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class PronyTerm(Block):
@@ -61,7 +60,7 @@ EFFECT = Effect(
     is_null=lambda c: all(
         t.fraction == 0 for t in c.given("relaxation", RelaxationParameters).terms
     ),
-    implementation="gelslim_twin.relaxation",
+    implementation="gelslim_twin.contact.relaxation",
     needs=("poses",),
     refines=("force",),
     after=("friction", "nonlinearity"),

@@ -6,11 +6,10 @@ import math
 
 from pydantic import Field
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.dot_contrast import least_light_dn, shift_px
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
 from gelslim_twin.effects.exposure import ExposureParameters
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class SensorNoiseParameters(EffectParameters):

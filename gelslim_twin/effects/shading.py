@@ -6,10 +6,9 @@ import math
 
 from pydantic import Field
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import Effect, Rung, picture
-from gelslim_twin.effects.parameters import EffectParameters
 
 GRAZING_DEG = 18.9
 """Light enters the gel at this angle above its face or more (total reflection acrylic to gel): a

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from gelslim_twin.effects.circumstances import Circumstances
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.dot_contrast import contrast, dot_px, edge_px, least_light_dn
 from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
-from gelslim_twin.effects.parameters import EffectParameters
 
 
 class SpecularParameters(EffectParameters):

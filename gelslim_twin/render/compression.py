@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_LUMINANCE_LOW = 12.0
-"""Step of the standard's luminance table at the frequencies of a dot, at quality 50."""
-
 
 @dataclass(frozen=True)
 class Compression:
@@ -40,18 +37,3 @@ class Compression:
         store = io.BytesIO()
         Image.fromarray(image).save(store, "JPEG", quality=self.quality, subsampling=2)
         return np.array(Image.open(io.BytesIO(store.getvalue())).convert("RGB"))
-
-    @property
-    def step_dn(self) -> float:
-        """Step of the coefficients at the frequencies of a dot (the usual scaling of tables)."""
-        scale = 50 / self.quality if self.quality < 50 else 2 - self.quality / 50
-        return max(1.0, _LUMINANCE_LOW * scale)
-
-    def a_priori_bound_px(self, dot_diameter_px: float, contrast_dn: float) -> float:
-        """Three standard deviations of a dot's centre by coefficients rounded to the step.
-
-        The transform is orthonormal: rounding spreads to pixel noise of step / √12.
-        """
-        from gelslim_twin.render.centre_noise import centre_noise_px
-
-        return 3 * centre_noise_px(self.step_dn / 12**0.5, contrast_dn, dot_diameter_px)

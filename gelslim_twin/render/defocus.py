@@ -156,12 +156,3 @@ def _kernels(most_px: float) -> Array:
     reach = int(np.ceil(3.9 * most_px)) + 1
     variance = np.linspace(0.0, most_px**2, _TABLE)
     return np.asarray(ive(np.arange(reach + 1)[None, :], variance[:, None]))
-
-
-def a_priori_bound_px(sigma_px: float, light_change_per_px: float) -> float:
-    """Bound of a dot's centre error if the blur is left out.
-
-    Where the light changes by the share g per px, blurring dot and light together moves the
-    centroid of darkness by g σ²; even light and an even kernel move nothing.
-    """
-    return abs(light_change_per_px) * sigma_px**2

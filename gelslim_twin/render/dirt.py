@@ -51,7 +51,7 @@ class Dirt:
         """Light (h, w, k) with what the dirt leaves of it."""
         if self.is_null:
             return light
-        from gelslim_twin.render.coverage_kernel import draw_dots
+        from gelslim_twin.render.dot_kernel import draw_dots
 
         outlines = np.concatenate([self._specks_mm(pad_mm), self._hairs_mm(pad_mm)])
         points = np.zeros((outlines.shape[0] * _CORNERS, 3))
@@ -81,13 +81,6 @@ class Dirt:
         back = np.stack([np.broadcast_to(along, bow.shape), bow - thick], axis=2)[:, ::-1]
         shape = np.concatenate([there, back], axis=1)
         return _placed(shape, random[:, :2], 2 * np.pi * random[:, 4], pad_mm)
-
-    def a_priori_bound_px(self, dot_diameter_px: float, scale_px_per_mm: float) -> float:
-        """Bound for a speck that touches a dot: its share of the darkness, half a dot away."""
-        if self.is_null:
-            return 0.0
-        share = self.opacity * (self.speck_mm * scale_px_per_mm / dot_diameter_px) ** 2
-        return float(share * (dot_diameter_px + self.speck_mm * scale_px_per_mm) / 2)
 
 
 def _placed(shape: Array, at: Array, turn: Array, pad_mm: tuple[float, float]) -> Array:

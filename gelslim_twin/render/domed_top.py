@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_twin.render.marker_motion import MarkerMotion
 from gelslim_twin.render.surface_state import SurfaceState
 
 if TYPE_CHECKING:
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _ROUNDS = 12
 _NEAR_MM = 1e-5
-_STEP_MM = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +50,6 @@ class DomedTop:
         raised = motion.displacement_mm.copy()
         raised[..., 2] += self._heights_at(motion)
         return replace(motion, displacement_mm=raised)
-
-    def carrying_markers(self, motion: MarkerMotion, centres_mm: Array) -> MarkerMotion:
-        """The same for motions given at the dots' centres (m, 2)."""
-        u, gradient = motion.displacement_mm.copy(), motion.gradient.copy()
-        u[:, 2] += self.height_mm(centres_mm)
-        for axis in range(2):
-            step = _STEP_MM * np.eye(2)[axis]
-            apart = self.height_mm(centres_mm + step) - self.height_mm(centres_mm - step)
-            gradient[:, 2, axis] += apart / (2 * _STEP_MM)
-        return MarkerMotion(u, gradient)
 
     def seen_mm(self, sight: Sight) -> Array:
         """Points (h, w, 2) of the dome at rest that the rays of `sight` meet."""

@@ -28,10 +28,3 @@ class Exposure:
     def scale(self) -> float:
         """Factor on the light."""
         return self.time * self.gain
-
-
-def a_priori_bound_px(dot_diameter_px: float, contrast_dn: float) -> float:
-    """Spread of a dot's centre by rounding to whole grey values (error ±1/2, variance 1/12)."""
-    from gelslim_twin.render.centre_noise import centre_noise_px
-
-    return centre_noise_px(12**-0.5, contrast_dn, dot_diameter_px)

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.render.dot_outlines import centroids_px, outlines_px
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.printed_dots import PrintedDots
-from gelslim_twin.render.rendered_frame import RenderedFrame
+from gelslim_twin.render.printed_dots import PrintedDots, centroids_px, outlines_px
 from gelslim_twin.render.sight import Sight
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad, still_irradiance
@@ -23,8 +21,21 @@ if TYPE_CHECKING:
     from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.defocus import BlurField
     from gelslim_twin.render.domed_top import DomedTop
-    from gelslim_twin.render.marker_motion import MarkerMotion
     from ifem_export.markers.grid import MarkerGrid
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedFrame:
+    """Picture (h, w, 3) uint8, red first, and the dots in it, in the print's order."""
+
+    image: NDArray[np.uint8]
+    centres_px: NDArray[np.float64]
+    """(m, 2) centroids of the dots' images, mean over the open shutter; pixel centres integers."""
+    diameter_px: NDArray[np.float64]
+    """(m,) of the disc of the same area."""
+    drawn: NDArray[np.bool_]
+    """(m,) whether the dot is printed and its whole outline lies in the picture."""
+
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -107,25 +118,21 @@ class FrameRenderer:
         surface: SurfaceState | None = None,
         before: SurfaceState | None = None,
         *,
-        markers: MarkerMotion | None = None,
-        markers_before: MarkerMotion | None = None,
         number: int = 0,
     ) -> RenderedFrame:
-        """Frame `number` of the gel displaced by `surface` (None: at rest).
+        """Frame `number` of the gel displaced by `surface` (None: undeformed).
 
-        `before` is the state a frame earlier, for motion blur. `markers` gives the dots' motion
-        where it is known better than by interpolating the surface; shading is the surface's.
-        Raises ValueError for dots behind the camera.
+        `before` is the state one frame earlier, for motion blur. Raises ValueError for dots behind
+        the camera.
         """
         if self.top is not None:
             surface = self.top.carrying(surface)
             before = self.top.carrying(before) if before is not None else None
-            markers, markers_before = self._raised(markers), self._raised(markers_before)
-        start, now = self._outlines(surface, before, markers, markers_before)
+        start, now = self._outlines(surface, before)
         middle = now if start is now else (start + now) / 2
         centres, area = centroids_px(middle)
         drawn = self.dots.present & (area * self._orientation > 0)
-        ink = self._ink(start, now, drawn, centres, np.abs(area), surface, markers)
+        ink = self._ink(start, now, drawn, np.abs(area), surface)
         return RenderedFrame(
             image=self._picture(ink, surface, number),
             centres_px=centres,
@@ -142,7 +149,7 @@ class FrameRenderer:
 
     def _composer(self, ink: Image, surface: SurfaceState | None) -> Callable[[int, Image], None]:
         """A function that writes the grey values of rows from a first one on."""
-        from gelslim_twin.render.compose_kernel import compose
+        from gelslim_twin.render.image_kernel import compose
 
         gain, step = _NONE, 1
         if self.look.shading is not None and surface is not None and surface.moves:
@@ -161,7 +168,7 @@ class FrameRenderer:
 
     def _picture(self, ink: Image, surface: SurfaceState | None, number: int) -> NDArray[np.uint8]:
         """The frame, made in strips that stay in the processor's cache."""
-        from gelslim_twin.render.compose_kernel import develop
+        from gelslim_twin.render.image_kernel import develop
 
         height, width = ink.shape
         write, noise = self._composer(ink, surface), self.look.noise
@@ -177,25 +184,14 @@ class FrameRenderer:
         return image if self.look.compression is None else self.look.compression.apply(image)
 
     def _outlines(
-        self,
-        surface: SurfaceState | None,
-        before: SurfaceState | None,
-        markers: MarkerMotion | None,
-        markers_before: MarkerMotion | None,
+        self, surface: SurfaceState | None, before: SurfaceState | None
     ) -> tuple[Array, Array]:
         """Outlines when the shutter opens and closes; the same array without motion blur."""
-        given = markers or surface
-        now = outlines_px(self.camera, self.dots, given) if given else self._rest_outlines
-        earlier = markers_before or before
-        if self.look.motion_blur is None or earlier is None:
+        now = outlines_px(self.camera, self.dots, surface) if surface else self._rest_outlines
+        if self.look.motion_blur is None or before is None:
             return now, now
-        then = outlines_px(self.camera, self.dots, earlier)
+        then = outlines_px(self.camera, self.dots, before)
         return self.look.motion_blur.start(then, now), now
-
-    def _raised(self, motion: MarkerMotion | None) -> MarkerMotion | None:
-        if motion is None or self.top is None:
-            return motion
-        return self.top.carrying_markers(motion, self.dots.centres_mm)
 
     @cached_property
     def _on_pad(self) -> Image:
@@ -217,7 +213,7 @@ class FrameRenderer:
         return float(np.sign(np.median(centroids_px(self._rest_outlines)[1])))
 
     def _inside(self, outlines: Array) -> NDArray[np.bool_]:
-        from gelslim_twin.render.outline_kernel import within
+        from gelslim_twin.render.dot_kernel import within
 
         inside = np.empty(len(outlines), dtype=bool)
         within(outlines, self.camera.image_width_px, self.camera.image_height_px, inside)
@@ -228,12 +224,11 @@ class FrameRenderer:
         start: Array,
         now: Array,
         drawn: NDArray[np.bool_],
-        centres: Array,
         area: Array,
         surface: SurfaceState | None,
-        markers: MarkerMotion | None,
     ) -> Image:
-        from gelslim_twin.render.coverage_kernel import draw_dots
+        """Share (h, w) of each pixel that ink covers, blurred by motion and defocus."""
+        from gelslim_twin.render.dot_kernel import draw_dots
 
         count = len(self.dots)
         poses = np.ones(count, dtype=np.int64)
@@ -244,16 +239,11 @@ class FrameRenderer:
             from gelslim_twin.render.defocus import kernel_taps
 
             scale = np.sqrt(area / (np.pi * self.dots.semi_axes_mm.prod(axis=1)))
-            points = self._centres_mm(surface, markers)
+            points = np.zeros((count, 3))
+            points[:, :2] = self.dots.centres_mm
+            if surface is not None:
+                points += surface.at(self.dots.centres_mm)
             taps, reach = kernel_taps(self.look.defocus.sigma_px(self._blur_field, points, scale))
         ink = np.zeros((self.camera.image_height_px, self.camera.image_width_px), dtype=np.float32)
         draw_dots(start, now, drawn, poses, self.look.samples, taps, reach, ink)
         return ink
-
-    def _centres_mm(self, surface: SurfaceState | None, markers: MarkerMotion | None) -> Array:
-        centres = np.zeros((len(self.dots), 3))
-        centres[:, :2] = self.dots.centres_mm
-        moved = markers or surface
-        if moved is not None and moved.moves:
-            centres += moved.carried(self.dots.centres_mm, self.dots.centres_mm[:, None, :])[:, 0]
-        return centres

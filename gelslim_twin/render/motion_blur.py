@@ -37,13 +37,9 @@ class MotionBlur:
 
     def poses(self, start: Array, now: Array) -> NDArray[np.int64]:
         """How many poses (m,) to draw of each dot; 1 for a dot that stands still."""
-        from gelslim_twin.render.outline_kernel import farthest
+        from gelslim_twin.render.dot_kernel import farthest
 
         path = np.empty(len(now))
         farthest(start, now, path)
         wanted = np.ceil(path / self.px_per_pose)
         return np.clip(wanted, 1, self.most_poses).astype(np.int64)
-
-    def a_priori_bound_px(self, step_px: float) -> float:
-        """Half the path in the open shutter: the smeared dot's centre lies that far behind."""
-        return 0.5 * self.open_share * step_px

@@ -52,10 +52,3 @@ class PrintFaults:
             turn_rad=np.where(odd[:, 0], np.pi * drawn[:, 3], dots.turn_rad),
             present=dots.present & ~absent,
         )
-
-    def a_priori_bound_px(self, scale_px_per_mm: float) -> float:
-        """Three standard deviations of a dot's place, in px: what skipping the jitter leaves.
-
-        Missing and odd dots move no centre; they matter to whoever counts or matches dots.
-        """
-        return 3.0 * self.jitter_mm * scale_px_per_mm

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
+    from gelslim_twin.render.surface_state import SurfaceState
     from ifem_export.markers.grid import MarkerGrid
+
 
 Array = NDArray[np.float64]
 
@@ -46,3 +50,58 @@ class PrintedDots:
         offset = np.stack([c * u - s * v, s * u + c * v], axis=2)
         rim: Array = self.centres_mm[:, None, :] + offset
         return rim
+
+
+RIM_POINTS = 8
+CORNERS = 48
+
+
+def outlines_px(
+    camera: VirtualCamera,
+    dots: PrintedDots,
+    surface: SurfaceState,
+    *,
+    rim_points: int = RIM_POINTS,
+    corners: int = CORNERS,
+) -> Array:
+    """Outlines (m, corners, 2) of the dots carried along by the surface; all dots, drawn or not.
+
+    The rim is widened so that the polygon has the ellipse's area and second moments to 1 in
+    `corners`⁴. Raises ValueError for dots that the camera cannot project.
+    """
+    turn = 2 * np.pi / corners
+    rim = dots.rim_mm(rim_points, float(np.sqrt(turn / np.sin(turn))))
+    points = np.zeros((len(dots) * rim_points, 3))
+    points[:, :2] = rim.reshape(-1, 2)
+    points += surface.at(rim.reshape(-1, 2))
+    projected = camera.project(points).reshape(len(dots), rim_points, 2)
+    if rim_points == corners:
+        return projected
+    from gelslim_twin.render.dot_kernel import expand
+
+    out = np.empty((len(dots), corners, 2))
+    expand(projected, _series(rim_points, corners), out)
+    return out
+
+
+def centroids_px(outlines: Array) -> tuple[Array, Array]:
+    """Area centroids (m, 2) and signed areas (m,) of outlines (m, k, 2), by Green's theorem."""
+    from gelslim_twin.render.dot_kernel import centroids
+
+    centres, area = np.empty((len(outlines), 2)), np.empty(len(outlines))
+    centroids(np.ascontiguousarray(outlines), centres, area)
+    return centres, area
+
+
+@cache
+def _series(points: int, corners: int) -> Array:
+    """Weights (corners, points) of trigonometric interpolation, even number of points."""
+    if points % 2 or points < 4:
+        raise ValueError(f"{points} rim points: must be an even number, at least 4")
+    apart = (
+        2 * np.pi * (np.arange(corners)[:, None] / corners - np.arange(points)[None, :] / points)
+    )
+    orders = np.arange(1, points // 2)
+    whole = 1 + 2 * np.cos(orders * apart[..., None]).sum(axis=2) + np.cos(points / 2 * apart)
+    weights: Array = whole / points
+    return weights

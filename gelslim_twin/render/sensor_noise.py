@@ -29,10 +29,6 @@ class SensorNoise:
         if not self.electrons_per_dn > 0:
             raise ValueError(f"electrons_per_dn = {self.electrons_per_dn}: must be positive")
 
-    def sigma_dn(self, value_dn: float, gain: float = 1.0) -> float:
-        """Standard deviation at a grey value."""
-        return float(np.sqrt((gain * self.read_dn) ** 2 + gain * value_dn / self.electrons_per_dn))
-
     def apply(
         self, image: NDArray[np.float32], gain: float = 1.0, frame: int = 0, first: int = 0
     ) -> None:
@@ -43,7 +39,7 @@ class SensorNoise:
         shot = gain / self.electrons_per_dn
         if self.read_dn == 0 and shot == 0:
             return
-        from gelslim_twin.render.noise_kernel import add_noise
+        from gelslim_twin.render.image_kernel import add_noise
 
         add_noise(
             image.reshape(-1, 3),
@@ -54,22 +50,13 @@ class SensorNoise:
             np.float32(shot),
         )
 
-    def a_priori_bound_px(
-        self, dot_diameter_px: float, contrast_dn: float, light_dn: float, gain: float = 1.0
-    ) -> float:
-        """Three standard deviations of a dot's centre; three channels average."""
-        from gelslim_twin.render.centre_noise import centre_noise_px
-
-        sigma = self.sigma_dn(light_dn, gain) / np.sqrt(3)
-        return 3 * centre_noise_px(float(sigma), contrast_dn, dot_diameter_px)
-
 
 @cache
 def normal_table() -> NDArray[np.float32]:
     """Means of the normal distribution over 2¹⁴ equal shares, scaled to unit variance."""
     from scipy.special import ndtri
 
-    from gelslim_twin.render.noise_kernel import BITS
+    from gelslim_twin.render.image_kernel import BITS
 
     edges = ndtri(np.arange(1, 2**BITS) / 2**BITS)
     density = np.concatenate([[0.0], np.exp(-(edges**2) / 2) / np.sqrt(2 * np.pi), [0.0]])

@@ -66,17 +66,3 @@ class Shading:
         gain = np.empty((len(slopes), light.sources), dtype=np.float32)
         lambert(np.ascontiguousarray(slopes), light.directions, self.ambient_share, gain)
         return gain
-
-
-def a_priori_bound_px(
-    dot_diameter_px: float, steepest: float, bend_per_px: float, elevation_deg: float
-) -> float:
-    """Bound of a dot's centre error if the shading is left out.
-
-    Light that rises by the share g per px across a dot of diameter d shifts its centroid of
-    darkness by g d²/16 (second moment of a disc); a surface bent by `bend_per_px` changes the
-    light by bend cot(elevation) per px. Slopes up to `steepest` saturate at full shadow.
-    """
-    cot = 1 / np.tan(np.deg2rad(elevation_deg))
-    per_px = min(bend_per_px * cot, 2 * max(steepest, 0.0) * cot)
-    return float(per_px * dot_diameter_px**2 / 16)

@@ -48,13 +48,3 @@ class Specular:
             tint = 0.5 + 0.5 * tint / max(tint.max(), 1e-12)
             out += (spot[..., None] * tint).astype(np.float32)
         return out
-
-    def a_priori_bound_px(self, dot_diameter_px: float, contrast_dn: float) -> float:
-        """Bound for a spot on a dot's rim: its light against the dot's darkness, half a dot away.
-
-        At most half a dot: a spot that hides more leaves no dot to be found.
-        """
-        if self.is_null:
-            return 0.0
-        share = self.level_dn / contrast_dn * (2 * self.radius_px / dot_diameter_px) ** 2
-        return float(min(share, 1.0) * dot_diameter_px / 2)

@@ -92,10 +92,6 @@ class SurfaceState:
             displacement(self.padded_mm, self.origin_mm, self.step_mm, points, out)
         return out
 
-    def carried(self, _centres_mm: Array, rims_mm: Array) -> Array:
-        """Displacement (m, k, 3) of points (m, k, 2) on the rims of dots."""
-        return self.at(rims_mm.reshape(-1, 2)).reshape(*rims_mm.shape[:2], 3)
-
 
 def _check_even(name: str, axis: Array) -> None:
     if axis.ndim != 1 or len(axis) < 3:

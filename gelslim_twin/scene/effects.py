@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from gelslim_core.yaml.base import Block
+from gelslim_twin.effects.circumstances import EffectParameters, Use
 from gelslim_twin.effects.compression import CompressionParameters
 from gelslim_twin.effects.defocus import DefocusParameters
 from gelslim_twin.effects.dirt import DirtParameters
@@ -16,7 +17,6 @@ from gelslim_twin.effects.marker_print import MarkerPrintParameters
 from gelslim_twin.effects.motion_blur import MotionBlurParameters
 from gelslim_twin.effects.nonlinearity import NonlinearityParameters
 from gelslim_twin.effects.normal_contact import NormalContactParameters
-from gelslim_twin.effects.parameters import EffectParameters, Use
 from gelslim_twin.effects.perspective import PerspectiveParameters
 from gelslim_twin.effects.refraction import RefractionParameters
 from gelslim_twin.effects.relaxation import RelaxationParameters

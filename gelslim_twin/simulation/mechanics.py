@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.plan import Plan
+from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
+from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.simulation.simulate import Mechanics
-from gelslim_twin.simulation.twin_sensor import TwinSensor
 
 
 def mechanics_of(
@@ -33,11 +33,11 @@ def mechanics_of(
     from gelslim_twin.contact.compliance import SurfaceCompliance
     from gelslim_twin.contact.tool import Tool
 
-    settings = solver.ContactSettings(**dict(chosen["normal_contact"].rung_parameters))
+    tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:
-        friction = import_module(chosen["friction"].implementation)
-        knobs = dict(chosen["friction"].rung_parameters)
-        settings = friction.apply(settings, loaded.scene.contact.friction, **knobs)
+        tolerance = min(tolerance, _tolerance(chosen["friction"]))
+        friction = loaded.scene.contact.friction
+    settings = solver.ContactSettings(tolerance, friction)
     tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
     contact: Any = solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder), tool, settings)
     if "nonlinearity" in chosen:
@@ -50,6 +50,10 @@ def mechanics_of(
         module = import_module(chosen["relaxation"].implementation)
         return Relaxing(contact, module, given["terms"])
     return contact
+
+
+def _tolerance(choice: Choice) -> float:
+    return float(dict(choice.rung_parameters)["tolerance"])
 
 
 @dataclass(frozen=True)

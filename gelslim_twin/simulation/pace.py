@@ -13,14 +13,13 @@ from threadpoolctl import threadpool_limits
 
 from gelslim_core.files.scratch import scratch_folder
 from gelslim_twin.effects.circumstances import SensorFigures
-from gelslim_twin.plan import Plan
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.sensor_figures import bundle_figures
+from gelslim_twin.planning.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE, pace_group
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.scene_task import job_of
+from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, store_sensor, stored_sensor
 from gelslim_twin.simulation.simulate import Ledger, simulate
-from gelslim_twin.simulation.stored_sensor import BUNDLE, store_sensor, stored_sensor
-from gelslim_twin.simulation.twin_sensor import TwinSensor
-from gelslim_twin.tolerance_ladder import GEL, LARGE_STRAIN, PICTURE, pace_group
 
 Progress = Callable[[str, int, int], None]
 DEPTH, RADIUS = 0.1, 2.0

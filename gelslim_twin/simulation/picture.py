@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.plan import Plan
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.render.scene_camera import plan_camera
 from gelslim_twin.scene.scene import Scene
-from gelslim_twin.simulation.twin_sensor import TwinSensor
-from gelslim_twin.view.camera import plan_camera
+from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.markers.interpolation import marker_to_node
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
-    from gelslim_twin.render.frame_renderer import FrameRenderer
-    from gelslim_twin.render.rendered_frame import RenderedFrame
+    from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
     from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
@@ -79,8 +78,8 @@ class Viewer:
         """Draws frames. Raises ValueError where the plan draws none."""
         from gelslim_twin.render.domed_top import DomedTop
         from gelslim_twin.render.frame_renderer import FrameRenderer
+        from gelslim_twin.render.look import plan_look
         from gelslim_twin.render.surroundings import Pad
-        from gelslim_twin.view.look import plan_look
 
         look = plan_look(
             self.plan,

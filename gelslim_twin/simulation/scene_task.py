@@ -7,13 +7,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene, read_scene
-from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
+from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
 from gelslim_twin.simulation.simulate import Progress, SimulationJob, simulate
-from gelslim_twin.simulation.stored_sensor import BUNDLE, stored_sensor
-from gelslim_twin.simulation.twin_sensor import TwinSensor
 
 
 @dataclass(frozen=True)

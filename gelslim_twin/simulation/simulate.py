@@ -20,9 +20,8 @@ from gelslim_core.files.beside import beside
 from gelslim_core.files.file_lock import locked
 from gelslim_force.outputs.picture_file import encoded
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.plan import Plan
-from gelslim_twin.scene.frame_times import FrameTime, frame_times
-from gelslim_twin.scene.pose import Pose
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.scene.pose import FrameTime, Pose, frame_times
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.run_folder import (
     FIELDS,
@@ -34,9 +33,9 @@ from gelslim_twin.simulation.run_folder import (
     SimulationError,
     simulation_key,
 )
+from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.simulation.state_store import StateStore
 from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
-from gelslim_twin.simulation.twin_sensor import TwinSensor
 from ifem_export.operators.single_thread import single_threaded
 
 Progress = Callable[[str, int, int], None]

@@ -6,12 +6,18 @@ stiffness, and for a known shape the cap of the indenter below the rim of the pa
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gelslim_core.budget.budget import Budget
+from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.estimator import ForceSettings
 from gelslim_force.settings import PipelineSettings
+from gelslim_twin.contact.gel_state import GelState
 from ifem_export.bundle.bundle import Bundle
 
 Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
@@ -56,3 +62,24 @@ def _budgeted(chain: Chain, budget: Budget | None) -> Chain:
     if chain.settings.rung is not None:
         return chain
     return replace(chain, settings=replace(chain.settings, budget=budget))
+
+
+Array = NDArray[np.float64]
+
+
+class KnownContact:
+    """Gives one state per frame, in their order."""
+
+    def __init__(self, states: Iterable[GelState]) -> None:
+        self._left: Iterator[GelState] = iter(states)
+
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> GelState:
+        """The frame's state. Raises StopIteration beyond the last."""
+        return next(self._left)
+
+    def motion(
+        self, seen: GelState, lateral_mm: NDArray[np.float64] | None = None
+    ) -> NormalReading:
+        """True heights, without doubt, and the nodes truly touched."""
+        w = seen.displacement_mm[:, 2]
+        return NormalReading(w, np.zeros(len(w)), seen.touch > 0)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
+
+import numpy as np
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import GelState
@@ -13,8 +15,8 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.validation.truth_pad import truth_pad
-from ifem_export.bundle.bundle import Bundle
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.mesh.pad_mesh import PadMesh
 
 Law = Literal["neo_hookean", "linear"]
 
@@ -56,3 +58,23 @@ class TruthGel:
 
             contact = NonlinearContact(contact)
         return list(contact.states(poses))
+
+
+LAYERS = 8
+
+
+def truth_pad(bundle: Bundle) -> Bundle:
+    """The bundle's pad in eight layers of B-bar cells on the same surface nodes.
+
+    Crowned or weighted pads come back as they are: their layers are not free to choose.
+    """
+    mesh = bundle.mesh
+    uniform = mesh.fill is None and mesh.surface_shift is None
+    if not uniform or mesh.layers >= LAYERS:
+        return bundle
+    hx, hy, hz = mesh.cell_size_mm
+    plan = np.asarray(mesh.occupancy)[:, :, :1]
+    cells = np.ascontiguousarray(np.repeat(plan, LAYERS, axis=2))
+    finer = PadMesh.from_occupancy(cells, (hx, hy, hz * mesh.layers / LAYERS), mesh.origin_mm)
+    made = build_bundle(finer, bundle.material, "bbar", with_stiffness=False)
+    return replace(made, camera=bundle.camera, spec_hash=bundle.spec_hash)

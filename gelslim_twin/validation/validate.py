@@ -23,15 +23,13 @@ from gelslim_force.pipeline import ForcePipeline
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.render.domed_top import DomedTop
 from gelslim_twin.render.frame_renderer import FrameRenderer
-from gelslim_twin.render.sensor_look import sensor_look
+from gelslim_twin.render.look import sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
-from gelslim_twin.simulation.twin_sensor import TwinSensor
-from gelslim_twin.validation.case import other_contacts
-from gelslim_twin.validation.chain import Chain, chains_for
+from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.validation.chain import Chain, KnownContact, chains_for
 from gelslim_twin.validation.error_budget import error_budget
-from gelslim_twin.validation.experiment import FRICTION, sphere_experiment
-from gelslim_twin.validation.known_contact import KnownContact
+from gelslim_twin.validation.experiment import FRICTION, other_contacts, sphere_experiment
 from gelslim_twin.validation.score import Score, score, summary
 from gelslim_twin.validation.truth_gel import TruthGel
 from gelslim_twin.validation.validation import Sample, Validation

@@ -16,7 +16,7 @@ from sensor_samples import sensor_bundle
 from gelslim.cli.main import main
 from gelslim_core.budget.budget import Budget
 from gelslim_force.settings import PipelineSettings
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.validation import validate as validation
 from gelslim_twin.validation.chain import chains_for
 

@@ -15,10 +15,8 @@ from gelslim_cad.build.folder import OutputError, require_ours
 from gelslim_core.files.output_error import OutputError as RunError
 from gelslim_force.outputs.run_recorder import RunRecorder
 from gelslim_twin.simulation.run_folder import RunFolder, SimulationError
-from gelslim_twin.simulation.stored_sensor import store_sensor
-from gelslim_twin.simulation.twin_sensor import TwinSensor
-from gelslim_twin.validation.case import other_contacts
-from gelslim_twin.validation.experiment import sphere_experiment
+from gelslim_twin.simulation.sensor import TwinSensor, store_sensor
+from gelslim_twin.validation.experiment import other_contacts, sphere_experiment
 
 
 def holding(folder: Path, name: str, content: object) -> Path:

@@ -12,9 +12,8 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 from gelslim_optics.light.light_map import LightMap, red_green_sides
-from gelslim_twin.render.frame_renderer import FrameRenderer
+from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.rendered_frame import RenderedFrame
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
 from ifem_export.markers.grid import build_marker_grid

@@ -10,8 +10,8 @@ import pytest
 
 from gelslim_core.yaml.errors import InputError, Problem
 from gelslim_twin.effects.circumstances import SensorFigures
-from gelslim_twin.plan import Plan
-from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.question import plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ from gelslim.cli.options import AsJson
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor
     from ifem_export.bundle.bundle import Bundle
 
 
@@ -83,7 +83,7 @@ def bench(
 
 def _parts(sensor: Path, simulation: bool, tell: Progress | None) -> Iterator[Part]:
     if sensor.is_dir():
-        from gelslim_twin.simulation.twin_sensor import TwinSensor
+        from gelslim_twin.simulation.sensor import TwinSensor
         from ifem_export.bundle.files import load_bundle
 
         bundle = load_bundle(sensor)
@@ -92,7 +92,7 @@ def _parts(sensor: Path, simulation: bool, tell: Progress | None) -> Iterator[Pa
             yield bench_simulation(TwinSensor(bundle), tell)
         return
     from gelslim.scene_sensor import spec_bundle
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor
 
     made = TwinSensor(spec_bundle(sensor))
     yield bench_operators(made.bundle, tell)

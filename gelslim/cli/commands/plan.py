@@ -11,7 +11,7 @@ from gelslim.cli.budget import PoseTime, SceneError
 from gelslim.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from gelslim_twin.plan import Choice, Plan
+    from gelslim_twin.planning.plan import Choice, Plan
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene's YAML file.")]
 

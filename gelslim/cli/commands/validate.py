@@ -13,7 +13,7 @@ from gelslim.cli.budget import FieldError, FrameTime
 from gelslim.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor
     from gelslim_twin.validation.validation import Validation
 
 RECORD = "validation.json"
@@ -48,7 +48,7 @@ def validate(
     from gelslim_cad.spec.reader import read_spec
     from gelslim_core.files.atomic_file import json_bytes
     from gelslim_force.outputs.packed_frame import plain
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor
 
     started = time.monotonic()
     budget = budget_of(error, within)
@@ -104,8 +104,7 @@ def _draw(found: Validation, folder: Path) -> list[str]:
 
 def picture_names(sensor: TwinSensor) -> list[str]:
     """All that `_draw` may write, known before the minutes that the experiment takes."""
-    from gelslim_twin.validation.case import other_contacts
-    from gelslim_twin.validation.experiment import DIRECTIONS
+    from gelslim_twin.validation.experiment import DIRECTIONS, other_contacts
 
     mesh = sensor.bundle.mesh
     cases = other_contacts(mesh.layers * mesh.cell_size_mm[2], *sensor.size_mm)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.relief import stl_profile
+from gelslim_twin.contact.profile import stl_profile
 from gelslim_twin.scene.indenter import Stl
 
 trimesh = pytest.importorskip(

@@ -15,10 +15,10 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects import friction, nonlinearity, normal_contact
-from gelslim_twin.effects.contact_rungs import RUNGS
-from gelslim_twin.scene.question import question
+from gelslim_twin.effects.normal_contact import RUNGS
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.sensor_figures import bundle_figures
 from ifem_export.bundle.files import load_bundle
 
 BALL = "- shape: sphere\n    radius_mm: 6"

@@ -15,13 +15,13 @@ from scene_samples import ROOT
 from sim_rig import small_sensor
 
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.plan import Plan
-from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import LoadedScene, read_scene
-from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 
 NULL: dict[str, dict[str, Any]] = {
@@ -119,11 +119,11 @@ def test_solving_a_bare_press_loads_no_other_mechanics(folder: Path) -> None:
     code = f"""
 import sys
 from pathlib import Path
-from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.planning.question import plan_scene
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.sensor_figures import bundle_figures
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.simulation.mechanics import mechanics_of
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.effects.registry import EFFECTS
 from ifem_export.bundle.files import load_bundle
 place = Path({str(folder)!r})
@@ -132,7 +132,7 @@ plan = plan_scene(loaded, bundle_figures(place / "bundle"))
 sensor = TwinSensor(load_bundle(place / "bundle"))
 assert len(list(mechanics_of(loaded, plan, sensor).states(loaded.poses))) == 4
 absent = [e.implementation for e in EFFECTS if e.name not in plan.order]
-assert "gelslim_twin.contact.nonlinear" in absent and "gelslim_twin.relaxation" in absent
+assert "gelslim_twin.contact.nonlinear" in absent and "gelslim_twin.contact.relaxation" in absent
 print(plan.order, [m for m in absent if m in sys.modules])
 """
     done = subprocess.run(

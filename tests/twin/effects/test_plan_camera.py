@@ -13,10 +13,10 @@ from gelslim_cad.geometry.sight import camera_record
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.effects import lens_distortion, refraction
-from gelslim_twin.scene.question import plan_scene, question
-from gelslim_twin.sensor_figures import figures
-from gelslim_twin.view.camera import plan_camera
-from gelslim_twin.view.look import plan_look
+from gelslim_twin.planning.question import plan_scene, question
+from gelslim_twin.planning.sensor_figures import figures
+from gelslim_twin.render.look import plan_look
+from gelslim_twin.render.scene_camera import plan_camera, refracting
 
 LENS = {"k1": -0.12, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.0}
 
@@ -82,16 +82,10 @@ def test_apparent_depths_err_by_no_more_than_their_rung_says(tmp_path, record):
     c = asked(tmp_path, record)
     rung = next(r for r in refraction.ladder(c) if r.name == "apparent depth")
     full = plan_camera(plan_of(tmp_path, record), record)
-    near = refraction_module().apply(full, record, **rung.parameters)
+    near = refracting(full, full.layers, **rung.parameters)
     worst = np.linalg.norm(near.project(points) - full.project(points), axis=1).max()
     assert worst <= rung.error.markers_px
     assert worst < 0.5 * refraction.bound(c).markers_px
-
-
-def refraction_module():
-    from gelslim_twin.view import refraction as module
-
-    return module
 
 
 def test_leaving_the_lens_out_errs_by_no_more_than_its_bound(tmp_path, record):

@@ -12,14 +12,13 @@ import pytest
 from scene_samples import GALLERY, MINIMAL, ROOT, SENSOR, load, plan_text, random_scene
 
 from gelslim_core.yaml.errors import InputError
-from gelslim_twin.effects.circumstances import Circumstances, MotionFigures
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters, MotionFigures
 from gelslim_twin.effects.effect import GIVEN, OBSERVABLES, Bound, Effect, Rung, picture
-from gelslim_twin.effects.parameters import EffectParameters
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.effects.touch import Footprint
-from gelslim_twin.plan import Plan
-from gelslim_twin.planner import PlanError, Question, make_plan
-from gelslim_twin.scene.question import plan_scene, question
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import PlanError, Question, make_plan
+from gelslim_twin.planning.question import plan_scene, question
 from gelslim_twin.scene.reader import read_scene
 
 BY_NAME = {effect.name: effect for effect in EFFECTS}
@@ -312,7 +311,7 @@ def worst(rung: Rung, shares: dict[str, float]) -> float:
 
 def test_the_budgets_choice_of_rungs_is_the_cheapest_within_the_shares() -> None:
     """Against a choice by hand over random ladders, shares of nil and rungs without error too."""
-    from gelslim_twin.planner import _rung
+    from gelslim_twin.planning.planner import _rung
 
     rng = random.Random(5)
     kept = missed = 0

@@ -15,11 +15,10 @@ from gelslim.cli.main import main
 from gelslim.contacts import twin_key
 from gelslim_core.budget.budget import Budget, BudgetError
 from gelslim_core.budget.machine_times import write_times
-from gelslim_twin.planner import make_plan
-from gelslim_twin.scene.question import question
-from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.sensor_figures import bundle_figures
-from gelslim_twin.tolerance_ladder import (
+from gelslim_twin.planning.planner import make_plan
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
+from gelslim_twin.planning.tolerance_ladder import (
     GEL,
     LARGE_STRAIN,
     PICTURE,
@@ -30,6 +29,7 @@ from gelslim_twin.tolerance_ladder import (
     tolerance_at,
     tolerance_ladder,
 )
+from gelslim_twin.scene.reader import read_scene
 
 PACES = {GEL: 3.0, LARGE_STRAIN: 0.2, PICTURE: 40.0}
 

@@ -10,9 +10,7 @@ from scipy.spatial import cKDTree
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_twin.render.domed_top import DomedTop
-from gelslim_twin.render.look import Look
-from gelslim_twin.render.marker_motion import MarkerMotion
-from gelslim_twin.render.sensor_look import sensor_look
+from gelslim_twin.render.look import Look, sensor_look
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.sight import Sight
 from gelslim_twin.render.surface_state import SurfaceState
@@ -84,14 +82,6 @@ def test_detector_finds_dots_of_a_dome_where_they_are() -> None:
     assert flat < 0.025
     assert rms(detected_error(renderer(top=dome()).frame())) < 1.1 * flat
     assert rms(detected_error(renderer(top=dome()).frame(moved((0.2, -0.1, -0.1))))) < 1.1 * flat
-
-
-def test_motion_given_at_the_dots_is_that_of_the_surface() -> None:
-    shift = np.array([0.3, -0.2, -0.15])
-    motion = MarkerMotion(np.tile(shift, (len(GRID), 1)), np.zeros((len(GRID), 3, 2)))
-    drawn = renderer(top=dome())
-    by_dots = drawn.frame(markers=motion).centres_px
-    assert by_dots == pytest.approx(drawn.frame(moved(tuple(shift))).centres_px, abs=0.01)
 
 
 def test_rays_meet_the_dome_where_the_height_field_is_met() -> None:

@@ -21,12 +21,10 @@ from shapely.geometry import Polygon, box
 
 from gelslim_force.calibration.fit import centroid_offset_px
 from gelslim_optics.camera.lens_distortion import LensDistortion
-from gelslim_twin.render.coverage_kernel import draw_dots
 from gelslim_twin.render.defocus import Defocus
-from gelslim_twin.render.dot_outlines import centroids_px, outlines_px
+from gelslim_twin.render.dot_kernel import draw_dots
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.marker_motion import MarkerMotion
-from gelslim_twin.render.printed_dots import PrintedDots
+from gelslim_twin.render.printed_dots import PrintedDots, centroids_px, outlines_px
 from gelslim_twin.render.surface_state import SurfaceState
 from ifem_export.markers.grid import build_marker_grid
 
@@ -118,19 +116,6 @@ def test_centres_at_rest_are_the_projection_and_the_known_shift_of_a_disc():
     assert np.abs(centres - CAMERA.project(places) - offset).max() < 2e-4
 
 
-def test_strain_at_markers_carries_rims_as_the_surface_that_has_it():
-    x, y = np.meshgrid(np.linspace(-11, 11, 9), np.linspace(-10.5, 10.5, 7))
-    slope = np.array([[0.05, -0.02], [0.03, -0.04], [0.02, -0.05]])
-    u = np.array([0.2, -0.1, -0.3]) + np.stack([x, y], 2) @ slope.T
-    state = SurfaceState(x[0], y[:, 0], u)
-    at = np.array([0.2, -0.1, -0.3]) + GRID.positions_mm @ slope.T
-    markers = MarkerMotion(at, np.broadcast_to(slope, (len(GRID), 3, 2)))
-    a, b = outlines_px(CAMERA, DOTS, state), outlines_px(CAMERA, DOTS, markers)
-    assert np.abs(a - b).max() < 1e-9
-    unstrained = MarkerMotion(at, np.zeros((len(GRID), 3, 2)))
-    assert np.abs(outlines_px(CAMERA, DOTS, unstrained) - a).max() > 0.1
-
-
 def test_a_surface_displaced_everywhere_alike_moves_every_dot_so():
     shifted = replace(DOTS, centres_mm=DOTS.centres_mm + np.array([0.3, -0.2]))
     a = outlines_px(CAMERA, DOTS, moved((0.3, -0.2, 0.0)))
@@ -219,12 +204,6 @@ def test_dots_shrink_with_distance_and_are_not_drawn_outside_the_picture():
 def test_surfaces_that_cannot_be_interpolated_are_refused(values, words):
     with pytest.raises(ValueError, match=words):
         SurfaceState(displacement_mm=np.zeros((3, 3, 3)), **values)
-
-
-def test_motion_of_another_number_of_markers_is_refused():
-    few = MarkerMotion(np.ones((3, 3)), np.zeros((3, 3, 2)))
-    with pytest.raises(ValueError, match="3 markers for"):
-        renderer().frame(markers=few)
 
 
 def test_a_small_picture_is_the_middle_of_the_large_one():

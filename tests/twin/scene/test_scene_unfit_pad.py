@@ -11,9 +11,8 @@ from gelslim.cli.main import main
 from gelslim_core.yaml.errors import InputError
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.scene_task import job_of
+from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from gelslim_twin.simulation.simulate import SimulationJob
-from gelslim_twin.simulation.stored_sensor import BUNDLE
-from gelslim_twin.simulation.twin_sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 from ifem_export.markers.grid import build_marker_grid
 from ifem_export.mesh.crown import Paraboloid

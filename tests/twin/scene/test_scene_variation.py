@@ -9,9 +9,8 @@ import pytest
 from scene_samples import GALLERY, MINIMAL, SENSOR, load
 
 from gelslim_core.yaml.errors import InputError
-from gelslim_twin.scene.frame_times import FrameTime, frame_times
-from gelslim_twin.scene.pose import Pose
-from gelslim_twin.scene.question import plan_scene
+from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.scene.pose import FrameTime, Pose, frame_times
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.scene.varied import own_seed
 

@@ -156,8 +156,7 @@ def test_a_cluster_does_the_same(place: Path) -> None:
 def test_another_gel_or_camera_replaces_the_stored_sensor(place: Path, tmp_path: Path) -> None:
     from dataclasses import replace
 
-    from gelslim_twin.simulation.stored_sensor import store_sensor, stored_sensor
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor, store_sensor, stored_sensor
     from ifem_export.bundle.files import load_bundle
     from ifem_export.elements.material import Material
 
@@ -221,8 +220,8 @@ def test_absent_effects_are_not_in_memory(place: Path) -> None:
         "from gelslim.cli.main import main\n"
         f"assert main(['simulate', {str(scene)!r}, '-o', {str(place / 'out' / 'still')!r}]) == 0\n"
         "bad = [m for m in sys.modules if m.startswith(('gelslim_twin.render', 'cv2', 'PIL.Image',"
-        " 'gelslim_twin.contact.friction', 'gelslim_twin.contact.nonlinear',"
-        " 'gelslim_twin.relaxation', 'cadquery', 'OCP', 'vtk'))]\n"
+        " 'gelslim_twin.contact.coulomb_kernel', 'gelslim_twin.contact.nonlinear',"
+        " 'gelslim_twin.contact.relaxation', 'cadquery', 'OCP', 'vtk'))]\n"
         "sys.exit(', '.join(bad) or None)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

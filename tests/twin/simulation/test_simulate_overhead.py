@@ -11,17 +11,17 @@ from typing import Any
 import pytest
 from sim_rig import SCENE, small_sensor
 
-from gelslim_twin import planner
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.plan import Plan
+from gelslim_twin.planning import planner
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.question import question
+from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.effects import Effects
-from gelslim_twin.scene.question import question
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.sensor_figures import bundle_figures
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_task import job_of
+from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.simulation.simulate import simulate
-from gelslim_twin.simulation.twin_sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 
 

@@ -10,14 +10,12 @@ from sim_rig import small_sensor
 
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.scene.indenter import Cylinder
-from gelslim_twin.simulation.twin_sensor import TwinSensor
+from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.validation import experiment as experiments
-from gelslim_twin.validation.case import other_contacts
 from gelslim_twin.validation.error_budget import SOURCES, BudgetRig, Source, error_budget
-from gelslim_twin.validation.experiment import FRICTION, sphere_experiment
+from gelslim_twin.validation.experiment import FRICTION, other_contacts, sphere_experiment
 from gelslim_twin.validation.score import field_errors, spread
-from gelslim_twin.validation.truth_gel import TruthGel
-from gelslim_twin.validation.truth_pad import truth_pad
+from gelslim_twin.validation.truth_gel import TruthGel, truth_pad
 from gelslim_twin.validation.validate import validate
 from gelslim_twin.validation.validation import PAPER_N, Validation
 from ifem_export.bundle.files import load_bundle

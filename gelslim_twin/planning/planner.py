@@ -12,7 +12,7 @@ from gelslim_core.errors import GelslimError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.plan import Choice, Plan
+from gelslim_twin.planning.plan import Choice, Plan
 
 
 class PlanError(GelslimError, ValueError):

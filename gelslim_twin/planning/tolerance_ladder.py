@@ -14,8 +14,8 @@ from gelslim_core.budget.budget import Budget, BudgetError, shown_share
 from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import unit_of
-from gelslim_twin.plan import Plan
-from gelslim_twin.planner import Question, make_plan
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import Question, make_plan
 
 LEVELS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
 FINER = (1e-9, 1e-4, 2e-4, 5e-4)

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 from gelslim_twin.effects.circumstances import Circumstances, MotionFigures, SensorFigures
 from gelslim_twin.effects.touch import Footprint
-from gelslim_twin.plan import Plan
-from gelslim_twin.planner import PlanError, Question, make_plan
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import PlanError, Question, make_plan
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene

@@ -15,7 +15,6 @@ once, where the real surface would follow for a moment; a force that would pull 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,15 +53,6 @@ class PronySeries:
     def is_null(self) -> bool:
         """Whether nothing decays."""
         return not any(self.fractions)
-
-    def modulus(self, time_s: ArrayLike) -> Array:
-        """g(t): stiffness over the instantaneous one, a time after a step."""
-        t = np.asarray(time_s, dtype=float)
-        decay = [g * -np.expm1(-t / tau) for g, tau in self._terms()]
-        return np.asarray(1.0 - sum(decay, np.zeros_like(t)))
-
-    def _terms(self) -> Sequence[tuple[float, float]]:
-        return tuple(zip(self.fractions, self.times_s, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,21 +105,3 @@ def _held(force: Array, elastic: Array) -> Array:
     free = ~elastic.any(axis=1)
     force[pulled | free] = 0.0
     return force
-
-
-def apply(series: PronySeries, times_s: ArrayLike, elastic_n: ArrayLike) -> Array:
-    """Relaxed forces (t, n, 3) from elastic ones (t, n, 3) at increasing times (t,).
-
-    Before the first time the gel is at rest; the first force is a jump.
-
-    Raises:
-        ValueError: shapes that do not fit, or times that fall.
-    """
-    times, elastic = np.asarray(times_s, dtype=float), np.asarray(elastic_n, dtype=float)
-    if elastic.ndim != 3 or elastic.shape[2] != 3 or times.shape != elastic.shape[:1]:
-        raise ValueError(f"times {times.shape} and forces {elastic.shape}: must be (t,), (t, n, 3)")
-    out = np.empty_like(elastic)
-    state = at_rest(series, elastic.shape[1])
-    for k, step in enumerate(np.diff(times, prepend=times[:1])):
-        out[k], state = relax(series, state, elastic[k], float(step))
-    return out

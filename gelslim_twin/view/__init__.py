@@ -1,1 +1,0 @@
-"""The camera of a scene, put together from the optical effects that a plan keeps."""
