@@ -176,8 +176,7 @@ def test_a_stored_sensor_that_is_kept_is_swept_of_a_killed_writer_only(
 ) -> None:
     """A process killed in storing a compliance that another one has stored since."""
     from gelslim_core.files.replaced_file import is_part, replacement
-    from gelslim_twin.simulation.stored_sensor import store_sensor
-    from gelslim_twin.simulation.twin_sensor import TwinSensor
+    from gelslim_twin.simulation.sensor import TwinSensor, store_sensor
     from ifem_export.bundle.files import load_bundle
 
     kept, sensor = tmp_path / "kept", TwinSensor(load_bundle(place / "bundle"))
