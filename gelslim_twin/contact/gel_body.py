@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,13 +13,14 @@ from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
+from ifem_export.elements.material import Material
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-SPRINGS = (0.0, 0.3, 3.0)
-"""Shares of the touched nodes' own stiffness at rest that hold them."""
+SPRINGS = (0.0, 1.0, 10.0, 100.0)
+"""Stiffness of the springs that hold nodes, as a share of the nodes' own at rest."""
 STIFFENINGS = (0.1, 0.3, 1.0, 3.0)
-"""Shares of the whole stiffness at rest that are added where springs do not do."""
+"""Shares of the whole stiffness at rest that are added where springs are not enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,28 @@ class GelBody:
 
     @cached_property
     def _at_rest(self) -> sparse.csr_array:
-        return self._tangent(np.zeros((self.bundle.mesh.n_nodes, 3)))
+        """Stiffness at rest of a gel that is as stiff in shear but easy to compress.
+
+        The tangent itself keeps the volume. What is added to it must not compete with that.
+        """
+        shear = self.bundle.material.shear_modulus_mpa
+        soft = Material(2.0 * shear, 0.0, self.bundle.material.density_kg_m3)
+        whole = replace(self.pad, material=soft).tangent(np.zeros((self.pad.n_nodes, 3)))
+        return sparse.csr_array(sparse.csr_array(whole)[self.free][:, self.free])
+
+    @cached_property
+    def _spring_n_mm(self) -> Array:
+        """(c,) stiffness at rest of each surface node, the mean over its axes."""
+        place = np.searchsorted(self.free, 3 * self.surface[:, None] + np.arange(3))
+        return np.asarray(self._at_rest.diagonal()[place].mean(axis=1))
+
+    def _scattered(self, springs: Array) -> sparse.csr_array:
+        """Springs (c, 3, 3) of the surface nodes as a matrix over the unknowns."""
+        on = np.flatnonzero(springs.any(axis=(1, 2)))
+        own = np.searchsorted(self.free, 3 * self.surface[on, None] + np.arange(3))
+        row, column = np.repeat(own, 3, axis=1).ravel(), np.tile(own, (1, 3)).ravel()
+        shape = (len(self.free), len(self.free))
+        return sparse.csr_array((springs[on].ravel(), (row, column)), shape=shape)
 
     def _tangent(self, whole_mm: Array, pressure_mpa: Array | None = None) -> sparse.csr_array:
         whole = sparse.csr_array(self.pad.tangent(whole_mm, pressure_mpa))
@@ -66,12 +88,13 @@ class GelBody:
         self,
         whole_mm: Array,
         pressure_mpa: Array,
-        touched: NDArray[np.bool_],
+        held: Array,
         least: float = 0.0,
     ) -> Tangent:
-        """The gel about a displacement (n, 3), its `touched` (c,) surface nodes held by springs.
+        """The gel about a displacement (n, 3), with springs where a tool holds its surface.
 
-        For the pressure of its cells (m,) see `NeoHookeanPad.tangent`.
+        For the pressure of its cells (m,) see `NeoHookeanPad.tangent`; `held` (c, 3, 3) projects
+        each surface node's motion onto the directions in which the tool holds it.
 
         Pressed hard, the gel would buckle away from under the forces of nodes that a rigid tool
         holds in place: the tangent is positive definite with springs there only. They do not
@@ -79,28 +102,20 @@ class GelBody:
         smallest share tried; raises ContactError, FiniteStrainError.
         """
         matrix = self._tangent(whole_mm, pressure_mpa)
-        own = (3 * self.surface[touched][:, None] + np.arange(3)).ravel()
-        place = np.searchsorted(self.free, own)
         for share in SPRINGS:
             if share < least:
                 continue
-            springs = np.zeros(len(self.free))
-            springs[place] = share * self._at_rest.diagonal()[place]
+            springs = share * self._spring_n_mm[:, None, None] * held
+            stiff = matrix if share == 0 else sparse.csr_array(matrix + self._scattered(springs))
             try:
-                stiff = (
-                    matrix if share == 0 else sparse.csr_array(matrix + sparse.diags_array(springs))
-                )
-                whole = np.zeros(3 * self.bundle.mesh.n_nodes)
-                whole[self.free] = springs
-                held = whole.reshape(-1, 3)[self.surface]
-                return Tangent(self, RowFactor.of(stiff, self._rows), held, share)
+                return Tangent(self, RowFactor.of(stiff, self._rows), springs, share)
             except LinAlgError:
                 continue
-        none = np.zeros((len(self.surface), 3))
+        none = np.zeros_like(held)
         for share in STIFFENINGS:
             try:
                 stiff = sparse.csr_array(matrix + share * self._at_rest)
-                return Tangent(self, RowFactor.of(stiff, self._rows), none, SPRINGS[-1])
+                return Tangent(self, RowFactor.of(stiff, self._rows), none, SPRINGS[-1], True)
             except LinAlgError:
                 continue
         raise ContactError("the gel buckles: its tangent stiffness is far from positive definite")
@@ -113,9 +128,11 @@ class Tangent:
     body: GelBody
     factor: RowFactor
     springs: Array
-    """(c, 3) in N/mm along the axes of the surface nodes."""
+    """(c, 3, 3) in N/mm, at the surface nodes."""
     share: float
     """Of `SPRINGS`."""
+    stiffened: bool = False
+    """Whether its steps are short of Newton's: it is stiffer than the gel, with no springs."""
     _nodes: Nodes = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     _block: Array = field(default_factory=lambda: np.zeros((0, 0)))
 

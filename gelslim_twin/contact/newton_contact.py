@@ -3,6 +3,11 @@
 About a displacement U with inner forces F(U) and tangent K, forces f on the surface move it by
 K⁻¹ (E f - F(U)). What the surface does under that is a linear contact, with K's compliance in the
 place of the linear one and -K⁻¹ F(U) as the motion that is there without forces.
+
+Nearly incompressible gel is stiff against errors of the volume only: a displacement that is off
+by little has pressures that are off by far. K therefore takes pressures that are unknowns of
+their own: what the last step predicts, or what was found at the last poses. Without that, K is
+indefinite far from balance, and rounding decides where the steps go.
 """
 
 from __future__ import annotations
@@ -14,7 +19,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.contact.anderson import Anderson
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.coulomb_balance import STICK, Balance, balanced
+from gelslim_twin.contact.coulomb_balance import FREE, STICK, Balance, balanced
 from gelslim_twin.contact.gel_body import GelBody, Tangent
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.held_state import HeldState
@@ -27,8 +32,8 @@ from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 MOST_STEPS = 40
-STALE = 0.3
-"""Gain of a step below which the tangent is made anew."""
+STALE, NEAR = 0.3, 0.1
+"""Gain of a step, and residual over the forces, above which the tangent is made anew."""
 SHORTEST = 1 / 32
 MOST_AHEAD = 2.0
 """Longest step, of the last one, that is begun on along it."""
@@ -40,9 +45,11 @@ BALANCE = (0.01, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class SolidState(HeldState):
-    """A state of the surface with the displacement (n, 3) of the whole gel."""
+    """A state of the surface, with displacement (n, 3) and pressure (m,) of the whole gel."""
 
     whole_mm: Array | None = None
+    pressure_mpa: Array | None = None
+    """None for the cells' own under that displacement."""
 
 
 @dataclass(eq=False)
@@ -61,7 +68,8 @@ class NewtonContact:
         """Nothing touches."""
         still = np.zeros((self.body.bundle.mesh.n_nodes, 3))
         rest = GelState.at_rest(len(self.body.surface))
-        return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, None, still)
+        none = np.zeros(len(self.body.pad.hexes))
+        return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, None, still, none)
 
     def step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
         """State at `pose` after `last` at `before`.
@@ -76,11 +84,10 @@ class NewtonContact:
         ahead = self._ahead(last, before, pose)
         if ahead is not None:
             try:
-                return self._found(_Walk(self, last, before, pose, *ahead))
+                return self._found(_Walk(self, last, before, pose, ahead))
             except (ContactError, FiniteStrainError):
                 pass
-        assert last.whole_mm is not None
-        return self._found(_Walk(self, last, before, pose, last.whole_mm, last.force_n))
+        return self._found(_Walk(self, last, before, pose, self._start(last)))
 
     def _found(self, walk: _Walk) -> SolidState:
         if walk.deepest_mm <= 0:
@@ -89,7 +96,7 @@ class NewtonContact:
         for done in range(1, MOST_STEPS + 1):
             if self._tangent is None or walk.stale:
                 least = 0.0 if self._tangent is None else self._tangent.share
-                self._tangent = self.body.tangent(walk.whole, walk.pressure, walk.touch > 0, least)
+                self._tangent = self.body.tangent(walk.whole, walk.pressure, walk.held, least)
             found = walk.forward(self._tangent, done)
             if found is not None:
                 return found
@@ -99,21 +106,47 @@ class NewtonContact:
             walk.rest,
         )
 
-    def _ahead(self, last: SolidState, before: Pose, pose: Pose) -> tuple[Array, Array] | None:
-        """Displacement and forces on along the last step, where this one goes the same way."""
+    def _start(self, state: SolidState) -> _Start:
+        assert state.whole_mm is not None
+        pressure = state.pressure_mpa
+        if pressure is None:
+            still = np.zeros_like(state.whole_mm)
+            pressure = self.body.pad.ahead_pressure_mpa(state.whole_mm, still)
+        return _Start(state.whole_mm, state.force_n, pressure)
+
+    def _ahead(self, last: SolidState, before: Pose, pose: Pose) -> _Start | None:
+        """Where the gel would be on along the last step, where this one goes the same way."""
         if self._come is None or self._come[2] is not last:
             return None
         first, start, _ = self._come
-        assert first.whole_mm is not None
-        assert last.whole_mm is not None
         if not first.force_n.any() or not last.force_n.any():
             return None
         came, goes = _way(start, before), _way(before, pose)
         share = float(came @ goes) / max(float(came @ came), 1e-300)
         if not 0.0 < share <= MOST_AHEAD:
             return None
-        whole = last.whole_mm + share * (last.whole_mm - first.whole_mm)
-        return whole, last.force_n + share * (last.force_n - first.force_n)
+        return self._start(last).ahead_of(self._start(first), share)
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Where a walk begins: displacement and forces (n, 3), pressures (m,)."""
+
+    whole_mm: Array
+    force_n: Array
+    pressure_mpa: Array
+
+    def ahead_of(self, first: _Start, share: float) -> _Start:
+        """On along the way from another by a share of it.
+
+        Pressures go on along their own way. Those under the displacement so found would be
+        mostly error, as a way that goes straight on does not keep the volume.
+        """
+        return _Start(
+            self.whole_mm + share * (self.whole_mm - first.whole_mm),
+            self.force_n + share * (self.force_n - first.force_n),
+            self.pressure_mpa + share * (self.pressure_mpa - first.pressure_mpa),
+        )
 
 
 def _way(start: Pose, end: Pose) -> Array:
@@ -133,16 +166,13 @@ class _Walk:
         last: SolidState,
         before: Pose,
         pose: Pose,
-        whole: Array,
-        force: Array,
+        start: _Start,
     ) -> None:
         self.solver, self.body, self.tolerance = owner.solver, owner.body, owner.tolerance
         self.pose = pose
-        self.whole = whole
-        self.force = force.copy()
+        self.whole, self.pressure = start.whole_mm, start.pressure_mpa
+        self.force = start.force_n.copy()
         self.inner = self.body.pad.force(self.whole)
-        assert last.whole_mm is not None
-        self.pressure = self.body.pad.predicted_pressure_mpa(last.whole_mm, whole - last.whole_mm)
         self.target, ahead = self.solver.targets(last, before, pose)
         points = self.solver.points_mm
         tool = self.solver.tool
@@ -153,6 +183,20 @@ class _Walk:
         self.rest, self.off_mm, self.stale = 1.0, np.inf, True
         self.size = 1e-300
         self.touch, self.memory = last.touch, Anderson()
+
+    @property
+    def held(self) -> Array:
+        """Projections (c, 3, 3) of the nodes' motion onto where the tool holds them.
+
+        A node that slips is held along the normal only: springs across it would pull at a node
+        that moves, and what they pull is found more slowly than all the rest.
+        """
+        points = self.solver.points_mm + self.whole[self.body.surface]
+        normal = tool_surface(self.solver.tool, self.pose, points, self.surface).normal
+        held = normal[:, :, None] * normal[:, None, :]
+        held[self.touch == STICK] = np.eye(3)
+        held[self.touch == FREE] = 0.0
+        return held
 
     def forward(self, tangent: Tangent, done: int) -> SolidState | None:
         """One step; the state once it is there."""
@@ -172,7 +216,9 @@ class _Walk:
         load[self.body.surface] = self.force
         pulled = load.copy()
         pulled[self.body.surface[nodes]] += pull
-        self._move(self._accelerated(free + tangent.motion(pulled), balance, nodes))
+        step = free + tangent.motion(pulled)
+        self._remember(balance, nodes, tangent)
+        self._move(self._accelerated(step) if tangent.stiffened else step)
         return self._judged(balance, nodes, load, done)
 
     def _held(
@@ -197,7 +243,7 @@ class _Walk:
             if not spring.any():
                 break
             self.force[nodes] = balance.force_n
-            found = spring * (balance.motion_mm + more[nodes] - u)
+            found = np.einsum("nab,nb->na", spring, balance.motion_mm + more[nodes] - u)
             change = found - pull
             if np.linalg.norm(change) <= PULLED * self.tolerance * np.linalg.norm(balance.force_n):
                 break
@@ -225,15 +271,19 @@ class _Walk:
                 failure = error
         raise failure
 
-    def _accelerated(self, step: Array, balance: Balance, nodes: Nodes) -> Array:
-        """Step from what the last ones with the same touch gained.
-
-        A tangent that had to be stiffened gains little by itself.
-        """
+    def _remember(self, balance: Balance, nodes: Nodes, tangent: Tangent) -> None:
+        """Who touches now; steps of another touch or of another kind are forgotten."""
         touch = np.zeros(len(self.force), dtype=np.int8)
         touch[nodes] = balance.touch
-        if not np.array_equal(touch, self.touch):
+        if not (tangent.stiffened and np.array_equal(touch, self.touch)):
             self.touch, self.memory = touch, Anderson()
+
+    def _accelerated(self, step: Array) -> Array:
+        """Step from what the last ones of stiffened tangents with the same touch gained.
+
+        Such a tangent gains little by itself. Newton's own steps are taken as they are: a mean of
+        several does not keep the volume.
+        """
         ahead = self.memory.next(self.whole.reshape(-1), step.reshape(-1))
         return np.asarray(ahead.reshape(-1, 3) - self.whole)
 
@@ -268,7 +318,7 @@ class _Walk:
         into = (gap < -slack) & ~self.wanted
         self.wanted |= into
         self.on_tool |= into
-        self.stale = self.rest > STALE * before
+        self.stale = self.rest > min(STALE * before, NEAR)
         if self.rest > self.tolerance or self.off_mm > slack or into.any():
             return None
         push = np.linalg.norm(balance.force_n, axis=1)
@@ -283,4 +333,4 @@ class _Walk:
         touch[nodes] = balance.touch
         u = self.whole[self.body.surface]
         held = np.where((touch == STICK)[:, None], self.target, u)
-        return SolidState(u, self.force, touch, report, held, self.whole)
+        return SolidState(u, self.force, touch, report, held, self.whole, self.pressure)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.contact.gel_state import GelState
 from ifem_export.elements.material import Material
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -77,24 +79,61 @@ def test_tangent_under_a_given_pressure() -> None:
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.5])
-def test_pressed_to_half_in_a_few_steps(friction: float) -> None:
-    """Steps of 15 % of the thickness; forces balance, nodes are on the ball, few steps do."""
-    gel = small_pad(0.4999)
-    solver = ContactSolver(
-        SurfaceCompliance(gel), Tool.of([SPHERE], Path()), ContactSettings(1e-3, friction)
+DEPTHS_MM = (0.0, 0.1, 0.2, 0.3, 0.6, 0.9, 1.05, -0.1)
+"""From 0.3 mm on in steps of 15 % of the thickness."""
+MOST_STEPS, TOLERANCE = 10, 3e-3
+FRICTIONS = (0.0, 0.5)
+
+
+@cache
+def pressed(friction: float) -> NonlinearContact:
+    """The gel under a ball."""
+    compliance = SurfaceCompliance(small_pad(0.4999))
+    solver = ContactSolver(compliance, Tool.of([SPHERE], Path()), ContactSettings(1e-3, friction))
+    return NonlinearContact(solver, TOLERANCE)
+
+
+def poses_off_by(size: float, seed: int = 0) -> tuple[Pose, ...]:
+    """The ball's way down and up, every number off by a part of it or by so many mm."""
+    noise = size * np.random.default_rng(seed).standard_normal((len(DEPTHS_MM), 3))
+    return tuple(
+        Pose(time_s=k, depth_mm=depth * (1 + off[0]), x_mm=off[1], y_mm=off[2])
+        for k, (depth, off) in enumerate(zip(DEPTHS_MM, noise, strict=True))
     )
-    depths = (0.0, 0.1, 0.2, 0.3, 0.6, 0.9, 1.05, -0.1)
-    poses = tuple(Pose(time_s=k, depth_mm=d) for k, d in enumerate(depths))
-    model = NonlinearContact(solver, tolerance=3e-3)
+
+
+def iterations(states: list[GelState]) -> list[float]:
+    """Of each pose that touches."""
+    return [state.solver["iterations"] for state in states[1:-1]]
+
+
+def pushes_n(states: list[GelState]) -> np.ndarray:
+    """Of each pose that touches."""
+    return np.array([-state.force_n[:, 2].sum() for state in states[1:-1]])
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_pressed_to_half_in_a_few_steps(friction: float) -> None:
+    """Forces balance, nodes are on the ball, few steps do."""
+    model, poses = pressed(friction), poses_off_by(0.0)
     states = list(model.states(poses))
     for pose, state in zip(poses[4:-1], states[4:-1], strict=True):
-        assert state.solver["residual"] <= 3e-3
-        assert state.solver["iterations"] <= 20
-        places = solver.points_mm + state.displacement_mm
-        height = solver.tool.height_mm(pose, places[:, 0], places[:, 1])
+        assert state.solver["residual"] <= TOLERANCE
+        places = model.solver.points_mm + state.displacement_mm
+        height = model.solver.tool.height_mm(pose, places[:, 0], places[:, 1])
         assert (height - places[:, 2]).min() > -3e-3
         assert np.abs(height - places[:, 2])[state.touch > 0].max() < 3e-3
-    pushes = [-s.force_n[:, 2].sum() for s in states[1:-1]]
-    assert (np.diff(pushes) > 0).all()
+    assert max(iterations(states)) <= MOST_STEPS
+    assert (np.diff(pushes_n(states)) > 0).all()
     assert not states[-1].force_n.any()
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+def test_rounding_does_not_decide_how_many_steps_it_takes(friction: float) -> None:
+    """Poses off by some hundred roundings: as few steps, and forces off by as little."""
+    model = pressed(friction)
+    forces = pushes_n(list(model.states(poses_off_by(0.0))))
+    for seed in range(4):
+        states = list(model.states(poses_off_by(1e-13, seed)))
+        assert max(iterations(states)) <= MOST_STEPS
+        np.testing.assert_allclose(pushes_n(states), forces, rtol=1e-6)
