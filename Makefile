@@ -8,13 +8,33 @@ PINS := requirements/constraints.txt
 
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: variant test test-slow site lint stability designs bench docs pins clean
+.PHONY: variant test test-cores test-slow site lint stability designs bench docs pins clean
 
 variant: $(VENV)/.installed
 	$(BIN)/gelslim build "$(SPEC)" -o "$(OUT)"
 
 test: lint $(VENV)/.installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile
+
+# Tests that another processor's last bits could turn: contact solvers and active sets, fits,
+# factors and operators, searches and iterations that stop by a residual. Rendering, files and the
+# rest of the suite neither iterate nor stop by a residual, and are left to `make test`.
+CORE_TESTS := tests/ifem/test_contact_inverse.py tests/ifem/test_finite_strain.py \
+	tests/ifem/test_solver_hard.py tests/ifem/test_surface_operator.py \
+	tests/twin/test_contact_balance.py tests/twin/test_contact_incompressible.py \
+	tests/twin/test_contact_limits.py tests/twin/test_contact_rungs.py \
+	tests/twin/test_contact_solver.py tests/twin/test_contact_walls.py \
+	tests/force/test_calibration_fit.py tests/force/test_contact_forces.py \
+	tests/force/test_lattice_registration.py tests/force/test_low_pass.py \
+	tests/optics/test_lens_distortion.py tests/optics/test_tir_certificate.py \
+	tests/dimensions/test_fold_solver.py
+
+# OpenBLAS' kernels for an older processor, and loops compiled for a plain one: no AVX, no fused
+# multiply-add. Where OpenBLAS does not have that processor it keeps its own kernels.
+test-cores: $(VENV)/.installed-dev
+	OPENBLAS_CORETYPE=Sandybridge NUMBA_CPU_NAME=generic \
+	  NUMBA_CACHE_DIR="$(CURDIR)/build/numba-generic" \
+	  $(BIN)/pytest -n 2 --dist loadfile $(CORE_TESTS)
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile -m slow

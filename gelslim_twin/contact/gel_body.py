@@ -12,8 +12,8 @@ from scipy import sparse
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.elements.material import Material
+from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

@@ -68,7 +68,7 @@ class NewtonContact:
         """Nothing touches."""
         still = np.zeros((self.body.bundle.mesh.n_nodes, 3))
         rest = GelState.at_rest(len(self.body.surface))
-        none = np.zeros(len(self.body.pad.hexes))
+        none = np.zeros(len(self.body.pad.mesh.hexes))
         return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, None, still, none)
 
     def step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
@@ -111,7 +111,7 @@ class NewtonContact:
         pressure = state.pressure_mpa
         if pressure is None:
             still = np.zeros_like(state.whole_mm)
-            pressure = self.body.pad.ahead_pressure_mpa(state.whole_mm, still)
+            pressure = self.body.pad.predicted_pressure_mpa(state.whole_mm, still)
         return _Start(state.whole_mm, state.force_n, pressure)
 
     def _ahead(self, last: SolidState, before: Pose, pose: Pose) -> _Start | None:
