@@ -17,16 +17,20 @@ test: lint $(VENV)/.installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile
 
 # Tests that another processor's last bits could turn: contact solvers and active sets, fits,
-# factors and operators, searches and iterations that stop by a residual. Rendering, files and the
-# rest of the suite neither iterate nor stop by a residual, and are left to `make test`.
-CORE_TESTS := tests/ifem/test_contact_inverse.py tests/ifem/test_finite_strain.py \
-	tests/ifem/test_solver_hard.py tests/ifem/test_surface_operator.py \
+# factors and operators, ray traces, searches and iterations that stop by a residual. Two and a
+# half minutes of one core; the rest of the suite is left to `make test`.
+CORE_TESTS := tests/ifem/test_contact_inverse.py tests/ifem/test_convolved_operator.py \
+	tests/ifem/test_finite_strain.py tests/ifem/test_solver_hard.py \
+	tests/ifem/test_surface_operator.py \
 	tests/twin/test_contact_balance.py tests/twin/test_contact_incompressible.py \
-	tests/twin/test_contact_limits.py tests/twin/test_contact_rungs.py \
+	tests/twin/test_contact_ladder.py tests/twin/test_contact_limits.py \
+	tests/twin/test_contact_relief.py tests/twin/test_contact_rungs.py \
 	tests/twin/test_contact_solver.py tests/twin/test_contact_walls.py \
 	tests/force/test_calibration_fit.py tests/force/test_contact_forces.py \
+	tests/force/test_crowned_sensor.py tests/force/test_force_estimator.py \
 	tests/force/test_lattice_registration.py tests/force/test_low_pass.py \
-	tests/optics/test_lens_distortion.py tests/optics/test_tir_certificate.py \
+	tests/optics/test_back_projection.py tests/optics/test_lens_distortion.py \
+	tests/optics/test_tir_certificate.py tests/optics/test_trace_balance.py \
 	tests/dimensions/test_fold_solver.py
 
 # OpenBLAS' kernels for an older processor, and loops compiled for a plain one: no AVX, no fused
