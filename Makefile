@@ -19,19 +19,13 @@ test: lint $(VENV)/.installed-dev
 # Tests that another processor's last bits could turn: contact solvers and active sets, fits,
 # factors and operators, ray traces, searches and iterations that stop by a residual. Two and a
 # half minutes of one core; the rest of the suite is left to `make test`.
-CORE_TESTS := tests/ifem/test_contact_inverse.py tests/ifem/test_convolved_operator.py \
-	tests/ifem/test_finite_strain.py tests/ifem/test_solver_hard.py \
-	tests/ifem/test_surface_operator.py \
-	tests/twin/test_contact_balance.py tests/twin/test_contact_incompressible.py \
-	tests/twin/test_contact_ladder.py tests/twin/test_contact_limits.py \
-	tests/twin/test_contact_relief.py tests/twin/test_contact_rungs.py \
-	tests/twin/test_contact_solver.py tests/twin/test_contact_walls.py \
-	tests/force/test_calibration_fit.py tests/force/test_contact_forces.py \
-	tests/force/test_crowned_sensor.py tests/force/test_force_estimator.py \
-	tests/force/test_lattice_registration.py tests/force/test_low_pass.py \
-	tests/optics/test_back_projection.py tests/optics/test_lens_distortion.py \
-	tests/optics/test_tir_certificate.py tests/optics/test_trace_balance.py \
-	tests/dimensions/test_fold_solver.py
+CORE_NAMES := contact_inverse convolved_operator finite_strain solver_hard surface_operator \
+	contact_balance contact_incompressible contact_ladder contact_limits contact_relief \
+	contact_rungs contact_solver contact_walls calibration_fit contact_forces \
+	crowned_sensor force_estimator lattice_registration low_pass back_projection \
+	lens_distortion tir_certificate trace_balance fold_solver
+CORE_TESTS = $(foreach name,$(CORE_NAMES),$(or $(shell find tests -name "test_$(name).py"),\
+	$(error no test file is called test_$(name).py)))
 
 # OpenBLAS' kernels for an older processor, and loops compiled for a plain one: no AVX, no fused
 # multiply-add. Where OpenBLAS does not have that processor it keeps its own kernels.
