@@ -23,7 +23,12 @@ if TYPE_CHECKING:
     from gelslim_force.forces.frame_result import ForceField, FrameResult
     from gelslim_force.forces.wrench import Wrench
     from gelslim_force.frames.source import open_frames
+    from gelslim_force.outputs.overlay import Overlay
+    from gelslim_force.outputs.recorded_run import read_run
+    from gelslim_force.outputs.run_recorder import RunRecorder
+    from gelslim_force.outputs.sinks import PictureSink, RecorderSink
     from gelslim_force.pipeline import ForcePipeline
+    from gelslim_force.run import run_frames
     from gelslim_force.sensor import indenter_source, open_sensor
     from gelslim_force.settings import PipelineSettings
 
@@ -37,7 +42,11 @@ __all__ = [
     "FrameResult",
     "NormalReading",
     "NormalSource",
+    "Overlay",
+    "PictureSink",
     "PipelineSettings",
+    "RecorderSink",
+    "RunRecorder",
     "Wrench",
     "calibrate",
     "indenter_source",
@@ -46,6 +55,8 @@ __all__ = [
     "read_calibration",
     "read_depth_maps",
     "read_reference",
+    "read_run",
+    "run_frames",
     "write_calibration",
 ]
 
@@ -61,7 +72,11 @@ __getattr__, __dir__ = lazy_exports(
         "FrameResult": "gelslim_force.forces.frame_result",
         "NormalReading": "gelslim_force.contact.normal_source",
         "NormalSource": "gelslim_force.contact.normal_source",
+        "Overlay": "gelslim_force.outputs.overlay",
+        "PictureSink": "gelslim_force.outputs.sinks",
         "PipelineSettings": "gelslim_force.settings",
+        "RecorderSink": "gelslim_force.outputs.sinks",
+        "RunRecorder": "gelslim_force.outputs.run_recorder",
         "Wrench": "gelslim_force.forces.wrench",
         "calibrate": "gelslim_force.calibration.calibration",
         "indenter_source": "gelslim_force.sensor",
@@ -70,6 +85,8 @@ __getattr__, __dir__ = lazy_exports(
         "read_calibration": "gelslim_force.calibration.file",
         "read_depth_maps": "gelslim_force.contact.depth_map_source",
         "read_reference": "gelslim_force.calibration.reference_picture",
+        "read_run": "gelslim_force.outputs.recorded_run",
+        "run_frames": "gelslim_force.run",
         "write_calibration": "gelslim_force.calibration.file",
     },
 )

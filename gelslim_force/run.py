@@ -71,6 +71,13 @@ def run_frames(
         count: Number of frames, for `progress`; None if it is not known.
         progress: Called after each frame with the text "frames", the number of processed frames
             and their total.
+
+    Returns:
+        Counts and extreme values of the run.
+
+    Raises:
+        OutputError: A sink cannot write.
+        FrameSourceError: The source fails.
     """
     report = progress or (lambda text, done, total: None)
     clock = StageSummary()

@@ -59,7 +59,11 @@ class OverlaySettings:
 
 
 class Overlay:
-    """Draws the frames of a run at one size."""
+    """Draws the frames of a run at one size.
+
+    Attributes:
+        zoom: Enlargement of the frames.
+    """
 
     def __init__(
         self,
@@ -94,10 +98,19 @@ class Overlay:
     def draw(
         self, image: NDArray[np.uint8] | None, result: FrameResult, scale: ArrowScale
     ) -> Image:
-        """Return an RGB picture of `size_px`.
+        """Draw a frame and its result.
 
-        `image` is RGB (h, w, 3) or grey (h, w). Without one, or with one of another size, the
-        picture stays dark. Raises MissingLibraryError without OpenCV.
+        Args:
+            image: RGB (h, w, 3) or grey (h, w). Without one, or with one of another size, the
+                picture stays dark.
+            result: What is drawn over it.
+            scale: How long the arrows are.
+
+        Returns:
+            An RGB picture of `size_px`.
+
+        Raises:
+            MissingLibraryError: OpenCV is not installed.
         """
         field = result.field if self._project is not None else None
         view = None if field is None else self._view_of(field)

@@ -60,7 +60,17 @@ class RecordedRun:
 
 
 def read_run(folder: str | os.PathLike[str]) -> RecordedRun:
-    """Open a run folder. Raises OutputError if there is no run or a file is damaged."""
+    """Open the folder of a run, also of one that was stopped, was killed or still goes on.
+
+    Args:
+        folder: The folder that a `RunRecorder` wrote.
+
+    Returns:
+        The run; its wrenches are in memory, its fields are read when they are needed.
+
+    Raises:
+        OutputError: The folder holds no run, or a file is damaged.
+    """
     root = Path(folder)
     manifest = read_manifest(root)
     path = root / WRENCHES

@@ -89,7 +89,10 @@ class _OpenChunk:
 
 
 class RunRecorder(AbstractContextManager["RunRecorder"]):
-    """Writes results in the order of their index.
+    """Writes results in the order of their index to a folder.
+
+    Attributes:
+        folder: The folder of the run.
 
     >>> with RunRecorder("out/run") as run:  # doctest: +SKIP
     ...     for result in results:

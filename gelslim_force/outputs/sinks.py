@@ -34,7 +34,11 @@ class Recorder(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RecorderSink:
-    """Passes results on to a recorder, without their pictures."""
+    """Passes results on to a recorder, without their pictures.
+
+    Attributes:
+        recorder: A `RunRecorder` or a `McapRecording`.
+    """
 
     recorder: Recorder
 
@@ -45,12 +49,17 @@ class RecorderSink:
 
 @dataclass(eq=False)
 class PictureSink:
-    """Keeps frames that are spread evenly over the run and draws them into a folder at its end."""
+    """Keeps frames that are spread evenly over the run; `write` draws them at its end.
+
+    Attributes:
+        overlay: What draws the pictures.
+        folder: Where the pictures go.
+        most: Largest number of pictures.
+    """
 
     overlay: Overlay
     folder: str | os.PathLike[str]
     most: int
-    """Largest number of pictures."""
     _kept: list[tuple[NDArray[np.uint8] | None, FrameResult]] = field(default_factory=list)
     _every: int = 1
     _count: int = 0
