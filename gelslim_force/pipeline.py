@@ -31,7 +31,7 @@ from gelslim_force.tracking.tracker import TrackedFrame
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.errors import IfemError
-from ifem_export.markers.interpolation_matrix import FilledInterpolation
+from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 from ifem_export.operators.single_thread import single_threaded
 
 Array = NDArray[np.float64]
@@ -288,7 +288,7 @@ class ForcePipeline:
 
     def _covariance(
         self,
-        interpolation: FilledInterpolation,
+        interpolation: MarkerInterpolation,
         motion: Array,
         noise: float,
         reading: NormalReading | None,
@@ -301,7 +301,7 @@ class ForcePipeline:
         apparent = self._motion.apparent_motion(motion, self.settings.unknown_normal_mm)
         return self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
 
-    def _gains(self, interpolation: FilledInterpolation) -> Array:
+    def _gains(self, interpolation: MarkerInterpolation) -> Array:
         """Wrench per motion of each marker; computed anew only where other markers are lost."""
         lost = interpolation.lost.tobytes()
         if self._kept_gains is None or self._kept_gains[0] != lost:

@@ -69,7 +69,6 @@ def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
         pitch_mm=(d["pad_mesh.cell_x_mm"], d["pad_mesh.cell_y_mm"]),
         layers=d["mesh.layers"],
         align_to_mm=grid.positions_mm,
-        alignment_tolerance_mm=None,
         **cut,
     )
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ifem_export.operators.sparse_factor import Factor, factored
+from ifem_export.operators.solver import Factor, factored
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

@@ -13,7 +13,7 @@ from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.motion.marker_motion import Compensation, MarkerView
 from gelslim_optics.camera.projection_error import projection_error_mm
 from ifem_export.markers.interpolation import marker_to_node
-from ifem_export.markers.interpolation_matrix import FilledInterpolation
+from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 
 Array = NDArray[np.float64]
 _STEP_MM = 1e-3
@@ -33,7 +33,7 @@ class SurfaceMotion:
     view: MarkerView
     markers: NDArray[np.int64]
     """(n,) ids among the sensor's markers."""
-    interpolation: FilledInterpolation
+    interpolation: MarkerInterpolation
     """From all k markers to the nodes."""
     points_mm: Array
     """(c, 3) nodes at rest."""
@@ -82,7 +82,7 @@ class SurfaceMotion:
 
     def of_nodes(
         self, motion_mm: Array, reading: NormalReading | None
-    ) -> tuple[FilledInterpolation, Array]:
+    ) -> tuple[MarkerInterpolation, Array]:
         """Interpolation without the lost markers, and the nodes' motion (c, 3).
 
         Raises InterpolationError where too few markers are left to interpolate from.

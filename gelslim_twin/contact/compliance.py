@@ -23,7 +23,7 @@ from gelslim_twin.contact.row_factor import RowFactor
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.sparse_factor import Factor, factored
+from ifem_export.operators.solver import Factor, factored
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]

@@ -1,16 +1,14 @@
 """Global stiffness matrix of a cropped uniform lattice, written directly in CSR form.
 
-Every node's rows are copied from a table of its possible cells, so there is no list of triplets
-and no sort. The peak memory is about that of the matrix. Its rows are sorted, and it is exactly
-symmetric for any number of threads. Cells may be scaled by their filled fraction φ_e,
-K = Σ φ_e K_e; with all fractions 1 the matrix is the same to the bit.
+Every node's rows are summed over the cells around it, K = Σ φ_e K_e with the filled fractions φ_e,
+so there is no list of triplets and no sort. The peak memory is about that of the matrix. Its rows
+are sorted, and it is exactly symmetric for any number of threads.
 """
 
 from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
@@ -19,12 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.assembly.occupancy_table import (
-    NeighbourPattern,
-    neighbour_pattern,
-    occupancy_table,
-    shared_cells,
-)
+from ifem_export.assembly.occupancy_table import neighbour_pattern, shared_cells
 from ifem_export.errors import MeshError
 from ifem_export.mesh.lattice import Numbering, number_nodes
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -76,7 +69,7 @@ def assemble_csr(
         MeshError: No cell exists, the element matrix is not a finite (24, 24) matrix, or the
             fill has another shape or a value that is not finite and > 0.
     """
-    from ifem_export.assembly.kernels import fill_csr, fill_weighted_csr
+    from ifem_export.assembly.kernels import fill_csr
 
     matrix = np.asarray(element_matrix, dtype=float)
     if matrix.shape != (24, 24) or not np.isfinite(matrix).all():
@@ -85,22 +78,8 @@ def assemble_csr(
             field="element_matrix",
         )
     nodes = number_nodes(occupancy) if numbering is None else numbering
-    kernel: Callable[..., None] = fill_csr
-    recipe: Any
-    if fill is None:
-        recipe = np.ascontiguousarray(occupancy_table(matrix).transpose(0, 2, 1, 3))
-    else:
-        kernel = fill_weighted_csr
-        by_corner = matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3)
-        scales = corner_fill(occupancy, fill)[nodes.positions]
-        recipe = (scales, np.ascontiguousarray(by_corner), *_pairs())
-    return _filled(kernel, nodes, recipe, threads)
-
-
-def _filled(
-    kernel: Callable[..., None], nodes: Numbering, recipe: Any, threads: int | None
-) -> sparse.csr_array:
-    """Let `kernel` write all rows, over as many threads as the size of the matrix requires."""
+    scales = corner_fill(occupancy, occupancy.astype(float) if fill is None else fill)
+    by_corner = np.ascontiguousarray(matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3))
     pattern = neighbour_pattern()
     ends = np.cumsum(pattern.counts[nodes.masks])
     blocks, n = int(ends[-1]), nodes.n_nodes
@@ -109,35 +88,27 @@ def _filled(
     indptr[-1] = 9 * blocks
     indices = np.empty(9 * blocks, dtype=index)
     data = np.empty(9 * blocks)
-    shared = (
-        nodes.masks,
-        nodes.positions,
-        np.concatenate([[0], ends[:-1]]),
-        nodes.node_index,
-        pattern.counts,
-        pattern.slots,
-        _slot_strides(nodes),
-        recipe,
-        indptr,
-        indices,
-        data,
-    )
+    shared: tuple[Any, ...] = (
+        nodes.masks, nodes.positions, np.concatenate([[0], ends[:-1]]), nodes.node_index,
+        pattern.counts, pattern.slots, _slot_strides(nodes),
+        (scales[nodes.positions], by_corner, *_pairs()), indptr, indices, data,
+    )  # fmt: skip
     workers = _worker_count(threads, data.nbytes + indices.nbytes)
     bounds = np.linspace(0, n, workers + 1).astype(int).tolist()
     with ThreadPoolExecutor(workers) as pool:
-        jobs = [pool.submit(kernel, a, b, *shared) for a, b in itertools.pairwise(bounds)]
+        jobs = [pool.submit(fill_csr, a, b, *shared) for a, b in itertools.pairwise(bounds)]
         for job in jobs:
             job.result()
-    matrix = sparse.csr_array((data, indices, indptr), shape=(3 * n, 3 * n))
+    stiffness = sparse.csr_array((data, indices, indptr), shape=(3 * n, 3 * n))
     # SciPy then never checks or sorts: the kernel writes sorted rows without duplicates.
-    matrix.has_sorted_indices = True
-    matrix.has_canonical_format = True
-    return matrix
+    stiffness.has_sorted_indices = True
+    stiffness.has_canonical_format = True
+    return stiffness
 
 
 def block_pattern(nodes: Numbering) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Which 3x3 blocks of the stiffness matrix exist, as CSR `indptr` and `indices` of nodes."""
-    pattern: NeighbourPattern = neighbour_pattern()
+    pattern = neighbour_pattern()
     counts = pattern.counts[nodes.masks]
     present = np.arange(27) < counts[:, None]
     offsets = _slot_strides(nodes)[pattern.slots[nodes.masks]]

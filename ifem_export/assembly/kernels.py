@@ -6,7 +6,7 @@ from typing import Any
 
 from numba import njit
 
-# Arguments of both kernels: the rows of nodes [start, stop) are written. `masks`, `positions` and
+# The rows of nodes [start, stop) are written. `masks`, `positions` and
 # `first_block` are per node, `node_index` is over the lattice, `counts` and `slots` are the
 # neighbour pattern, and `strides` is the lattice offset of each slot. The rows of a node do not
 # depend on those of another node, so any division among threads gives the same bits.
@@ -14,42 +14,6 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def fill_csr(
-    start: int,
-    stop: int,
-    masks: Any,
-    positions: Any,
-    first_block: Any,
-    node_index: Any,
-    counts: Any,
-    slots: Any,
-    strides: Any,
-    table: Any,
-    indptr: Any,
-    indices: Any,
-    data: Any,
-) -> None:
-    """Write the scalar CSR rows 3·start … 3·stop; `table` is (256, 3, 27, 3)."""
-    for node in range(start, stop):
-        mask = masks[node]
-        count = counts[mask]
-        position = positions[node]
-        row_start = 9 * first_block[node]
-        width = 3 * count
-        for row in range(3):
-            indptr[3 * node + row] = row_start + row * width
-        for b in range(count):
-            slot = slots[mask, b]
-            column = 3 * node_index[position + strides[slot]]
-            at = row_start + 3 * b
-            for row in range(3):
-                for c in range(3):
-                    indices[at + c] = column + c
-                    data[at + c] = table[mask, row, slot, c]
-                at += width
-
-
-@njit(cache=True, nogil=True)
-def fill_weighted_csr(
     start: int,
     stop: int,
     masks: Any,

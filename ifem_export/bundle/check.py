@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from scipy import sparse
 
 from ifem_export.assembly.assembly import corner_fill
 from ifem_export.bundle.bundle import Bundle, elementwise_force
+from ifem_export.bundle.layout import bundle_arrays
 from ifem_export.bundle.manifest import REBUILD
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.errors import BundleError, IfemError
@@ -44,29 +44,11 @@ def _fail(array: str, reason: str) -> None:
 
 
 def _check_finite(bundle: Bundle) -> None:
-    arrays: dict[str, NDArray[Any]] = {
-        "nodes_mm": bundle.mesh.nodes_mm,
-        "element_matrix_n_per_mm": bundle.element_matrix,
-        "self_test_displacement_mm": bundle.self_test.displacement_mm,
-        "self_test_force_n": bundle.self_test.force_n,
-    }
-    if bundle.stiffness is not None:
-        arrays["stiffness_data_n_per_mm"] = bundle.stiffness.data
-    if bundle.markers is not None:
-        arrays["marker_positions_mm"] = bundle.markers.positions_mm
-        arrays["interpolation_data"] = bundle.markers.to_surface.data
-        if bundle.markers.spline is not None:
-            arrays["thin_plate"] = bundle.markers.spline.to_nodes
-            arrays["thin_plate_bending"] = bundle.markers.spline.bending
-        for name, values in bundle.markers.arrays.items():
-            arrays[f"marker_{name}"] = values
-    arrays |= {f"light_{name}": values for name, values in bundle.light.items()}
-    for name, array in arrays.items():
-        if array.dtype.kind != "f":
-            continue
-        bad = int(array.size - np.isfinite(array).sum())
-        if bad:
-            _fail(name, f"holds {bad} values that are not finite")
+    for name, array in bundle_arrays(bundle).items():
+        if array.dtype.kind == "f":
+            bad = int(array.size - np.isfinite(array).sum())
+            if bad:
+                _fail(name, f"holds {bad} values that are not finite")
 
 
 def _check_mesh(mesh: PadMesh) -> None:

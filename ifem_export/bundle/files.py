@@ -80,38 +80,25 @@ def _fill(folder: Path, bundle: Bundle) -> None:
     )
 
 
-def load_bundle(
-    path: str | os.PathLike[str],
-    verify: bool = True,
-    *,
-    expected_geometry_hash: str | None = None,
-) -> Bundle:
+def load_bundle(path: str | os.PathLike[str], verify: bool = True) -> Bundle:
     """Open a bundle, whose arrays are memory-mapped and read-only.
 
     Args:
         path: Directory of the bundle.
         verify: Whether the SHA-256 of every file, all values and the self-test pair are checked.
             Otherwise only the manifest and the array headers are read, and values when used.
-        expected_geometry_hash: Geometry hash that the bundle must have; None accepts all.
 
     Returns:
         The bundle.
 
     Raises:
-        BundleError: A file is missing, damaged or altered, or the bundle belongs to another pad.
+        BundleError: A file is missing, damaged or altered.
     """
     folder = Path(path)
     if not folder.is_dir():
         what = "is a file, not a bundle directory" if folder.exists() else "does not exist"
         raise BundleError(str(folder), what, "give the path of a bundle directory")
     manifest = read_manifest(folder)
-    if expected_geometry_hash not in (None, manifest["geometry_hash"]):
-        raise BundleError(
-            MANIFEST,
-            f"geometry hash {manifest['geometry_hash'][:12]}… belongs to another sensor, "
-            f"expected {str(expected_geometry_hash)[:12]}…",
-            "load the bundle that was built for this sensor",
-        )
     arrays = {
         name: _open_array(folder, entry, verify) for name, entry in manifest["arrays"].items()
     }

@@ -57,11 +57,6 @@ def strain_displacement(gradients: NDArray[np.float64]) -> NDArray[np.float64]:
     return b.reshape(*gradients.shape[:-2], 6, 3 * n)
 
 
-def elasticity_matrix(material: Material) -> NDArray[np.float64]:
-    """Matrix D (6, 6) in MPa: stress = D strain, in the order of `strain_displacement`."""
-    return deviatoric_matrix(material) + material.bulk_modulus_mpa * np.outer(TRACE, TRACE)
-
-
 def deviatoric_matrix(material: Material) -> NDArray[np.float64]:
     """Deviatoric part of D, (6, 6) in MPa, which a pure volume change does not affect."""
     g = material.shear_modulus_mpa

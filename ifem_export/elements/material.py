@@ -61,11 +61,6 @@ class Material:
         """Bulk modulus κ = E / (3(1-2ν))."""
         return self.youngs_modulus_mpa / (3.0 * (1.0 - 2.0 * self.poissons_ratio))
 
-    @property
-    def constrained_modulus_mpa(self) -> float:
-        """Modulus of uniaxial strain, M = λ + 2G."""
-        return self.lame_lambda_mpa + 2.0 * self.shear_modulus_mpa
-
 
 def _refusal(name: str, value: Any, reason: str) -> MaterialError:
     return MaterialError(f"{name} = {value!r}: {reason}", field=name, value=value)

@@ -2,8 +2,7 @@
 
 Eight cells are processed at a time, with the cell as the innermost index, so that one vector
 instruction serves several cells. Local corners and Gauss points are numbered by bits,
-x + 2y + 4z. The forces of a cell depend on no other cell, and a node sums its cells in increasing
-order, so any division among threads gives the same bits.
+x + 2y + 4z.
 """
 
 from __future__ import annotations
@@ -24,8 +23,6 @@ _FAR = 0.5 - 0.5 / math.sqrt(3.0)
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def element_forces(
-    start: int,
-    stop: int,
     hexes: Any,
     displacement: Any,
     cell_size: Any,
@@ -34,10 +31,10 @@ def element_forces(
     least_j: float,
     forces: Any,
 ) -> int:
-    """Write the corner forces (m, 8, 3) of cells start … stop.
+    """Write the corner forces (m, 8, 3) of all cells.
 
     Returns:
-        The first of these cells with J <= least_j, infinite or NaN at a Gauss point, or -1.
+        The first cell with J <= least_j, infinite or NaN at a Gauss point, or -1.
     """
     weight = cell_size[0] * cell_size[1] * cell_size[2] / 8.0
     floor = least_j - 1.0
@@ -48,8 +45,8 @@ def element_forces(
     iso = np.empty((8, LANES))
     dilatation = np.empty((8, LANES))
     mean = np.empty(LANES)
-    for first in range(start, stop, LANES):
-        used = min(LANES, stop - first)
+    for first in range(0, len(hexes), LANES):
+        used = min(LANES, len(hexes) - first)
         for lane in range(LANES):
             # Spare lanes repeat the last cell; their forces are not stored.
             cell = first + min(lane, used - 1)
@@ -75,7 +72,9 @@ def element_forces(
                 for g in range(8):
                     if not floor < dilatation[g, lane] < np.inf:
                         return first + lane
-        _isochoric_factors(dilatation, iso)
+        for g in range(8):
+            for lane in range(LANES):
+                iso[g, lane] = (1.0 + dilatation[g, lane]) ** (-2.0 / 3.0)
         for lane in range(LANES):
             mean[lane] *= bulk
         _stresses(h, c, dilatation, iso, mean, shear)
@@ -147,14 +146,6 @@ def _determinants(h: Any, c: Any, dilatation: Any) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _isochoric_factors(dilatation: Any, iso: Any) -> None:
-    """J^(-2/3)."""
-    for g in range(8):
-        for lane in range(LANES):
-            iso[g, lane] = (1.0 + dilatation[g, lane]) ** (-2.0 / 3.0)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _stresses(h: Any, c: Any, dilatation: Any, iso: Any, pressure: Any, shear: float) -> None:
     """Replace the displacement gradient by the first Piola-Kirchhoff stress."""
     for g in range(8):
@@ -214,9 +205,9 @@ def _nodal(h: Any, cell_size: Any, weight: float, f: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def gather(start: int, stop: int, starts: Any, entries: Any, forces: Any, total: Any) -> None:
-    """Sum the corner forces (8m, 3) of nodes start … stop, cells in increasing order."""
-    for node in range(start, stop):
+def gather(starts: Any, entries: Any, forces: Any, total: Any) -> None:
+    """Sum the corner forces (8m, 3) at each node, cells in increasing order."""
+    for node in range(len(total)):
         x = 0.0
         y = 0.0
         z = 0.0

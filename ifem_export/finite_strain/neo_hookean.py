@@ -7,8 +7,6 @@ Newton's method uses the tangent to find the inner nodes.
 
 from __future__ import annotations
 
-import itertools
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -79,12 +77,11 @@ class NeoHookeanPad:
         """Number of nodes n."""
         return self.mesh.n_nodes
 
-    def force(self, displacement_mm: ArrayLike, *, threads: int = 1) -> Array:
+    def force(self, displacement_mm: ArrayLike) -> Array:
         """Nodal forces that hold the pad in a displacement: the gradient of its strain energy.
 
         Args:
             displacement_mm: (n, 3), in the node order of `PadMesh`.
-            threads: Worker threads; their number does not change the bits of the result.
 
         Returns:
             (n, 3) in N; positive components pull the node along the axis.
@@ -93,10 +90,21 @@ class NeoHookeanPad:
             FiniteStrainError: The shape is wrong, a value is not finite, or J <= 0 at a Gauss
                 point of a cell.
         """
+        from ifem_export.finite_strain import kernel
+
         u = self._checked(displacement_mm)
-        if threads < 1:
-            raise FiniteStrainError(f"threads = {threads}: must be >= 1", field="threads")
-        return self._compiled_force(u, threads)
+        hexes = self.mesh.hexes
+        starts, entries = self._incidence
+        corners = np.empty((len(hexes), 8, 3))
+        total = np.empty((self.n_nodes, 3))
+        size = np.array(self.mesh.cell_size_mm)
+        g, bulk = self.material.shear_modulus_mpa, self.material.bulk_modulus_mpa
+        cell = int(kernel.element_forces(hexes, u, size, g, bulk, LEAST_J, corners))
+        if cell >= 0:
+            states = element.gauss_states(u[hexes[cell : cell + 1]], self.mesh.cell_size_mm)
+            raise self._inversion(cell, states.dilatation[0])
+        kernel.gather(starts, entries, corners.reshape(-1, 3), total)
+        return total
 
     def predicted_pressure_mpa(self, displacement_mm: ArrayLike, step_mm: Array) -> Array:
         """Mean pressure (m,) of the cells after a step (n, 3), to first order in the step.
@@ -182,30 +190,6 @@ class NeoHookeanPad:
             least,
         )
 
-    def _compiled_force(self, u: Array, threads: int) -> Array:
-        from ifem_export.finite_strain import kernel
-
-        starts, entries = self._incidence
-        corners = np.empty((len(self.mesh.hexes), 8, 3))
-        total = np.empty((self.n_nodes, 3))
-        size = np.array(self.mesh.cell_size_mm)
-        g, bulk = self.material.shear_modulus_mpa, self.material.bulk_modulus_mpa
-        hexes = self.mesh.hexes
-
-        def fill(a: int, b: int) -> int:
-            return int(kernel.element_forces(a, b, hexes, u, size, g, bulk, LEAST_J, corners))
-
-        def gather(a: int, b: int) -> None:
-            kernel.gather(a, b, starts, entries, corners.reshape(-1, 3), total)
-
-        inverted = [cell for cell in _split(fill, len(hexes), threads) if cell >= 0]
-        if inverted:
-            cell = inverted[0]
-            states = element.gauss_states(u[hexes[cell : cell + 1]], self.mesh.cell_size_mm)
-            raise self._inversion(cell, states.dilatation[0])
-        _split(gather, self.n_nodes, threads)
-        return total
-
     @cached_property
     def _incidence(self) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         """Corner entries (8 cell + corner) of each node in increasing order, as CSR."""
@@ -227,13 +211,3 @@ class NeoHookeanPad:
         ones = np.ones(len(order))
         sums = sparse.csr_array((ones, order, ends), shape=(len(row), len(order)))
         return indptr, indices, sums
-
-
-def _split(job: Any, n: int, threads: int) -> list[Any]:
-    """Results of job(start, stop) for `threads` ranges that cover 0 to n."""
-    workers = min(threads, n)
-    if workers == 1:
-        return [job(0, n)]
-    bounds = np.linspace(0, n, workers + 1).astype(int)
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda ab: job(int(ab[0]), int(ab[1])), itertools.pairwise(bounds)))

@@ -192,21 +192,13 @@ def smoothing(points_mm: ArrayLike, width_mm: float) -> sparse.csr_array:
 
 def _projected(force: Array, in_contact: NDArray[np.bool_], friction: float) -> Array:
     """Projection of the forces in contact onto the cones F_z <= 0, |F_xy| <= friction |F_z|."""
-    kept = np.zeros_like(force)
-    normal = -force[in_contact, 2]
-    tangential = np.hypot(force[in_contact, 0], force[in_contact, 1])
-    if np.isinf(friction):
-        kept[in_contact] = force[in_contact]
-        kept[in_contact, 2] = -np.maximum(normal, 0.0)
-        return kept
-    inside = tangential <= friction * normal
-    # In the polar cone the nearest point is the apex, otherwise one on the surface of the cone.
-    nearest = np.maximum((normal + friction * tangential) / (1 + friction * friction), 0.0)
-    scale = np.where(inside, 1.0, friction * nearest / np.where(tangential > 0, tangential, 1.0))
-    kept[in_contact, 0] = force[in_contact, 0] * scale
-    kept[in_contact, 1] = force[in_contact, 1] * scale
-    kept[in_contact, 2] = -np.where(inside, normal, nearest)
-    return kept
+    from ifem_export.inverse.contact_fit_kernel import project
+
+    contact_force = np.ascontiguousarray(force[in_contact]).reshape(-1)
+    project(contact_force, friction)
+    projected = np.zeros_like(force)
+    projected[in_contact] = contact_force.reshape(-1, 3)
+    return projected
 
 
 def _relative_change(force: Array, before: Array) -> float:

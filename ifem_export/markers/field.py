@@ -14,7 +14,7 @@ from scipy import sparse
 
 from ifem_export.errors import IfemError
 from ifem_export.markers.interpolation import marker_to_node
-from ifem_export.markers.interpolation_matrix import FilledInterpolation, filled_sparse
+from ifem_export.markers.interpolation_matrix import MarkerInterpolation, filled_sparse
 from ifem_export.markers.thin_plate import MOST_MARKERS, ThinPlate, thin_plate
 from ifem_export.mesh.pad_mesh import PadMesh
 
@@ -41,12 +41,12 @@ class MarkerField:
     spline: ThinPlate | None = None
 
     @cached_property
-    def sparse(self) -> FilledInterpolation:
+    def sparse(self) -> MarkerInterpolation:
         """Interpolation by `to_surface`; its `with_missing` handles lost markers."""
         return filled_sparse(np.asarray(self.positions_mm)[:, :2], self.to_surface)
 
     @cached_property
-    def thin_plate(self) -> FilledInterpolation:
+    def thin_plate(self) -> MarkerInterpolation:
         """Interpolation by the stored spline.
 
         Raises:
@@ -59,7 +59,7 @@ class MarkerField:
                 field="spline",
             )
         positions = np.asarray(self.positions_mm)[:, :2]
-        return FilledInterpolation(positions, self.spline.to_nodes, self.spline.bending)
+        return MarkerInterpolation(positions, self.spline.to_nodes, self.spline.bending)
 
 
 def marker_field(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,21 +57,21 @@ class MarkerGrid:
         shape = (int(self.lattice_shape[0]), int(self.lattice_shape[1]))
         object.__setattr__(self, "lattice_shape", shape)
         object.__setattr__(self, "pitch_mm", float(self.pitch_mm))
+        if np.size(self.omitted) == 0:
+            object.__setattr__(self, "omitted", np.zeros((0, 2)))
         for name in ("positions_mm", "diameter_mm"):
-            object.__setattr__(self, name, _frozen(getattr(self, name), np.float64))
+            object.__setattr__(self, name, _frozen(getattr(self, name), np.float64, name))
         for name in ("row", "column", "kind", "omitted"):
-            object.__setattr__(self, name, _frozen(getattr(self, name), np.int64))
-        _check_lengths(self)
-        _check_values(self)
-        _check_sites(self)
+            object.__setattr__(self, name, _frozen(getattr(self, name), np.int64, name))
+        _check_arrays(self)
         gap = self.smallest_gap_mm
-        if gap < -1e-9:
-            raise MarkerGridError(
-                f"marker dots overlap by {-gap:.4g} mm: the pitch is {self.pitch_mm:g} mm and the "
-                f"largest dot {self.diameter_mm.max():g} mm; use a larger pitch or smaller dots",
-                field="pitch_mm",
-                value=self.pitch_mm,
-            )
+        _require(
+            gap >= -1e-9,
+            "pitch_mm",
+            f"marker dots overlap by {-gap:.4g} mm: the pitch is {self.pitch_mm:g} mm and the "
+            f"largest dot {self.diameter_mm.max():g} mm; use a larger pitch or smaller dots",
+            self.pitch_mm,
+        )
 
     def __len__(self) -> int:
         """Number of dots."""
@@ -128,12 +128,12 @@ class MarkerGrid:
             MarkerGridError: No dot is left.
         """
         keep = _rims_inside(self.positions_mm, self.diameter_mm, contains)
-        if not keep.any():
-            raise MarkerGridError(
-                f"none of the {len(self)} markers lies inside the outline; "
-                "use a smaller marker pitch or dot, or a larger gel",
-                field="outline",
-            )
+        _require(
+            keep.any(),
+            "outline",
+            f"none of the {len(self)} markers lies inside the outline; "
+            "use a smaller marker pitch or dot, or a larger gel",
+        )
         missing_mm = np.full(len(self.omitted), self.diameter_mm[keep].max())
         known = _rims_inside(self.sites_mm(self.omitted), missing_mm, contains)
         return MarkerGrid(
@@ -200,12 +200,15 @@ def _lattice_mm(
     return (sites.reshape(-1, 2) - (np.array(shape) - 1) / 2) * pitch_mm
 
 
-def _frozen(values: ArrayLike, dtype: type) -> NDArray:
+def _require(condition: Any, field: str, message: str, value: Any = None) -> None:
+    if not condition:
+        raise MarkerGridError(message, field=field, value=value)
+
+
+def _frozen(values: ArrayLike, dtype: type, name: str) -> NDArray:
     array = np.array(values)
-    if dtype is np.int64 and array.size and not np.array_equal(array, np.rint(array)):
-        raise MarkerGridError(
-            "marker grid: lattice indices and kinds must be whole numbers", field="kind"
-        )
+    whole = dtype is not np.int64 or not array.size or np.array_equal(array, np.rint(array))
+    _require(whole, name, f"marker grid: {name} must hold whole numbers")
     array = array.astype(dtype)
     array.setflags(write=False)
     return array
@@ -218,120 +221,102 @@ def _rims_inside(
 ) -> NDArray[np.bool_]:
     angle = np.linspace(0.0, 2.0 * np.pi, _RIM_POINTS, endpoint=False)
     disc = np.vstack([np.column_stack([np.cos(angle), np.sin(angle)]), [[0.0, 0.0]]]) / 2
-    points = centres_mm[:, None, :] + diameter_mm[:, None, None] * disc
-    inside = np.asarray(contains(points.reshape(-1, 2)), dtype=bool)
-    if inside.shape != (points.shape[0] * points.shape[1],):
-        raise MarkerGridError(
-            f"contains must return one boolean per point, got shape {inside.shape} "
-            f"for {points.shape[0] * points.shape[1]} points",
-            field="contains",
-        )
-    return np.all(inside.reshape(points.shape[:2]), axis=1)
+    points = (centres_mm[:, None, :] + diameter_mm[:, None, None] * disc).reshape(-1, 2)
+    inside = np.asarray(contains(points), dtype=bool)
+    _require(
+        inside.shape == (len(points),),
+        "contains",
+        f"contains must return one boolean per point, got shape {inside.shape} "
+        f"for {len(points)} points",
+    )
+    return np.all(inside.reshape(-1, len(disc)), axis=1)
 
 
 def _check_request(
-    rows: int,
-    columns: int,
-    pitch_mm: float,
-    diameter_mm: float,
-    anchors: str,
-    anchor_scale: float,
+    rows: int, columns: int, pitch_mm: float, diameter_mm: float, anchors: str, scale: float
 ) -> None:
     for name, count in (("rows", rows), ("columns", columns)):
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-            raise MarkerGridError(
-                f"marker {name} = {count!r}: must be a whole number, at least 1",
-                field=name,
-                value=count,
-            )
+        _require(
+            not isinstance(count, bool) and isinstance(count, int | np.integer) and count >= 1,
+            name,
+            f"marker {name} = {count!r}: must be a whole number, at least 1",
+            count,
+        )
     for name, length in (("pitch_mm", pitch_mm), ("diameter_mm", diameter_mm)):
-        if not (np.isfinite(length) and length > 0):
-            raise MarkerGridError(
-                f"marker {name} = {length!r}: must be a finite length > 0", field=name, value=length
-            )
-    if anchors not in ("odd_sized", "omitted", "none"):
-        raise MarkerGridError(
-            f"marker anchors = {anchors!r}: must be 'odd_sized', 'omitted' or 'none'",
-            field="anchors",
-            value=anchors,
+        _require(
+            np.isfinite(length) and length > 0,
+            name,
+            f"marker {name} = {length!r}: must be a finite length > 0",
+            length,
         )
-    if anchors == "odd_sized" and not (np.isfinite(anchor_scale) and anchor_scale > 1):
-        raise MarkerGridError(
-            f"marker anchor_scale = {anchor_scale!r}: must be > 1, or the anchors look like the "
-            "other dots; 1.5 is usual",
-            field="anchor_scale",
-            value=anchor_scale,
-        )
-    if diameter_mm > pitch_mm:
-        raise MarkerGridError(
-            f"marker diameter_mm = {diameter_mm:g} exceeds pitch_mm = {pitch_mm:g}: the dots would "
-            "overlap; use a larger pitch or smaller dots",
-            field="diameter_mm",
-            value=diameter_mm,
-        )
-
-
-def _check_lengths(grid: MarkerGrid) -> None:
-    count = len(grid.row)
-    expected = {"positions_mm": (count, 2)} | dict.fromkeys(
-        ("row", "column", "diameter_mm", "kind"), (count,)
+    _require(
+        anchors in get_args(Anchors),
+        "anchors",
+        f"marker anchors = {anchors!r}: must be 'odd_sized', 'omitted' or 'none'",
+        anchors,
     )
-    for name, shape in expected.items():
-        if getattr(grid, name).shape != shape:
-            raise MarkerGridError(
-                f"marker grid: {name} has shape {getattr(grid, name).shape}, expected {shape}",
-                field=name,
-            )
-    if grid.omitted.size == 0:
-        empty = np.zeros((0, 2), dtype=np.int64)
-        empty.setflags(write=False)
-        object.__setattr__(grid, "omitted", empty)
-    if grid.omitted.ndim != 2 or grid.omitted.shape[1] != 2:
-        raise MarkerGridError(
-            f"marker grid: omitted has shape {grid.omitted.shape}, expected (k, 2) sites",
-            field="omitted",
-        )
-    if count == 0:
-        raise MarkerGridError(
-            "marker grid: no markers; use a smaller pitch or a larger gel", field="row"
-        )
+    _require(
+        anchors != "odd_sized" or (np.isfinite(scale) and scale > 1),
+        "anchor_scale",
+        f"marker anchor_scale = {scale!r}: must be > 1, or the anchors look like the "
+        "other dots; 1.5 is usual",
+        scale,
+    )
+    _require(
+        diameter_mm <= pitch_mm,
+        "diameter_mm",
+        f"marker diameter_mm = {diameter_mm:g} exceeds pitch_mm = {pitch_mm:g}: the dots would "
+        "overlap; use a larger pitch or smaller dots",
+        diameter_mm,
+    )
 
 
-def _check_values(grid: MarkerGrid) -> None:
-    if not (np.isfinite(grid.pitch_mm) and grid.pitch_mm > 0):
-        raise MarkerGridError(
-            f"marker grid: pitch_mm = {grid.pitch_mm}: must be a finite length > 0",
-            field="pitch_mm",
-            value=grid.pitch_mm,
+def _check_arrays(grid: MarkerGrid) -> None:
+    count, (rows, columns) = len(grid.row), grid.lattice_shape
+    shapes = {"positions_mm": (count, 2), "omitted": (len(grid.omitted), 2)}
+    for name in ("positions_mm", "row", "column", "diameter_mm", "kind", "omitted"):
+        shape, expected = getattr(grid, name).shape, shapes.get(name, (count,))
+        _require(
+            shape == expected, name, f"marker grid: {name} has shape {shape}, expected {expected}"
         )
-    if not np.all(np.isfinite(grid.diameter_mm) & (grid.diameter_mm > 0)):
-        raise MarkerGridError(
-            "marker grid: every diameter_mm must be a finite length > 0", field="diameter_mm"
-        )
-    if not np.isin(grid.kind, (REGULAR, ANCHOR_LARGE)).all():
-        raise MarkerGridError(
-            "marker grid: kind must be 0 (regular) or 1 (large anchor)", field="kind"
-        )
-
-
-def _check_sites(grid: MarkerGrid) -> None:
-    rows, columns = grid.lattice_shape
+    _require(count, "row", "marker grid: no markers; use a smaller pitch or a larger gel")
+    _require(
+        np.isfinite(grid.pitch_mm) and grid.pitch_mm > 0,
+        "pitch_mm",
+        f"marker grid: pitch_mm = {grid.pitch_mm}: must be a finite length > 0",
+        grid.pitch_mm,
+    )
+    _require(
+        np.all(np.isfinite(grid.diameter_mm) & (grid.diameter_mm > 0)),
+        "diameter_mm",
+        "marker grid: every diameter_mm must be a finite length > 0",
+    )
+    _require(
+        np.isin(grid.kind, (REGULAR, ANCHOR_LARGE)).all(),
+        "kind",
+        "marker grid: kind must be 0 (regular) or 1 (large anchor)",
+    )
     dots = np.column_stack([grid.row, grid.column])
     sites = np.vstack([dots, grid.omitted])
-    if (sites < 0).any() or (sites >= np.array([rows, columns])).any():
-        raise MarkerGridError(
-            f"marker grid: a site lies outside the {rows} x {columns} lattice", field="omitted"
-        )
+    _require(
+        (sites >= 0).all() and (sites < (rows, columns)).all(),
+        "sites",
+        f"marker grid: a site lies outside the {rows} x {columns} lattice",
+    )
     flat = sites[:, 0] * columns + sites[:, 1]
-    if len(np.unique(flat)) != len(flat):
-        raise MarkerGridError("marker grid: a lattice site is used twice", field="row")
-    if np.any(np.diff(flat[: len(dots)]) < 0):
-        raise MarkerGridError("marker grid: markers must be in row-major order", field="row")
+    _require(
+        len(np.unique(flat)) == len(flat), "sites", "marker grid: a lattice site is used twice"
+    )
+    _require(
+        (np.diff(flat[: len(dots)]) >= 0).all(),
+        "row",
+        "marker grid: markers must be in row-major order",
+    )
     offset_mm = np.abs(grid.positions_mm - grid.sites_mm(dots))
-    if not np.all(offset_mm <= _LATTICE_TOLERANCE * grid.pitch_mm):
-        raise MarkerGridError(
-            f"marker grid: a marker lies {offset_mm.max():.4g} mm off its lattice site; "
-            "positions are (row, column) times the pitch, centred on the origin",
-            field="positions_mm",
-            value=float(offset_mm.max()),
-        )
+    _require(
+        np.all(offset_mm <= _LATTICE_TOLERANCE * grid.pitch_mm),
+        "positions_mm",
+        f"marker grid: a marker lies {offset_mm.max():.4g} mm off its lattice site; "
+        "positions are (row, column) times the pitch, centred on the origin",
+        float(offset_mm.max()),
+    )

@@ -17,7 +17,7 @@ again when other markers are lost.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,37 +40,6 @@ _SINGULAR = 1e-12
 _ON_A_LINE = 1e-9
 
 
-class MarkerInterpolation(Protocol):
-    """Interpolation of values from k markers to s surface nodes."""
-
-    @property
-    def n_markers(self) -> int:
-        """Markers k, lost ones included."""
-
-    @property
-    def n_nodes(self) -> int:
-        """Surface nodes s."""
-
-    @property
-    def lost(self) -> NDArray[np.bool_]:
-        """(k,) bool, the markers whose values are not read."""
-
-    def __call__(self, values: ArrayLike) -> Array:
-        """Values (s, m) at the nodes from (k, m) at the markers; lost markers may be NaN.
-
-        Raises InterpolationError for a wrong shape or a kept value that is not finite.
-        """
-
-    def transposed(self, values: ArrayLike) -> Array:
-        """The transpose: (k, m) at the markers from (s, m) at the nodes, 0 at lost markers."""
-
-    def with_missing(self, mask: ArrayLike) -> MarkerInterpolation:
-        """The same without the markers in the (k,) bool `mask`, which replaces an earlier mask.
-
-        Raises InterpolationError if the kept markers do not determine a field.
-        """
-
-
 @dataclass(frozen=True, eq=False)
 class _Fill:
     """Values of the lost markers `lost` from those of the kept ones."""
@@ -89,7 +58,7 @@ class _Fill:
 
 
 @dataclass(frozen=True, eq=False)
-class FilledInterpolation:
+class MarkerInterpolation:
     """A matrix from markers to nodes, and a roughness that determines the values of lost markers.
 
     Attributes:
@@ -124,7 +93,10 @@ class FilledInterpolation:
         return mask
 
     def __call__(self, values: ArrayLike) -> Array:
-        """See `MarkerInterpolation`."""
+        """Values (s, m) at the nodes from (k, m) at the markers; lost markers may be NaN.
+
+        Raises InterpolationError for a wrong shape or a kept value that is not finite.
+        """
         d = np.array(values, dtype=float)
         if d.ndim != 2 or len(d) != self.n_markers:
             raise InterpolationError(
@@ -147,15 +119,18 @@ class FilledInterpolation:
         return np.asarray(self.to_nodes @ d)
 
     def transposed(self, values: ArrayLike) -> Array:
-        """See `MarkerInterpolation`."""
+        """The transpose: (k, m) at the markers from (s, m) at the nodes, 0 at lost markers."""
         found = np.array(self.to_nodes.T @ np.asarray(values, dtype=float))
         if self.fill is not None:
             found += self.fill.transposed(found[self.fill.lost])
             found[self.fill.lost] = 0.0
         return found
 
-    def with_missing(self, mask: ArrayLike) -> FilledInterpolation:
-        """See `MarkerInterpolation`."""
+    def with_missing(self, mask: ArrayLike) -> MarkerInterpolation:
+        """The same without the markers in the (k,) bool `mask`, which replaces an earlier mask.
+
+        Raises InterpolationError if the kept markers do not determine a field.
+        """
         lost = np.asarray(mask)
         if lost.shape != (self.n_markers,) or lost.dtype != np.bool_:
             raise InterpolationError(
@@ -184,36 +159,32 @@ class FilledInterpolation:
         return np.asarray(np.linalg.norm(self.dense(), axis=1))
 
 
-def sparse_interpolation(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> FilledInterpolation:
+def sparse_interpolation(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> MarkerInterpolation:
     """Interpolation by `marker_to_node`; arguments and errors as there."""
     operator = marker_to_node(markers_mm, nodes_mm)
     markers = points_in_plane(markers_mm, "markers_mm", InterpolationError)
     return filled_sparse(markers, operator)
 
 
-def filled_sparse(markers_mm: Array, to_nodes: sparse.csr_array) -> FilledInterpolation:
+def filled_sparse(markers_mm: Array, to_nodes: sparse.csr_array) -> MarkerInterpolation:
     """The interpolation of a stored operator (s, k)."""
-    return FilledInterpolation(markers_mm, to_nodes, local_roughness(markers_mm))
+    return MarkerInterpolation(markers_mm, to_nodes, local_roughness(markers_mm))
 
 
-def thin_plate_interpolation(
-    markers_mm: ArrayLike, nodes_mm: ArrayLike, smoothing_mm2: float = 0.0
-) -> FilledInterpolation:
+def thin_plate_interpolation(markers_mm: ArrayLike, nodes_mm: ArrayLike) -> MarkerInterpolation:
     """Interpolation by `thin_plate`.
 
     Args:
         markers_mm: (k, 2) or (k, 3) positions at rest, 3 <= k <= 4000; only x and y are used.
         nodes_mm: (s, 2) or (s, 3).
-        smoothing_mm2: See `thin_plate`; 0 passes through every marker.
 
     Raises:
-        InterpolationError: As `marker_to_node`; there are too many markers, or the smoothing is
-            negative.
+        InterpolationError: As `marker_to_node`, or there are too many markers.
     """
     markers = checked_markers(markers_mm)
     nodes = points_in_plane(nodes_mm, "nodes_mm", InterpolationError)
-    spline = thin_plate(markers, nodes, smoothing_mm2)
-    return FilledInterpolation(markers, spline.to_nodes, spline.bending)
+    spline = thin_plate(markers, nodes)
+    return MarkerInterpolation(markers, spline.to_nodes, spline.bending)
 
 
 def _require_field(kept: Array, markers: Array) -> None:

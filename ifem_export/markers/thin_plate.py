@@ -42,18 +42,15 @@ class ThinPlate:
 
 
 @single_threaded
-def thin_plate(markers_mm: Array, nodes_mm: Array, smoothing_mm2: float = 0.0) -> ThinPlate:
+def thin_plate(markers_mm: Array, nodes_mm: Array) -> ThinPlate:
     """Matrices of the thin-plate spline.
 
     Args:
         markers_mm: (k, 2) distinct positions at rest, 3 <= k <= 4000, not on one line.
         nodes_mm: (s, 2) node positions at rest.
-        smoothing_mm2: >= 0; the spline minimises Σ (u(x_i) - d_i)² + smoothing / 8π times the
-            bending energy. 0 interpolates.
 
     Raises:
-        InterpolationError: There are too many markers, they do not determine a field, or the
-            smoothing is negative.
+        InterpolationError: There are too many markers, or they do not determine a field.
     """
     count = len(markers_mm)
     if count > MOST_MARKERS:
@@ -63,18 +60,11 @@ def thin_plate(markers_mm: Array, nodes_mm: Array, smoothing_mm2: float = 0.0) -
             field="markers_mm",
             value=count,
         )
-    if not (np.isfinite(smoothing_mm2) and smoothing_mm2 >= 0.0):
-        raise InterpolationError(
-            f"smoothing_mm2 = {smoothing_mm2!r}: must be finite and >= 0",
-            field="smoothing_mm2",
-            value=smoothing_mm2,
-        )
     # Scale to unit spacing: another unit of length changes r² log r by an affine field only.
     centre = markers_mm.mean(axis=0)
     unit = float(np.sqrt(np.ptp(markers_mm, axis=0).max() ** 2 / count))
     markers, nodes = (markers_mm - centre) / unit, (nodes_mm - centre) / unit
     energy = kernel(markers, markers)
-    energy[np.diag_indices(count)] += smoothing_mm2 / unit**2
     q, r = linalg.qr(affine(markers))
     if np.abs(np.diag(r)).min() <= 1e-9 * np.abs(r).max():
         raise InterpolationError(

@@ -56,26 +56,3 @@ def aligned_start(
     offset = (points - shifted) / pitch
     distance = np.abs(offset - np.rint(offset)) * pitch
     return shifted, int((distance.max(axis=1) < 1e-6).sum()), float(distance.max())
-
-
-def misalignment(
-    points: NDArray[np.float64],
-    pitch: NDArray[np.float64],
-    error: float,
-    aligned: int,
-    tolerance: float,
-) -> MeshError:
-    """The error for points off the lattice, with the nearest pitch that divides their spacing."""
-    fitting = []
-    for axis in (0, 1):
-        gaps = np.diff(np.unique(np.round(points[:, axis], 9)))
-        spacing = float(gaps.min()) if len(gaps) else float(pitch[axis])
-        fitting.append(spacing / max(1, round(spacing / pitch[axis])))
-    return MeshError(
-        f"{len(points) - aligned} of {len(points)} alignment points lie off the lattice of "
-        f"pitch {pitch[0]:g} x {pitch[1]:g} mm by up to {error:.4g} mm, "
-        f"the limit is {tolerance:g} mm: use a pitch that divides the marker spacing, "
-        f"such as {fitting[0]:.6g} x {fitting[1]:.6g} mm",
-        field="pitch_mm",
-        value=(fitting[0], fitting[1]),
-    )

@@ -29,29 +29,12 @@ _PROBES, _SAMPLES, _SAMPLES_INSIDE = 3, 32, 8
 
 
 @dataclass(frozen=True)
-class DroppedPart:
-    """A group of cells that is not connected to the kept part by a face.
-
-    Attributes:
-        n_cells: Number of cells.
-        touches: How it touches the kept part: "edge", "vertex" or "nothing". Two parts that
-            share only an edge or a vertex would rotate about it without any stiffness.
-        bonded: Whether it has cells on the bonded face.
-    """
-
-    n_cells: int
-    touches: str
-    bonded: bool
-
-
-@dataclass(frozen=True)
 class CropReport:
     """Result of cropping the lattice to the outline.
 
     Attributes:
         n_cells_inside: Cells inside the outline.
         n_cells_kept: Cells of the largest face-connected part that reaches the bonded face.
-        dropped: The other parts, largest first.
         outline_area_mm2: Exact area of the outline.
         mesh_area_mm2: Area of the kept cells seen from above.
         aligned_points: Number of alignment points that coincide with surface nodes.
@@ -61,7 +44,6 @@ class CropReport:
 
     n_cells_inside: int
     n_cells_kept: int
-    dropped: tuple[DroppedPart, ...]
     outline_area_mm2: float
     mesh_area_mm2: float
     aligned_points: int = 0
@@ -175,17 +157,14 @@ def _sampled(
     return np.stack(layers, axis=1)
 
 
-def keep_bonded_part(
-    occupancy: NDArray[np.bool_],
-) -> tuple[NDArray[np.bool_], tuple[DroppedPart, ...]]:
+def keep_bonded_part(occupancy: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Keep the largest face-connected part that reaches the bonded face (lowest layer).
+
+    Two parts that share only an edge or a vertex would rotate about it without any stiffness. Of
+    equally large parts the first in lattice order is kept.
 
     Args:
         occupancy: (nx, ny, nz) bool.
-
-    Returns:
-        The occupancy of the kept part, and the dropped parts, largest first. Of equally large
-        parts the first in lattice order is kept.
 
     Raises:
         MeshError: No cell lies on the bonded face.
@@ -199,22 +178,4 @@ def keep_bonded_part(
             "no cell lies on the bonded face: use a finer pitch or check the outline",
             field="occupancy",
         )
-    largest = int(bonded[np.argmax(sizes[bonded])])
-    kept = labels == largest
-    others = [label for label in range(1, n_parts + 1) if label != largest]
-    if not others:
-        return kept, ()
-    by_edge = ndimage.binary_dilation(kept, ndimage.generate_binary_structure(3, 2))
-    by_vertex = ndimage.binary_dilation(kept, ndimage.generate_binary_structure(3, 3))
-    edge_labels = set(np.unique(labels[by_edge]).tolist())
-    vertex_labels = set(np.unique(labels[by_vertex]).tolist())
-    bonded_labels = set(bonded.tolist())
-    parts = [
-        DroppedPart(
-            int(sizes[label]),
-            "edge" if label in edge_labels else "vertex" if label in vertex_labels else "nothing",
-            label in bonded_labels,
-        )
-        for label in others
-    ]
-    return kept, tuple(sorted(parts, key=lambda part: -part.n_cells))
+    return np.asarray(labels == bonded[np.argmax(sizes[bonded])])

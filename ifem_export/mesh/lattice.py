@@ -126,17 +126,8 @@ def hexahedra(occupancy: NDArray[np.bool_], numbering: Numbering) -> NDArray[np.
     return numbering.node_index[corner[:, None] + offsets[None, :]]
 
 
-@dataclass(frozen=True, eq=False)
-class NodeSets:
-    """Sorted int32 node numbers of the three faces; see `node_sets`."""
-
-    bonded: NDArray[np.int32]
-    surface: NDArray[np.int32]
-    sides: NDArray[np.int32]
-
-
-def node_sets(occupancy: NDArray[np.bool_], numbering: Numbering) -> NodeSets:
-    """Node sets by exposed faces.
+def node_sets(occupancy: NDArray[np.bool_], numbering: Numbering) -> dict[str, NDArray[np.int32]]:
+    """Sorted int32 node numbers of three sets, by exposed faces.
 
     `bonded` holds the nodes of faces on the lowest lattice plane, `surface` those of upward
     faces with no cell above, and `sides` those of lateral faces with no neighbour. Nodes on a
@@ -157,7 +148,7 @@ def node_sets(occupancy: NDArray[np.bool_], numbering: Numbering) -> NodeSets:
                 exposed_cells[1:] = False
             _mark_face_nodes(on_set, exposed_cells, axis, end)
         found[name] = numbering.node_index[np.flatnonzero(on_set.reshape(-1))]
-    return NodeSets(**found)
+    return found
 
 
 def _cells_with_exposed_face(cells: NDArray[np.bool_], axis: int, end: int) -> NDArray[np.bool_]:

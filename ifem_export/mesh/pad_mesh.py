@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import MeshError
-from ifem_export.mesh.alignment import aligned_start, misalignment, points_in_plane
+from ifem_export.mesh.alignment import aligned_start, points_in_plane
 from ifem_export.mesh.crop import (
     DEFAULT_FLOOR,
     CropReport,
@@ -110,9 +110,9 @@ class PadMesh:
         return cls(
             nodes_mm=node_coordinates(numbering, origin, size),
             hexes=hexahedra(occupancy, numbering),
-            bonded=sets.bonded,
-            surface=sets.surface,
-            sides=sets.sides,
+            bonded=sets["bonded"],
+            surface=sets["surface"],
+            sides=sets["sides"],
             cell_size_mm=(float(size[0]), float(size[1]), float(size[2])),
             origin_mm=(float(origin[0]), float(origin[1]), float(origin[2])),
             occupancy=occupancy.copy(),
@@ -176,7 +176,6 @@ def build_pad_mesh(
     pitch_mm: float | tuple[float, float] | None = None,
     layers: int = 1,
     align_to_mm: ArrayLike | None = None,
-    alignment_tolerance_mm: float | None = 1e-6,
     crown: Crown | None = None,
     weighting: Weighting = "cell_centre",
     floor: float = DEFAULT_FLOOR,
@@ -190,10 +189,8 @@ def build_pad_mesh(
             thickness. Exactly one of `cells` and `pitch_mm` is given.
         pitch_mm: Cell size, one number or (hx, hy); the lattice is centred on the outline.
         layers: Layers through the thickness if `pitch_mm` is given.
-        align_to_mm: (k, 2) or (k, 3) points (markers) that must coincide with surface nodes; the
-            lattice is shifted so that as many as possible do.
-        alignment_tolerance_mm: Largest distance of such a point from a lattice line; None accepts
-            every distance and only reports it.
+        align_to_mm: (k, 2) or (k, 3) points (markers); the lattice is shifted so that as many of
+            them as possible coincide with surface nodes, and the report tells how many do.
         crown: Outer surface of a crowned gel; None for a flat one at z = 0.
         weighting: Treatment of cells that the outline or the crown cuts: "cell_centre" keeps or
             drops them as a whole, "volume_fraction" scales their stiffness.
@@ -203,8 +200,8 @@ def build_pad_mesh(
         The mesh, and the report of what the cropping did.
 
     Raises:
-        MeshError: A size is out of range, the lattice has too many cells, no cell is inside the
-            outline, or no shift of the lattice reaches the points.
+        MeshError: A size is out of range, the lattice has too many cells, or no cell is inside
+            the outline.
     """
     if not math.isfinite(thickness_mm) or thickness_mm <= 0.0:
         raise MeshError(
@@ -221,8 +218,6 @@ def build_pad_mesh(
     if align_to_mm is not None:
         points = points_in_plane(align_to_mm, "align_to_mm")
         start, aligned, error = aligned_start(points, start, pitch)
-        if alignment_tolerance_mm is not None and error > alignment_tolerance_mm:
-            raise misalignment(points, pitch, error, aligned, alignment_tolerance_mm)
     # With one spare cell on each side the box contains the gel, however the lattice is shifted.
     low = np.floor((np.array([x_min, y_min]) - start) / pitch).astype(int) - 1
     high = np.ceil((np.array([x_max, y_max]) - start) / pitch).astype(int) + 1
@@ -241,7 +236,7 @@ def build_pad_mesh(
             field="pitch_mm",
             value=(float(pitch[0]), float(pitch[1])),
         )
-    kept, dropped = keep_bonded_part(occupancy)
+    kept = keep_bonded_part(occupancy)
     window, first = _trim(kept)
     corner = start + (low + first) * pitch
     mesh = PadMesh.from_occupancy(
@@ -254,7 +249,6 @@ def build_pad_mesh(
     report = CropReport(
         n_cells_inside=int(occupancy.sum()),
         n_cells_kept=int(kept.sum()),
-        dropped=dropped,
         outline_area_mm2=outline.area_mm2,
         mesh_area_mm2=float(plan.sum() * pitch[0] * pitch[1]),
         aligned_points=aligned,

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol, cast, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from ifem_export.errors import IfemError
 from ifem_export.operators.layered_operator import Preconditioner
 from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.sparse_factor import Backend, Factor, factored
 
 Array = NDArray[np.float64]
-Method = Literal["auto", "pcg", "direct", "superlu", "cholmod", "pardiso"]
+Method = Literal["auto", "pcg", "direct"]
 METHODS: tuple[str, ...] = get_args(Method)
 MOST_ITERATIONS = 500
 DIRECT_BELOW = 2000
@@ -59,13 +58,46 @@ class Solution:
         residual: |b - A x| / |b|, computed from x. After few steps to a loose tolerance it is the
             residual that the iteration updates, which differs by rounding only.
         iterations: Iterations or back-substitutions taken.
-        seconds: Time taken.
     """
 
     x: Array
     residual: float
     iterations: int
-    seconds: float
+
+
+class Factor(Protocol):
+    """A factored matrix."""
+
+    @property
+    def nnz(self) -> int:
+        """Entries that a back-substitution reads."""
+
+    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A⁻¹ b for b (n,) or (n, k)."""
+
+
+def factored(matrix: sparse.csr_array) -> Factor:
+    """Factor a symmetric positive definite matrix by SuperLU.
+
+    Raises:
+        IfemError: The matrix is singular, or there is not enough memory.
+    """
+    try:
+        factor: Factor = splu(
+            sparse.csc_array(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except MemoryError as error:
+        raise IfemError(
+            f"no memory to factor {matrix.shape[0]} unknowns: use method 'pcg'", field="matrix"
+        ) from error
+    except RuntimeError as error:
+        raise IfemError(
+            f"the stiffness matrix cannot be factored ({error})", field="matrix"
+        ) from error
+    return factor
 
 
 class Solver(Protocol):
@@ -89,11 +121,10 @@ class ConjugateGradients:
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
         """Solve to a relative residual, starting from the preconditioner's result."""
-        started = time.perf_counter()
         right = _checked(b, self.matrix.shape[0])
         size = float(np.linalg.norm(right))
         if size == 0.0:
-            return Solution(np.zeros_like(right), 0.0, 0, time.perf_counter() - started)
+            return Solution(np.zeros_like(right), 0.0, 0)
         x, norms = _iterate(
             self.matrix, right, self._precondition, rtol * size, self.most_iterations
         )
@@ -110,7 +141,7 @@ class ConjugateGradients:
         if not residual <= rtol:
             relative = [norm / size for norm in norms]
             raise _no_convergence(residual, rtol, relative, self.most_iterations)
-        return Solution(x, residual, len(norms) - 1, time.perf_counter() - started)
+        return Solution(x, residual, len(norms) - 1)
 
     def _residual(self, right: Array, x: Array) -> float:
         return float(np.linalg.norm(right - self.matrix @ x))
@@ -124,16 +155,14 @@ class SparseFactor:
     """Sparse factor, computed at the first use and kept."""
 
     matrix: sparse.csr_array
-    backend: Backend = "auto"
 
     @cached_property
     def factor(self) -> Factor:
         """The factor. Raises IfemError for a matrix that cannot be factored."""
-        return factored(self.matrix, self.backend)
+        return factored(self.matrix)
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
         """Back-substitute, and once more on the residual if that does not suffice."""
-        started = time.perf_counter()
         right = _checked(b, self.matrix.shape[0])
         size = float(np.linalg.norm(right))
         x = np.asarray(self.factor.solve(right))
@@ -144,7 +173,7 @@ class SparseFactor:
             residual, steps = float(np.linalg.norm(right - self.matrix @ x)) / size, 2
         if not residual <= max(rtol, DIRECT_RESIDUAL):
             raise _no_convergence(residual, rtol, [residual], 1)
-        return Solution(x, residual, steps, time.perf_counter() - started)
+        return Solution(x, residual, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +237,7 @@ def _direct(matrix: sparse.csr_array, method: Method) -> SparseFactor | None:
         )
     if method == "pcg" or (method == "auto" and matrix.shape[0] >= DIRECT_BELOW):
         return None
-    backend = "auto" if method in ("auto", "direct") else method
-    return SparseFactor(matrix, cast(Backend, backend))
+    return SparseFactor(matrix)
 
 
 def _iterate(

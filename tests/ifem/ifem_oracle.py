@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from ifem_export.elements.material import Material
 from ifem_export.finite_strain.element import GaussStates, gauss_states
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -18,6 +19,13 @@ def triplet_assembly(mesh: PadMesh, element_matrix: np.ndarray) -> sparse.csr_ar
     values = np.tile(element_matrix.ravel(), len(unknowns))
     n = 3 * mesh.n_nodes
     return sparse.coo_array((values, (rows, columns)), shape=(n, n)).tocsr()
+
+
+def elasticity_matrix(material: Material) -> np.ndarray:
+    """D (6, 6) in MPa of Hooke's law, with engineering shear strains."""
+    d = material.shear_modulus_mpa * np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
+    d[:3, :3] += material.lame_lambda_mpa
+    return d
 
 
 def random_occupancy(seed: int, shape=(5, 4, 3), fill: float = 0.6) -> np.ndarray:

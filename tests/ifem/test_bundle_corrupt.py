@@ -198,12 +198,6 @@ def test_broken_manifests_are_refused(stored, content):
     assert refused_file(stored) == "manifest.json"
 
 
-def test_another_sensors_bundle_is_refused(stored, bundle):
-    load_bundle(stored, expected_geometry_hash=bundle.geometry_hash)
-    options = {"verify": False, "expected_geometry_hash": "0" * 64}
-    assert refused_file(stored, **options) == "manifest.json"
-
-
 def test_wrong_paths_are_refused(tmp_path):
     assert refused_file(tmp_path / "nothing") == str(tmp_path / "nothing")
     (tmp_path / "file").write_text("")

@@ -1,13 +1,9 @@
 import numpy as np
 import pytest
-from ifem_oracle import rigid_modes
+from ifem_oracle import elasticity_matrix, rigid_modes
 
 from ifem_export.elements.hex8 import FORMULATIONS, hex8_stiffness
-from ifem_export.elements.kinematics import (
-    elasticity_matrix,
-    shape_gradients,
-    strain_displacement,
-)
+from ifem_export.elements.kinematics import shape_gradients, strain_displacement
 from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError
 from ifem_export.mesh.lattice import VTK_CORNERS

@@ -6,19 +6,18 @@ from itertools import product
 import numpy as np
 import pytest
 from ifem_layer import solve_held
-from ifem_oracle import random_occupancy, rigid_modes
+from ifem_oracle import elasticity_matrix, random_occupancy, rigid_modes
 from scipy.linalg import cholesky
 
 from ifem_export.assembly.assembly import assemble_csr
-from ifem_export.elements.hex8 import (
-    FORMULATIONS,
-    elasticity_matrix,
-    hex8_stiffness,
-    mode_strains,
+from ifem_export.elements.hex8 import FORMULATIONS, hex8_stiffness, mode_strains
+from ifem_export.elements.kinematics import (
+    GAUSS,
+    TRACE,
+    deviatoric_matrix,
     shape_gradients,
     strain_displacement,
 )
-from ifem_export.elements.kinematics import GAUSS, TRACE, deviatoric_matrix
 from ifem_export.elements.material import Material
 from ifem_export.mesh.lattice import VTK_CORNERS
 from ifem_export.mesh.pad_mesh import PadMesh

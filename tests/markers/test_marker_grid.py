@@ -117,11 +117,11 @@ def test_inconsistent_arrays_are_refused():
         ({"positions_mm": moved}, "positions_mm"),
         ({"positions_mm": np.full((25, 2), np.nan)}, "positions_mm"),
         ({"row": grid.row[:-1]}, "positions_mm"),
-        ({"omitted": np.array([[0, 0]])}, "row"),
-        ({"omitted": np.array([[9, 0]])}, "omitted"),
+        ({"omitted": np.array([[0, 0]])}, "sites"),
+        ({"omitted": np.array([[9, 0]])}, "sites"),
         ({"kind": np.full(25, 2)}, "kind"),
         ({"diameter_mm": np.full(25, np.inf)}, "diameter_mm"),
-        ({"row": grid.row + 0.5}, "kind"),
+        ({"row": grid.row + 0.5}, "row"),
     ):
         with pytest.raises(MarkerGridError) as caught:
             dataclasses.replace(grid, **change)
