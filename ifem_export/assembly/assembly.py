@@ -106,14 +106,15 @@ def assemble_csr(
     return stiffness
 
 
-def block_pattern(nodes: Numbering) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+def block_pattern(nodes: Numbering) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Which 3x3 blocks of the stiffness matrix exist, as CSR `indptr` and `indices` of nodes."""
     pattern = neighbour_pattern()
     counts = pattern.counts[nodes.masks]
     present = np.arange(27) < counts[:, None]
     offsets = _slot_strides(nodes)[pattern.slots[nodes.masks]]
     neighbours = (nodes.positions[:, None] + offsets)[present]
-    return np.concatenate([[0], np.cumsum(counts)]), nodes.node_index[neighbours]
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    return ends.astype(np.int32), nodes.node_index[neighbours]
 
 
 def _slot_strides(nodes: Numbering) -> NDArray[np.int64]:

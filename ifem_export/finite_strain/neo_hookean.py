@@ -199,7 +199,7 @@ class NeoHookeanPad:
         return np.concatenate([[0], np.cumsum(counts)]), entries
 
     @cached_property
-    def _blocks(self) -> tuple[NDArray[np.int64], NDArray[np.int32], sparse.csr_array]:
+    def _blocks(self) -> tuple[NDArray[np.int32], NDArray[np.int32], sparse.csr_array]:
         """Pattern of the blocks, and the matrix that sums the element blocks (64m) into them."""
         indptr, indices = block_pattern(self.mesh.numbering)
         n, hexes = self.n_nodes, self.mesh.hexes.astype(np.int64)
