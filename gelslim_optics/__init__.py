@@ -1,1 +1,87 @@
-"""The finger's optics: virtual camera through fold mirror and layers. Imports no CAD."""
+"""Optics of the finger without CAD: the virtual camera, the light guide, and traced light."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gelslim_core.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from gelslim_optics.camera.back_projection import HeightGrid
+    from gelslim_optics.camera.lens_distortion import LensDistortion
+    from gelslim_optics.camera.projection_error import projection_error_mm
+    from gelslim_optics.camera.rays import ray_slope
+    from gelslim_optics.camera.refraction import Layer, lateral_reach
+    from gelslim_optics.camera.view_quality import blur_map, fit_homography
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
+    from gelslim_optics.guide.profile import GuideProfile
+    from gelslim_optics.guide.shapes import (
+        CurvedGuide,
+        GelSection,
+        MirrorGuide,
+        curved_profile,
+        mirror_profile,
+    )
+    from gelslim_optics.guide.tir_certificate import TirCertificate, certify_tir
+    from gelslim_optics.light.light_map import LightMap
+    from gelslim_optics.light.result import LightResult
+    from gelslim_optics.light.scene import LightScene, Medium, Surface
+    from gelslim_optics.light.source import LedRow
+    from gelslim_optics.light.trace import trace_light
+
+__all__ = [
+    "CurvedGuide",
+    "GelSection",
+    "GuideProfile",
+    "HeightGrid",
+    "Layer",
+    "LedRow",
+    "LensDistortion",
+    "LightMap",
+    "LightResult",
+    "LightScene",
+    "Medium",
+    "MirrorGuide",
+    "Surface",
+    "TirCertificate",
+    "VirtualCamera",
+    "blur_map",
+    "certify_tir",
+    "curved_profile",
+    "fit_homography",
+    "lateral_reach",
+    "mirror_profile",
+    "projection_error_mm",
+    "ray_slope",
+    "trace_light",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__,
+    {
+        "CurvedGuide": "gelslim_optics.guide.shapes",
+        "GelSection": "gelslim_optics.guide.shapes",
+        "GuideProfile": "gelslim_optics.guide.profile",
+        "HeightGrid": "gelslim_optics.camera.back_projection",
+        "Layer": "gelslim_optics.camera.refraction",
+        "LedRow": "gelslim_optics.light.source",
+        "LensDistortion": "gelslim_optics.camera.lens_distortion",
+        "LightMap": "gelslim_optics.light.light_map",
+        "LightResult": "gelslim_optics.light.result",
+        "LightScene": "gelslim_optics.light.scene",
+        "Medium": "gelslim_optics.light.scene",
+        "MirrorGuide": "gelslim_optics.guide.shapes",
+        "Surface": "gelslim_optics.light.scene",
+        "TirCertificate": "gelslim_optics.guide.tir_certificate",
+        "VirtualCamera": "gelslim_optics.camera.virtual_camera",
+        "blur_map": "gelslim_optics.camera.view_quality",
+        "certify_tir": "gelslim_optics.guide.tir_certificate",
+        "curved_profile": "gelslim_optics.guide.shapes",
+        "fit_homography": "gelslim_optics.camera.view_quality",
+        "lateral_reach": "gelslim_optics.camera.refraction",
+        "mirror_profile": "gelslim_optics.guide.shapes",
+        "projection_error_mm": "gelslim_optics.camera.projection_error",
+        "ray_slope": "gelslim_optics.camera.rays",
+        "trace_light": "gelslim_optics.light.trace",
+    },
+)

@@ -1,4 +1,4 @@
-"""Brown–Conrady lens distortion, with the domain on which it can be inverted."""
+"""Brown-Conrady lens distortion, with the domain on which it can be inverted."""
 
 from __future__ import annotations
 
@@ -13,21 +13,31 @@ Array = NDArray[np.float64]
 
 MAX_NEWTON_STEPS = 80
 MAX_HALVINGS = 40
-STEP_LEFT = 1e-15
-MISS_LEFT = 4e-16
-# Points whose work fits into the processor's cache.
+SMALL_STEP = 1e-15
+SMALL_RESIDUAL = 4e-16
+# Below this number compiled code does not pay; BLOCK points fit into the processor's cache.
 COMPILED_FROM = 64
 BLOCK = 4096
 
 
 @dataclass(frozen=True)
 class LensDistortion:
-    """Radial and tangential distortion of image coordinates normalised by the focal length.
+    """Radial and tangential distortion of image coordinates in focal lengths.
 
-    With ρ² = x² + y² and f = 1 + k1 ρ² + k2 ρ⁴ + k3 ρ⁶ (Brown 1966, Conrady 1919; coefficients
-    in the order and sense of OpenCV):
+    With ρ² = x² + y² and f = 1 + k1 ρ² + k2 ρ⁴ + k3 ρ⁶ (Brown 1966, Conrady 1919; the convention
+    is that of OpenCV)
+
         x' = x f + 2 p1 x y + p2 (ρ² + 2 x²),  y' = y f + p1 (ρ² + 2 y²) + 2 p2 x y.
-    Raises ValueError for a coefficient that is not finite.
+
+    Attributes:
+        k1: Radial coefficient of ρ².
+        k2: Radial coefficient of ρ⁴.
+        p1: First tangential coefficient.
+        p2: Second tangential coefficient.
+        k3: Radial coefficient of ρ⁶.
+
+    Raises:
+        ValueError: A coefficient is not finite.
     """
 
     k1: float = 0.0
@@ -45,44 +55,45 @@ class LensDistortion:
     def monotone_radius(self) -> float:
         """Radius ρ of the disc of undistorted coordinates on which the map is one-to-one.
 
-        The map is the gradient of a potential, so its Jacobian is symmetric. Its radial part has
-        the eigenvalues f and (ρ f)', its tangential part none below -6 |p| ρ: up to the first
-        ρ at which min(f, (ρ f)') = 6 |p| ρ the potential is strictly convex, hence the gradient
-        one-to-one. Without p1, p2 it is where ρ f stops growing. inf if that never happens.
+        The map is the gradient of a potential, so that its Jacobian is symmetric. The radial part
+        has the eigenvalues f and (ρ f)'; those of the tangential part are at least -6 |p| ρ. Up to
+        the first ρ at which min(f, (ρ f)') = 6 |p| ρ the potential is strictly convex and its
+        gradient one-to-one. Without p1 and p2 this is where ρ f stops growing; inf if it never
+        does.
         """
         slope = -6 * float(np.hypot(self.p1, self.p2))
         outward = [7 * self.k3, 0.0, 5 * self.k2, 0.0, 3 * self.k1, slope, 1.0]
         around = [self.k3, 0.0, self.k2, 0.0, self.k1, slope, 1.0]
         roots = np.concatenate([np.roots(outward), np.roots(around)])
-        # A double root comes out of the eigenvalue solver as a nearly real pair.
+        # The eigenvalue solver returns a double root as a pair that is nearly real.
         real = roots[np.abs(roots.imag) <= 1e-7 * np.abs(roots)].real
         return float(min(real[real > 0], default=np.inf))
 
     def distort(self, undistorted: ArrayLike) -> Array:
         """Distorted coordinates (n, 2) of undistorted ones (n, 2); NaN stays NaN.
 
-        Raises ValueError for points beyond the monotone radius, where the polynomial folds the
-        image back over itself.
+        Raises ValueError for points outside the monotone radius, where the polynomial folds the
+        image over itself.
         """
         xy = np.asarray(undistorted, dtype=float)
         radius = np.hypot(xy[..., 0], xy[..., 1])
         beyond = radius >= self.monotone_radius
         if beyond.any():
             raise ValueError(
-                f"{int(beyond.sum())} of {radius.size} points lie beyond the distortion's monotone "
-                f"radius of {self.monotone_radius:.6g} focal lengths (farthest: "
-                f"{np.nanmax(radius):.6g}), where it folds back: the coefficients do not hold there"
+                f"{int(beyond.sum())} of {radius.size} points lie outside the monotone radius of "
+                f"{self.monotone_radius:.6g} focal lengths of the lens distortion (farthest: "
+                f"{np.nanmax(radius):.6g}), where its coefficients are not valid"
             )
         return self._map(xy)
 
     def undistort(self, distorted: ArrayLike) -> Array:
         """Undistorted coordinates (n, 2) of distorted ones (n, 2); NaN stays NaN.
 
-        Newton, halving a step that leaves the monotone disc or does not bring the image nearer.
-        Raises ValueError for points that no point within the monotone radius is distorted to.
+        Newton's method; a step is halved that leaves the monotone disc or increases the residual.
+        Raises ValueError for points that are the image of no point within the monotone radius.
         """
         target = np.atleast_2d(np.asarray(distorted, dtype=float))
-        undistorted, left = self._settled(target)
+        undistorted, left = self._newton_undamped(target)
         lost = np.zeros(len(target), dtype=bool)
         for k in range(0, len(left), BLOCK):
             part = left[k : k + BLOCK]
@@ -92,23 +103,23 @@ class LensDistortion:
             raise ValueError(
                 f"{int(lost.sum())} of {len(target)} points, such as ({worst[0]:.6g}, "
                 f"{worst[1]:.6g}) focal lengths from the axis, are the image of no point within "
-                f"the distortion's monotone radius of {self.monotone_radius:.6g}: the coefficients "
-                "do not hold there"
+                f"the monotone radius of {self.monotone_radius:.6g} of the lens distortion: its "
+                "coefficients are not valid there"
             )
         return undistorted.reshape(np.shape(distorted))
 
-    def _settled(self, target: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Points (n, 2) where plain Newton, compiled, settles; and which are left to do."""
+    def _newton_undamped(self, target: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Points (n, 2) where compiled, undamped Newton converges, and indices of the others."""
         xy = np.array(target)
         if len(target) < COMPILED_FROM:
             return xy, np.arange(len(target))
         from gelslim_optics.camera.undistort_kernel import undistort
 
-        settled = np.zeros(len(target), dtype=bool)
+        converged = np.zeros(len(target), dtype=bool)
         coefficients = np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
         points = np.ascontiguousarray(target)
-        undistort(points, coefficients, self.monotone_radius, xy, settled)
-        return xy, np.flatnonzero(~settled)
+        undistort(points, coefficients, self.monotone_radius, xy, converged)
+        return xy, np.flatnonzero(~converged)
 
     def jacobian(self, undistorted: ArrayLike) -> Array:
         """Derivative (n, 2, 2) of the distorted by the undistorted coordinates (n, 2)."""
@@ -116,7 +127,7 @@ class LensDistortion:
         return np.stack([np.stack([xx, cross], -1), np.stack([cross, yy], -1)], -2)
 
     def _stretch(self, xy: Array) -> tuple[Array, Array, Array]:
-        """The Jacobian's elements xx, xy = yx and yy."""
+        """The elements xx, xy = yx and yy of the Jacobian."""
         x, y = xy[..., 0], xy[..., 1]
         s = x * x + y * y
         f = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
@@ -132,16 +143,16 @@ class LensDistortion:
 
     @classmethod
     def from_record(cls, record: Mapping[str, object]) -> LensDistortion:
-        """Inverse of `to_record`; coefficients left out are zero.
+        """The distortion of a record made by `to_record`; missing coefficients are zero.
 
-        Raises ValueError for a name or a value that is no coefficient.
+        Raises ValueError for an unknown name or a value that is not a number.
         """
         names = [f.name for f in fields(cls)]
         values: dict[str, float] = {}
         for name, value in record.items():
             if name not in names or isinstance(value, bool) or not isinstance(value, int | float):
                 raise ValueError(
-                    f"lens distortion has no {name} = {value!r}: it takes numbers for "
+                    f"{name} = {value!r} of the lens distortion: give numbers for "
                     f"{', '.join(names)}"
                 )
             values[name] = float(value)
@@ -160,45 +171,47 @@ class LensDistortion:
         )
 
     def _inverted(self, target: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Points (n, 2) distorted to `target`, and which have none."""
+        """Points (n, 2) that are distorted to `target`, and where there is none."""
         xy = target.copy()
         radius = np.hypot(xy[:, 0], xy[:, 1])
         outside = radius >= self.monotone_radius
         xy[outside] *= (0.9 * self.monotone_radius / radius[outside])[:, None]
-        whole = np.isfinite(target).all(axis=1)
-        xy[~whole] = np.nan
-        open_ = np.flatnonzero(whole)
+        finite = np.isfinite(target).all(axis=1)
+        xy[~finite] = np.nan
+        open_ = np.flatnonzero(finite)
         lost = np.zeros(len(xy), dtype=bool)
         for _ in range(MAX_NEWTON_STEPS):
             if not len(open_):
                 break
-            xy[open_], settled, stuck = self._newton_step(xy[open_], target[open_])
+            xy[open_], converged, stuck = self._newton_step(xy[open_], target[open_])
             lost[open_[stuck]] = True
-            open_ = open_[~(settled | stuck)]
+            open_ = open_[~(converged | stuck)]
         lost[open_] = True
         return xy, lost
 
     def _newton_step(
         self, xy: Array, target: Array
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """One damped step from `xy` (n, 2); which points have arrived, which find no way on."""
-        miss = target - self._map(xy)
-        off = np.hypot(miss[:, 0], miss[:, 1])
+        """One damped step from `xy` (n, 2); which points have converged, and which cannot go on."""
+        residual = target - self._map(xy)
+        off = np.hypot(residual[:, 0], residual[:, 1])
         xx, cross, yy = self._stretch(xy)
-        u, v = miss.T
+        u, v = residual.T
         step = np.stack([yy * u - cross * v, xx * v - cross * u], -1)
         step /= (xx * yy - cross * cross)[:, None]
         size = 1 + np.hypot(target[:, 0], target[:, 1])
-        # Near the fold the step stays long when the image is already met to the last digit.
-        near = (np.hypot(step[:, 0], step[:, 1]) <= STEP_LEFT * size) | (off <= MISS_LEFT * size)
-        part = np.where(near, 0.0, 1.0)
+        # Near the fold a step is long even where the residual is at rounding level.
+        done = (np.hypot(step[:, 0], step[:, 1]) <= SMALL_STEP * size) | (
+            off <= SMALL_RESIDUAL * size
+        )
+        fraction = np.where(done, 0.0, 1.0)
         for _ in range(MAX_HALVINGS):
-            tried = xy + part[:, None] * step
+            tried = xy + fraction[:, None] * step
             left = target - self._map(tried)
             worse = np.hypot(left[:, 0], left[:, 1]) >= off
             worse |= np.hypot(tried[:, 0], tried[:, 1]) >= self.monotone_radius
-            worse &= ~near
+            worse &= ~done
             if not worse.any():
                 break
-            part = np.where(worse, part / 2, part)
-        return np.where(worse[:, None], xy, tried), near, worse
+            fraction = np.where(worse, fraction / 2, fraction)
+        return np.where(worse[:, None], xy, tried), done, worse

@@ -1,4 +1,4 @@
-"""Compiled Newton steps for undistorting points. Import only where it runs: it loads numba."""
+"""Compiled Newton's method for undistorting points. Importing this module loads numba."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from typing import Any
 
 from numba import njit
 
-MOST_STEPS = 12
+MAX_STEPS = 12
 TOLERANCE = 1e-15
 
 
 @njit(cache=True, nogil=True)
-def undistort(target: Any, k: Any, radius: float, out: Any, settled: Any) -> None:
-    """Undistorted points of `target` (n, 2) into `out`, where plain Newton settles.
+def undistort(target: Any, k: Any, radius: float, out: Any, converged: Any) -> None:
+    """Undistorted points of `target` (n, 2), written to `out`, by undamped Newton steps.
 
-    `k` holds k1, k2, k3, p1, p2. `settled` (n,) tells where it did, within `radius`; the other
-    rows are left as they came.
+    `k` holds k1, k2, k3, p1, p2. `converged` (n,) is True where the iteration ended within
+    `radius`; the other rows are invalid.
     """
     k1, k2, k3, p1, p2 = k[0], k[1], k[2], k[3], k[4]
     for n in range(len(target)):
         tx, ty = target[n, 0], target[n, 1]
         x, y = tx, ty
-        settled[n] = False
-        for _ in range(MOST_STEPS):
+        converged[n] = False
+        for _ in range(MAX_STEPS):
             s = x * x + y * y
             f = 1 + s * (k1 + s * (k2 + s * k3))
             g = 2 * (k1 + s * (2 * k2 + s * 3 * k3))
@@ -37,6 +37,6 @@ def undistort(target: Any, k: Any, radius: float, out: Any, settled: Any) -> Non
             dx, dy = (yy * ex - cross * ey) / det, (xx * ey - cross * ex) / det
             x, y = x - dx, y - dy
             if abs(dx) + abs(dy) <= TOLERANCE * (1 + abs(x) + abs(y)) * 4:
-                settled[n] = x * x + y * y < radius * radius
+                converged[n] = x * x + y * y < radius * radius
                 break
         out[n, 0], out[n, 1] = x, y

@@ -6,7 +6,7 @@
               |  /              \\  |                |  |           |  |
               |_|                |_|                |__|           |__|
 
-Media by name: acrylic, gel, air, paint (the coat of the gel's outer face), mirror.
+Media by name: acrylic, gel, air, paint (the coat on the outer face of the gel), mirror.
 """
 
 from __future__ import annotations
@@ -23,7 +23,13 @@ Fit = Literal["glued", "air_gap"]
 
 @dataclass(frozen=True)
 class GelSection:
-    """Cross-section of the pad on the window, centred; `crown_mm` is the rise of its middle."""
+    """Cross-section of the pad, centred on the window.
+
+    Attributes:
+        width_mm: Width across the finger.
+        thickness_mm: Thickness at the edge.
+        crown_mm: How much thicker the pad is in the middle.
+    """
 
     width_mm: float
     thickness_mm: float
@@ -32,10 +38,17 @@ class GelSection:
 
 @dataclass(frozen=True)
 class CurvedGuide:
-    """Flat window, a bend at each side, straight legs down (and out) to the LEDs.
+    """A flat window with a bend at each side and straight legs to the LEDs.
 
-    `window_top_z_mm` is the bonded face. `foot_thickness_mm` tapers the legs, symmetric about
-    their middle plane; None keeps the thickness.
+    Attributes:
+        flat_width_mm: Width of the flat window.
+        thickness_mm: Thickness t of window and bends.
+        inner_radius_mm: Inner radius R of the bends.
+        leg_mm: Length of the legs.
+        bend_rad: Angle of the bends, at most 150 degrees.
+        foot_thickness_mm: Thickness at the foot of a leg that tapers symmetrically; None for
+            parallel walls.
+        window_top_z_mm: Height of the face to which the gel is bonded.
     """
 
     flat_width_mm: float
@@ -48,10 +61,19 @@ class CurvedGuide:
 
 
 def curved_profile(guide: CurvedGuide, gel: GelSection | None = None) -> GuideProfile:
-    """Edges of the curved guide, acrylic on their left, and of the gel.
+    """The cross-section of a curved guide.
 
-    Raises ValueError for lengths that are not positive, R = 0 (a sharp inner edge cannot be bent
-    and guides nothing), a bend over 150° or a gel wider than the flat window.
+    Args:
+        guide: The guide.
+        gel: The pad on the window; None without.
+
+    Returns:
+        The edges of the guide, with the acrylic on their left, and of the gel.
+
+    Raises:
+        ValueError: A length is not positive, the inner radius is 0 (a sharp inner edge cannot be
+            bent and guides no light), a bend is above 150 degrees, or the gel is wider than the
+            flat window.
     """
     _check_curved(guide)
     right = _curved_side(guide)
@@ -69,11 +91,16 @@ def curved_profile(guide: CurvedGuide, gel: GelSection | None = None) -> GuidePr
 
 @dataclass(frozen=True)
 class MirrorGuide:
-    """Flat window with straight legs, turned by 45° mirrors in the corners.
+    """A flat window with straight legs and 45 degree mirrors in the corners.
 
-    `glued`: window and legs are one piece whose cut corner is silvered. `air_gap`: the window
-    ends in a vertical face, the leg below in a horizontal one, and a free mirror turns the light
-    in the air between them. `leg_mm` is counted from the window's lower face.
+    Attributes:
+        flat_width_mm: Width of the flat window.
+        thickness_mm: Thickness of window and legs.
+        leg_mm: Length of the legs, from the lower face of the window.
+        fit: `glued`: window and legs are one piece whose cut corner is silvered. `air_gap`: the
+            window ends in a vertical face, the leg below in a horizontal face, and a separate
+            mirror turns the light in the air between them.
+        window_top_z_mm: Height of the face to which the gel is bonded.
     """
 
     flat_width_mm: float
@@ -84,10 +111,18 @@ class MirrorGuide:
 
 
 def mirror_profile(guide: MirrorGuide, gel: GelSection | None = None) -> GuideProfile:
-    """Edges of the straight guide with 45° mirrors, and of the gel; air_gap has several bodies.
+    """The cross-section of a guide with 45 degree mirrors.
 
-    Raises ValueError for lengths that are not positive, a fit that does not exist or a gel wider
-    than the flat window.
+    Args:
+        guide: The guide.
+        gel: The pad on the window; None without.
+
+    Returns:
+        The edges of the guide and of the gel; with `air_gap` the legs are bodies of their own.
+
+    Raises:
+        ValueError: A length is not positive, the fit is unknown, or the gel is wider than the flat
+            window.
     """
     _require_positive(
         flat_width_mm=guide.flat_width_mm, thickness_mm=guide.thickness_mm, leg_mm=guide.leg_mm
@@ -108,7 +143,7 @@ def mirror_profile(guide: MirrorGuide, gel: GelSection | None = None) -> GuidePr
 
 
 def _curved_side(guide: CurvedGuide) -> list[Edge]:
-    """Right side, from the window's lower face down, over the foot and up to its upper face."""
+    """The right side, from the lower face of the window over the foot to its upper face."""
     y, z = guide.flat_width_mm / 2, guide.window_top_z_mm - guide.thickness_mm
     inner, t = guide.inner_radius_mm, guide.thickness_mm
     centre, end = (y, z - inner), math.pi / 2 - guide.bend_rad
@@ -168,7 +203,7 @@ def _air_gap_side(guide: MirrorGuide) -> list[Edge]:
 
 
 def _window_top(half: float, top: float, gel: GelSection | None) -> list[Edge]:
-    """Upper face from right to left: beside the gel it meets air, under it the gel."""
+    """The upper face from right to left: under the gel it meets gel, elsewhere air."""
     if gel is None:
         return [Edge("window_top", Segment((half, top), (-half, top)), "acrylic", "air")]
     _require_positive(gel_width_mm=gel.width_mm, gel_thickness_mm=gel.thickness_mm)
@@ -209,7 +244,7 @@ def _gel_edges(top: float, gel: GelSection | None) -> list[Edge]:
 
 
 def _mirrored(edge: Edge) -> Edge:
-    """The edge at the other side, run so that its left medium stays on its left."""
+    """The mirror image of an edge, directed so that its left medium stays on its left."""
     c = edge.curve
     name = edge.name.replace("_right", "_left")
     if isinstance(c, Segment):
@@ -235,7 +270,7 @@ def _check_curved(guide: CurvedGuide) -> None:
         return
     _require_positive(foot_thickness_mm=foot)
     if foot / 2 >= guide.inner_radius_mm + guide.thickness_mm / 2:
-        raise ValueError(f"foot_thickness_mm = {foot:g}: the foot reaches the bend's centre")
+        raise ValueError(f"foot_thickness_mm = {foot:g}: the foot reaches the centre of the bend")
 
 
 def _require_positive(**lengths: float) -> None:

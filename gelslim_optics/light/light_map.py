@@ -1,4 +1,4 @@
-"""Light that reaches the gel's face: per source a map of irradiance and a direction."""
+"""Light on the gel's face: a map of irradiance and a direction for each source."""
 
 from __future__ import annotations
 
@@ -12,12 +12,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class LightMap:
-    """Irradiance (ny, nx, k) of k sources at axes `x_mm` (nx,), `y_mm` (ny,), 1 = usual.
+    """Irradiance and direction of the light of k sources on the gel's face.
 
-    Source i travels on the mean along `azimuth_deg` (k,) (0: towards +x, 90: towards +y) and
-    rises towards the gel's face at `elevation_deg` (k,) within the gel; `colour` (k, 3) is what
-    the sensor's red, green and blue make of it. Axes may be centres of a tracer's bins; beyond
-    them the map goes on as at its edge. Raises ValueError for values that are no light.
+    Outside its axes the map continues with the values at its edge.
+
+    Attributes:
+        x_mm: Increasing coordinates (nx,) along the finger.
+        y_mm: Increasing coordinates (ny,) across the finger.
+        irradiance: (ny, nx, k) relative to the mean.
+        azimuth_deg: Mean direction (k,) in the plane; 0 is towards +x, 90 towards +y.
+        elevation_deg: Mean elevation (k,) at which light rises to the face, within the gel.
+        colour: Response (k, 3) of the camera's red, green and blue.
+
+    Raises:
+        ValueError: A shape does not fit, or a value is out of range.
     """
 
     x_mm: Array
@@ -51,7 +59,7 @@ class LightMap:
         if self.irradiance.min() < 0 or self.colour.min() < 0:
             raise ValueError("irradiance and colour of the light must not be negative")
         if np.any((self.elevation_deg <= 0) | (self.elevation_deg > 90)):
-            raise ValueError("light must rise towards the gel: elevation_deg in 0 ... 90")
+            raise ValueError("elevation_deg of the light must be above 0 and at most 90")
 
     @classmethod
     def from_bins(
@@ -65,14 +73,16 @@ class LightMap:
         colour: Array,
         smooth_mm: float = 0.0,
     ) -> LightMap:
-        """Light from a tracer's maps (k, x bins, y bins) of one pad, over their common mean.
+        """Light from the maps (k, nx, ny) of a tracer for one pad, relative to their common mean.
 
-        `smooth_mm` is the standard deviation of a Gaussian that takes out the tracer's scatter.
+        `smooth_mm` is the standard deviation of a Gaussian filter against the noise of the tracer.
         Raises ValueError for maps without light.
         """
         maps = np.asarray(bins, dtype=float)
         if maps.ndim != 3 or not maps.mean() > 0:
-            raise ValueError(f"irradiance bins {maps.shape}: must be (k, x, y) and hold light")
+            raise ValueError(
+                f"irradiance bins {maps.shape} must have the shape (k, nx, ny) and contain light"
+            )
         steps = length_mm / maps.shape[1], width_mm / maps.shape[2]
         if smooth_mm > 0:
             from scipy.ndimage import gaussian_filter
@@ -88,7 +98,7 @@ class LightMap:
 
     @property
     def sources(self) -> int:
-        """How many sources there are."""
+        """Number of sources."""
         return len(self.elevation_deg)
 
     @property
@@ -125,9 +135,10 @@ def red_green_sides(
     red: float = 1.0,
     green: float = 1.0,
 ) -> LightMap:
-    """Red light from -y, green from +y, each decaying as exp(-distance / decay) across the pad.
+    """Red light from -y and green light from +y, each decaying exponentially across the pad.
 
-    For a sensor whose light was not traced; the mean of each map over the pad is `red`, `green`.
+    For a sensor whose light was not traced. `decay_mm` is the decay length; the means of the two
+    maps over the pad are `red` and `green`.
     """
     x = np.linspace(-length_mm / 2, length_mm / 2, 17)
     y = np.linspace(-width_mm / 2, width_mm / 2, 65)
@@ -145,10 +156,10 @@ def red_green_sides(
 
 
 LED_COLOURS = np.array([[1.0, 0.05, 0.01], [0.02, 1.0, 0.04]])
-"""A red (625 nm) and a green (525 nm) LED in a camera's colours, its colour matrix applied."""
+"""A red (625 nm) and a green (525 nm) LED in the colours of a camera with a colour matrix."""
 
 
 def _cell(axis: Array, at: Array) -> tuple[NDArray[np.intp], Array]:
-    held = np.clip(at, axis[0], axis[-1])
-    number = np.clip(np.searchsorted(axis, held, side="right") - 1, 0, len(axis) - 2)
-    return number, ((held - axis[number]) / (axis[number + 1] - axis[number]))[..., None]
+    limited = np.clip(at, axis[0], axis[-1])
+    number = np.clip(np.searchsorted(axis, limited, side="right") - 1, 0, len(axis) - 2)
+    return number, ((limited - axis[number]) / (axis[number + 1] - axis[number]))[..., None]

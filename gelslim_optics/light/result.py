@@ -1,4 +1,4 @@
-"""What the rays told: flux ledger with intervals, irradiance of the gel's face, uniformity."""
+"""The result of a trace: flux ledger with intervals, irradiance on the gel's face, uniformity."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Estimate:
 
 
 def estimate(replicates: Array) -> Estimate:
-    """Estimate from one value per replicate; with a single one the interval is unbounded."""
+    """Estimate from one value per replicate; a single replicate gives an unbounded interval."""
     values = np.asarray(replicates, dtype=float)
     mean = float(np.mean(values))
     if values.size < 2:
@@ -41,10 +41,11 @@ def estimate(replicates: Array) -> Estimate:
 
 @dataclass(frozen=True)
 class Uniformity:
-    """Evenness of an irradiance map, without what the rays' scatter adds to it.
+    """Uniformity of an irradiance map, without the contribution of the rays' noise.
 
-    `min_over_mean` is of the darkest of PATCHES x PATCHES patches, `cv` the standard deviation of
-    the bins over their mean.
+    Attributes:
+        min_over_mean: Irradiance of the darkest of 8 x 8 patches over the mean.
+        cv: Coefficient of variation, the standard deviation of the bins over their mean.
     """
 
     min_over_mean: float
@@ -53,10 +54,17 @@ class Uniformity:
 
 @dataclass(frozen=True)
 class LightResult:
-    """Tallies of a trace, per flux of 1 emitted by each source.
+    """The tallies of a trace; each source emits a flux of 1.
 
-    `tallies` (source, replicate, column), `maps` (source, replicate, x bins, y bins) hold flux;
-    `shares` are the sources' parts of all emitted flux. Columns: see `trace_geometry`.
+    Attributes:
+        colours: Colour of each source.
+        shares: Share of each source in the emitted flux.
+        edges: Names of the edges of the profile.
+        face: Name of the edge whose arriving light is mapped.
+        rays: Number of rays.
+        tallies: Flux (source, replicate, column); for the columns see `trace_geometry`.
+        maps: Flux (source, replicate, nx, ny) that arrives at the face, by bin.
+        bin_area_mm2: Area of a bin.
     """
 
     colours: tuple[str, ...]
@@ -69,11 +77,11 @@ class LightResult:
     bin_area_mm2: float
 
     def replicates(self, entry: str, colour: str | None = None) -> Array:
-        """One value per replicate of a ledger entry, as a share of the emitted flux.
+        """One value per replicate of an entry of the ledger, as a share of the emitted flux.
 
-        Beside the ledger's entries: `arrived` (at the gel's face, again after each reflection
-        there) and `entered_gel` (net through the bonded face). `colour` restricts to the sources
-        of that colour (and their flux). Raises KeyError for an unknown entry.
+        Further entries are `arrived` (at the gel's face, counted again after each reflection
+        there) and `entered_gel` (net flux through the bonded face). `colour` selects the sources of
+        one colour and their flux. Raises KeyError for an unknown entry.
         """
         extra = {"arrived": column.ARRIVED, "entered_gel": column.ENTERED_GEL}
         places = {**self._columns(), **extra}
@@ -84,11 +92,11 @@ class LightResult:
     def ledger(self, colour: str | None = None) -> dict[str, Estimate]:
         """Where the emitted flux went; the values sum to 1.
 
-        delivered: absorbed by the coat of the gel's face. leaked.EDGE: left for good, last out of
-        a solid through that edge; leaked.ends, leaked.gel_ends: through end faces. stopped.EDGE:
-        absorbed by a mirror or coat there. returned.EDGE: out of a foot. foot_reflection and
-        missed_foot: never entered. absorbed: in the media. truncated: weight cut off. lost: at
-        corners, should be 0. Edges that never saw light are left out.
+        `delivered`: absorbed by the coat of the gel's face. `leaked.EDGE`: left the guide, last
+        through that edge; `leaked.ends` and `leaked.gel_ends`: through the end faces.
+        `stopped.EDGE`: absorbed by a mirror or coat. `returned.EDGE`: left through a foot.
+        `foot_reflection` and `missed_foot`: never entered. `absorbed`: in the media. `truncated`:
+        weight that was cut off. `lost`: at corners, should be 0. Edges without light are left out.
         """
         sums = self._sum(colour)
         return {
@@ -108,22 +116,22 @@ class LightResult:
         return estimate(np.sum(sums[:, chosen], axis=1))
 
     def ledger_gap(self) -> float:
-        """Largest departure from 1 of a replicate's and source's ledger."""
+        """Largest deviation from 1 of the ledger of any source and replicate."""
         places = list(self._columns().values())
         return float(np.max(np.abs(np.sum(self.tallies[:, :, places], axis=2) - 1)))
 
     def irradiance(self, colour: str | None = None) -> Array:
-        """Map (x bins, y bins) of flux arriving at the gel's face per mm² and emitted flux."""
+        """Irradiance (nx, ny) on the gel's face per mm², as a share of the emitted flux."""
         weights = self._weights(colour)
         flux = np.tensordot(weights, self.maps.mean(axis=1), axes=(0, 0))
         return np.asarray(flux / self.bin_area_mm2)
 
     def uniformity(self, colour: str | None = None) -> Uniformity:
-        """Evenness of the irradiance map; nan where no light arrives.
+        """Uniformity of the irradiance map; NaN where no light arrives.
 
-        Squares are products of different replicates, whose scatter is independent, and the
-        darkest patch is measured by the replicates that did not choose it. A single replicate
-        leaves its scatter in.
+        Squares are products of different replicates, whose noise is independent, and the darkest
+        patch is measured by the replicates that did not choose it. With a single replicate the
+        noise remains.
         """
         maps = np.tensordot(self._weights(colour), self.maps, axes=(0, 0))
         mean = float(np.mean(maps))
@@ -136,7 +144,7 @@ class LightResult:
         return Uniformity(_darkest(_patches(maps)), math.sqrt(max(excess, 0.0)))
 
     def arrived(self, colour: str | None = None) -> Estimate:
-        """Flux that reaches the gel's face, again after each reflection there."""
+        """Flux that reaches the gel's face, counted again after each reflection there."""
         return estimate(self._sum(colour)[:, column.ARRIVED])
 
     def entered_gel(self, colour: str | None = None) -> Estimate:
@@ -150,18 +158,18 @@ class LightResult:
     def slope_sensitivity(self, colour: str | None = None) -> Estimate:
         """Relative change of the mean irradiance per unit slope of the face along +y.
 
-        A facet turned by a small slope h changes the irradiance by -h (d·y)/(d·n) of each ray d.
+        A facet with a small slope h changes the irradiance of each ray d by -h (d·y)/(d·n).
         """
         return self._per_arrival(colour, column.SLOPE, lambda value: value)
 
     @property
     def crossings(self) -> float:
-        """Faces met, per ray."""
+        """Number of faces met, per ray."""
         return float(np.mean(self.tallies[:, :, column.CROSSINGS]))
 
     @property
     def corners(self) -> float:
-        """Share of rays that rounding put past a corner and that were led on from it."""
+        """Share of rays that rounding moved past a corner and that were continued from it."""
         return float(np.mean(self.tallies[:, :, column.CORNERS]))
 
     def _per_arrival(
@@ -176,7 +184,9 @@ class LightResult:
     def _weights(self, colour: str | None) -> Array:
         chosen = np.array([colour is None or c == colour for c in self.colours])
         if not np.any(chosen):
-            raise KeyError(f"no light source is {colour}; there are {', '.join(set(self.colours))}")
+            raise KeyError(
+                f"no light source has the colour {colour}; there are {', '.join(set(self.colours))}"
+            )
         weights = np.where(chosen, np.asarray(self.shares), 0.0)
         return np.asarray(weights / np.sum(weights))
 
@@ -204,9 +214,9 @@ class LightResult:
 
 
 def paired_ratio(ours: LightResult, other: LightResult, entry: str = "delivered") -> Estimate:
-    """Ratio of an entry in two traces of the same seed, rays and replicates, paired by replicate.
+    """Ratio of an entry in two traces of equal seed, rays and replicates, paired by replicate.
 
-    Raises ValueError where the replicates do not match or the other's entry is 0.
+    Raises ValueError where the replicates do not match or the entry of `other` is 0.
     """
     a, b = ours.replicates(entry), other.replicates(entry)
     if a.size != b.size:
@@ -214,13 +224,13 @@ def paired_ratio(ours: LightResult, other: LightResult, entry: str = "delivered"
     if float(np.mean(b)) == 0:
         raise ValueError(f"the ratio of {entry} is undefined: the other design has none")
     ratio = float(np.mean(a) / np.mean(b))
-    # Linearised (delta method), so that the ratio of means keeps no bias of a mean of ratios.
+    # Linearised (delta method): a mean of ratios would be biased.
     spread = estimate(ratio + (a - ratio * b) / float(np.mean(b)))
     return Estimate(ratio, spread.standard_error, spread.low, spread.high)
 
 
 def _mean_square(maps: Array) -> float:
-    """Mean over bins of the squared expectation, from maps (replicate, bin): no bias by scatter."""
+    """Mean over bins of the squared expectation, unbiased, from maps (replicate, bin)."""
     count = len(maps)
     if count < 2:
         return float(np.mean(maps**2))
@@ -229,7 +239,7 @@ def _mean_square(maps: Array) -> float:
 
 
 def _darkest(maps: Array) -> float:
-    """Mean of each replicate's value where the others are darkest, maps (replicate, bin)."""
+    """Mean of the value of each replicate where the others are darkest, maps (replicate, bin)."""
     if len(maps) < 2:
         return float(np.min(maps))
     others = maps.sum(axis=0) - maps

@@ -1,4 +1,4 @@
-"""What light meets: an extruded profile, its media and surfaces, and the emitters."""
+"""A scene of light: an extruded profile with its media, surfaces and sources."""
 
 from __future__ import annotations
 
@@ -16,10 +16,17 @@ PMMA_SELLMEIER = (1.1819, 0.011313)
 
 @dataclass(frozen=True)
 class Medium:
-    """A clear medium: refractive index and absorption (1/mm, Beer-Lambert).
+    """A transparent medium.
 
-    `sellmeier` = (B, C): n² = 1 + B λ²/(λ² - C), λ in µm, used for sources that state their
-    wavelength. Otherwise `red_index` and `green_index` go before `index` for those colours.
+    Attributes:
+        index: Refractive index, between 1 and 4.
+        absorption_per_mm: Absorption coefficient (Beer-Lambert law).
+        red_index: Refractive index for red sources without a wavelength; None for `index`.
+        green_index: Refractive index for green sources without a wavelength; None for `index`.
+        sellmeier: (B, C) of n² = 1 + B λ² / (λ² - C), λ in µm, for sources with a wavelength.
+
+    Raises:
+        ValueError: An index or the absorption is out of range.
     """
 
     index: float
@@ -36,7 +43,7 @@ class Medium:
             raise ValueError(f"absorption_per_mm = {self.absorption_per_mm!r}: must be >= 0")
 
     def index_for(self, colour: str, wavelength_um: float | None = None) -> float:
-        """Index for light of a colour and, if given, wavelength."""
+        """Refractive index for light of a colour and, if given, a wavelength."""
         if self.sellmeier is not None and wavelength_um is not None:
             b, c = self.sellmeier
             square = wavelength_um**2
@@ -47,7 +54,15 @@ class Medium:
 
 @dataclass(frozen=True)
 class Surface:
-    """An opaque surface; what it does not reflect it absorbs. Specular unless `diffuse`."""
+    """An opaque surface, which absorbs what it does not reflect.
+
+    Attributes:
+        reflectance: Reflected share of the flux, 0 to 1.
+        diffuse: Whether it reflects diffusely (Lambertian) rather than like a mirror.
+
+    Raises:
+        ValueError: The reflectance is out of range.
+    """
 
     reflectance: float = 0.0
     diffuse: bool = False
@@ -58,29 +73,39 @@ class Surface:
 
 
 def default_media() -> dict[str, Medium]:
-    """Air, PMMA (window and separate leg) and silicone gel; n of PMMA at 590 nm."""
+    """Air, PMMA (the window and separate legs; index at 590 nm) and silicone gel."""
     pmma = Medium(1.4906, absorption_per_mm=0.001, sellmeier=PMMA_SELLMEIER)
     return {AIR: Medium(1.0), "acrylic": pmma, "leg": pmma, GEL: Medium(1.41)}
 
 
 def default_surfaces() -> dict[str, Surface]:
-    """Black paint coat and an aluminium mirror."""
+    """A black coat of paint and an aluminium mirror."""
     return {"paint": Surface(), "mirror": Surface(0.9)}
 
 
 @dataclass(frozen=True)
 class LightScene:
-    """A profile extruded over `x_mm`, with emitters.
+    """A profile extruded along x, with light sources.
 
-    The gel covers `gel_x_mm` only, within `x_mm`: elsewhere the bonded face meets air and the
-    gel's other faces are absent. `ends` names what the faces x = x0, x1 meet (air, or a
-    surface). Light that crosses an edge of `feet` into the air ends there (LED board): it is
-    `returned`. Light that leaves elsewhere goes on in the air: it may meet a mirror, enter again
-    or reach the gel's sides; once it meets nothing more, the back of a coat, or a foot from
-    outside, it has leaked, through the edge by which it last left a solid. `face` is the edge
-    whose arriving light is mapped and counted as delivered.
+    Light that crosses an edge of `feet` into the air ends at the LED board and is counted as
+    returned. Light that leaves elsewhere continues in the air: it may meet a mirror, enter again
+    or reach the sides of the gel. When it meets nothing more, the back of a coat, or a foot from
+    outside, it has leaked through the edge by which it last left a solid.
 
-    Raises ValueError for extents out of order and media the scene does not describe.
+    Attributes:
+        profile: The cross-section.
+        x_mm: First and last x of the guide.
+        gel_x_mm: First and last x of the gel, within `x_mm`. Elsewhere the bonded face meets air
+            and the other faces of the gel are absent.
+        sources: The light sources.
+        media: Transparent media by name; air must be among them.
+        surfaces: Opaque surfaces by name.
+        ends: What the end faces of the guide meet: air, or the name of a surface.
+        feet: Names of the edges at which the LEDs are.
+        face: Name of the edge whose arriving light is mapped and counted as delivered.
+
+    Raises:
+        ValueError: An extent is out of order, or an edge meets a medium without properties.
     """
 
     profile: GuideProfile
@@ -100,7 +125,7 @@ class LightScene:
         if not x0 <= g0 < g1 <= x1:
             raise ValueError(f"gel_x_mm = {self.gel_x_mm}: must be in order and within {self.x_mm}")
         if AIR not in self.media:
-            raise ValueError("the scene's media lack air")
+            raise ValueError("media must contain air")
         if self.ends != AIR and self.ends not in self.surfaces:
             raise ValueError(f"ends = {self.ends!r}: must be air or one of {sorted(self.surfaces)}")
         known = set(self.media) | set(self.surfaces)
@@ -113,5 +138,5 @@ class LightScene:
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """Colours of the sources, in order of first appearance."""
+        """The colours of the sources, in the order of the sources."""
         return tuple(dict.fromkeys(source.colour for source in self.sources))

@@ -1,4 +1,4 @@
-"""Trace light through a guide: source points in, flux ledger and irradiance out."""
+"""Trace light through a guide, from the sources to a flux ledger and irradiance maps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gelslim_optics.light.source import Source
 from gelslim_optics.light.trace_geometry import OWNER, TraceGeometry, columns, face_names, pack
 
 Array = NDArray[np.float64]
-# Sums are kept per block and added in order, so that neither batches nor threads change a bit.
+# Sums are made per block and added in order, so that batches and threads change no bit.
 BLOCK_RAYS = 4096
 SMALLEST_SPLIT = 1e-4
 KERNELS = ("trace_kernel", "trace_face", "trace_crossing")
@@ -32,14 +32,18 @@ HELPERS = ("trace_kernel", "trace_face", "trace_crossing", "trace_geometry")
 class TraceOptions:
     """How rays branch and end; weights are relative to the weight at launch.
 
-    At a face both branches are followed where the weaker weighs at least `split`; below that
-    chance decides, unbiased and without loss of weight. `split` = 1 follows one branch only.
-    Weight below `cut`, or past `most_faces` faces, is booked as truncated.
+    Attributes:
+        split: At a face both branches are followed where the weaker one has at least this weight.
+            Below it one branch is chosen at random (Russian roulette, unbiased). 1 follows one
+            branch only.
+        cut: Weight below which a ray ends; its weight is counted as truncated.
+        max_faces: Number of faces after which a ray ends in the same way.
+        bins: Numbers of bins (nx, ny) of the irradiance map.
     """
 
     split: float = 5e-2
     cut: float = 1e-6
-    most_faces: int = 10_000
+    max_faces: int = 10_000
     bins: tuple[int, int] = (40, 40)
 
     def __post_init__(self) -> None:
@@ -47,13 +51,13 @@ class TraceOptions:
             raise ValueError(f"split = {self.split!r}: must be between {SMALLEST_SPLIT} and 1")
         if not 0 <= self.cut < 1:
             raise ValueError(f"cut = {self.cut!r}: must be at least 0 and less than 1")
-        if self.most_faces < 1 or min(self.bins) < 1:
-            raise ValueError("most_faces and both numbers of bins must be at least 1")
+        if self.max_faces < 1 or min(self.bins) < 1:
+            raise ValueError("max_faces and both numbers of bins must be at least 1")
 
 
 @dataclass(frozen=True)
 class _Job:
-    """A scene's packed arrays for one source."""
+    """The arrays of a scene for one source."""
 
     geometry: TraceGeometry
     index: Array
@@ -77,12 +81,27 @@ def trace_light(
     threads: int = 1,
     batch_rays: int = 1 << 16,
 ) -> LightResult:
-    """Trace at least `rays` rays, shared evenly by sources and replicates.
+    """Trace light through a scene.
 
-    Each share is rounded up to a power of 2 for Sobol points. The same seed, rays and replicates
-    give the same points in another scene (paired comparison). `threads` and `batch_rays` never
-    change the answer. The first call compiles the kernel (some seconds; cached on disk).
-    Raises ValueError for counts below 1 and sources that do not fit the profile.
+    The first call compiles the kernel, which takes some seconds and is cached on disk.
+
+    Args:
+        scene: The scene.
+        rays: Smallest number of rays, divided equally among sources and replicates. Each share is
+            rounded up to a power of 2 for Sobol points.
+        seed: Seed of the random numbers. Equal seed, rays and replicates give equal points in
+            another scene, for a paired comparison.
+        replicates: Number of independent replicates, from which errors are estimated.
+        sampling: `sobol` or `random`.
+        options: How rays branch and end.
+        threads: Number of threads; it does not change the result.
+        batch_rays: Number of rays launched at one time; it does not change the result.
+
+    Returns:
+        The tallies.
+
+    Raises:
+        ValueError: A count is below 1, or a source does not fit the profile.
     """
     for name, count in (("rays", rays), ("replicates", replicates), ("threads", threads)):
         if count < 1:
@@ -122,14 +141,14 @@ def trace_light(
 
 
 def trace_paths(
-    scene: LightScene, count: int = 200, *, seed: int = 0, most_points: int = 400
+    scene: LightScene, count: int = 200, *, seed: int = 0, max_points: int = 400
 ) -> tuple[tuple[str, Array], ...]:
-    """Paths of `count` rays for a picture: (colour, points (k, 3) of x, y, z in mm).
+    """Paths of `count` rays for a picture: pairs of colour and points (k, 3) in mm.
 
-    One branch is followed at each face, by chance. Rays that miss the foot are left out, and
-    those that leave end at the last face. At most `most_points` points a ray on average.
+    At each face one branch is followed at random. Rays that miss the foot are left out, and rays
+    that leave end at the last face. On average a ray has at most `max_points` points.
     """
-    options = TraceOptions(split=1.0, most_faces=most_points)
+    options = TraceOptions(split=1.0, max_faces=max_points)
     each = math.ceil(count / len(scene.sources))
     paths: list[tuple[str, Array]] = []
     for s, source in enumerate(scene.sources):
@@ -137,7 +156,7 @@ def trace_paths(
         points = next(point_batches(each, each, seed=seed, replicate=0, source=s, sampling="sobol"))
         starts = _centred(launch(scene, source, points), job.middle)
         key = np.random.SeedSequence([seed, 0, s, 1]).generate_state(1, np.uint64)[0]
-        trail = np.zeros((each * most_points, 5))
+        trail = np.zeros((each * max_points, 5))
         _, _, written = _run(job, starts, key, 0, trail)
         trail = trail[:written]
         for number in np.unique(trail[:, 0]):
@@ -161,7 +180,7 @@ def _job(scene: LightScene, source: Source, options: TraceOptions) -> _Job:
         medium=number[start],
         first_edge=int(np.flatnonzero(geometry.facts[:, OWNER] == names.index(source.edge))[0]),
         middle=middle,
-        limits=np.array([options.split, options.cut, options.most_faces]),
+        limits=np.array([options.split, options.cut, options.max_faces]),
         bins=options.bins,
         edges=len(names),
     )
@@ -202,7 +221,7 @@ def _run(
 
     sums, heat = np.zeros(columns(job.edges)), np.zeros(job.bins)
     trail = np.zeros((0, 5)) if trail is None else trail
-    # Branches wait with at least the split weight each, of a whole of 1.
+    # Each branch that waits has at least the split weight, of a total of 1.
     depth = math.ceil(1 / job.limits[0]) + 4
     written = trace_block(
         *job.geometry,

@@ -1,11 +1,11 @@
-"""Compiled search for the face a ray meets next. Import it only where rays are traced (numba).
+"""Compiled search for the next face on a ray. Importing this module loads numba.
 
-An edge is crossed where its ends lie on different sides of the ray's line; that is read from the
-sign of one number per corner, the same for both edges that meet there, so no ray slips between
-them. No distance is compared with a tolerance, save in naming a corner that rounding missed.
+A line crosses an edge whose ends are on different sides of it. The side follows from the sign of
+one number per corner, which is the same for both edges that meet there, so that no ray passes
+between them. Distances are compared with a tolerance only to find a corner that rounding missed.
 
-`trace_kernel` is compiled with these functions inside it and its cached code is only renewed when
-its own file changes: remove the cached code (`__pycache__/*.nb*`) after editing this one.
+These functions are compiled into `trace_kernel`; `gelslim_core.kernel_cache` removes its cached
+code when this file has changed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gelslim_optics.light.trace_geometry import BONDED, CIRCLE, CORNER_PART, GEL
 AIR = 0
 NOTHING = -1
 FAR = 1e300
-# Without reference counting of arrays the search is nearly 3 times faster; nothing is allocated.
+# Without reference counting of arrays the search is almost 3 times faster; it allocates nothing.
 COMPILED = {
     "cache": True,
     "nogil": True,
@@ -34,7 +34,7 @@ INLINED = {**COMPILED, "forceinline": True}
 def crossings(
     shape: Any, facts: Any, e: int, last: int, y: float, z: float, dy: float, dz: float
 ) -> Any:
-    """Where the line meets edge e: count, then (t, left to right) of up to two crossings."""
+    """Crossings of the line with edge e: count, then (t, left to right) of up to two."""
     ay, az, by, bz = shape[e, 0] - y, shape[e, 1] - z, shape[e, 2] - y, shape[e, 3] - z
     ca, cb = dy * az - dz * ay, dy * bz - dz * by
     apart = (ca >= 0) != (cb >= 0)
@@ -48,7 +48,7 @@ def crossings(
     along, off = my * dy + mz * dz, dy * mz - dz * my
     leaves = sense > 0
     if not apart:
-        # Both crossings or none: the line's point nearest the centre tells on which side.
+        # Two crossings or none: the point of the line nearest to the centre decides.
         if off * off >= s2 * r * r:
             return 0, 0.0, False, 0.0, False
         side = (by - ay) * (along * dz + s2 * az) - (bz - az) * (along * dy + s2 * ay)
@@ -60,7 +60,7 @@ def crossings(
         if t <= 0 or (apart and leaves != (cb > ca)):
             return 0, 0.0, False, 0.0, False
         return 1, t, leaves, 0.0, False
-    # Both factors of the discriminant, as its difference loses digits near a tangent.
+    # The discriminant as a product, because the difference loses digits near a tangent.
     span = math.sqrt(s2) * r
     root = math.sqrt(max((span - abs(off)) * (span + abs(off)), 0.0))
     if apart:
@@ -72,7 +72,7 @@ def crossings(
 
 @njit(**INLINED)
 def side_medium(facts: Any, box: Any, gel: int, e: int, right: bool, x: float) -> int:
-    """Medium on one side of an edge at x; beside the gel the bonded face meets air."""
+    """Medium on one side of an edge at x; outside the gel the bonded face meets air."""
     medium = facts[e, 1 if right else 0]
     if facts[e, PRESENCE] == BONDED and medium == gel and (x < box[2] or x > box[3]):
         return AIR
@@ -81,7 +81,7 @@ def side_medium(facts: Any, box: Any, gel: int, e: int, right: bool, x: float) -
 
 @njit(**INLINED)
 def edge_normal(shape: Any, e: int, y: float, z: float) -> Any:
-    """Unit normal of an edge (y, z) at a place on it, to its right."""
+    """Unit normal (y, z) to the right of an edge at a point on it."""
     if shape[e, 7] == 0.0:
         return shape[e, 4], shape[e, 5]
     size = shape[e, 7] * shape[e, 6]
@@ -101,9 +101,9 @@ def corner_exit(
     dy: float,
     dz: float,
 ) -> Any:
-    """Other face at the corner the ray stands on, if it heads out there: (edge, left to right).
+    """The other face at the corner where the ray is, if it leaves there: (edge, left to right).
 
-    A ray that stands on a corner may pass both of its faces on the outside.
+    A ray that starts at a corner may pass both of its faces on the outside.
     """
     found, found_way, steepest = NOTHING, False, 0.0
     for k in range(near[medium, 0]):
@@ -141,7 +141,7 @@ def next_edge(
     dy: float,
     dz: float,
 ) -> Any:
-    """Edge at which the ray leaves its medium: (edge, t, left to right, 0 | 1 corner | 2 lost)."""
+    """Edge where the ray leaves its medium: (edge, t, left to right, 0 | 1 corner | 2 lost)."""
     out, out_t, out_way = NOTHING, FAR, False
     back, back_t, back_way = NOTHING, -FAR, False
     wrong_t = FAR
@@ -174,8 +174,8 @@ def next_edge(
         return out, out_t, out_way, 0
     if wrong_t == FAR and medium == AIR:
         return NOTHING, FAR, False, 0
-    # The nearest face is met from its wrong side: rounding put the ray past a corner. Ahead, the
-    # ray passes the tip of an inward corner; behind, it stands on one; or it runs along a face.
+    # The nearest face is met from its wrong side: rounding moved the ray past a corner. Either a
+    # reentrant corner is ahead, or the ray is at a corner, or it runs along a face.
     if out != NOTHING and out_t - wrong_t <= box[4]:
         return out, out_t, out_way, 1
     if back_t > -box[4]:
@@ -208,7 +208,7 @@ def gel_plane(
     dy: float,
     dz: float,
 ) -> float:
-    """Distance at which a ray in air enters an end face of the gel, FAR if it does not."""
+    """Distance at which a ray in air enters an end face of the gel; FAR if it does not."""
     if dx > 0 and x < box[2]:
         t = (box[2] - x) / dx
     elif dx < 0 and x > box[3]:

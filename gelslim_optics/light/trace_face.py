@@ -1,6 +1,6 @@
-"""Compiled physics at one face: Fresnel, chance, mirrors and coats, arrival at the gel's face.
+"""Compiled physics at one face: Fresnel's equations, random numbers, mirrors and coats, arrival.
 
-Part of the kernel (numba); see `trace_crossing` on renewing its cached code.
+Importing this module loads numba. Its functions are compiled into `trace_kernel`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FOUR, ONE = np.uint64(4), np.uint64(1)
 
 @njit(**COMPILED)
 def scramble(z: Any) -> Any:
-    """Finaliser of splitmix64 (Steele, Lea, Flood 2014)."""
+    """Finaliser of splitmix64 (Steele, Lea and Flood 2014)."""
     z = (z ^ (z >> S30)) * MIX_A
     z = (z ^ (z >> S27)) * MIX_B
     return z ^ (z >> S31)
@@ -31,14 +31,14 @@ def scramble(z: Any) -> Any:
 
 @njit(**COMPILED)
 def uniform(path: Any, bounce: Any, slot: Any) -> float:
-    """Number in [0, 1), a pure function of the path's key, the bounce and the slot."""
+    """Random number in [0, 1) for the key of a path, the bounce and the slot."""
     z = path + STEP * (FOUR * np.uint64(bounce) + np.uint64(slot) + ONE)
     return float(scramble(z) >> S11) * 2.0**-53
 
 
 @njit(**COMPILED)
 def fresnel(n1: float, n2: float, cosine: float) -> Any:
-    """Reflectance of unpolarised light and cosine behind the face; (1, 0) in total reflection."""
+    """Reflectance of unpolarised light and cosine of refraction; (1, 0) in total reflection."""
     if n1 == n2:
         return 0.0, cosine
     ratio = n1 / n2
@@ -64,7 +64,7 @@ def map_arrival(
     sums: Any,
     heat: Any,
 ) -> None:
-    """Record the flux w that reaches the mapped face at the ray's place."""
+    """Add the flux w that reaches the mapped face at the position of the ray."""
     x, y, z, dy, dz = ray[0], ray[1], ray[2], ray[4], ray[5]
     ay, az, by, bz = shape[e, 0], shape[e, 1], shape[e, 2], shape[e, 3]
     if shape[e, 7] == 0.0:
@@ -74,8 +74,8 @@ def map_arrival(
         cy, cz = shape[e, 4], shape[e, 5]
         py, pz, qy, qz = ay - cy, az - cz, by - cy, bz - cz
         ry, rz = y - cy, z - cz
-        whole = abs(math.atan2(py * qz - pz * qy, py * qy + pz * qz))
-        part = abs(math.atan2(py * rz - pz * ry, py * ry + pz * rz)) / whole
+        sweep = abs(math.atan2(py * qz - pz * qy, py * qy + pz * qz))
+        part = abs(math.atan2(py * rz - pz * ry, py * ry + pz * rz)) / sweep
     if ay > by:
         part = 1.0 - part
     nx, ns = heat.shape
@@ -94,7 +94,7 @@ def map_arrival(
 def turn_back(
     coats: Any, coat: int, ray: Any, path: Any, bounce: int, normal: Any, cosine: float
 ) -> float:
-    """Turn the ray at an opaque surface; returns the reflectance."""
+    """Reflect the ray at an opaque surface; returns the reflectance."""
     reflectance = coats[coat, 1]
     if reflectance == 0.0:
         return 0.0

@@ -1,4 +1,4 @@
-"""A light scene packed in arrays for the compiled tracer."""
+"""A light scene as arrays for the compiled tracer."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ from gelslim_optics.light.scene import AIR, GEL, LightScene
 ALWAYS, BONDED, GEL_ONLY = 0, 1, 2
 NONE = -1
 CORNER_PART = 1e-9
-# Columns of `facts` behind the media on the left and right.
+# Columns of `facts` after the media on the left and right.
 PRESENCE, OWNER, EXIT, CIRCLE = range(2, 6)
 
 
 class TraceGeometry(NamedTuple):
-    """Arrays of the kernel; edges are pieces of the profile's edges (arcs over 180° in two).
+    """The arrays of the kernel; arcs above 180 degrees are split into two edges.
 
-    `shape` (e, 8): start and end (y, z), equal to the last bit where edges join, which makes the
-    corners tight; then an arc's centre, radius and sense ±1, or a segment's unit normal to its
-    right and two zeros. `facts` (e, 6):
-    media left and right, where present along x, number of the edge's name, whether light ends
-    behind it, and a number shared by pieces of one circle (-1 for segments). `near` (m, 1 + e):
-    count and list of the edges that bound a medium; all of them for air, medium 0. `coats`
-    (m, 3): opaque, reflectance, diffuse. `box`: x0, x1 of the guide and of the gel, and the size
-    of a corner in mm. `marks`: medium beyond the ends, gel, mapped edge.
+    Attributes:
+        shape: (e, 8) start and end (y, z), identical to the last bit where edges join, so that
+            corners have no gaps; then centre, radius and sense ±1 of an arc, or the unit normal to
+            the right of a segment and two zeros.
+        facts: (e, 6) media on the left and right, where the edge is present along x, number of its
+            name, whether light ends behind it, and a number for its circle (-1 for segments).
+        near: (m, 1 + e) number and list of the edges that bound a medium; all for air, medium 0.
+        coats: (m, 3) opaque, reflectance, diffuse.
+        box: First and last x of the guide and of the gel, and the size of a corner in mm.
+        marks: Medium beyond the end faces, gel, mapped edge.
     """
 
     shape: Any
@@ -39,7 +41,7 @@ class TraceGeometry(NamedTuple):
 
 
 def pack(scene: LightScene) -> tuple[TraceGeometry, dict[str, int], tuple[float, float]]:
-    """Arrays, the media's numbers, and the profile's middle (y, z), which they are relative to."""
+    """Arrays, numbers of the media, and the middle (y, z) of the profile, their origin."""
     names = [AIR, *(m for m in scene.media if m != AIR), *scene.surfaces]
     number = {name: i for i, name in enumerate(names)}
     middle, extent = _box(scene)
@@ -68,7 +70,7 @@ def pack(scene: LightScene) -> tuple[TraceGeometry, dict[str, int], tuple[float,
 
 
 def face_names(scene: LightScene) -> tuple[str, ...]:
-    """Names of the profile's edges, each once, in order: what flux is booked to."""
+    """Names of the edges of the profile, each once, in order; flux is tallied by them."""
     return tuple(dict.fromkeys(edge.name for edge in scene.profile.edges))
 
 
@@ -141,7 +143,7 @@ def _presence(scene: LightScene, edge: Edge) -> int:
     return BONDED if other in scene.media and other != AIR else GEL_ONLY
 
 
-# Columns of the kernel's sums; then one per edge for each of leaked, stopped, returned.
+# Columns of the sums; then one per edge for each of leaked, stopped and returned flux.
 ABSORBED, MISSED, FOOT_REFLECTION, TRUNCATED, LOST, ENDS, GEL_ENDS, ENDS_STOPPED = range(8)
 ARRIVED, ELEVATION, SLOPE, ENTERED_GEL, CROSSINGS, CORNERS, PER_EDGE = range(8, 15)
 

@@ -1,4 +1,4 @@
-"""Compiled ray loop. Import this module only where rays are traced: it loads numba."""
+"""The compiled loop over rays. Importing this module loads numba."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from gelslim_optics.light.trace_geometry import (
     TRUNCATED,
 )
 
-# Faces that are no edge of the profile: end of the guide, end of the gel.
+# Faces that are not edges of the profile: end of the guide, end of the gel.
 END, GEL_END = -2, -3
 
 
@@ -74,11 +74,11 @@ def trace_block(
 ) -> int:
     """Trace rays (n, 8) into `sums` and `heat`; returns the number of rows written to `trail`.
 
-    `limits`: smallest weight split at a face, weight cut off, most faces met. `ray` (7),
-    `stack` (d, 7), `notes` (d, 4) and `seeds` (d) are room to work in. `trail` rows: ray, branch,
-    x, y, z; none are written where it is empty.
+    `limits`: smallest weight that is split at a face, weight at which a ray ends, largest number
+    of faces. `ray` (7), `stack` (d, 7), `notes` (d, 4) and `seeds` (d) are work space. The rows of
+    `trail` are ray, branch, x, y, z; none are written where it is empty.
     """
-    split, cut, most = limits[0], limits[1], int(limits[2])
+    split, cut, max_faces = limits[0], limits[1], int(limits[2])
     depth = stack.shape[0]
     edges = (sums.shape[0] - PER_EDGE) // 3
     leaked, stopped, returned = PER_EDGE, PER_EDGE + edges, PER_EDGE + 2 * edges
@@ -104,7 +104,7 @@ def trace_block(
             written = note(trail, written, r, branch, ray)
             while True:
                 w = ray[6]
-                if w < cut or bounce >= most:
+                if w < cut or bounce >= max_faces:
                     sums[TRUNCATED] += w
                     break
                 bounce += 1
@@ -145,7 +145,7 @@ def trace_block(
                     break
                 sums[CORNERS] += trouble
                 if e == NOTHING:
-                    book_leak(sums, left, leaked, facts, w)
+                    add_leak(sums, left, leaked, facts, w)
                     break
                 for i in range(3):
                     ray[i] += t * ray[3 + i]
@@ -156,7 +156,7 @@ def trace_block(
                     w *= math.exp(-absorption[now] * t)
                     sums[ABSORBED] += ray[6] - w
                     ray[6] = w
-                # Beyond the face, and its normal along the ray.
+                # The medium behind the face, and the normal of the face along the ray.
                 if e == END or (
                     e == GEL_END and now == gel and (plane == box[0] or plane == box[1])
                 ):
@@ -180,7 +180,7 @@ def trace_block(
                     )
                 ):
                     # The LED board at a foot, or the back of a coat.
-                    book_leak(sums, left, leaked, facts, w)
+                    add_leak(sums, left, leaked, facts, w)
                     break
                 if coats[beyond, 0] > 0.0:
                     if e >= 0 and facts[e, OWNER] == face:
@@ -197,7 +197,7 @@ def trace_block(
                     continue
                 back, behind = fresnel(index[now], index[beyond], cosine)
                 into = w * (1.0 - back)
-                # Share out the weight: `into` goes through, the rest is reflected.
+                # Divide the weight: `into` is transmitted, the rest is reflected.
                 small = min(into, w - into)
                 if small < split and back < 1.0 and back > 0.0:
                     u = uniform(path, bounce, 0)
@@ -249,7 +249,7 @@ def trace_block(
                 else:
                     break
                 last = e
-                # Newton step to unit length: rounding must not build up over many faces.
+                # A Newton step to unit length, so that rounding does not accumulate.
                 size2 = ray[3] ** 2 + ray[4] ** 2 + ray[5] ** 2
                 scale = 1.5 - 0.5 * size2
                 for i in range(3):
@@ -259,7 +259,7 @@ def trace_block(
 
 @njit(**COMPILED)
 def note(trail: Any, written: int, ray_number: int, branch: int, ray: Any) -> int:
-    """Write a point of a ray's path where there is room."""
+    """Write a point of the path of a ray where there is room."""
     if written < trail.shape[0]:
         trail[written, 0] = ray_number
         trail[written, 1] = branch
@@ -270,8 +270,8 @@ def note(trail: Any, written: int, ray_number: int, branch: int, ray: Any) -> in
 
 
 @njit(**COMPILED)
-def book_leak(sums: Any, left: int, leaked: int, facts: Any, w: float) -> None:
-    """Flux that left for good, by the face it last left a solid through."""
+def add_leak(sums: Any, left: int, leaked: int, facts: Any, w: float) -> None:
+    """Add flux that left the guide, by the face through which it last left a solid."""
     if left >= 0:
         sums[leaked + facts[left, OWNER]] += w
     elif left == GEL_END:

@@ -128,7 +128,7 @@ def test_a_whole_circle_guides_for_ever() -> None:
         media(),
         {"paint": Surface(), "mirror": Surface(1.0)},
     )
-    result = trace_light(scene, 256, replicates=1, options=TraceOptions(most_faces=2000))
+    result = trace_light(scene, 256, replicates=1, options=TraceOptions(max_faces=2000))
     assert result.value("lost") == 0
     assert result.ledger_gap() < 1e-12
 
