@@ -12,6 +12,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ifem_export.operators.condensed_operators import (
+    CondensedOperator,
+    DenseOperator,
+    PaperOperator,
+)
 from ifem_export.operators.solver import Factor, factored
 
 Array = NDArray[np.float64]
@@ -84,9 +89,9 @@ class NormalCompliance:
 
     def _solved(self, nodes: Nodes) -> Array:
         """Columns (c, n)."""
-        system = getattr(self._operator, "system", None)
-        if system is None or not hasattr(self._operator, "whole"):
+        if not isinstance(self._operator, (PaperOperator, CondensedOperator, DenseOperator)):
             return np.column_stack([self._one(node) for node in nodes])
+        system = self._operator.system
         if self._factor is None:
             self._factor = factored(system.stiffness)
         unknowns = system.stiffness.shape[0]

@@ -10,7 +10,13 @@ import numpy as np
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
 
 
-def finger_view(tilt_deg: float = 30.0, height_mm: float = 22.0, focal_px: float = 640.0):
+def finger_view(
+    tilt_deg: float = 30.0,
+    height_mm: float = 22.0,
+    focal_px: float = 640.0,
+    aside_mm: float = -0.6,
+    lens_offset_px: tuple[float, float] = (6.0, 4.0),
+):
     """VGA camera tilted by `tilt_deg` from the gel's normal, looking near the gel's middle.
 
     It stands aside in y and its lens is off the picture's middle, so that nothing is symmetric.
@@ -33,6 +39,6 @@ def finger_view(tilt_deg: float = 30.0, height_mm: float = 22.0, focal_px: float
     )
     return dataclasses.replace(
         view,
-        principal_offset_px=(6.0, 4.0),
-        position_mm=view.position_mm + np.array([0.0, 0.6, 0.0]),
+        principal_offset_px=lens_offset_px,
+        position_mm=view.position_mm + np.array([0.0, aside_mm, 0.0]),
     )

@@ -19,6 +19,10 @@ BALL = Sphere(10.0)
 CENTRE_MM = np.array([1.1, -0.7])
 LATERAL_MM = np.array([0.4, -0.25])
 PATCH = ContactPatch("disc", CENTRE_MM, 1.6, covariance=np.diag([1e-4, 1e-4, 4e-4, 0.0]))
+MESH = PadMesh.from_occupancy(
+    np.ones((22, 16, 3), dtype=bool), (0.45, 0.6, 0.6), (-4.95, -4.8, -1.8)
+)
+OPERATOR = surface_operator(MESH, Material(0.147, 0.45, 1000.0), "bbar", "factor")
 
 
 class Finder:
@@ -30,11 +34,7 @@ class Finder:
 
 @pytest.fixture(scope="module")
 def source() -> IndenterSource:
-    mesh = PadMesh.from_occupancy(
-        np.ones((22, 16, 3), dtype=bool), (0.45, 0.6, 0.6), (-4.95, -4.8, -1.8)
-    )
-    operator = surface_operator(mesh, Material(0.147, 0.45, 1000.0), "bbar", "factor")
-    return IndenterSource(Finder(), NormalModel(operator, mesh.surface_mm), BALL)
+    return IndenterSource(Finder(), NormalModel(OPERATOR, MESH.surface_mm), BALL)
 
 
 def test_the_gel_is_pressed_in_under_the_ball(source) -> None:
@@ -52,6 +52,15 @@ def test_the_gel_is_pressed_in_under_the_ball(source) -> None:
     assert not found.touched[away > 2.3].any()
     assert found.patch is PATCH
     assert 0 < found.sigma_mm[deepest] < 0.2 * found.depth_mm
+
+
+def test_the_free_surface_moves_as_the_contact_forces_move_it(source) -> None:
+    found = source.model.motion(PATCH, BALL)
+    force = np.zeros((len(found.w_mm), 3))
+    force[:, 2] = -found.force_n
+    exact = OPERATOR.displacement(force)[:, 2]
+    np.testing.assert_allclose(found.w_mm, exact, atol=1e-5 * found.depth_mm)
+    assert np.abs(exact[~found.patch]).max() > 0.02 * found.depth_mm
 
 
 def test_the_patch_is_moved_back_by_the_lateral_motion(source) -> None:

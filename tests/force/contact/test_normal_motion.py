@@ -180,6 +180,23 @@ def test_compliance_by_symmetry_is_that_of_single_solves():
     assert 0 < table.ready < 1
 
 
+@pytest.mark.parametrize("rung", ["paper", "factor", "pcg", "dense32"])
+def test_operators_with_the_full_system_are_factored_once(rung, monkeypatch):
+    """One factorisation with many right-hand sides, not one solve for every node."""
+    mesh = PadMesh.from_occupancy(np.ones((7, 5, 2), bool), (1.0, 1.2, 1.0), (-3.5, -3, -2))
+    operator = surface_operator(mesh, Material(E_MPA, 0.4, 1000.0), "bbar", rung)
+    columns = len(mesh.surface_mm)
+    exact = np.column_stack(
+        [operator.displacement(np.eye(3 * columns)[3 * k + 2].reshape(-1, 3))[:, 2]
+         for k in range(columns)]
+    )  # fmt: skip
+    table = NormalCompliance(operator, columns)
+    monkeypatch.setattr(NormalCompliance, "_one", None)
+    table.prepare()
+    found = table.block(np.arange(columns))
+    np.testing.assert_allclose(found, exact, atol=1e-6 * exact.max())
+
+
 @pytest.mark.parametrize("rung", ["paper", "fft", "truncated", "pcg"])
 def test_compliance_of_every_operator_is_its_own(rung):
     mesh = PadMesh.from_occupancy(np.ones((10, 8, 2), bool), (1.0, 1.0, 1.0), (-5, -4, -2))
