@@ -8,7 +8,7 @@ PINS := requirements/constraints.txt
 
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: variant test test-cores test-slow site lint stability designs bench docs pins clean
+.PHONY: variant test test-cores test-slow mutants site lint stability designs bench docs pins clean
 
 variant: $(VENV)/.installed
 	$(BIN)/gelslim build "$(SPEC)" -o "$(OUT)"
@@ -36,6 +36,9 @@ test-cores: $(VENV)/.installed-dev
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile -m slow
+
+mutants: $(VENV)/.installed-mutants
+	$(BIN)/python tools/mutants.py
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -75,6 +78,10 @@ $(VENV)/.installed: pyproject.toml $(PINS)
 $(VENV)/.installed-dev: pyproject.toml $(PINS)
 	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev"
 	touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-mutants: pyproject.toml $(PINS)
+	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev,mutants"
+	touch $@ $(VENV)/.installed-dev $(VENV)/.installed
 
 $(VENV)/.installed-docs: pyproject.toml $(PINS)
 	PYTHON="$(PYTHON)" sh tools/install.sh "cad,view,vision,record,cluster,dev,docs"
