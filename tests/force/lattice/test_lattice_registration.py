@@ -54,7 +54,8 @@ def test_a_print_whole_pitches_off_is_resolved_by_its_anchors(anchors, step):
     for camera in (None, CAMERA):
         found = register(detected(frame), grid, SHAPE, camera)
         inside = np.all((frame.centres_px > 8) & (frame.centres_px < [631, 471]), axis=1)
-        off = np.hypot(*(found.centres_px - frame.centres_px)[found.found].T)
+        # A dot that the border of the picture cuts has another centroid.
+        off = np.hypot(*(found.centres_px - frame.centres_px)[found.found & inside].T)
         assert off.max() < 1.5
         assert found.found[inside].mean() > 0.99
     assert found.camera_offset_pitch == pytest.approx(np.hypot(*step), rel=0.15)
