@@ -96,6 +96,15 @@ def test_what_needs_no_extra_works_without_any(words: str, place: Path, tmp_path
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
+def test_light_is_drawn_with_plots_and_without_cad(place: Path, tmp_path: Path) -> None:
+    others = tuple(n for n in EVERYTHING if n not in (*MISSING["plot"], "PIL"))  # its own need
+    words = ["light", str(MINI20), "--rays", "1024", "-o", str(tmp_path / "out")]
+    done = without(others, words, tmp_path / "tmp")
+    assert done.returncode == 0, done.stderr
+    assert list((tmp_path / "out").glob("*.png"))
+
+
 def test_doctor_lists_what_is_missing_and_how_to_get_it(tmp_path: Path) -> None:
     done = without(EVERYTHING, ["doctor", "--quick", "--json"], tmp_path)
     assert done.returncode == 0, done.stderr
