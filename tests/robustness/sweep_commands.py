@@ -29,6 +29,11 @@ class Command:
     program: tuple[str, ...] = ("-m", "gelslim")
     ignored: frozenset[str] = field(default=frozenset())
 
+    @property
+    def interrupts(self) -> int:
+        """How many moments of the command are interrupted: fewer where it takes long."""
+        return 8 if self.kills >= 5 else 4
+
     def argv(self, place: Path, out: Path, other: bool = False) -> list[str]:
         """The command as a list; no shell is involved."""
         text = self.arguments

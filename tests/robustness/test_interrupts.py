@@ -24,9 +24,9 @@ def test_an_interrupt_is_one_line(
     """At moments of the command's own time: imports, work, writing."""
     moments, took = random.Random(f"interrupt {command.name}"), clean_runs(command).took_s
     lines = 0
-    for k in range(8):
+    for k in range(command.interrupts):
         out, scratch = tmp_path / f"out_{k}" / "out", tmp_path / f"tmp_{k}"
-        after_s = max(0.0, took * (k - moments.uniform(0, 1)) / 8)
+        after_s = max(0.0, took * (k - moments.uniform(0, 1)) / command.interrupts)
         number = signal.SIGTERM if k % 4 == 2 else signal.SIGINT
         run = interrupted(command.argv(place, out), scratch, after_s, number, twice=k % 4 == 3)
         lines += run.was_one_line()
@@ -40,7 +40,7 @@ def test_an_interrupt_amidst_writing_leaves_nothing(
     command: Command, place: Path, tmp_path: Path
 ) -> None:
     events = random.Random(f"writing {command.name}")
-    for k in range(6):
+    for k in range(3 * command.interrupts // 4):
         out, scratch = tmp_path / f"out_{k}" / "out", tmp_path / f"tmp_{k}"
         at = f"change:{round(2 ** events.uniform(0, 6))}"
         number = signal.SIGTERM if k % 3 == 2 else signal.SIGINT
