@@ -231,17 +231,15 @@ class _Parser:
     def _key(self, event: Any, path: Path) -> tuple[str, bool]:
         """The key that begins with `event`, and whether it may be one."""
         name = type(event).__name__
+        position, key, raw = _position(event.start_mark), None, None
         if name in ("MappingStartEvent", "SequenceStartEvent"):
-            position = _position(event.start_mark)
             self._value(event, (*path, "?"), None)
-            message = "a key must be a plain name, not a collection"
-            self._problem(position, path, None, message, "write `name: value`")
-            return "?", False
-        position = self._begin(event, path)
-        raw, key, _ = _scalar(event)
+        else:
+            self._begin(event, path)
+            raw, key, _ = _scalar(event)
         if not isinstance(key, str):
             self._problem(position, path, raw, "a key must be a name", "write `name: value`")
-            return raw, False
+            return raw or "?", False
         if raw == "<<":
             self._problem(position, path, raw, "merge keys are not read", "write the fields out")
             return raw, False

@@ -18,77 +18,35 @@ from pydantic.fields import FieldInfo
 Limits = tuple[tuple[str, float], ...]
 """Pairs such as ("gt", 0.0)."""
 
-_SCALES: dict[str, dict[str, float]] = {
-    "length": {"nm": 1e-6, "um": 1e-3, "mm": 1, "cm": 10, "m": 1e3, "inch": 25.4, "in": 25.4},
-    "area": {"mm2": 1, "cm2": 100},
-    "volume": {"mm3": 1, "ml": 1e3},
-    "angle": {"deg": 1, "rad": 57.29577951308232},
-    "pressure": {"pa": 1e-6, "kpa": 1e-3, "mpa": 1, "gpa": 1e3},
-    "force": {"n": 1, "mn": 1e-3, "kn": 1e3},
-    "torque": {"n_mm": 1},
-    "torsional stiffness": {"nm_per_rad": 1},
-    "stiffness": {"n_per_mm": 1},
-    "mass": {"g": 1e-3, "kg": 1},
-    "density": {"kg_m3": 1, "kg_per_m3": 1, "g_cm3": 1e3, "g_per_cm3": 1e3},
-    "time": {"us": 1e-3, "ms": 1, "s": 1e3},
-    "frequency": {"hz": 1, "khz": 1e3, "fps": 1},
-    "fraction": {"percent": 1, "ratio": 100},
-    "speed": {"mm_s": 1, "mm_per_s": 1},
-    "attenuation": {"per_mm": 1e3, "per_cm": 1e2, "per_m": 1},
-    "current": {"ma": 1},
-    "voltage": {"v": 1},
-    "power": {"mw": 1, "w": 1e3},
-    "luminous flux": {"lm": 1},
-    "luminous intensity": {"mcd": 1},
-    "temperature": {"c": 1},
-    "pixels": {"px": 1},
-    "charge": {"electrons": 1},
-    "charge density": {"e_um2": 1},
-    "grey value": {"dn": 1},
-}
-_LABELS = {
-    "um": "µm",
-    "inch": "inches",
-    "in": "inches",
-    "mm2": "mm²",
-    "cm2": "cm²",
-    "mm3": "mm³",
-    "deg": "degrees",
-    "rad": "radians",
-    "pa": "Pa",
-    "kpa": "kPa",
-    "mpa": "MPa",
-    "gpa": "GPa",
-    "n": "N",
-    "mn": "mN",
-    "kn": "kN",
-    "n_mm": "N·mm",
-    "nm_per_rad": "N·m/rad",
-    "n_per_mm": "N/mm",
-    "px": "pixels",
-    "kg_m3": "kg/m³",
-    "kg_per_m3": "kg/m³",
-    "g_cm3": "g/cm³",
-    "g_per_cm3": "g/cm³",
-    "us": "µs",
-    "hz": "Hz",
-    "khz": "kHz",
-    "fps": "frames/s",
-    "percent": "%",
-    "ratio": "",
-    "mm_s": "mm/s",
-    "mm_per_s": "mm/s",
-    "per_mm": "1/mm",
-    "per_cm": "1/cm",
-    "per_m": "1/m",
-    "ma": "mA",
-    "v": "V",
-    "mw": "mW",
-    "w": "W",
-    "e_um2": "electrons/µm²",
-    "dn": "grey levels",
-    "c": "°C",
-}
+_UNITS = """
+length      nm,nm,1e-6 um,µm,1e-3 mm,mm,1 cm,cm,10 m,m,1e3 inch,inches,25.4 in,inches,25.4
+area        mm2,mm²,1 cm2,cm²,100
+volume      mm3,mm³,1 ml,ml,1e3
+angle       deg,degrees,1 rad,radians,57.29577951308232
+pressure    pa,Pa,1e-6 kpa,kPa,1e-3 mpa,MPa,1 gpa,GPa,1e3
+force       n,N,1 mn,mN,1e-3 kn,kN,1e3
+torque      n_mm,N·mm,1
+torsion     nm_per_rad,N·m/rad,1
+stiffness   n_per_mm,N/mm,1
+mass        g,g,1e-3 kg,kg,1
+density     kg_m3,kg/m³,1 kg_per_m3,kg/m³,1 g_cm3,g/cm³,1e3 g_per_cm3,g/cm³,1e3
+time        us,µs,1e-3 ms,ms,1 s,s,1e3
+frequency   hz,Hz,1 khz,kHz,1e3 fps,frames/s,1
+fraction    percent,%,1 ratio,,100
+speed       mm_s,mm/s,1 mm_per_s,mm/s,1
+attenuation per_mm,1/mm,1e3 per_cm,1/cm,1e2 per_m,1/m,1
+current     ma,mA,1
+voltage     v,V,1
+power       mw,mW,1 w,W,1e3
+flux        lm,lm,1
+intensity   mcd,mcd,1
+temperature c,°C,1
+pixels      px,pixels,1
+charge      electrons,electrons,1
+full_well   e_um2,electrons/µm²,1
+grey_value  dn,grey_levels,1
+"""
+"""For each quantity its units: suffix of a field's name, label, size in a common unit."""
 
 
 @dataclass(frozen=True)
@@ -107,9 +65,9 @@ class Unit:
 
 
 UNITS = {
-    suffix: Unit(_LABELS.get(suffix, suffix), quantity, float(size))
-    for quantity, sizes in _SCALES.items()
-    for suffix, size in sizes.items()
+    suffix: Unit(label.replace("_", " "), quantity, float(size))
+    for quantity, *units in map(str.split, _UNITS.strip().splitlines())
+    for suffix, label, size in (unit.split(",") for unit in units)
 }
 _LONGEST_FIRST = sorted(UNITS, key=len, reverse=True)
 

@@ -23,7 +23,7 @@ from gelslim_core.yaml.fields import (
 )
 from gelslim_core.yaml.scalars import RefusedScalarError, resolve
 from gelslim_core.yaml.source import Position
-from gelslim_core.yaml.suggest import Suggestion, one_of, suggest_choice, suggest_key
+from gelslim_core.yaml.suggest import one_of, suggest_choice, suggest_key
 
 _KINDS = {
     float: "a number",
@@ -146,26 +146,25 @@ class Translator:
     document: Document
     model: type[BaseModel]
 
-    def problem(self, complaint: Complaint) -> tuple[Problem, Suggestion]:
+    def problem(self, complaint: Complaint) -> tuple[Problem, tuple[str, ...]]:
         """The problem, and the fields that its remedy suggests."""
         path = complaint.path
         if complaint.kind == "extra_forbidden":
             parent, key = join_path(path[:-1]), str(path[-1])
-            suggestion = suggest_key(self.model, parent, key, self.document.value(path))
-            position = self.document.marks[path].key
-            return self._at(path, "unknown field", suggestion.remedy, position), suggestion
+            remedy, fields = suggest_key(self.model, parent, key, self.document.value(path))
+            return self._at(path, "unknown field", remedy, self.document.marks[path].key), fields
         if complaint.kind == "missing":
-            return self._missing(complaint), Suggestion("")
+            return self._missing(complaint), ()
         if complaint.is_rule:
-            return self._broken_rule(complaint), Suggestion("")
+            return self._broken_rule(complaint), ()
         if complaint.kind == "union_tag_invalid":
             path, *_ = self.document.locate((*path, _tag(complaint)))
             tags = tuple(re.findall("'([^']*)'", str(complaint.detail.get("expected_tags", ""))))
             remedy = suggest_choice(self.document.value(path), tags)
-            return self._at(path, f"must be {one_of(tags)}", remedy), Suggestion("")
+            return self._at(path, f"must be {one_of(tags)}", remedy), ()
         shape, unit = self._shape(join_path(path))
         message, remedy = self._bad_value(complaint, shape, unit)
-        return self._at(path, message, remedy), Suggestion("")
+        return self._at(path, message, remedy), ()
 
     def value_remedy(self, path: str) -> str:
         """What to write instead of the value at the dotted `path`."""
@@ -235,9 +234,10 @@ class Translator:
             models = shape.models if shape else ()
             tags = tuple(c for m in models for c in get_args(m.model_fields[tag].annotation))
             return f"has no {tag}", f"add `{tag}: {one_of(tags) if tags else '...'}`"
-        if kind == "literal_error" and shape is not None and isinstance(value, str | int | float):
-            choice = "" if isinstance(value, bool) else suggest_choice(value, shape.choices)
-            if choice.startswith("did") or (choice and not {int, float} & set(shape.types)):
+        is_plain = isinstance(value, str | int | float) and not isinstance(value, bool)
+        if kind == "literal_error" and is_plain and shape is not None and shape.choices:
+            choice = suggest_choice(value, shape.choices)
+            if choice.startswith("did") or not {int, float} & set(shape.types):
                 return f"must be {_expected(shape)}", choice
         if kind in ("too_short", "too_long"):
             return _wrong_count("items", detail, detail.get("actual_length"))

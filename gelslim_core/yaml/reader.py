@@ -135,7 +135,7 @@ def _problems(
     ordered = sorted(settle_unions(open_), key=lambda c: document.marks[c.path].position)
     # Suggestions compare a key with every field, so only the listed problems are worded.
     worded = [translator.problem(complaint) for complaint in ordered[:MAX_PROBLEMS]]
-    meant = {suggestion.paths[0] for _, suggestion in worded if len(suggestion.paths) == 1}
+    meant = {fields[0] for _, fields in worded if len(fields) == 1}
     problems = [p for p, _ in worded if p.message != "missing" or p.field not in meant]
     return problems, len(ordered) - len(worded)
 

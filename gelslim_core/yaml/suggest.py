@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any
@@ -25,16 +24,10 @@ _SIMILAR_ELSEWHERE = 0.85
 _MOST_NAMED = 3
 
 
-@dataclass(frozen=True)
-class Suggestion:
-    """A remedy, and the paths of the fields that it names."""
-
-    remedy: str
-    paths: tuple[str, ...] = ()
-
-
-def suggest_key(model: type[BaseModel], parent: str, key: str, value: Any) -> Suggestion:
-    """What to write instead of the unknown `key` in the block at `parent`.
+def suggest_key(
+    model: type[BaseModel], parent: str, key: str, value: Any
+) -> tuple[str, tuple[str, ...]]:
+    """What to write instead of an unknown key in the block at `parent`, and the fields named.
 
     In this order: the same name in other spelling or with another unit, the same name in another
     block, a similar name here, a similar name elsewhere; failing all, the fields of the block.
@@ -44,7 +37,7 @@ def suggest_key(model: type[BaseModel], parent: str, key: str, value: Any) -> Su
     others = _others(model, parent, siblings)
     if any(field.path == key for field in others):
         nested = ": ".join(key.split("."))
-        return Suggestion(f"nest it, one level per line: {nested}: ...", (key,))
+        return f"nest it, one level per line: {nested}: ...", (key,)
     found = (
         [field for field in siblings if field.name == name]
         or _same_stem(name, siblings)
@@ -56,10 +49,10 @@ def suggest_key(model: type[BaseModel], parent: str, key: str, value: Any) -> Su
     if not found:
         names = ", ".join(field.name for field in siblings)
         block = f"{parent} has the fields" if parent else "the fields are"
-        return Suggestion(f"{block} {names}" if names else "delete it")
+        return (f"{block} {names}" if names else "delete it"), ()
     paths = tuple(_with_indices(field.path, parent) for field in found)
     named = [path + _in_unit(field, name, value) for path, field in zip(paths, found, strict=True)]
-    return Suggestion(f"did you mean {' or '.join(named)}?", paths)
+    return f"did you mean {' or '.join(named)}?", paths
 
 
 def suggest_choice(value: Any, choices: tuple[Any, ...]) -> str:
