@@ -1,8 +1,9 @@
 """Global stiffness matrix of a cropped uniform lattice, written directly in CSR form.
 
-Every node's rows are summed over the cells around it, K = Σ φ_e K_e with the filled fractions φ_e,
-so there is no list of triplets and no sort. The peak memory is about that of the matrix. Its rows
-are sorted, and it is exactly symmetric for any number of threads.
+Every node's rows are copied from a table of its possible cells, so there is no list of triplets
+and no sort. The peak memory is about that of the matrix. Its rows are sorted, and it is exactly
+symmetric for any number of threads. Around cells with a filled fraction φ_e below 1 the rows are
+summed, K = Σ φ_e K_e.
 """
 
 from __future__ import annotations
@@ -17,7 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ifem_export.assembly.occupancy_table import neighbour_pattern, shared_cells
+from ifem_export.assembly.occupancy_table import (
+    neighbour_pattern,
+    occupancy_table,
+    shared_cells,
+)
 from ifem_export.errors import MeshError
 from ifem_export.mesh.lattice import Numbering, number_nodes
 from ifem_export.mesh.pad_mesh import PadMesh
@@ -78,10 +83,15 @@ def assemble_csr(
             field="element_matrix",
         )
     nodes = number_nodes(occupancy) if numbering is None else numbering
-    scales = corner_fill(occupancy, occupancy.astype(float) if fill is None else fill)
+    scale_rows, scales = np.full(nodes.n_nodes, -1, dtype=np.int32), np.empty((0, 8))
+    if fill is not None:
+        around = corner_fill(occupancy, fill)[nodes.positions]
+        cut = ((around != 0.0) & (around != 1.0)).any(axis=1)
+        scale_rows[cut], scales = np.arange(cut.sum()), around[cut]
+    table = np.ascontiguousarray(occupancy_table(matrix).transpose(0, 2, 1, 3))
     by_corner = np.ascontiguousarray(matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3))
-    pattern = neighbour_pattern()
-    ends = np.cumsum(pattern.counts[nodes.masks])
+    counts, slots = neighbour_pattern()
+    ends = np.cumsum(counts[nodes.masks])
     blocks, n = int(ends[-1]), nodes.n_nodes
     index = np.int32 if 9 * blocks <= np.iinfo(np.int32).max else np.int64
     indptr = np.empty(3 * n + 1, dtype=index)
@@ -90,8 +100,8 @@ def assemble_csr(
     data = np.empty(9 * blocks)
     shared: tuple[Any, ...] = (
         nodes.masks, nodes.positions, np.concatenate([[0], ends[:-1]]), nodes.node_index,
-        pattern.counts, pattern.slots, _slot_strides(nodes),
-        (scales[nodes.positions], by_corner, *_pairs()), indptr, indices, data,
+        counts, slots, _slot_strides(nodes),
+        (scale_rows, table, scales, by_corner, *_pairs()), indptr, indices, data,
     )  # fmt: skip
     workers = _worker_count(threads, data.nbytes + indices.nbytes)
     bounds = np.linspace(0, n, workers + 1).astype(int).tolist()
@@ -108,10 +118,10 @@ def assemble_csr(
 
 def block_pattern(nodes: Numbering) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Which 3x3 blocks of the stiffness matrix exist, as CSR `indptr` and `indices` of nodes."""
-    pattern = neighbour_pattern()
-    counts = pattern.counts[nodes.masks]
+    all_counts, slots = neighbour_pattern()
+    counts = all_counts[nodes.masks]
     present = np.arange(27) < counts[:, None]
-    offsets = _slot_strides(nodes)[pattern.slots[nodes.masks]]
+    offsets = _slot_strides(nodes)[slots[nodes.masks]]
     neighbours = (nodes.positions[:, None] + offsets)[present]
     ends = np.concatenate([[0], np.cumsum(counts)])
     return ends.astype(np.int32), nodes.node_index[neighbours]

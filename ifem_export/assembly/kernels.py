@@ -6,10 +6,10 @@ from typing import Any
 
 from numba import njit
 
-# The rows of nodes [start, stop) are written. `masks`, `positions` and
-# `first_block` are per node, `node_index` is over the lattice, `counts` and `slots` are the
-# neighbour pattern, and `strides` is the lattice offset of each slot. The rows of a node do not
-# depend on those of another node, so any division among threads gives the same bits.
+# `masks`, `positions` and `first_block` are per node, `node_index` is over the lattice, `counts`
+# and `slots` are the neighbour pattern, and `strides` is the lattice offset of each slot. The rows
+# of a node do not depend on those of another node, so any division among threads gives the same
+# bits.
 
 
 @njit(cache=True, nogil=True)
@@ -30,16 +30,19 @@ def fill_csr(
 ) -> None:
     """Write the scalar CSR rows 3·start … 3·stop.
 
-    `recipe` holds the fill of each node's cells (n, 8), the element's blocks (8, 8, 3, 3), and
-    for each slot the number of shared cells (27,) and the cells themselves (27, 8, 3).
+    `recipe` holds for each node its row in `scales`, or -1 where all cells are full; the `table`
+    (256, 3, 27, 3) of the rows of full cells; the `scales` (k, 8) of the cells around the other
+    nodes; the element's blocks (8, 8, 3, 3); and for each slot the number of shared cells (27,)
+    and the cells themselves (27, 8, 3).
     """
-    scales, blocks, pair_counts, pairs = recipe
+    scale_rows, table, scales, blocks, pair_counts, pairs = recipe
     for node in range(start, stop):
         mask = masks[node]
         count = counts[mask]
         position = positions[node]
         row_start = 9 * first_block[node]
         width = 3 * count
+        scale_row = scale_rows[node]
         for row in range(3):
             indptr[3 * node + row] = row_start + row * width
         for b in range(count):
@@ -48,12 +51,13 @@ def fill_csr(
             at = row_start + 3 * b
             for row in range(3):
                 for c in range(3):
+                    indices[at + c] = column + c
+                    if scale_row < 0:
+                        data[at + c] = table[mask, row, slot, c]
+                        continue
                     total = 0.0
                     for p in range(pair_counts[slot]):
-                        bit = pairs[slot, p, 0]
-                        total += (
-                            scales[node, bit] * blocks[pairs[slot, p, 1], pairs[slot, p, 2], row, c]
-                        )
-                    indices[at + c] = column + c
+                        bit, here, there = pairs[slot, p]
+                        total += scales[scale_row, bit] * blocks[here, there, row, c]
                     data[at + c] = total
                 at += width

@@ -6,29 +6,12 @@ All cells of a uniform lattice share one element matrix, so the rows of a node d
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ifem_export.mesh.lattice import VTK_CORNERS
-
-
-@dataclass(frozen=True, eq=False)
-class NeighbourPattern:
-    """Which of a node's 27 neighbours share a cell with it, for each mask.
-
-    Neighbour slot 9(dz+1)+3(dy+1)+(dx+1) lies at offset (dx, dy, dz); slots increase with the
-    neighbour's number.
-
-    Attributes:
-        counts: (256,) number of neighbours, the node itself included.
-        slots: (256, 27) uint8, the present slots in increasing order, then the absent ones.
-    """
-
-    counts: NDArray[np.int64]
-    slots: NDArray[np.uint8]
 
 
 @lru_cache(maxsize=1)
@@ -53,15 +36,23 @@ def shared_cells() -> tuple[tuple[tuple[int, int, int], ...], ...]:
 
 
 @lru_cache(maxsize=1)
-def neighbour_pattern() -> NeighbourPattern:
-    """The neighbour pattern, the same for every element matrix."""
+def neighbour_pattern() -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Which of a node's 27 neighbours share a cell with it, for each mask.
+
+    Neighbour slot 9(dz+1)+3(dy+1)+(dx+1) lies at offset (dx, dy, dz); slots increase with the
+    neighbour's number.
+
+    Returns:
+        The number of neighbours (256,), the node itself included, and the slots (256, 27): the
+        present ones in increasing order, then the absent ones.
+    """
     masks = np.arange(256)
     present = np.zeros((256, 27), dtype=bool)
     for slot, pairs in enumerate(shared_cells()):
         for bit, _, _ in pairs:
             present[:, slot] |= (masks >> bit & 1).astype(bool)
     order = np.argsort(~present, axis=1, kind="stable").astype(np.uint8)
-    return NeighbourPattern(present.sum(axis=1), order)
+    return present.sum(axis=1), order
 
 
 def occupancy_table(element_matrix: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,7 +14,6 @@ anchor coincides with another. For rotations and reflections at most two do.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -59,7 +58,7 @@ def _chosen(rows: int, columns: int) -> tuple[tuple[int, int], ...]:
             least = max(2.0, spacing * float(np.sqrt(rows * columns / count)))
             for attempt in range(_ATTEMPTS):
                 sites = _draw(rows, columns, count, least, attempt) if count >= 4 else None
-                if sites is not None and (not strict or _robust_in_overlap(rows, columns, sites)):
+                if sites is not None and (not strict or _is_robust(rows, columns, sites)):
                     return tuple(sorted(sites))
     raise MarkerGridError(
         f"no anchor pattern found for a {rows} x {columns} marker lattice; "
@@ -89,13 +88,14 @@ def choose_anchor_sites(rows: int, columns: int) -> NDArray[np.int64]:
     return np.array(_chosen(rows, columns), dtype=np.int64)
 
 
-def _fewest_contradictions(anchors: NDArray[np.bool_]) -> Iterator[int]:
-    """For each symmetry the fewest contradictions over all wrong shifts of a full lattice.
+def _is_robust(rows: int, columns: int, sites: list[tuple[int, int]]) -> bool:
+    """Whether every wrong motion of a full lattice has enough contradictions in the overlap.
 
-    Only the overlap of the moved lattice with the original counts. Quarter turns of an oblong
-    lattice are left out, because they overlap too little.
+    Quarter turns of an oblong lattice are left out, because they overlap too little.
     """
-    lattice = np.ones_like(anchors)
+    lattice = np.ones((rows, columns), dtype=bool)
+    anchors = np.zeros_like(lattice)
+    anchors[tuple(np.array(sites).T)] = True
     for turn in range(4):
         for mirror in (False, True):
             moved = np.rot90(anchors, turn)
@@ -109,7 +109,9 @@ def _fewest_contradictions(anchors: NDArray[np.bool_]) -> Iterator[int]:
             count = on_regular + from_regular - 2 * both
             if turn == 0 and not mirror:
                 count[count.shape[0] // 2, count.shape[1] // 2] = np.iinfo(np.int64).max
-            yield int(count.min())
+            if count.min() < ROBUST_CONTRADICTIONS:
+                return False
+    return True
 
 
 def _overlaps(few: NDArray[np.bool_], many: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -199,9 +201,3 @@ def _stays_distinct(
         for shift, times in added.items()
         if symmetry != 0 or shift != (0, 0)
     )
-
-
-def _robust_in_overlap(rows: int, columns: int, sites: list[tuple[int, int]]) -> bool:
-    anchors = np.zeros((rows, columns), dtype=bool)
-    anchors[tuple(np.array(sites).T)] = True
-    return all(count >= ROBUST_CONTRADICTIONS for count in _fewest_contradictions(anchors))

@@ -11,9 +11,9 @@ keep the resultant. Condensing all other nodes gives the surface stiffness, as f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,9 @@ from ifem_export.assembly.assembly import mesh_stiffness
 from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.layered_operator import (
+    Blocks,
     EmbeddedPreconditioner,
+    LayeredOperator,
     inverse,
     layered_operator,
     padding_columns,
@@ -146,20 +148,9 @@ class CrownedSystem(PadSystem):
             transformation=transformation,
         )
 
-    @property
-    def infinite_stiffness(self) -> NoReturn:
-        """Not available, because the infinite pad has one thickness. Raises MeshError."""
-        raise _uneven()
-
-    @property
-    def infinite_compliance(self) -> NoReturn:
-        """Not available, because the infinite pad has one thickness. Raises MeshError."""
-        raise _uneven()
-
-
-def _uneven() -> MeshError:
-    return MeshError(
-        "the pad is crowned: `paper`, `truncated` and `fft` need one thickness; use pcg, factor or "
-        "dense32",
-        field="mesh",
-    )
+    def _operator(self, transform: Callable[[Blocks], Blocks]) -> LayeredOperator:
+        raise MeshError(
+            "the pad is crowned, but the infinite pad has one thickness: use the rungs pcg, factor "
+            "or dense32",
+            field="mesh",
+        )

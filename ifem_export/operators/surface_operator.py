@@ -38,12 +38,7 @@ DEFAULT_RADIUS = 6
 
 
 class SurfaceOperator(Protocol):
-    """Stiffness and compliance of the outer surface.
-
-    Attributes:
-        name: Name of the rung.
-        n_bytes: Bytes of memory that a call of `force` reads.
-    """
+    """Stiffness and compliance of the outer surface."""
 
     @property
     def name(self) -> str:

@@ -72,7 +72,7 @@ def test_lumping_mends_the_rim_and_leaves_the_middle_alone() -> None:
 
 
 def test_a_bundle_chooses_the_lumped_rung_and_applies_it() -> None:
-    mesh = pad(RoundedRectangle(24.0, 24.0, 1.0))
+    mesh = pad(RoundedRectangle(18.0, 15.0, 1.0))
     ladder = measure_ladder(mesh, gel(0.3223), "bbar")
     rung = next(r for r in ladder.rungs if r.label == "fft (lumped 1)")
     plain = next(r for r in ladder.rungs if r.label == "fft")

@@ -24,7 +24,7 @@ from ifem_export.operators.surface_operator import RUNGS, one_layer, surface_ope
 
 OUTLINES: dict[str, Outline] = {
     "rectangle": RoundedRectangle(9.0, 7.0, 1.5),
-    "disc": disc(9.0),
+    "disc": disc(5.0),
     "polygon": Polygon([(-5, -4), (5, -4), (5, 1), (1, 1), (1, 4), (-5, 4)]),
     "long": RoundedRectangle(14.0, 3.4, 0.6),
 }
