@@ -15,7 +15,7 @@ def finger_view(
     height_mm: float = 22.0,
     focal_px: float = 640.0,
     aside_mm: float = -0.6,
-    lens_offset_px: tuple[float, float] = (6.0, 4.0),
+    lens_offset_px: tuple[float, float] = (3.0, 2.0),
 ):
     """VGA camera tilted by `tilt_deg` from the gel's normal, looking near the gel's middle.
 
