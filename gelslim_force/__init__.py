@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gelslim_force.forces.estimator import ForceSettings
     from gelslim_force.forces.frame_result import ForceField, FrameResult
     from gelslim_force.forces.wrench import Wrench
+    from gelslim_force.frames.frame import Frame
     from gelslim_force.frames.source import open_frames
     from gelslim_force.outputs.overlay import Overlay
     from gelslim_force.outputs.recorded_run import read_run
@@ -39,6 +40,7 @@ __all__ = [
     "ForceField",
     "ForcePipeline",
     "ForceSettings",
+    "Frame",
     "FrameResult",
     "NormalReading",
     "NormalSource",
@@ -69,6 +71,7 @@ __getattr__, __dir__ = lazy_exports(
         "ForceField": "gelslim_force.forces.frame_result",
         "ForcePipeline": "gelslim_force.pipeline",
         "ForceSettings": "gelslim_force.forces.estimator",
+        "Frame": "gelslim_force.frames.frame",
         "FrameResult": "gelslim_force.forces.frame_result",
         "NormalReading": "gelslim_force.contact.normal_source",
         "NormalSource": "gelslim_force.contact.normal_source",
