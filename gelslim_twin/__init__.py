@@ -1,1 +1,84 @@
-"""The digital twin: a scene planned, then simulated with only the effects it calls for."""
+"""The digital twin: simulated contacts of a sensor, with known forces and rendered frames.
+
+A scene says what touches the sensor, how it moves and what is to be known. `plan_scene` chooses
+the physical effects that matter for it, `simulate` solves the contact and renders the frames, and
+`validate` measures the force pipeline on such frames. The names load when they are first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gelslim_core.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from gelslim_twin.contact.contact_error import ContactError
+    from gelslim_twin.contact.gel_state import GelState
+    from gelslim_twin.effects.circumstances import SensorFigures
+    from gelslim_twin.effects.effect import Effect
+    from gelslim_twin.effects.registry import EFFECTS
+    from gelslim_twin.planning.plan import Plan
+    from gelslim_twin.planning.planner import PlanError
+    from gelslim_twin.planning.question import plan_scene
+    from gelslim_twin.planning.sensor_figures import bundle_figures
+    from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
+    from gelslim_twin.scene.reader import LoadedScene, read_scene
+    from gelslim_twin.simulation.run_folder import SimulationError
+    from gelslim_twin.simulation.scene_task import job_of
+    from gelslim_twin.simulation.sensor import TwinSensor, store_sensor, stored_sensor
+    from gelslim_twin.simulation.simulate import SimulationJob, simulate
+    from gelslim_twin.validation.validate import validate
+    from gelslim_twin.validation.validation import Validation
+
+__all__ = [
+    "EFFECTS",
+    "ContactError",
+    "Effect",
+    "FrameRenderer",
+    "GelState",
+    "LoadedScene",
+    "Plan",
+    "PlanError",
+    "RenderedFrame",
+    "SensorFigures",
+    "SimulationError",
+    "SimulationJob",
+    "TwinSensor",
+    "Validation",
+    "bundle_figures",
+    "job_of",
+    "plan_scene",
+    "read_scene",
+    "simulate",
+    "store_sensor",
+    "stored_sensor",
+    "validate",
+]
+
+__getattr__, __dir__ = lazy_exports(
+    __name__,
+    {
+        "EFFECTS": "gelslim_twin.effects.registry",
+        "ContactError": "gelslim_twin.contact.contact_error",
+        "Effect": "gelslim_twin.effects.effect",
+        "FrameRenderer": "gelslim_twin.render.frame_renderer",
+        "GelState": "gelslim_twin.contact.gel_state",
+        "LoadedScene": "gelslim_twin.scene.reader",
+        "Plan": "gelslim_twin.planning.plan",
+        "PlanError": "gelslim_twin.planning.planner",
+        "RenderedFrame": "gelslim_twin.render.frame_renderer",
+        "SensorFigures": "gelslim_twin.effects.circumstances",
+        "SimulationError": "gelslim_twin.simulation.run_folder",
+        "SimulationJob": "gelslim_twin.simulation.simulate",
+        "TwinSensor": "gelslim_twin.simulation.sensor",
+        "Validation": "gelslim_twin.validation.validation",
+        "bundle_figures": "gelslim_twin.planning.sensor_figures",
+        "job_of": "gelslim_twin.simulation.scene_task",
+        "plan_scene": "gelslim_twin.planning.question",
+        "read_scene": "gelslim_twin.scene.reader",
+        "simulate": "gelslim_twin.simulation.simulate",
+        "store_sensor": "gelslim_twin.simulation.sensor",
+        "stored_sensor": "gelslim_twin.simulation.sensor",
+        "validate": "gelslim_twin.validation.validate",
+    },
+)

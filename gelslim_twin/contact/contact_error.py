@@ -1,4 +1,4 @@
-"""Refusal of a contact that was not found."""
+"""Error of a contact that did not converge."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from ifem_export.errors import IfemError
 
 
 class ContactError(IfemError):
-    """No contact within the tolerance; the message says how far it got and what to try.
+    """A contact did not converge to the tolerance, or its input is invalid.
 
     Attributes:
-        residual: the best reached, relative to the forces; NaN where it does not apply.
+        residual: Smallest residual reached, relative to the forces; NaN where there is none.
     """
 
     def __init__(self, message: str, residual: float = float("nan")) -> None:
@@ -17,5 +17,5 @@ class ContactError(IfemError):
         self.residual = residual
 
     def __reduce__(self) -> tuple[type[ContactError], tuple[str, float]]:
-        """Pickle by its parts, so that it crosses process boundaries."""
+        """Parts for pickling, so that worker processes can raise it."""
         return (type(self), (str(self), self.residual))

@@ -1,4 +1,4 @@
-"""The gel at one pose: where its surface is and which forces act on it."""
+"""State of the gel at one pose: displacement, nodal forces and contact status."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Touch(IntEnum):
-    """What a surface node does."""
+class ContactStatus(IntEnum):
+    """Contact status of a surface node: no contact, sticking or slipping."""
 
     FREE = 0
     STICK = 1
@@ -22,25 +22,28 @@ class Touch(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class GelState:
-    """Fields over the c nodes of `PadMesh.surface`."""
+    """Fields over the c surface nodes of the pad.
+
+    Attributes:
+        displacement_mm: Displacement (c, 3) in mm.
+        force_n: Nodal forces (c, 3) in N on the gel.
+        touch: Contact status (c,), values of `ContactStatus`.
+        solver: Report of the solver: residual, penetration_mm, complementarity, iterations.
+    """
 
     displacement_mm: Array
-    """(c, 3)."""
     force_n: Array
-    """(c, 3) on the gel."""
     touch: NDArray[np.int8]
-    """(c,) values of `Touch`."""
     solver: Mapping[str, float] = field(default_factory=dict)
-    """What the solver reports: residual, penetration_mm, complementarity, iterations."""
 
     @classmethod
     def at_rest(cls, nodes: int) -> GelState:
-        """Nothing touches."""
+        """The undeformed gel without contact."""
         nothing = np.zeros((nodes, 3))
         return cls(nothing, nothing, np.zeros(nodes, dtype=np.int8))
 
     def blended(self, later: GelState, part: float) -> GelState:
-        """State `part` (0 ... 1) of the way to a later one: both fields on straight lines."""
+        """Linear interpolation to a later state, at `part` (0 ... 1) of the way."""
         if part == 0.0:
             return self
         u = (1 - part) * self.displacement_mm + part * later.displacement_mm

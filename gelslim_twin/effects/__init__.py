@@ -1,1 +1,1 @@
-"""Effects: one declaration each of what it needs, gives, costs and what leaving it out costs."""
+"""The physical effects of the twin, one declaration each: needs, error bound, rungs and times."""

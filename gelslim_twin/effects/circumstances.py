@@ -1,4 +1,4 @@
-"""What bounds and costs of effects are computed from: figures of sensor, motion and touch."""
+"""Figures of sensor, motion and contact from which bounds and times of effects are computed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from typing import Literal, TypeVar
 from pydantic import Field
 
 from gelslim_core.yaml.base import Block
-from gelslim_twin.effects.touch import RIDGES, Footprint, Touch, touch
+from gelslim_twin.effects.contact_estimate import (
+    RIDGES,
+    ContactEstimate,
+    Footprint,
+    contact_estimate,
+)
 
 Use = Literal["auto", "on", "off"]
 
@@ -29,7 +34,32 @@ P = TypeVar("P", bound=EffectParameters)
 
 @dataclass(frozen=True)
 class SensorFigures:
-    """The few numbers of a sensor that planning needs; lengths mm, moduli MPa."""
+    """Figures of a sensor for the planner.
+
+    Attributes:
+        length_mm: Length of the pad.
+        width_mm: Width of the pad.
+        thickness_mm: Thickness of the pad.
+        youngs_modulus_mpa: Young's modulus of the gel.
+        poissons_ratio: Poisson's ratio of the gel.
+        surface_nodes: Nodes of the outer surface.
+        layers: Layers of cells.
+        markers: Number of printed dots.
+        marker_pitch_mm: Distance of neighbouring dots.
+        marker_diameter_mm: Diameter of a dot.
+        focal_px: Focal length.
+        image_width_px: Width of a frame.
+        image_height_px: Height of a frame.
+        near_mm: Apparent distance along the axis from the lens to the nearest point of the gel.
+        far_mm: The same for the farthest point.
+        half_view_px: Largest distance of the gel's image from the principal point.
+        tilt_deg: Angle between the camera's axis and the gel's normal.
+        oblique_deg: Largest angle in air between a ray to the gel and the gel's normal.
+        layers_mm: Thickness in mm and refractive index of each flat layer above the air.
+        aperture_mm: Diameter of the entrance pupil, 0 for a pinhole.
+        focus_mm: Distance of best focus, 0 for a pinhole.
+        lens_distortion: Names and values of the distortion coefficients.
+    """
 
     length_mm: float
     width_mm: float
@@ -45,20 +75,13 @@ class SensorFigures:
     image_width_px: int
     image_height_px: int
     near_mm: float
-    """Apparent distance from the lens to the nearest point of the gel, along the axis."""
     far_mm: float
     half_view_px: float
-    """Largest distance of the gel's image from the principal point."""
     tilt_deg: float
-    """Of the camera's axis from the gel's normal."""
     oblique_deg: float
-    """Largest angle in air of a ray to the gel, from the gel's normal."""
     layers_mm: tuple[tuple[float, float], ...]
-    """Thickness and refractive index of each flat layer above the air."""
     aperture_mm: float = 0.0
-    """Diameter of the lens opening, 0 for a pinhole."""
     focus_mm: float = 0.0
-    """Distance of best focus, 0 for a pinhole."""
     lens_distortion: tuple[tuple[str, float], ...] = ()
 
     @property
@@ -77,18 +100,18 @@ class SensorFigures:
         return self.image_width_px * self.image_height_px
 
     def lift_mm(self, angle_deg: float) -> float:
-        """How much nearer the layers make the gel look, along its normal.
+        """Apparent shift of the gel towards the camera by refraction, along its normal.
 
-        For a ray that meets it at that angle in air: h (1 - tan of the ray within over tan
-        without) = h (1 - cos / sqrt(n² - sin²)), summed over the layers; exact.
+        For a ray at this angle in air it is h (1 - cos / sqrt(n² - sin²)), summed over the layers,
+        which is exact.
         """
         sine, cosine = math.sin(math.radians(angle_deg)), math.cos(math.radians(angle_deg))
         return sum(h * (1 - cosine / math.sqrt(n * n - sine * sine)) for h, n in self.layers_mm)
 
     def lifted_px(self, lift_mm: float) -> float:
-        """How far a point moves in the image that looks `lift_mm` higher along the gel's normal.
+        """Shift in the image of a point that appears shifted by `lift_mm` along the gel's normal.
 
-        At most f/Z lift (sin of the camera's tilt + r/f): across its axis and along it.
+        It is at most f/Z lift (sin of the camera's tilt + r/f), across the axis and along it.
         """
         slope = self.half_view_px / self.focal_px
         nearest = self.near_mm - self.lift_mm(self.oblique_deg) + self.lift_mm(0.0)
@@ -98,7 +121,7 @@ class SensorFigures:
 
 @dataclass(frozen=True)
 class MotionFigures:
-    """Extremes of a motion while the tool is below the undeformed surface."""
+    """Extreme values of a motion while the tool is below the undeformed surface."""
 
     poses: int = 1
     depth_mm: float = 0.0
@@ -115,7 +138,7 @@ class MotionFigures:
 
 @dataclass(frozen=True)
 class Circumstances:
-    """Sensor, motion, footprint, friction and the parameters of every effect."""
+    """Everything that bounds depend on: sensor, motion, footprint, friction and parameters."""
 
     sensor: SensorFigures
     motion: MotionFigures
@@ -131,10 +154,10 @@ class Circumstances:
         return found
 
     @cached_property
-    def touch(self) -> Touch:
-        """Size and force of the deepest contact."""
+    def contact(self) -> ContactEstimate:
+        """Estimate of size and force of the deepest contact."""
         s = self.sensor
-        return touch(
+        return contact_estimate(
             self.footprint,
             self.motion.depth_mm,
             s.thickness_mm,
@@ -145,12 +168,12 @@ class Circumstances:
     @property
     def contact_nodes(self) -> float:
         """Nodes under the tool at the deepest contact."""
-        return self.touch.area_mm2 / self.sensor.node_pitch_mm**2
+        return self.contact.area_mm2 / self.sensor.node_pitch_mm**2
 
     @property
     def force_n(self) -> float:
-        """Of the deepest contact, normal and tangential together, with friction; linear gel."""
-        t, mu = self.touch, self.friction
+        """Upper estimate of the resultant of the deepest contact, with friction, linear gel."""
+        t, mu = self.contact, self.friction
         normal = t.normal_n + min(mu, 1.0) * (t.stick_n - t.normal_n)
         return RIDGES * math.hypot(1.0, mu) * normal
 

@@ -1,4 +1,4 @@
-"""An effect as the planner sees it: a declaration, light enough to import always."""
+"""The declaration of an effect, which is all that the planner needs of it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 OBSERVABLES = ("displacement", "force", "markers", "image")
 """Data that a scene may observe."""
 GIVEN = frozenset({"poses"})
-"""Data that need no effect: they come with scene and sensor."""
+"""Data that come with scene and sensor, so that no effect has to provide them."""
 _FIELDS = {o: f"{o}_n" if o == "force" else f"{o}_px" for o in OBSERVABLES}
 
 
@@ -19,10 +19,10 @@ _FIELDS = {o: f"{o}_n" if o == "force" else f"{o}_px" for o in OBSERVABLES}
 class Bound:
     """Largest error in each observable.
 
-    Forces in N: the resultant of the error, or for shear its sum over the nodes. The others in
-    pixels: displacements as seen by the camera where its scale is largest, markers as the shift
-    of their true centres, and the image as the shift of a dot's edge that would change the grey
-    values as much, that is grey levels divided by the grey slope of an edge.
+    The error of forces is in N: the resultant of the error, or for shear its sum over the nodes.
+    The others are in pixels. Displacements count as the camera sees them where its scale is
+    largest, markers as the shift of their true centres. An error of grey values counts as the
+    shift of a dot's edge that changes them as much: grey values over the slope of the edge.
     """
 
     force_n: float = 0.0
@@ -44,7 +44,7 @@ class Bound:
         )
 
     def to_record(self) -> dict[str, float]:
-        """By observable with its unit."""
+        """Errors by observable and unit."""
         return {f"{o}_{unit_of(o)}": self.of(o) for o in OBSERVABLES}
 
 
@@ -54,7 +54,7 @@ def unit_of(observable: str) -> str:
 
 
 def geometry(px: float, force_n: float = 0.0) -> Bound:
-    """An error that moves the gel by `px` as seen by the camera: everything after it moves too."""
+    """An error that displaces the gel by `px` as the camera sees it, and so markers and image."""
     return Bound(force_n, px, px, px)
 
 
@@ -64,13 +64,13 @@ def optics(px: float) -> Bound:
 
 
 def picture(px: float) -> Bound:
-    """An error in grey values, as the edge shift that does the same."""
+    """An error in grey values, as the equivalent shift of an edge."""
     return Bound(image_px=px)
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One way to simulate an effect: its name, knobs, error against the effect itself, and cost."""
+    """One way to simulate an effect: parameters, error relative to the exact effect, and time."""
 
     name: str
     error: Bound
@@ -81,13 +81,21 @@ class Rung:
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect.
+    """Declaration of one physical effect.
 
-    `provides` names data it makes from `needs`; `refines` names data that others provide and that
-    it changes. `after` names refinements of the same data that come before it. `bound` is the
-    largest error of leaving it out, `formula` the same in words; `is_null` tells that its
-    parameters make it do nothing. `implementation` is the module with its `apply`, imported only
-    when a plan keeps the effect.
+    Attributes:
+        name: Name in the scene file.
+        title: Name in reports.
+        parameters: Model of its block in the scene file.
+        bound: Largest error of leaving it out.
+        formula: The bound in words.
+        ladder: Rungs with their errors and times.
+        is_null: Whether its parameters make it do nothing.
+        implementation: Module that computes it, imported only when a plan includes the effect.
+        needs: Data that it takes.
+        provides: Data that it computes from these.
+        refines: Data of other effects that it changes.
+        after: Effects that refine the same data before it.
     """
 
     name: str

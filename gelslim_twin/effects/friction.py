@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
+from gelslim_twin.effects.contact_estimate import RIDGES
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
 from gelslim_twin.effects.normal_contact import RUNGS
-from gelslim_twin.effects.touch import RIDGES
 
 
 class FrictionParameters(EffectParameters):
@@ -15,22 +15,23 @@ class FrictionParameters(EffectParameters):
 
 
 LOCAL = 4.0
-"""Most that a node moves over the mean of a pad stuck to the tool: 3.6 for a sliding cone."""
+"""Largest displacement of a node over the mean under a sticking tool: 3.6 for a sliding cone."""
 
 
 def dragged_mm(c: Circumstances) -> float:
-    """How far the surface is dragged at most: the tool's way, its turn, and the depth.
+    """Largest displacement that the tool can impose: its path, its rotation, and the depth.
 
-    A frictionless press moves the surface aside, which friction hinders.
+    The depth counts because a frictionless press displaces the surface sideways, which friction
+    prevents.
     """
-    turn = math.radians(c.motion.twist_deg) * c.footprint.reach_mm(c.touch.depth_mm)
-    tilt = math.radians(c.motion.tilt_deg) * c.touch.depth_mm
-    return c.motion.lateral_mm + turn + tilt + math.hypot(c.touch.depth_mm, c.touch.sideways_mm)
+    turn = math.radians(c.motion.twist_deg) * c.footprint.reach_mm(c.contact.depth_mm)
+    tilt = math.radians(c.motion.tilt_deg) * c.contact.depth_mm
+    return c.motion.lateral_mm + turn + tilt + math.hypot(c.contact.depth_mm, c.contact.sideways_mm)
 
 
 def moved_mm(c: Circumstances) -> float:
-    """How far the surface moves sideways by friction: with the tool, or as its force can."""
-    t = c.touch
+    """Sideways displacement by friction, limited by the tool's path and by the tangential force."""
+    t = c.contact
     if c.friction == 0 or t.normal_n == 0:
         return 0.0
     tangential = min(c.friction * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
@@ -38,11 +39,11 @@ def moved_mm(c: Circumstances) -> float:
 
 
 def bound(c: Circumstances) -> Bound:
-    """Tangential force: the friction limit, or full stick if that is less; stiffer layer too.
+    """Tangential force at the friction limit or at full stick, and the stiffer layer.
 
-    On a gel at large strain all forces are larger.
+    The smaller of the two limits counts. On a gel at large strain all forces are larger.
     """
-    t, mu = c.touch, c.friction
+    t, mu = c.contact, c.friction
     if mu == 0 or t.normal_n == 0:
         return Bound()
     tangential = min(mu * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
@@ -52,9 +53,9 @@ def bound(c: Circumstances) -> Bound:
 
 
 def ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """Coulomb's cone in the contact's solver: its tolerance is the contact's, which errs for both.
+    """One rung: the error is that of the contact's own tolerance, which covers friction too.
 
-    The solver takes the tighter of the two tolerances, so the loosest of all asks for nothing.
+    The solver takes the smaller of the two tolerances, so this one is the largest of all.
     """
     nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
     return (Rung("as contact", Bound(), 0.4 * nodes, {"tolerance": RUNGS[0][1]}),)

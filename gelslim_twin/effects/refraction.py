@@ -23,7 +23,7 @@ def paraxial_px(c: Circumstances) -> float:
     """
     s = c.sensor
     missed = s.lift_mm(s.oblique_deg) - s.lift_mm(0.0)
-    pressed = c.touch.depth_mm / s.thickness_mm * s.lift_mm(s.oblique_deg)
+    pressed = c.contact.depth_mm / s.thickness_mm * s.lift_mm(s.oblique_deg)
     return s.lifted_px(min(missed + pressed, s.lift_mm(s.oblique_deg)))
 
 

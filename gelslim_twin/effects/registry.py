@@ -1,4 +1,4 @@
-"""All effects, in the order in which light and force meet them."""
+"""All effects, in the order of the physics: contact first, compression of the picture last."""
 
 from __future__ import annotations
 

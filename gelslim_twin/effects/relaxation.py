@@ -47,7 +47,7 @@ def bound(c: Circumstances) -> Bound:
     """
     terms = c.given("relaxation", RelaxationParameters).terms
     lost = sum(t.fraction * -math.expm1(-c.motion.contact_s / t.time_s) for t in terms)
-    return Bound(force_n=lost * c.force_n * (1 + c.touch.nonlinear_excess))
+    return Bound(force_n=lost * c.force_n * (1 + c.contact.nonlinear_excess))
 
 
 EFFECT = Effect(

@@ -30,7 +30,7 @@ def grey_share(c: Circumstances) -> float:
     The gel is as steep as the tool, but not steeper than the mesh can be: the depth from one node
     to the next.
     """
-    p, t = c.given("shading", ShadingParameters), c.touch
+    p, t = c.given("shading", ShadingParameters), c.contact
     if t.depth_mm == 0:
         return 0.0
     slope = min(t.depth_mm / c.sensor.node_pitch_mm, c.footprint.steepest(t.depth_mm))

@@ -1,4 +1,4 @@
-"""A plan: what a scene's simulation consists of and why."""
+"""A plan: which effects the simulation of a scene includes, how finely, and why."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FORMAT = "gelslim-plan/1"
 
 @dataclass(frozen=True)
 class Choice:
-    """One effect, in or out, and why."""
+    """Whether one effect is simulated, how finely, and why."""
 
     effect: str
     title: str
@@ -23,9 +23,10 @@ class Choice:
     bound: Bound
     """Largest error of leaving it out."""
     shares: tuple[tuple[str, float], ...]
-    """Per observable, what it may cost of the tolerance; empty where nothing depends on it."""
+    """Per observable, the share of the tolerance that the effect may use up. It is empty where
+    nothing observed depends on the effect."""
     error: Bound
-    """What it does cost: the bound where left out, the error of its rung where simulated."""
+    """Its bound where it is left out, the error of its rung where it is simulated."""
     formula: str = ""
     rung: str = ""
     rung_parameters: tuple[tuple[str, Any], ...] = ()
@@ -36,11 +37,11 @@ class Choice:
 
     @property
     def over_share(self) -> tuple[str, ...]:
-        """Observables that it spoils by more than its share."""
+        """Observables whose error by this effect exceeds its share."""
         return tuple(o for o, share in self.shares if self.error.of(o) > share)
 
-    def telling(self, bound: Bound) -> tuple[float, str]:
-        """The value of `bound` that is largest against its share, with its unit, N or px."""
+    def most_relevant(self, bound: Bound) -> tuple[float, str]:
+        """The value of `bound` that is largest relative to its share, with its unit, N or px."""
 
         def against(pair: tuple[str, float]) -> float:
             observable, share = pair
@@ -54,7 +55,7 @@ class Choice:
         return bound.of(observable), "N" if unit_of(observable) == "n" else "px"
 
     def to_record(self) -> dict[str, Any]:
-        """Plain values."""
+        """The values as they are written to JSON."""
         return {
             "effect": self.effect,
             "included": self.included,
@@ -72,7 +73,17 @@ class Choice:
 
 @dataclass(frozen=True)
 class Plan:
-    """The choices for every effect and the order of those that are in."""
+    """The choice for every effect, and the order in which those included are applied.
+
+    Attributes:
+        scene: Name of the scene.
+        observe: Observables that the scene asks for.
+        force_n: Tolerance of forces in N.
+        image_px: Tolerance of displacements, markers and pictures in px.
+        choices: One entry per effect.
+        order: Names of the included effects, in the order of application.
+        poses: Number of poses.
+    """
 
     scene: str
     observe: tuple[str, ...]
@@ -101,7 +112,7 @@ class Plan:
         return sum(choice.predicted_ms for choice in self.included)
 
     def error(self, observable: str) -> float:
-        """Sum of what all effects cost, in N or px: no more than the tolerance is exceeded by."""
+        """Sum of the errors of all effects in one observable, in N or px."""
         return sum(c.error.of(observable) for c in self.choices if dict(c.shares))
 
     @property
@@ -114,7 +125,7 @@ class Plan:
         )
 
     def to_record(self) -> dict[str, Any]:
-        """Plain values."""
+        """The values as they are written to JSON."""
         return {
             "format": FORMAT,
             "scene": self.scene,
@@ -129,7 +140,7 @@ class Plan:
         }
 
     def to_json(self) -> str:
-        """The same as JSON text; equal plans give equal bytes."""
+        """The record as JSON text; equal plans give equal bytes."""
         return self._json
 
     @cached_property
@@ -137,10 +148,10 @@ class Plan:
         return json.dumps(self.to_record(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
     def __str__(self) -> str:
-        """A table for people."""
+        """A table as text."""
         rows = [("effect", "", "bound", "rung", "ms", "why")]
         for c in self.choices:
-            value, unit = c.telling(c.bound)
+            value, unit = c.most_relevant(c.bound)
             time = f"{c.predicted_ms:.3g}" if c.included else ""
             state = "in" if c.included else "out"
             size = f"{value:.3g} {unit}" if value else "0"

@@ -1,4 +1,4 @@
-"""Which effects a scene calls for: back from what is observed, by what leaving one out costs."""
+"""The planner: which effects a scene needs, found by going back from what it observes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,13 @@ from gelslim_twin.planning.plan import Choice, Plan
 
 
 class PlanError(GelslimError, ValueError):
-    """A scene that cannot be planned; `effect` is the one whose override is to blame."""
+    """A scene cannot be planned.
+
+    Attributes:
+        effect: The effect that must not be switched off; empty where there is none.
+        message: What is wrong.
+        remedy: What to change.
+    """
 
     def __init__(self, effect: str, message: str, remedy: str) -> None:
         super().__init__(f"{message}; {remedy}")
@@ -27,7 +33,7 @@ class PlanError(GelslimError, ValueError):
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of a plan: observables, tolerances in N and px, and the circumstances."""
+    """Input of the planner: observables, tolerances in N and px, and the circumstances."""
 
     name: str
     observe: tuple[str, ...]
@@ -37,15 +43,15 @@ class Question:
     _kept: dict[int, tuple[Effect, Bound, tuple[Rung, ...]]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
-    """Bounds and ladders are asked for at every turn of the planning."""
+    """Bounds and ladders by effect, since the planner needs them in every iteration."""
 
     def weighed(self, effect: Effect) -> tuple[Effect, Bound, tuple[Rung, ...]]:
-        """An effect with its bound, nil where its parameters do nothing, and its ladder."""
+        """An effect, its bound (zero where its parameters do nothing) and its ladder."""
         found = self._kept.get(id(effect))
         if found is None:
             c = self.circumstances
             bound = Bound() if effect.is_null(c) else effect.bound(c)
-            # The effect is kept too: its id is not given to another one.
+            # The effect is stored too, so that its id is not given to another object.
             found = self._kept[id(effect)] = effect, bound, tuple(effect.ladder(c))
         return found
 
@@ -59,15 +65,15 @@ class Question:
 
 
 def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
-    """The plan: each effect in or out, why, and the cheapest rung that is good enough.
+    """Decide for each effect whether it is simulated, and choose its cheapest sufficient rung.
 
-    Per observable the tolerance is shared evenly among the effects that could use it up. One left
-    out costs its bound, one simulated the error of its rung, neither more than a share: the sum
-    keeps the tolerance, but for effects that the scene switches off or whose best rung errs more,
-    which `Plan.over_tolerance` lists.
+    For each observable the tolerance is shared evenly among the effects that can use it up. An
+    effect left out contributes its bound, a simulated one the error of its rung, and neither may
+    exceed a share, so that the sum keeps the tolerance. Exceptions are effects that the scene
+    switches off and effects whose best rung errs more; `Plan.over_tolerance` lists them.
 
     Raises:
-        PlanError: a provider of something needed is switched off and nothing else provides it.
+        PlanError: The only provider of something needed is switched off.
     """
     decided: dict[str, Choice] = {}
     needed = frozenset(question.observe)
@@ -98,7 +104,7 @@ def _closure(
     needed: frozenset[str],
     decided: dict[str, Choice],
 ) -> frozenset[str]:
-    """`needed` and all that its providers need in turn."""
+    """`needed` and everything that its providers need, directly or indirectly."""
     todo, found = sorted(needed), set(needed)
     while todo:
         datum = todo.pop()
@@ -125,7 +131,7 @@ def _provider(question: Question, effects: Sequence[Effect], datum: str) -> Effe
 
 
 def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
-    """Per observable, the tolerance over the number of effects that could use up some of it."""
+    """Per observable, the tolerance over the number of effects that can use up some of it."""
     return {
         observable: question.tolerance(observable)
         / max(1, sum(_may_cost(question, e, observable) for e in relevant))
@@ -134,9 +140,9 @@ def _shares(question: Question, relevant: Sequence[Effect]) -> dict[str, float]:
 
 
 def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
-    """Whether an effect may be left out at a price, or be simulated with an error.
+    """Whether an effect may cause an error, by being left out or by an inexact rung.
 
-    One that must be in and has none but exact rungs costs nothing.
+    An effect that must be simulated and has exact rungs only causes none.
     """
     _, bound, ladder = question.weighed(effect)
     lost = bound.of(observable)
@@ -204,9 +210,9 @@ def _in(
 
 
 def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
-    """The cheapest within the shares, else the one that exceeds them least.
+    """The cheapest rung within the shares, or else the one that exceeds them least.
 
-    Its error is put to the budget as the largest part of a share that it uses up.
+    The error given to the budget is the largest part of a share that a rung uses up.
     """
     errors = [
         max((_excess(r.error.of(o), s) for o, s in shares.items()), default=0.0) for r in ladder
@@ -226,9 +232,10 @@ def _as_pairs(shares: dict[str, float]) -> tuple[tuple[str, float], ...]:
 
 
 def _ordered(effects: Sequence[Effect]) -> list[Effect]:
-    """Providers before refinements before users, and `after` kept; else as registered.
+    """Topological order: providers, their refinements, their users; `after` is respected.
 
-    Raises ValueError where the declarations go in a circle.
+    Effects that do not depend on each other keep the order of the registry. Raises ValueError
+    where the declarations form a cycle.
     """
     before = {e.name: {o.name for o in effects if o is not e and _precedes(o, e)} for e in effects}
     left, order = list(effects), list[Effect]()
@@ -236,7 +243,7 @@ def _ordered(effects: Sequence[Effect]) -> list[Effect]:
     while left:
         ready = next((e for e in left if before[e.name] <= done), None)
         if ready is None:
-            raise ValueError(f"effects in a circle: {', '.join(e.name for e in left)}")
+            raise ValueError(f"the effects form a cycle: {', '.join(e.name for e in left)}")
         left.remove(ready)
         order.append(ready)
         done.add(ready.name)

@@ -1,4 +1,4 @@
-"""A scene as a question to the planner: its figures, and what is asked."""
+"""The planner's input from a scene: figures of motion and tool, observables and tolerances."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from gelslim_twin.effects.circumstances import Circumstances, MotionFigures, SensorFigures
-from gelslim_twin.effects.touch import Footprint
+from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import PlanError, Question, make_plan
 from gelslim_twin.scene.footprint import tool_footprint
@@ -18,9 +18,18 @@ JUST_TOUCHING_MM = 1e-9
 
 
 def plan_scene(loaded: LoadedScene, sensor: SensorFigures) -> Plan:
-    """The plan of a scene.
+    """Choose the effects that a scene needs.
 
-    Raises `InputError` on the line of an override that leaves something observed unprovided.
+    Args:
+        loaded: The scene.
+        sensor: Figures of its sensor, for example from `bundle_figures`.
+
+    Returns:
+        Every effect with its bound, whether it is simulated, and how finely.
+
+    Raises:
+        InputError: An effect is switched off without which something observed cannot be computed;
+            it names the line.
     """
     try:
         return make_plan(question(loaded, sensor))
@@ -31,7 +40,7 @@ def plan_scene(loaded: LoadedScene, sensor: SensorFigures) -> Plan:
 
 
 def question(loaded: LoadedScene, sensor: SensorFigures) -> Question:
-    """What the scene asks of a plan."""
+    """Observables, tolerances and circumstances of a scene, as the planner takes them."""
     scene = loaded.scene
     footprint = tool_footprint(
         scene.indenters, loaded.folder, sensor.length_mm * sensor.width_mm, sensor.node_pitch_mm
@@ -68,7 +77,7 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
         side, turn = math.hypot(b.x_mm - a.x_mm, b.y_mm - a.y_mm), abs(b.twist_deg - a.twist_deg)
         lateral, turned = lateral + side, turned + turn
         aside = side + math.radians(turn + _tilt(a, b)) * reach
-        # What stands beside the tool is pushed down as the tool comes over it.
+        # Gel next to the tool is pushed down when the tool moves over it.
         deepest = max(depths[i], depths[j])
         pushed = min(deepest, footprint.steepest(deepest) * aside) if aside > 0 else 0.0
         way = math.hypot(aside, b.depth_mm - a.depth_mm) + pushed
@@ -93,7 +102,7 @@ def _reach(pose: Pose, footprint: Footprint) -> float:
     reached = pose.depth_mm
     if slope == 0:
         return reached
-    # Twice: shapes that are raised may come down by the tilt.
+    # Two passes, because the tilt may lower shapes that are raised.
     for _ in range(2):
         reached = pose.depth_mm + footprint.reach_mm(max(reached, JUST_TOUCHING_MM)) * slope
     return reached

@@ -1,4 +1,4 @@
-"""The few figures of a sensor that planning needs, from what a bundle records about it."""
+"""Figures of a sensor for the planner, from the record of its bundle."""
 
 from __future__ import annotations
 
@@ -16,9 +16,16 @@ Vector = tuple[float, float, float]
 
 
 def bundle_figures(path: str | os.PathLike[str]) -> SensorFigures:
-    """Figures of the bundle in the folder `path`; its arrays are not loaded but for the dots.
+    """Read the figures of a sensor from a bundle; of its arrays only the markers are loaded.
 
-    Raises IfemError for a folder that is no bundle, or one without markers or camera.
+    Args:
+        path: Folder of the bundle.
+
+    Returns:
+        The figures that bounds and costs of effects are computed from.
+
+    Raises:
+        IfemError: The folder is no bundle, or the bundle has no markers or no camera.
     """
     import numpy as np
 
@@ -111,9 +118,9 @@ def figures(
 
 
 def _seen(camera: Mapping[str, Any], point: Vector) -> tuple[float, float]:
-    """Distance along the camera's axis in mm of an apparent point, and its slope from the axis.
+    """Distance in mm along the camera's axis of an apparent point, and its slope from the axis.
 
-    A point of the outer surface, z = 0, looks nearer to the camera below it, at z = -lift.
+    Refraction makes a point of the outer surface (z = 0) appear nearer to the camera.
     """
     way = [a - b for a, b in zip(point, camera["position_mm"], strict=True)]
     along = sum(a * b for a, b in zip(way, camera["forward"], strict=True))

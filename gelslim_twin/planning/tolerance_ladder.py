@@ -1,8 +1,8 @@
-"""Tolerances of a scene as rungs: what each plan may err, relative, and how long a pose takes.
+"""Tolerances of a scene as rungs: the relative error of each plan and its time per pose.
 
-Errors and work are those that the effects declare, so they are the same on every machine; a
-machine's paces only stretch the times. A force is relative to that of the deepest contact, what
-the camera sees to the depth of that contact in pixels.
+Errors and work are those that the effects declare, so they are the same on every machine; the
+paces measured on a machine only scale the times. Errors of forces are relative to the force of
+the deepest contact, errors in the picture to the depth of that contact in pixels.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from gelslim_twin.planning.planner import Question, make_plan
 
 LEVELS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2, 0.5)
 FINER = (1e-9, 1e-4, 2e-4, 5e-4)
-"""Only where an error is asked for; the first asks every effect for its finest rung."""
+"""Used only where an error is given; at the first level every effect takes its finest rung."""
 FITTED_RADII = (0.7, 3.0)
-"""Radius of the contact over the gel's thickness for which the force of a contact was fitted."""
+"""Ratios of contact radius to gel thickness for which the estimate of the force was fitted."""
 GEL, LARGE_STRAIN, PICTURE = "gel", "large strain", "picture"
 WORDING = Wording(
     "tolerance", "error", "per pose", "no effect has a finer rung that would err less"
@@ -37,13 +37,13 @@ class Tolerance:
 
 
 def scale(circumstances: Circumstances) -> Tolerance:
-    """What relative errors are relative to. Raises BudgetError where nothing touches the gel.
+    """Force and depth that relative errors refer to.
 
-    The force is the estimate itself, not the effects' upper one, so that a share is of no more
-    force than there is, near enough.
+    The force is the estimate itself, not the upper bound of it that the effects use. Raises
+    BudgetError where nothing touches the gel.
     """
-    force_n = circumstances.touch.normal_n
-    depth_px = circumstances.touch.depth_mm * circumstances.sensor.px_per_mm
+    force_n = circumstances.contact.normal_n
+    depth_px = circumstances.contact.depth_mm * circumstances.sensor.px_per_mm
     if not (force_n > 0 and depth_px > 0):
         raise BudgetError(
             "error as a share: nothing touches the gel in this scene, so there is nothing to err "
@@ -61,9 +61,9 @@ def tolerance_at(question: Question, error: float) -> Tolerance:
 def tolerance_ladder(
     question: Question, error: float | None = None, paces: Mapping[str, float] | None = None
 ) -> tuple[Ladder, dict[str, Tolerance]]:
-    """Rungs at the usual tolerances and at `error`, and the tolerance of each by name.
+    """Rungs at the default tolerances and at `error`, and the tolerance of each by name.
 
-    `paces` are times of this machine over those the effects declare, by group (`pace_group`).
+    `paces` are ratios of measured to declared times, by group (`pace_group`).
     Raises BudgetError where nothing touches the gel, PlanError as `make_plan`.
     """
     tolerances, rungs = dict[str, Tolerance](), []
@@ -81,9 +81,9 @@ def tolerance_ladder(
 def choose_tolerance(
     question: Question, budget: Budget, paces: Mapping[str, float] | None = None
 ) -> tuple[Choice, Tolerance]:
-    """The tolerance that a budget of relative error and time per pose asks for.
+    """The tolerance that keeps a budget of relative error and time per pose.
 
-    Effects that the scene switches off are not counted as errors: the scene asked for that.
+    Effects that the scene switches off are not counted as errors.
     Raises BudgetError where no plan keeps the budget.
     """
     ladder, tolerances = tolerance_ladder(question, budget.error, paces)
@@ -118,7 +118,7 @@ def _switched_off(question: Question, effect: str) -> bool:
 
 def _outside(circumstances: Circumstances) -> tuple[str, ...]:
     low, high = FITTED_RADII
-    ratio = circumstances.touch.radius_mm / circumstances.sensor.thickness_mm
+    ratio = circumstances.contact.radius_mm / circumstances.sensor.thickness_mm
     if low <= ratio <= high:
         return ()
     return (

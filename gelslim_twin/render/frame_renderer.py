@@ -1,4 +1,4 @@
-"""Frames of one sensor: what stands still is drawn once, each frame adds dots and shading."""
+"""Frames of one sensor. The constant part is rendered once; a frame adds dots and shading."""
 
 from __future__ import annotations
 
@@ -26,15 +26,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RenderedFrame:
-    """Picture (h, w, 3) uint8, red first, and the dots in it, in the print's order."""
+    """A picture and the true positions of the dots in it, in the order of the print.
+
+    Attributes:
+        image: Picture (h, w, 3), uint8, RGB.
+        centres_px: Area centroids (m, 2) of the dots' images, averaged over the open shutter;
+            pixel centres have integer coordinates.
+        diameter_px: Diameter (m,) of the disc of the same area.
+        drawn: Whether (m,) the dot is printed and its whole outline lies in the picture.
+    """
 
     image: NDArray[np.uint8]
     centres_px: NDArray[np.float64]
-    """(m, 2) centroids of the dots' images, mean over the open shutter; pixel centres integers."""
     diameter_px: NDArray[np.float64]
-    """(m,) of the disc of the same area."""
     drawn: NDArray[np.bool_]
-    """(m,) whether the dot is printed and its whole outline lies in the picture."""
 
 
 Array = NDArray[np.float64]
@@ -46,10 +51,18 @@ _STRIP = 48
 
 @dataclass(frozen=True, eq=False)
 class FrameRenderer:
-    """Draws frames of the dots of `grid` on the pad as `camera` sees them in `light`.
+    """Renders the printed dots of a sensor as its camera sees them.
 
-    Frames are pure functions of the arguments: the same state and frame number give the same
-    bytes, in any order, on any number of threads.
+    A frame is a pure function of its arguments: the same state and number give the same bytes, in
+    any order and on any number of threads.
+
+    Attributes:
+        camera: The camera.
+        grid: The marker grid.
+        light: Irradiance and direction of each light source.
+        pad: Outline and appearance of the pad.
+        look: The effects to render.
+        top: The outer surface at rest where it is crowned; None for a flat one.
     """
 
     camera: VirtualCamera
@@ -58,23 +71,22 @@ class FrameRenderer:
     pad: Pad
     look: Look
     top: DomedTop | None = None
-    """The outer surface at rest; None is flat."""
 
     @cached_property
     def dots(self) -> PrintedDots:
-        """The print, faults included."""
+        """The dots as printed, with the faults of the print."""
         nominal = PrintedDots.nominal(self.grid)
         faults = self.look.print_faults
         return nominal if faults is None else faults.apply(nominal)
 
     @cached_property
     def sight(self) -> Sight:
-        """What every pixel sees at rest."""
+        """The ray of every pixel."""
         return Sight.of(self.camera)
 
     @cached_property
     def still(self) -> Image:
-        """Light (h, w, k) of the pad at rest without dots: edge, dirt and blur included."""
+        """Irradiance (h, w, k) seen by each pixel at rest, without dots, with dirt and defocus."""
         seen = None if self.top is None else self.top.seen_mm(self.sight)
         light = still_irradiance(self.camera, self.sight, self.light, self.pad, seen)
         if self.look.dirt is not None:
@@ -148,7 +160,7 @@ class FrameRenderer:
         return out
 
     def _composer(self, ink: Image, surface: SurfaceState | None) -> Callable[[int, Image], None]:
-        """A function that writes the grey values of rows from a first one on."""
+        """A function that writes the grey values of a strip of rows."""
         from gelslim_twin.render.image_kernel import compose
 
         gain, step = _NONE, 1
@@ -167,7 +179,7 @@ class FrameRenderer:
         return write
 
     def _picture(self, ink: Image, surface: SurfaceState | None, number: int) -> NDArray[np.uint8]:
-        """The frame, made in strips that stay in the processor's cache."""
+        """The picture, composed in strips that fit into the processor's cache."""
         from gelslim_twin.render.image_kernel import develop
 
         height, width = ink.shape
@@ -195,7 +207,7 @@ class FrameRenderer:
 
     @cached_property
     def _on_pad(self) -> Image:
-        """Share (rows, columns, 1) of the pad on the shading's lattice; the frame is no dome."""
+        """Share (rows, columns, 1) of pad at each ray: the frame around it is not crowned."""
         assert self._shading_sight is not None
         places = self._shading_sight.rest_mm
         beyond = self.pad.beyond_mm(places[..., 0], places[..., 1])
@@ -209,7 +221,7 @@ class FrameRenderer:
 
     @cached_property
     def _orientation(self) -> float:
-        """Sign of an outline's area on a level gel: a folded-over dot has the other one."""
+        """Sign of an outline's area on the undeformed gel; a dot seen from behind has the other."""
         return float(np.sign(np.median(centroids_px(self._rest_outlines)[1])))
 
     def _inside(self, outlines: Array) -> NDArray[np.bool_]:

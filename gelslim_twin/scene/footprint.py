@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gelslim_twin.effects.touch import Footprint
+from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,

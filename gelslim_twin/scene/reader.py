@@ -20,7 +20,13 @@ from gelslim_twin.scene.varied import varied
 
 @dataclass(frozen=True)
 class LoadedScene(Loaded[Scene]):
-    """A scene read from a file, with its poses."""
+    """A scene read from a file, with the poses of its motion.
+
+    Attributes:
+        model: The scene, also called `scene`.
+        path: The file it was read from.
+        poses: Poses of the tool in the order of time.
+    """
 
     poses: tuple[Pose, ...]
 

@@ -1,4 +1,4 @@
-"""The mechanics that a plan asks for: linear contact, friction, large strain, relaxation."""
+"""The mechanical model of a plan: linear contact, friction, large strain, relaxation."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from gelslim_twin.simulation.simulate import Mechanics
 def mechanics_of(
     loaded: LoadedScene, plan: Plan, sensor: TwinSensor, folder: Path | None = None
 ) -> Mechanics:
-    """Mechanics of a planned scene; `folder` keeps the pad's compliance.
+    """The mechanical model of a planned scene; the pad's compliance is stored in `folder`.
 
-    Only the effects in the plan are imported. Raises ValueError or OSError for an STL that cannot
-    be read.
+    Only modules of effects in the plan are imported. Raises ValueError or OSError for an STL file
+    that cannot be read.
     """
     chosen = {choice.effect: choice for choice in plan.included}
     if "normal_contact" not in chosen:

@@ -1,7 +1,6 @@
-"""How long this machine takes for a simulated pose, over what the effects declare.
+"""Pace of this machine: measured time of a simulated pose over the time that effects declare.
 
-A sphere is pressed into the sensor and slid, once on a linear gel and once at large strain; the
-time of each part of the simulation is set against the times its effects declare.
+A sphere is pressed into the sensor and sheared, once on a linear gel and once at large strain.
 """
 
 from __future__ import annotations
@@ -23,9 +22,9 @@ from gelslim_twin.simulation.simulate import Ledger, simulate
 
 Progress = Callable[[str, int, int], None]
 DEPTH, RADIUS = 0.1, 2.0
-"""Of the sphere's press and of the sphere, over the thickness of the gel."""
+"""Depth and radius of the sphere over the thickness of the gel."""
 RUNS = (("first", "off"), ("linear", "off"), ("large", "on"))
-"""Names, and whether the gel is strained largely."""
+"""Name of each run and its use of `nonlinearity`."""
 SCENE = """\
 format: gelslim-scene/1
 name: pace
@@ -46,19 +45,17 @@ effects:
 def measure_paces(
     sensor: TwinSensor, progress: Progress | None = None
 ) -> tuple[dict[str, float], SensorFigures]:
-    """Times over declared times by group of effects (`tolerance_ladder.pace_group`).
+    """Ratios of measured to declared times by group of effects, and the figures of the sensor.
 
-    With them the figures of the sensor as planning sees it. Raises what `simulate` raises.
+    For the groups see `tolerance_ladder.pace_group`. Raises what `simulate` raises.
     """
     tell = progress or (lambda text, done, total: None)
     with scratch_folder() as folder:
         store_sensor(sensor, folder / "sensor")
         runs = {}
         # The first run computes the compliance of the pad and compiles what is not compiled yet.
-        for step, (name, strain) in enumerate(
-            (("first", "off"), ("linear", "off"), ("large", "on"))
-        ):
-            tell(f"simulation, {name} run", step, 3)
+        for step, (name, strain) in enumerate(RUNS):
+            tell(f"simulation, {name} run", step, len(RUNS))
             runs[name] = _run(folder, name, strain)
         figures = bundle_figures(folder / "sensor" / BUNDLE)
     (linear, plan), (large, strained) = runs["linear"], runs["large"]

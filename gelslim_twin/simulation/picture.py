@@ -1,4 +1,4 @@
-"""Markers and pictures of gel states, with the effects that a plan keeps."""
+"""Markers and pictures of gel states, with the effects that a plan includes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOTTLE, VIGNETTING = 0.04, 0.7
 
 @dataclass(frozen=True, eq=False)
 class Viewer:
-    """One sensor as a plan has it seen."""
+    """Camera and renderer of one sensor, with the effects of a plan."""
 
     sensor: TwinSensor
     plan: Plan
@@ -61,16 +61,18 @@ class Viewer:
         return float(getattr(blur, "shutter_ms", 0.0)) / 1000
 
     def _usual(self, before: GelState, state: GelState, apart_s: float | None) -> GelState:
-        """Where the gel was one usual step ago, for which the look has the shutter's share.
+        """The state from which the renderer's motion blur gives the true exposure.
 
-        The shutter is open for as long as it is, or since the frame before if that is less.
+        The renderer's share of open shutter refers to the median time step. At another step the
+        earlier state is moved along the path, so that the shutter is open for its own time, or
+        since the frame before if that is less.
         """
         shutter_s = self._shutter_s
         if apart_s is None or apart_s <= 0 or self.step_s <= 0 or shutter_s == 0:
             return before
         usual = min(1.0, shutter_s / self.step_s)
         part = 1 - min(1.0, shutter_s / apart_s) / usual
-        # Even steps are even but for rounding.
+        # Equal steps differ by rounding only.
         return before if abs(part) < 1e-9 else before.blended(state, part)
 
     @cached_property
@@ -99,8 +101,7 @@ class Viewer:
         return FrameRenderer(self.camera, self.sensor.grid, self.sensor.light(), pad, look, top)
 
     def surface(self, state: GelState) -> SurfaceState:
-        """The state as the renderer takes it; the last two are kept, as a frame needs the one
-        before it."""
+        """The state as the renderer takes it. The last two are cached: a frame needs both."""
         from gelslim_twin.render.surface_state import SurfaceState
 
         for known, surface in self._surfaces:

@@ -1,4 +1,4 @@
-"""The folder of one simulated scene: what it was made from, and whether it is complete."""
+"""The folder of one simulated scene: the key of its input, and whether it is complete."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FRAMES, STATES = "frames", "states"
 
 
 class SimulationError(GelslimError, ValueError):
-    """A simulation that cannot start or go on; the message says why and what to do."""
+    """A simulation cannot start or continue; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class RunFolder:
 
     @classmethod
     def opened(cls, path: Path, key: str, overwrite: bool = False) -> RunFolder:
-        """Make the folder, or go on in it where it holds the same simulation.
+        """Make the folder, or continue in it where it holds the same simulation.
 
-        Raises SimulationError for a folder with anything else in it, unless `overwrite`, which
-        takes away another simulation's files and nothing more.
+        Raises SimulationError for a folder with anything else in it. With `overwrite` the files
+        of another simulation, and only those, are deleted.
         """
         found = cls(path, key)
         try:
@@ -62,12 +62,12 @@ class RunFolder:
 
     @property
     def complete(self) -> bool:
-        """Whether everything is there."""
+        """Whether the simulation is finished."""
         record = self.record()
         return record is not None and record.get("state") == "complete"
 
     def foreign(self) -> bool:
-        """Whether it holds more than a simulation killed at its very start leaves."""
+        """Whether it holds files that no simulation wrote before its first record."""
         for path in self.path.iterdir():
             begun = path.name in (FRAMES, STATES) and path.is_dir() and not any(path.iterdir())
             if not begun and not is_part(path.name):
@@ -75,7 +75,7 @@ class RunFolder:
         return False
 
     def record(self) -> dict[str, Any] | None:
-        """What run.json says; None without one."""
+        """Content of run.json; None where there is none."""
         try:
             record = json.loads((self.path / RUN).read_bytes())
         except (OSError, ValueError):
@@ -83,7 +83,7 @@ class RunFolder:
         return record if isinstance(record, dict) and record.get("format") == FORMAT else None
 
     def write(self, name: str, data: bytes) -> None:
-        """A file, whole or not at all."""
+        """Write a file atomically."""
         replace_file(self.path / name, data)
 
     def mark(self, state: str, about: dict[str, Any]) -> None:
@@ -95,7 +95,7 @@ class RunFolder:
         return self.path / FRAMES / f"frame_{number:06d}.png"
 
     def clear(self) -> None:
-        """Take away a simulation's files."""
+        """Delete the files of a simulation."""
         for name in (RUN, PLAN, LEDGER, TRUTH, FIELDS):
             (self.path / name).unlink(missing_ok=True)
         for pattern in (f"{FRAMES}/frame_*.png", f"{STATES}/states_*.npz"):
@@ -104,7 +104,7 @@ class RunFolder:
 
 
 def simulation_key(scene_record: str, plan_json: str, geometry_hash: str, material: str) -> str:
-    """Tells simulations apart: scene, plan, pad and gel."""
+    """Hash of scene, plan, pad and gel."""
     digest = hashlib.sha256(b"gelslim-simulation/1")
     for part in (scene_record, plan_json, geometry_hash, material):
         digest.update(len(part).to_bytes(8, "little"))

@@ -1,4 +1,4 @@
-"""One scene of a data set as a task that any worker can do."""
+"""One scene of a data set as a task for a worker process."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class SceneTask:
     number: int | None = None
     overwrite: bool = False
     tolerance: tuple[float, float] | None = None
-    """In N and px, in place of the scene's: decided once, so that every worker does the same."""
+    """In N and px, instead of the scene's. It is decided once, so that all workers agree."""
 
 
 def perform(task: SceneTask) -> dict[str, Any]:
-    """Simulate; the same bytes wherever it is done. Raises what `simulate` raises."""
+    """Simulate one scene. The files are the same on every worker. Raises what `simulate` raises."""
     from threadpoolctl import threadpool_limits
 
     loaded = read_scene(task.scene)
@@ -48,9 +48,18 @@ def perform(task: SceneTask) -> dict[str, Any]:
 
 
 def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJob:
-    """Plan a scene for a sensor stored in `folder`.
+    """Plan a scene for a stored sensor and prepare its simulation.
 
-    Raises InputError where the plan needs an effect that the sensor's pad does not allow.
+    Args:
+        loaded: The scene.
+        sensor: The sensor.
+        folder: Folder where `store_sensor` wrote the sensor; it also keeps the pad's compliance.
+
+    Returns:
+        The input of `simulate`.
+
+    Raises:
+        InputError: The plan needs an effect that the sensor's pad does not allow.
     """
     plan = plan_scene(loaded, bundle_figures(folder / BUNDLE))
     for choice in plan.included:

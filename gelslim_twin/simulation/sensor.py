@@ -1,4 +1,4 @@
-"""A sensor beside a simulation: its bundle in a folder, for any worker."""
+"""The sensor of a simulation, and its copy next to the results, which every worker reads."""
 
 from __future__ import annotations
 
@@ -84,13 +84,18 @@ MOST_COMPLIANCES = 4
 
 
 def store_sensor(sensor: TwinSensor, folder: Path) -> None:
-    """Write the sensor's bundle unless it is there; another sensor there is replaced.
+    """Write the sensor's bundle into a folder unless it is there; another sensor is replaced.
 
-    A bundle with light also serves simulations that need none. What killed processes left
-    half-written there is removed, even where nothing is written: another one may have stored their
-    compliance. The sensor is in use by this process from then on. Raises SimulationError where
-    another process uses another sensor there, files of other origin are in the way, or the folder
-    cannot be written.
+    A bundle with light also serves simulations that need none. Files that killed processes left
+    incomplete are removed in any case. From then on this process counts as a user of the copy.
+
+    Args:
+        sensor: The sensor.
+        folder: Folder of the copy.
+
+    Raises:
+        SimulationError: Another process uses another sensor in this folder, files of other origin
+            are there, or the folder cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -138,9 +143,17 @@ def _forget_compliances(folder: Path) -> None:
 
 
 def stored_sensor(folder: Path) -> TwinSensor:
-    """Return the sensor that `store_sensor` wrote.
+    """Read the sensor that `store_sensor` wrote.
 
-    Raises SimulationError where it is not complete, BundleError for a damaged bundle.
+    Args:
+        folder: Folder of the copy.
+
+    Returns:
+        The sensor.
+
+    Raises:
+        SimulationError: The copy is not complete.
+        BundleError: The bundle is damaged.
     """
     if not _record(folder):
         raise SimulationError(f"{folder}: the sensor stored there is not complete")

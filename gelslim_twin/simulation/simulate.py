@@ -1,6 +1,6 @@
-"""Carry out a planned scene: solve the gel pose by pose, look at it frame by frame, write both.
+"""Simulate a planned scene: solve the gel pose by pose, render it frame by frame, write both.
 
-What was solved and drawn before a stop is kept: the same call goes on from there.
+What was solved and rendered before an interruption is kept; the same call continues from there.
 """
 
 from __future__ import annotations
@@ -51,18 +51,25 @@ class Mechanics(Protocol):
 
 @dataclass(frozen=True)
 class SimulationJob:
-    """One scene with its plan, sensor and mechanics."""
+    """Everything that `simulate` needs of one scene.
+
+    Attributes:
+        scene: The scene.
+        poses: Poses of the tool.
+        plan: The effects to simulate.
+        sensor: The sensor.
+        mechanics: Makes the solver; called only if there is something to solve.
+    """
 
     scene: Scene
     poses: tuple[Pose, ...]
     plan: Plan
     sensor: TwinSensor
     mechanics: Callable[[], Mechanics]
-    """Made only if there is something to solve."""
 
     @property
     def key(self) -> str:
-        """Tells this simulation from others."""
+        """Hash of all input of the simulation."""
         bundle = self.sensor.bundle
         material = f"{bundle.material} {bundle.formulation}"
         scene = self.scene.model_dump_json() + repr(self.poses)
@@ -71,7 +78,7 @@ class SimulationJob:
 
 @dataclass
 class Ledger:
-    """Where the time went, and how well the solver did."""
+    """Times of the stages and the accuracy that the solver reached."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     poses_solved: int = 0
@@ -81,13 +88,13 @@ class Ledger:
     """Largest residual, penetration and complementarity of any pose."""
 
     def add(self, stage: str, since: float) -> float:
-        """Count time since `since`; returns now."""
+        """Add the time since `since` to a stage; returns the present time."""
         now = time.perf_counter()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - since
         return now
 
     def judge(self, state: GelState) -> None:
-        """Keep the worst of what the solver reports."""
+        """Update the largest values that the solver reports."""
         for name, value in state.solver.items():
             self.worst[name] = max(self.worst.get(name, 0.0), float(value))
 
@@ -110,14 +117,23 @@ def simulate(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> Ledger:
-    """Simulate into a folder.
+    """Simulate a scene into a folder.
 
-    Writes plan.json, truth.csv, truth.npz, frames/ where pictures are observed, ledger.json, and
-    run.json, which says "complete" last. A complete folder is left as it is.
+    Writes plan.json, truth.csv, truth.npz, frames/ where pictures are observed, ledger.json and,
+    last, run.json with the state "complete". A complete folder is left as it is.
+
+    Args:
+        job: Scene, plan and sensor, for example from `job_of`.
+        folder: Folder of the results.
+        overwrite: Replace another simulation in this folder.
+        progress: Called with the stage, the steps done and their number.
+
+    Returns:
+        Times of the stages and the accuracy that the solver reached.
 
     Raises:
-        SimulationError: the folder holds something else.
-        IfemError: the solver does not converge; states solved before it are kept.
+        SimulationError: The folder holds something else or cannot be written.
+        IfemError: The solver does not converge; the states solved before are kept.
     """
     place = Path(os.path.abspath(folder))
     try:
@@ -135,7 +151,7 @@ def _say_waiting(lock: Path) -> None:
 
 def _simulated(job: SimulationJob, folder: Path, overwrite: bool, tell: Progress) -> Ledger:
     if "image" in job.scene.observe:
-        # Without a library for pictures it must not solve first and fail at the first frame.
+        # A missing library for pictures must be reported before hours of solving, not after.
         encoded(np.zeros((1, 1, 3), dtype=np.uint8), ".png")
     run = RunFolder.opened(folder, job.key, overwrite)
     about = {"scene": job.scene.name, "observe": list(job.scene.observe), "seed": job.scene.seed}
@@ -156,10 +172,10 @@ def _simulated(job: SimulationJob, folder: Path, overwrite: bool, tell: Progress
 
 
 def _solved(job: SimulationJob, store: StateStore, ledger: Ledger, tell: Progress) -> StateStore:
-    """States of all poses; those stored already are not solved again where the rest is."""
+    """States of all poses. Where all are stored, nothing is solved."""
     total = len(job.poses)
     if store.count < total:
-        # The solver remembers its path, so it walks it again; what is stored already is the same.
+        # The solution depends on the path, so the solver starts at the first pose again.
         kept = store.count
         started = time.perf_counter()
         for index, state in enumerate(job.mechanics().states(job.poses)):
@@ -225,5 +241,5 @@ def _pose(poses: tuple[Pose, ...], when: FrameTime) -> Pose:
 
 
 def _step_s(times: tuple[FrameTime, ...]) -> float:
-    """Usual time between frames."""
+    """Median time between frames."""
     return float(np.median(np.diff([t.time_s for t in times]))) if len(times) > 1 else 0.0

@@ -1,4 +1,4 @@
-"""Gel states on disk, in chunks that are written whole: what was solved is not solved again."""
+"""Gel states on disk, in chunks that are written atomically, so that a simulation can resume."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class StateStore:
     """States of a scene's poses in the order of the poses, `states_00000.npz` onwards."""
 
     def __init__(self, folder: Path) -> None:
-        """The folder may hold chunks already."""
+        """Open a folder, which may hold chunks already."""
         self.folder = folder
         self._waiting: list[GelState] = []
         self._stored = self._whole_chunks()
@@ -38,7 +38,7 @@ class StateStore:
             self.flush()
 
     def flush(self) -> None:
-        """Write what waits. A chunk that is not full may only be the last."""
+        """Write the states that are not written yet. Only the last chunk may be incomplete."""
         if not self._waiting:
             return
         number = self._stored // CHUNK
@@ -66,7 +66,7 @@ class StateStore:
         return self.folder / f"states_{number:05d}.npz"
 
     def _whole_chunks(self) -> int:
-        """States in the unbroken row of chunks from the first one on."""
+        """Number of states in the readable chunks before the first gap."""
         total = number = 0
         while self._path(number).is_file():
             try:

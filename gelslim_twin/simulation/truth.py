@@ -1,4 +1,4 @@
-"""What is known exactly about each frame: the table beside the pictures."""
+"""Ground truth of each frame: pose, wrench, fields and marker positions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.wrench import resultant
-from gelslim_twin.contact.gel_state import GelState, Touch
+from gelslim_twin.contact.gel_state import ContactStatus, GelState
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def wrench_csv(frames: Sequence[FrameTruth], points_mm: Array) -> bytes:
         p, touch = frame.pose, frame.state.touch
         place = (p.x_mm, p.y_mm, p.depth_mm, p.twist_deg, p.tilt_x_deg, p.tilt_y_deg)
         numbers = [repr(float(v)) for v in (frame.time_s, *place, *force, *torque)]
-        nodes = [int((touch == kind).sum()) for kind in (Touch.STICK, Touch.SLIP)]
+        nodes = [int((touch == kind).sum()) for kind in (ContactStatus.STICK, ContactStatus.SLIP)]
         table.writerow([frame.number, *numbers, *nodes])
     return out.getvalue().encode()
 

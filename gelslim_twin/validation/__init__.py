@@ -1,1 +1,1 @@
-"""What a sensor will measure, before it is printed: the pipeline on frames with known forces."""
+"""Accuracy of the force pipeline on a sensor, from rendered frames with known forces."""

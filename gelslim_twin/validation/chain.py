@@ -1,7 +1,8 @@
-"""The chains that a validation compares: ours, and the paper's choices.
+"""The variants of the pipeline (chains) that a validation compares: ours and the paper's.
 
-The paper's: one layer of full cells, the printed compensation, forces straight from the
-stiffness, and for a known shape the cap of the indenter below the rim of the patch.
+The paper uses one layer of fully integrated cells, the projection compensation as printed, forces
+as stiffness times displacement, and for a known shape the cap of the indenter below the rim of the
+contact patch.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from gelslim_twin.contact.gel_state import GelState
 from ifem_export.bundle.bundle import Bundle
 
 Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
-"""The surface's true height, with or without the nodes touched, or the indenter's shape (`cap`:
-with the paper's model of it)."""
+"""What the chain is given: the true heights (`depth`), with the true contact region (`contact`), or
+the shape of the indenter (`shape`; `cap` with the paper's model of it)."""
 
 
 @dataclass(frozen=True)
 class Chain:
-    """One way to estimate."""
+    """One variant of the pipeline."""
 
     name: str
     settings: PipelineSettings
     knows: Knows
     needs_even_layers: bool = False
-    """Not for crowned pads and cut cells."""
+    """It does not take crowned pads and cut cells."""
 
 
 _PAPER = PipelineSettings(
@@ -52,7 +53,7 @@ CHAINS: tuple[Chain, ...] = (
 
 
 def chains_for(bundle: Bundle, budget: Budget | None = None) -> tuple[Chain, ...]:
-    """The chains that a bundle's pad can take, those that name no operator with the budget."""
+    """The chains for a bundle's pad; those that name no operator get the budget."""
     mesh = bundle.mesh
     even = mesh.fill is None and mesh.surface_shift is None
     return tuple(_budgeted(c, budget) for c in CHAINS if even or not c.needs_even_layers)
@@ -68,7 +69,7 @@ Array = NDArray[np.float64]
 
 
 class KnownContact:
-    """Gives one state per frame, in their order."""
+    """The true normal motion and contact region as a normal source, one state per frame."""
 
     def __init__(self, states: Iterable[GelState]) -> None:
         self._left: Iterator[GelState] = iter(states)

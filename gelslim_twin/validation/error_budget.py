@@ -1,8 +1,8 @@
-"""What each idealisation of the paper's pipeline costs in newtons, one at a time, without noise.
+"""Error budget: the error in newtons by each idealisation of the paper's pipeline, without noise.
 
-Markers are where they truly are and the normal motion is the true one, so nothing differs from
-the truth but the source named: the gel's large strain, its thickness, its modulus, the pose
-between finger and force sensor, the projection. Forces are those of the paper's one layer.
+Marker positions and normal motion are the true ones, so that only the named source differs from
+the truth: large strain, thickness, modulus, pose between finger and force sensor, projection.
+Forces are those of the paper's operator of one layer.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 THICKNESS_OFF = 0.05
-"""A casting of 2 mm is off by 0.1 mm."""
+"""Relative error of the thickness: a casting of 2 mm errs by 0.1 mm."""
 MODULUS_OFF = 0.10
-"""Of a tensile test, and from one mix to the next."""
+"""Relative error of the modulus, by the tensile test and between batches."""
 POSE_OFF_DEG = 2.0
-"""About x and y, between the finger and the force sensor that is the reference."""
+"""Rotation about x and y between the finger and the reference force sensor."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """One thing that is wrong, or all of them."""
+    """One source of error, or several together."""
 
     name: str
     strained: bool = False
@@ -64,7 +64,7 @@ TOGETHER = Source(
 
 @dataclass(frozen=True, eq=False)
 class BudgetRig:
-    """The sensor that the sources are tried on."""
+    """The sensor to which the sources of error are applied."""
 
     bundle: Bundle
 
@@ -91,7 +91,7 @@ class BudgetRig:
         return lambda values: np.asarray(operator @ values)
 
     def motion_mm(self, state: GelState, source: Source) -> Array:
-        """Motion (c, 3) of the nodes as the paper's pipeline would read it."""
+        """Displacement (c, 3) of the nodes as the paper's pipeline would measure it."""
         true = state.displacement_mm
         w = true[:, 2]
         if source.cap and (state.touch > 0).any():
@@ -104,7 +104,7 @@ class BudgetRig:
         return np.column_stack([self.bundle.markers.sparse(lateral), w])
 
     def operator(self, source: Source) -> SurfaceOperator:
-        """The paper's operator on the pad that the pipeline believes in."""
+        """The paper's operator on the pad that the pipeline assumes."""
         mesh, gel = self.bundle.mesh, self.bundle.material
         if source.thickness != 1:
             hx, hy, hz = mesh.cell_size_mm

@@ -1,4 +1,4 @@
-"""The paper's experiment: a ball pressed into the gel, then slid in many directions."""
+"""Contacts of a validation: the paper's ball that presses and slides, two rods and a punch."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SlideTest:
 
     @property
     def poses(self) -> tuple[Pose, ...]:
-        """Just touching, pressed in even steps, slid in even steps."""
+        """Poses from first contact: pressed in equal steps, then slid in equal steps."""
         turn = math.radians(self.direction_deg)
         pressed = [
             Pose(float(k), self.x_mm, self.y_mm, self.depth_mm * k / PRESS_STEPS)
@@ -58,14 +58,14 @@ class SlideTest:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A ball and what is done with it."""
+    """A ball and its slides."""
 
     ball: Sphere
     tests: tuple[SlideTest, ...]
 
     @property
     def known(self) -> str:
-        """The ball as `gelslim force` takes it."""
+        """The ball as an argument of `gelslim force`."""
         return f"sphere:{self.ball.radius_mm:g}"
 
 
@@ -100,13 +100,13 @@ DEPTH_SHARE = 0.15
 
 @dataclass(frozen=True)
 class Case:
-    """A tool along poses; `known` is its shape as `gelslim force` takes it."""
+    """A tool with its poses; `known` is its shape as an argument of `gelslim force`."""
 
     name: str
     indenter: Indenter
     poses: tuple[Pose, ...]
     known: str
-    """Empty where the pipeline cannot tell the depth from the patch."""
+    """Empty where the contact patch does not determine the depth."""
 
 
 def other_contacts(thickness_mm: float, length_mm: float, width_mm: float) -> tuple[Case, ...]:
@@ -117,7 +117,7 @@ def other_contacts(thickness_mm: float, length_mm: float, width_mm: float) -> tu
     punch = FlatPunch(shape="flat_punch", radius_mm=radius * 2 / 3)
     down = Pose(1.0, 0.0, 0.0, depth)
     known = f"cylinder:{radius:g}"
-    # Rods reach over both rims: where they end is another question.
+    # The rods are longer than the pad, so that their ends do not press into it.
     along = Cylinder(shape="cylinder", radius_mm=radius, length_mm=2 * length_mm)
     across = Cylinder(shape="cylinder", radius_mm=radius, length_mm=2 * width_mm, axis_deg=90)
     return (
@@ -128,7 +128,7 @@ def other_contacts(thickness_mm: float, length_mm: float, width_mm: float) -> tu
 
 
 def path(*ends: Pose) -> tuple[Pose, ...]:
-    """From just over the first end's place through every end, three steps each."""
+    """Poses from first contact above the first end through all ends, three steps each."""
     first = ends[0]
     poses = [Pose(0.0, first.x_mm, first.y_mm, 0.0)]
     for end in ends:

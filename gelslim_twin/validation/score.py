@@ -1,4 +1,4 @@
-"""How far one estimate is from the truth: resultant, field, place and direction."""
+"""Errors of one estimate: resultant, field, centre of pressure and direction."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gelslim_twin.contact.gel_state import GelState
 
 Array = NDArray[np.float64]
 NEAR = 0.15
-"""The paper's own measure."""
+"""Relative error within which the paper counts a frame as right."""
 SHEARED = 0.2
-"""Shear over normal force from which a direction is worth comparing."""
+"""Smallest ratio of shear to normal force for which directions are compared."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """One chain on one frame; forces in N. NaN where the chain does not know."""
+    """Errors of one chain on one frame; NaN where the chain gives no value."""
 
     test: int
     frame: int
@@ -28,29 +28,29 @@ class Score:
     true_n: tuple[float, float, float]
     found_n: tuple[float, float, float]
     field_error: float
-    """Of the nodal forces it knows, against the true ones, relative L2."""
+    """Relative L2 error of the nodal forces that the chain gives."""
     outside_share: float
-    """Share of the tangential force on nodes that nothing touches."""
+    """Share of the tangential force on nodes outside the true contact region."""
     centre_error_mm: float
-    """Between the centres of pressure."""
+    """Distance of the centres of pressure."""
     direction_error_deg: float
-    """Between the shear resultants; NaN where there is little shear."""
+    """Angle between the shear resultants; NaN where there is little shear."""
     marker_error_mm: float
-    """Root mean square of the markers' motion in the plane."""
+    """Root mean square error of the markers' motion in the plane."""
     sigma_n: tuple[float, float, float]
-    """The chain's own statement of its standard deviation."""
+    """Standard deviation that the chain reports."""
     milliseconds: float
     problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Errors of a chain over many frames, as the paper states its own."""
+    """Statistics of a chain over many frames, as in the paper."""
 
     name: str
     frames: int
     without: tuple[int, int, int]
-    """Frames that give no force along x, y, z."""
+    """Number of frames without a force along x, y, z."""
     deviation_n: tuple[float, float, float]
     """Standard deviation of found minus true, about its mean."""
     bias_n: tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""The gel that makes the frames: finer than the pipeline's, of another element, at large strain."""
+"""The gel model behind the frames: finer than the pipeline's, another element, large strain."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Law = Literal["neo_hookean", "linear"]
 
 @dataclass(frozen=True, eq=False)
 class TruthGel:
-    """Frictional contacts solved on the truth's pad; `folder` keeps its compliance."""
+    """Solves contacts with friction on the finer pad; its compliance is stored in `folder`."""
 
     sensor: Bundle
     friction: float
@@ -32,18 +32,18 @@ class TruthGel:
 
     @cached_property
     def compliance(self) -> SurfaceCompliance:
-        """Of the truth's pad."""
+        """Surface compliance of the finer pad."""
         return SurfaceCompliance(truth_pad(self.sensor), self.folder)
 
     @property
     def law(self) -> Law:
-        """Large strain wherever the pad's cells allow it: not on crowned and cut pads."""
+        """Neo-Hookean for flat pads of whole cells, linear for the others."""
         mesh = self.compliance.bundle.mesh
         return "neo_hookean" if mesh.fill is None and mesh.surface_shift is None else "linear"
 
     @property
     def layers(self) -> int:
-        """Of the truth's pad."""
+        """Layers of the finer pad."""
         return self.compliance.bundle.mesh.layers
 
     def states(self, tool: Indenter, poses: tuple[Pose, ...], law: Law) -> list[GelState]:

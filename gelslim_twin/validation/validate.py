@@ -1,7 +1,7 @@
-"""A sensor on frames with known forces: the paper's experiment, and other contacts.
+"""Validation of a sensor on rendered frames with known forces.
 
-Frames are drawn with everything a real sensor shows. The pipeline has the sensor's own bundle and
-a reference frame, nothing else.
+The contacts are the paper's experiment and some others. Frames show everything that a real sensor
+shows. The pipeline is given the sensor's bundle and a reference frame, nothing else.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Progress = Callable[[str, int, int], None]
 FRAMES_APART = 100
-"""Between the frame numbers of two contacts: noise is drawn by number."""
+"""Distance of the frame numbers of two contacts, so that each has its own noise."""
 
 
 class Bench:
@@ -68,7 +68,7 @@ class Bench:
     def results(
         self, states: Sequence[GelState], images: Sequence[Image], known: str
     ) -> Iterator[tuple[Chain, list[FrameResult]]]:
-        """Every chain's results of a run of frames; chains that need a shape only with one."""
+        """Results of every chain; without a shape, chains that need it are skipped."""
         for chain in self.chains:
             pipeline = self._pipelines[chain.name]
             pipeline.reset()
@@ -126,11 +126,22 @@ def validate(
     progress: Progress | None = None,
     budget: Budget | None = None,
 ) -> Validation:
-    """Validate a sensor; `folder` keeps the compliance of the pad.
+    """Measure how well the force pipeline would do on a sensor before it is built.
 
-    `budget` picks the operator of our chains from the bundle's ladder.
-    Raises BudgetError where no operator keeps it, ContactError where a contact is not found,
-    CalibrationError where the sensor's own reference frame is refused.
+    Args:
+        sensor: The sensor.
+        folder: Folder where the compliance of the pad is stored for the next time.
+        seed: Seed of everything random in the frames.
+        progress: Called with the present step, its number and the number of steps.
+        budget: Chooses the operator of our chains from the bundle's ladder.
+
+    Returns:
+        Errors of every chain, frame by frame and in summary, and the error budget.
+
+    Raises:
+        BudgetError: No operator keeps the budget.
+        ContactError: A contact does not converge.
+        CalibrationError: The rendered reference frame cannot be calibrated.
     """
     tell = progress or (lambda text, done, total: None)
     bundle = sensor.bundle
@@ -183,7 +194,7 @@ def validate(
 
 
 def sensor_renderer(sensor: TwinSensor, seed: int) -> FrameRenderer:
-    """Draws what the sensor's camera sees, with all that a used sensor shows."""
+    """A renderer with the effects of a used sensor."""
     from gelslim_force.calibration.design import bundle_camera
 
     record = sensor.camera_record
@@ -196,7 +207,7 @@ def sensor_renderer(sensor: TwinSensor, seed: int) -> FrameRenderer:
 
 
 def _statement(gel: TruthGel, layers: int) -> str:
-    """What the truth is, and how far it is from what the pipeline assumes."""
+    """Which model made the frames, and how it differs from that of the pipeline."""
     if gel.law == "linear":
         return (
             f"Frames come from contacts solved forward, with Coulomb friction {FRICTION:g}, on a "

@@ -1,4 +1,4 @@
-"""All that a validation finds, and what it says about itself."""
+"""The result of a validation and its record."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PAPER_RELATIVE = 0.15
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One frame with its truth and what chains made of it, for pictures."""
+    """One frame with its true state and the results of the chains, for figures."""
 
     name: str
     image: Image
@@ -34,10 +34,21 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """The slides frame by frame, their statistics, the budget, and other contacts' last frames."""
+    """The result of a validation.
+
+    Attributes:
+        truth: Which model made the frames, and how it differs from that of the pipeline.
+        experiment: The ball and its slides.
+        scores: Every chain on every frame of the slides.
+        chains: Statistics of each chain over the slides.
+        budget: Errors of the resultant by source.
+        others: Scores of the last frame of the other contacts.
+        samples: Last frame of each contact.
+        points_mm: Surface nodes (c, 3) in mm.
+        calibration: Calibration of the rendered reference frame.
+    """
 
     truth: str
-    """Which model made the frames, and how it differs from the pipeline's."""
     experiment: Experiment
     scores: tuple[Score, ...]
     chains: tuple[Spread, ...]
@@ -52,7 +63,7 @@ class Validation:
     """What lies outside the calibrated range of that choice."""
 
     def to_record(self) -> dict[str, Any]:
-        """Plain values."""
+        """The values as they are written to JSON."""
         return {
             "format": "gelslim-validation/1",
             "truth": self.truth,

@@ -68,7 +68,7 @@ def print_plan(made: Plan) -> None:
 
 
 def _row(choice: Choice) -> tuple[str, ...]:
-    value, unit = choice.telling(choice.bound)
+    value, unit = choice.most_relevant(choice.bound)
     return (
         choice.effect,
         "in" if choice.included else "out",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.gel_state import GelState, Touch
+from gelslim_twin.contact.gel_state import ContactStatus, GelState
 from gelslim_twin.contact.halved_path import between, reached
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
@@ -155,7 +155,7 @@ def test_full_stick_is_a_glued_punch() -> None:
     # A glued node may be pulled; here all of them are pressed.
     assert (force.reshape(-1, 3)[:, 2] < 0).all()
     np.testing.assert_allclose(state.force_n[under].reshape(-1), force, atol=3e-5)
-    assert (state.touch[under] == Touch.STICK).all()
+    assert (state.touch[under] == ContactStatus.STICK).all()
 
 
 @pytest.mark.parametrize("friction", [0.2, 1.0])
@@ -170,7 +170,7 @@ def test_full_slip_and_reversed(friction: float) -> None:
     # come under the punch still sticks.
     assert 0.93 * friction <= forth[0] / -forth[2] <= friction * (1 + 1e-4)
     assert 0.93 * friction <= back[0] / back[2] <= friction * (1 + 1e-4)
-    slides = states[-1].touch == Touch.SLIP
+    slides = states[-1].touch == ContactStatus.SLIP
     assert slides.sum() > 0.9 * (states[-1].touch > 0).sum()
     one_by_one = np.hypot(*states[-1].force_n[slides, :2].T) / -states[-1].force_n[slides, 2]
     np.testing.assert_allclose(one_by_one, friction, rtol=1e-3)

@@ -13,9 +13,9 @@ from scene_samples import GALLERY, MINIMAL, ROOT, SENSOR, load, plan_text, rando
 
 from gelslim_core.yaml.errors import InputError
 from gelslim_twin.effects.circumstances import Circumstances, EffectParameters, MotionFigures
+from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.effects.effect import GIVEN, OBSERVABLES, Bound, Effect, Rung, picture
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.effects.touch import Footprint
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import PlanError, Question, make_plan
 from gelslim_twin.planning.question import plan_scene, question

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from gelslim_twin.effects.touch import Footprint, nonlinear_excess, touch
+from gelslim_twin.effects.contact_estimate import Footprint, contact_estimate, nonlinear_excess
 from gelslim_twin.scene.footprint import shape_reach_mm, tool_footprint, tool_reach_mm
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.stl_extent import footprint_mm, stl_corners
@@ -141,14 +141,14 @@ def punch(radius: float) -> Footprint:
 
 
 def test_on_a_thick_gel_the_force_is_boussinesqs():
-    t = touch(punch(1.0), 0.1, 1e4, 0.2, 0.3)
+    t = contact_estimate(punch(1.0), 0.1, 1e4, 0.2, 0.3)
     assert t.normal_n == pytest.approx(1.1 * 2 * 0.2 / (1 - 0.09) * 1.0 * 0.1, rel=0.02)
 
 
 def test_on_a_thin_compressible_layer_it_is_winklers_at_least():
     nu, e, h, a, d = 0.3, 0.2, 0.1, 5.0, 0.01
     confined = e * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
-    t = touch(punch(a), d, h, e, nu)
+    t = contact_estimate(punch(a), d, h, e, nu)
     assert 1 <= t.normal_n / (confined * math.pi * a**2 * d / h) < 1.1
 
 
@@ -162,7 +162,7 @@ def test_the_squeezed_layer_agrees_with_a_solved_lubrication_equation():
     pressure = spsolve(matrix, np.full(n, -3 * g * d / h**3))
     expected = float((2 * np.pi * r * pressure * dr).sum())
     # A very thin, nearly incompressible layer: the squeeze is all.
-    t = touch(punch(a), d, h, 3 * g, 0.5 - 1e-12)
+    t = contact_estimate(punch(a), d, h, 3 * g, 0.5 - 1e-12)
     assert t.normal_n == pytest.approx(expected, rel=5e-3)
     assert t.stick_n == pytest.approx(4 * expected, rel=5e-3)
 
@@ -200,7 +200,7 @@ def test_the_estimate_of_the_force_is_no_less_than_solved_contacts(nu):
         (made(shape="sphere", radius_mm=8.0), r * r / 16, 0.5),
         (made(shape="flat_punch", radius_mm=3.0), np.where(r <= 3, 0, 9.0), 0.3),
     ):
-        t = touch(tool_footprint([indenter], HERE, 256.0), depth, 2.0, 0.147, nu)
+        t = contact_estimate(tool_footprint([indenter], HERE, 256.0), depth, 2.0, 0.147, nu)
         assert 0.97 < t.normal_n / solved(nu, height, points, op, depth, False) < 2
         assert 0.97 < t.stick_n / solved(nu, height, points, op, depth, True) < 2
 
@@ -213,5 +213,5 @@ def test_the_nonlinear_excess_is_the_measured_table_and_grows():
 
 
 def test_no_contact_has_no_force():
-    t = touch(punch(1.0), -0.1, 2.0, 0.147, 0.3223)
+    t = contact_estimate(punch(1.0), -0.1, 2.0, 0.147, 0.3223)
     assert (t.normal_n, t.stick_n, t.area_mm2, t.shear_n_per_mm) == (0, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""How large and how hard a contact is: estimates that err on the large side, in closed form."""
+"""Closed-form estimates of size and force of a contact, which rather overestimate."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 NONLINEAR_EXCESS = ((0.0, 0.0), (0.05, 0.02), (0.15, 0.08), (0.30, 0.21), (0.50, 0.47))
-"""Neo-Hookean over linear force, less one, by indentation over thickness (measured, PHYSICS 5)."""
+"""Indentation over thickness, and neo-Hookean over linear force minus one (computed)."""
 
 
 RIDGES = 1.25
-"""Rings and bumps press up to 1.19 as hard as the disc of their area."""
+"""Factor for rings and bumps, whose force is up to 1.19 times that of the disc of their area."""
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """Of the undeformed shapes below the gel's surface, by depth."""
+    """Size of the part of a tool below the gel's undeformed surface, as functions of depth."""
 
     area_mm2: Callable[[float], float]
     volume_mm3: Callable[[float], float]
@@ -26,50 +26,51 @@ class Footprint:
     steepest: Callable[[float], float]
     """Largest slope; infinite for shapes with walls."""
     width_mm: Callable[[float], float]
-    """Across the narrowest shape."""
+    """Width of the narrowest shape."""
 
 
 @dataclass(frozen=True)
-class Touch:
-    """The deepest contact of a motion."""
+class ContactEstimate:
+    """Size, stiffness and force of the deepest contact of a motion."""
 
     depth_mm: float
     indentation: float
     """Depth over thickness of the gel."""
     area_mm2: float
     radius_mm: float
-    """Of the disc of the same area."""
+    """Radius of the disc of the same area."""
     normal_n: float
-    """Frictionless, linear gel."""
+    """Normal force without friction on a linear gel."""
     stick_n: float
-    """The same with full stick, which keeps an incompressible layer from squeezing out."""
+    """The same with full stick, which prevents an incompressible layer from flowing sideways."""
     shear_n_per_mm: float
-    """Tangential force per mm of sideways motion with full stick, G A / h and the border's part."""
+    """Tangential stiffness with full stick: G A / h and the part of the surrounding gel."""
     squeezed: float
-    """Share of the indentation that goes sideways, the rest compresses the gel."""
+    """Share of the indentation that displaces gel sideways; the rest compresses it."""
     squeezed_at_rim: float
-    """The same where no gel lies around the contact: at the rim of the pad."""
+    """The same at the rim of the pad, where no gel surrounds the contact."""
     strain: float
     """Depth over thickness, or over the width of the narrowest shape if that is more."""
 
     @property
     def sideways_mm(self) -> float:
-        """How far a frictionless surface moves aside at most.
+        """Largest sideways displacement of a frictionless surface.
 
-        By 0.75 of the depth (0.73 at a wedge, measured); under wide tools by what is squeezed out
-        past the rim: a d/(2 h) in the mean over the layer, half as much again at its face
-        (lubrication with a free face), 1.2 times that in the middle of a square's sides, and as
-        much again where the pad's rim cuts the contact (measured: 1.09 of that).
+        It is 0.75 of the depth (0.73 in solved contacts of a wedge). Under wide tools the gel
+        flows past the rim of the tool: a d/(2 h) in the mean over the layer, half as much again at
+        its face (lubrication with a free face), 1.2 times that at the middle of a square's sides,
+        and 1.2 times again where the pad's rim cuts the contact (1.09 in solved contacts).
         """
         wide = self.squeezed_at_rim * self.radius_mm * self.indentation
         return 0.75 * max(self.depth_mm, 1.2 * 1.2 * wide)
 
     @property
     def nonlinear_excess(self) -> float:
-        """Share by which a linear gel under-reads the force.
+        """Share by which a linear gel underestimates the force.
 
-        The measured table, of a compressible gel under a ball; of what is squeezed out, the layer
-        that gets thinner: d/h³ becomes the integral of 1/(h - d)³, ((1 - e)^-2 - 1)/(2 e) as much.
+        For the compressed part it is the table, which was computed for a compressible gel under a
+        ball. For the displaced part the layer becomes thinner: d/h³ becomes the integral of
+        1/(h - d)³, which is larger by the factor ((1 - e)^-2 - 1)/(2 e).
         """
         table, e = nonlinear_excess(self.strain), min(self.indentation, 0.8)
         thinner = ((1 - e) ** -2 - 1) / (2 * e) - 1 if e > 0 else 0.0
@@ -77,38 +78,40 @@ class Touch:
 
 
 def nonlinear_excess(indentation: float) -> float:
-    """Share by which a linear gel under-reads the force: the table, straight beyond its end."""
+    """The table of the nonlinear excess, interpolated linearly."""
     e = max(0.0, indentation)
     points = NONLINEAR_EXCESS
     for (e0, x0), (e1, x1) in itertools.pairwise(points):
         if e <= e1:
             return x0 + (x1 - x0) * (e - e0) / (e1 - e0)
     (e0, x0), (e1, x1) = points[-2:]
-    # Beyond the table the excess grows faster than straight: double the last slope.
+    # Beyond the table the excess grows faster than linearly, hence twice the last slope.
     return x1 + 2 * (x1 - x0) / (e1 - e0) * (e - e1)
 
 
-def touch(
+def contact_estimate(
     footprint: Footprint,
     depth_mm: float,
     thickness_mm: float,
     youngs_modulus_mpa: float,
     poissons_ratio: float,
-) -> Touch:
-    """The contact at `depth_mm`, none for a depth of 0 or less.
+) -> ContactEstimate:
+    """Estimate the contact at `depth_mm`; it is empty for a depth of 0 or less.
 
-    The normal force adds the half-space under a flat punch, 2 E* a δ (Boussinesq; δ the mean
-    overlap V/A), which is all there is on a thick gel, to that of a thin bonded layer, which
-    compresses, M V/h, and squeezes out sideways, 3 G V A / (8 π h³) (lubrication with a free
-    upper face; four times as much where it sticks): the softer of the two governs, so they act
-    in series. The gel around the contact is in the way of what is squeezed out, as if the radius
-    were larger by 1.2 h, or 0.5 h where it sticks. These two are fitted to solved contacts
-    (ν 0.32 to 0.495, radius over thickness 0.7 to 3): the sum is 1.0 to 1.9 times those.
+    The normal force is the sum of two parts. The first is that of a half-space under a flat
+    punch, 2 E* a δ (Boussinesq, with the mean overlap δ = V/A), which is all there is on a thick
+    gel. The second is that of a thin bonded layer: compression, M V/h, in series with sideways
+    flow, 3 G V A / (8 π h³) (lubrication with a free upper face; four times as much with stick).
+    The surrounding gel hinders the flow as if the radius were larger by 1.2 h, or by 0.5 h with
+    stick. These two lengths are fitted to solved contacts (ν from 0.32 to 0.495, radius over
+    thickness from 0.7 to 3), for which the sum is 1.0 to 1.9 times the solved force.
     """
     d = max(0.0, depth_mm)
     area = footprint.area_mm2(d) if d > 0 else 0.0
     if area <= 0:
-        return Touch(d, d / thickness_mm, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, d / thickness_mm)
+        return ContactEstimate(
+            d, d / thickness_mm, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, d / thickness_mm
+        )
     volume, h = footprint.volume_mm3(d), thickness_mm
     e, nu = youngs_modulus_mpa, poissons_ratio
     g = e / (2 * (1 + nu))
@@ -126,7 +129,7 @@ def touch(
 
     normal = 1.1 * half_space + layer(1.0, 1.2)
     free = squeeze * (1 + 1.2 * h / a) ** 4
-    return Touch(
+    return ContactEstimate(
         d,
         d / h,
         area,
