@@ -51,7 +51,7 @@ PHYSICS = (
     "gelslim_force/forces/*.py",
     "gelslim_force/motion/*.py",
     "gelslim_force/tracking/*noise*.py",
-    "gelslim_twin/planner.py",
+    "gelslim_twin/planning/planner.py",
     "gelslim_twin/effects/*.py",
     "gelslim_twin/contact/*.py",
 )
