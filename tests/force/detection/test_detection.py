@@ -119,7 +119,7 @@ def test_dots_within_one_wide_dark_region_are_cut_out_at_a_higher_level():
 )
 def test_the_fast_path_gives_what_the_full_search_gives(look, limit_px):
     """From positions up to half a radius away, to less than the noise of the centres."""
-    frame = render(GRID, look=look)
+    frame = render(GRID, finger_view(aside_mm=0.0, lens_offset_px=(0.0, 0.0)), look)
     detector = detector_for(frame, look.double)
     full = detector.detect(frame.image)
     rng = np.random.default_rng(3)
@@ -129,11 +129,6 @@ def test_the_fast_path_gives_what_the_full_search_gives(look, limit_px):
     fast = detector.detect_near(frame.image, near, full.moments_px2)
     assert fast.found.all()
     apart = np.hypot(*(fast.centres_px - full.centres_px).T)
-    # From a start far off, the ring around a large double dot, where the light is measured, holds
-    # parts of its neighbours.
-    anchor = (full.flags & LARGE) > 0
-    assert apart[anchor].max() < (0.25 if look.double else 5 * limit_px)
-    apart = apart[~anchor]
     assert np.percentile(apart, 99) < limit_px
     assert apart.max() < 5 * limit_px
     assert np.allclose(fast.area_px, full.area_px, rtol=0.1)
