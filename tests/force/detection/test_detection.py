@@ -101,7 +101,7 @@ def test_dots_in_a_shadow_are_found():
     assert np.mean(gap[edge] < 3) > 0.6
 
 
-def test_dots_within_one_wide_dark_region_are_cut_out_at_a_higher_level():
+def test_dots_in_one_wide_dark_region_are_separated_at_a_higher_level():
     """A blot four pitches wide joins the dots; they are a little darker than it."""
     frame = render(GRID, look=Look(noise=2, contrast=0.6, gradient=0.2))
     y, x = np.mgrid[:480, :640]
@@ -150,7 +150,7 @@ def test_the_fast_path_finds_nothing_where_there_is_nothing():
     assert np.array_equal(lost.found[5:], frame.drawn[5:])
 
 
-def test_two_places_that_lead_to_one_dot_do_not_share_it():
+def test_of_two_predictions_of_one_dot_the_nearer_has_it():
     frame = render(GRID, look=Look(noise=4))
     detector = detector_for(frame)
     full = detector.detect(frame.image)
@@ -180,7 +180,7 @@ def test_doubtful_dots_are_flagged():
     assert np.all(cut.centres_px[rim, 0] < 12)
 
 
-def test_a_saturated_spot_swallows_its_dots_and_no_others():
+def test_a_saturated_spot_hides_only_the_dots_in_it():
     frame = render(GRID, look=Look(noise=8))
     y, x = np.mgrid[:480, :640]
     image = frame.image.copy()

@@ -53,7 +53,7 @@ def png_with_bad_pixels(image):
     return whole[: at + 4] + bytes(body) + crc + whole[at + 8 + length :]
 
 
-def test_a_folder_is_read_in_the_order_people_count(tmp_path):
+def test_a_folder_is_read_in_natural_order(tmp_path):
     for k in (10, 2, 9, 1):
         save(tmp_path / f"frame{k}.png", scene(k))
     (tmp_path / "notes.txt").write_text("no picture")
@@ -104,7 +104,7 @@ def test_broken_pictures_are_flagged_and_the_rest_goes_on(tmp_path):
     assert found[7].problem
 
 
-def test_a_first_picture_of_another_size_does_not_decide(tmp_path):
+def test_the_most_frequent_size_counts(tmp_path):
     save(tmp_path / "a.png", scene(1, (20, 20, 3)))
     for k in range(3):
         save(tmp_path / f"b{k}.png", scene(k))
@@ -135,7 +135,7 @@ def test_deep_transparent_and_grey_pictures(tmp_path):
     assert read_picture(tmp_path / "grey.png").shape == (48, 64)
 
 
-def test_pixels_stay_where_the_sensor_has_them(tmp_path):
+def test_the_orientation_in_exif_data_is_ignored(tmp_path):
     """A note in the file on how the camera was held must not turn the frame."""
     picture = Image.fromarray(scene(5))
     note = picture.getexif()
@@ -166,7 +166,7 @@ def test_a_video_gives_every_frame_with_its_time(tmp_path, ending):
     assert [f.time_s for f in frames_of(path, frames_per_s=50)][2] == pytest.approx(0.04)
 
 
-def test_a_truncated_video_gives_what_there_is_and_says_so(tmp_path):
+def test_a_truncated_video_gives_its_frames_and_a_problem(tmp_path):
     path = write_video(tmp_path / "run.avi", 14, (240, 320))
     data = path.read_bytes()
     path.write_bytes(data[: int(0.6 * len(data))])
@@ -180,7 +180,7 @@ def test_a_truncated_video_gives_what_there_is_and_says_so(tmp_path):
 
 
 class Broken:
-    """A capture whose reads fail where told; 20 frames."""
+    """A capture of 20 frames, some of which cannot be read."""
 
     def __init__(self, bad, count=20, opened=True):
         self.bad, self.count, self.opened, self.at, self.released = bad, count, opened, -1, 0
@@ -257,7 +257,7 @@ def test_times_that_do_not_fit_an_array():
             FrameArray(stack, times)
 
 
-def test_numpy_files_that_are_none(tmp_path):
+def test_damaged_numpy_files(tmp_path):
     np.save(tmp_path / "run.npy", np.zeros((5, 48, 64), np.uint8))
     data = (tmp_path / "run.npy").read_bytes()
     (tmp_path / "cut.npy").write_bytes(data[:9000])

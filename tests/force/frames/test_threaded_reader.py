@@ -11,7 +11,7 @@ from gelslim_force.frames.threaded_reader import ThreadedReader
 
 
 class Scripted(FrameSource):
-    """Frames 0 ... count-1; tells when so many were read, and waits to be told to go on."""
+    """Frames 0 ... count-1; an event says when so many were read, another lets it go on."""
 
     def __init__(self, count, live, fails_at=None, holds_at=None):
         self.count, self.live, self.frames_per_s = count, live, 90.0
@@ -34,7 +34,7 @@ class Scripted(FrameSource):
         self.closed += 1
 
 
-def test_live_frames_that_nobody_took_are_dropped_and_the_newest_is_kept():
+def test_old_live_frames_are_dropped_and_the_latest_is_kept():
     source = Scripted(100, live=True, holds_at=1)
     with ThreadedReader(source) as reader:
         frames = iter(reader)
@@ -122,7 +122,7 @@ class FakeCapture:
         self.released += 1
 
 
-def test_a_camera_that_stumbles_goes_on_and_one_that_is_gone_ends():
+def test_a_failed_read_is_skipped_and_a_lost_camera_ends_the_frames():
     capture = FakeCapture([(48, 64)] * 3 + [None] * 2 + [(48, 64), (24, 32), (48, 64), None])
     ticks = iter(np.arange(1000) * 0.5)
     camera = LiveCamera(0, capture=lambda device: capture, clock=lambda: float(next(ticks)))

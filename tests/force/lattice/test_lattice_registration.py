@@ -33,7 +33,7 @@ def assert_right(registration, frame, least=1.0):
 @pytest.mark.parametrize(
     "look", [Look(), Look(noise=8), Look(noise=8, blur=2, dirt=10, specular=5)]
 )
-def test_every_dot_is_named_by_the_anchors_alone(anchors, look):
+def test_the_anchors_alone_identify_every_dot(anchors, look):
     grid = grid_of_dots(anchors)
     frame = render(grid, look=look)
     found = register(detected(frame), grid, SHAPE)
@@ -126,7 +126,7 @@ def test_a_corner_in_shadow():
     assert 0.8 < lit.mean() < 0.97
 
 
-def test_without_anchors_the_camera_decides_and_without_both_nobody_does():
+def test_without_anchors_the_camera_decides_and_without_both_it_is_refused():
     grid = grid_of_dots("none")
     frame = render(grid, look=Look(noise=5))
     dots = detected(frame)
@@ -184,7 +184,7 @@ def test_a_lattice_of_no_known_print():
     assert np.allclose(np.abs(change[:2]).sum(axis=0), 1.0)
 
 
-def test_a_speck_beside_the_print_adds_no_row():
+def test_a_speck_next_to_the_print_adds_no_row():
     frame = render(GRID, look=Look())
     dots = detected(frame)
     at = (GRID.row == 9) & (GRID.column >= 14)

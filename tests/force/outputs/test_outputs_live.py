@@ -90,7 +90,7 @@ def part(answer: Any) -> bytes:
     return bytes(data)
 
 
-def test_other_names_are_turned_away() -> None:
+def test_requests_under_other_host_names_are_refused() -> None:
     with LiveView() as view:
         port = urlparse(view.url).port
         assert get(view, "/state.json", host=f"evil.example:{port}")[0] == 403

@@ -151,7 +151,7 @@ def test_a_killed_run_has_every_frame(tmp_path: Path) -> None:
         samples.assert_same(mine, samples.frame(k), 0.0)
 
 
-def test_a_piece_cut_off_is_left_out_and_named(tmp_path: Path) -> None:
+def test_an_incomplete_record_is_left_out_and_reported(tmp_path: Path) -> None:
     folder = tmp_path / "cut"
     child(folder, "os.kill(os.getpid(), signal.SIGKILL)")
     part = max(folder.glob("*.part"))
@@ -209,7 +209,7 @@ except OutputError as error:
     assert run.manifest["counts"]["frames"] == count
 
 
-def test_a_chunk_that_cannot_be_written_is_told_with_the_next_frame(tmp_path: Path) -> None:
+def test_a_chunk_that_cannot_be_written_fails_the_next_frame(tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     run = RunRecorder(folder, keep=RecorderSettings(frames_per_chunk=1))
     run.append(samples.frame(0))

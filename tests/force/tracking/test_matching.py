@@ -1,4 +1,4 @@
-"""Dots to markers in one shot, against the truth; and the paper's nearest neighbour beside it."""
+"""Matching of dots to markers in one frame, against the truth and the nearest neighbour."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_the_nearest_neighbour_fails_from_half_a_pitch_on(score, kind):
     assert right >= 0.99 * there, "fine while markers move less than half a pitch"
 
 
-def test_the_nearest_neighbour_takes_dots_twice_and_knows_no_doubt():
+def test_the_nearest_neighbour_takes_dots_twice():
     rng = np.random.default_rng(1)
     seen = shot(rng, 0.0, missing=0.2, spurious=0.0)
     tracks = match(REFERENCE, seen.dots_px, mode="nearest")
@@ -87,7 +87,7 @@ def test_half_of_the_markers_missing():
         assert tracks.coverage == pytest.approx(tracks.tracked.mean())
 
 
-def test_predicted_places_of_missing_markers_are_near_the_truth():
+def test_predicted_positions_of_missing_markers_are_near_the_truth():
     rng = np.random.default_rng(4)
     moved = motion(rng, "both", 0.5)
     seen = shot(rng, moved, missing=0.1, spurious=0.0)
@@ -115,7 +115,7 @@ def test_a_dot_that_contradicts_its_neighbours_is_rejected():
     assert tracks.tracked.sum() == len(GRID) - 1
 
 
-def test_the_steep_rim_of_a_contact_keeps_its_markers():
+def test_markers_at_the_steep_edge_of_a_contact_are_kept():
     """Pushed aside by a third of a pitch within one pitch, as real presses do."""
     place = GRID.positions_mm - [1.3, 0.4]
     far = np.hypot(*place.T)
@@ -149,7 +149,7 @@ def test_whole_print_in_view_shows_a_shift_of_one_pitch():
 
 
 @pytest.mark.parametrize("count", [0, 1, 5, 30])
-def test_next_to_no_dots(count):
+def test_almost_no_dots(count):
     rng = np.random.default_rng(9)
     tracks = match(REFERENCE, rng.uniform(0, 400, (count, 2)))
     assert tracks.tracked.sum() <= 0.3 * count

@@ -86,7 +86,7 @@ def test_nothing_moves_nothing_moves(rest):
         assert np.sqrt(np.mean(tracked.tracks.displacement_px**2)) < 0.05
 
 
-def test_frames_dropped_in_mid_press_cost_nothing(rest):
+def test_frames_dropped_during_a_press_lose_no_marker(rest):
     """From rest to more than a pitch at once, and back."""
     tracker = tracker_for(rest)
     for amount in (0.0, 0.1, 1.4, 0.0, 1.4, 0.7):
@@ -165,7 +165,7 @@ def test_black_frames_white_frames_and_another_scene_are_survived(rest):
 
 
 @pytest.mark.parametrize("step", [(1, 0), (0, -1)])
-def test_a_slip_of_the_whole_lattice_by_a_pitch_is_told_by_the_anchors(rest, step):
+def test_the_anchors_show_a_shift_of_all_markers_by_a_pitch(rest, step):
     """Between two frames the print moves by a pitch: nothing but the anchors looks different."""
     tracker = tracker_for(rest, TrackerSettings(full_every=5))
     tracker.update(rest.image)
