@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gelslim_twin.simulation.sensor import TwinSensor
 
 import gelslim
 from gelslim.cli import main
@@ -15,6 +14,7 @@ from gelslim_cad.build.writers import WRITERS
 from gelslim_cad.spec import Spec
 from gelslim_core.budget.budget import Budget, BudgetError
 from gelslim_optics.light.light_map import LightMap
+from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle
 
