@@ -19,8 +19,8 @@ import numpy as np
 
 from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.rays import newton_rays
-from gelslim_optics.camera.refraction import newton_slope
 from gelslim_optics.camera.refraction_kernel import solve_rays, solve_slopes
+from gelslim_optics.camera.refraction_newton import newton_slope
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
 HEIGHTS_MM, INDICES = (31.0, 2.5, 2.0), (1.0, 1.4906, 1.41)

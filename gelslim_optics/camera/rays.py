@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_optics.camera.refraction import (
     LayerStack,
-    newton_slope,
     reach_growth,
     reach_per_slope,
 )
+from gelslim_optics.camera.refraction_newton import newton_slope
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def ray_slope(
 
         slope = solve_slopes(np.broadcast_to(r, shape), heights, media)
     else:
-        slope = newton_slope(r, heights, media)
+        slope = np.asarray(newton_slope(r, heights, media), dtype=float)
     return np.copysign(slope, np.broadcast_to(signed, slope.shape))
 
 

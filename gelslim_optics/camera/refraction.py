@@ -6,7 +6,7 @@ sin θi = sin θ0 / ni and reaches r(θ0) = Σ hi tan θi sideways (Snell's law)
     r(t) = Σ hi t / sqrt(ni² + (ni² - 1) t²),
 
 a sum of positive terms without cancellation, from the normal ray to grazing incidence.
-`newton_slope` inverts it; `rays.ray_slope` also checks its input and uses a compiled loop.
+`refraction_newton.newton_slope` inverts it; `rays.ray_slope` also checks its input.
 """
 
 from __future__ import annotations
@@ -18,13 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from gelslim_optics.camera.refraction_newton import apparent_height, slope_ratio
 
-MAX_NEWTON_STEPS = 60
-# t |r''| <= 3 r' term by term, so a Newton step of δt leaves at most about 1.5 (δt/t)² t.
-RELATIVE_STEP = 1e-8
-# Below this slope the asymptotic start is never the better one; its square root is saved.
-STEEP_SLOPE = 0.5
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -111,11 +107,9 @@ def reach_per_slope(
 ) -> Array:
     """r(t)/t in mm: Σ h / sqrt(n² + (n² - 1) t²); for the normal ray the apparent height."""
     t = np.asarray(slope, dtype=float)
-    total = np.zeros(np.broadcast_shapes(t.shape, *(np.shape(h) for h in heights_mm)))
-    for height, index in zip(heights_mm, indices, strict=True):
-        n = np.asarray(index, dtype=float)
-        total = total + np.asarray(height) * (1 / np.sqrt(n * n + (n - 1) * (n + 1) * t * t))
-    return np.asarray(total, dtype=float)
+    heights = [np.asarray(h, dtype=float) for h in heights_mm]
+    media = [np.asarray(n, dtype=float) for n in indices]
+    return np.asarray(apparent_height(t, heights, media), dtype=float)
 
 
 def reach_growth(
@@ -126,50 +120,6 @@ def reach_growth(
     total = np.zeros(np.broadcast_shapes(t.shape, *(np.shape(h) for h in heights_mm)))
     for height, index in zip(heights_mm, indices, strict=True):
         n = np.asarray(index, dtype=float)
-        w = 1 / np.sqrt(n * n + (n - 1) * (n + 1) * t * t)
+        w = slope_ratio(t, n)
         total = total + np.asarray(height) * w * (n * n) * w * w
     return np.asarray(total, dtype=float)
-
-
-def newton_slope(r: Array, heights_mm: Sequence[Array], indices: Sequence[Array]) -> Array:
-    """Slope in air of the rays with reaches `r` >= 0 in mm; the input is not checked.
-
-    Newton's method for t. The reach is increasing and concave in t and lies below both t Σ h/n and
-    its asymptote. From the larger of the two starts that these give, the iteration increases to
-    the root and never passes it. A ray whose step is small (or, by rounding, negative) is final.
-    The compiled loop in `refraction_kernel` gives the same digits.
-    """
-    n2 = [n * n for n in indices]
-    m2 = [(n - 1) * (n + 1) for n in indices]
-    t = r / sum(h / n for h, n in zip(heights_mm, indices, strict=True))
-    steep = t > STEEP_SLOPE
-    if steep.any():
-        bound = _grazing_bound(r, heights_mm, m2)
-        t = np.where(steep & (bound > t), bound, t)
-    moving = np.ones(t.shape, dtype=bool)
-    for _ in range(MAX_NEWTON_STEPS):
-        reach_per_t = np.zeros_like(t)
-        growth = np.zeros_like(t)
-        for h, a, b in zip(heights_mm, n2, m2, strict=True):
-            w = 1 / np.sqrt(a + b * t * t)
-            reach_per_t = reach_per_t + h * w
-            growth = growth + h * w * a * w * w
-        step = (r - t * reach_per_t) / growth
-        next_t = t + step
-        converged = ~(step > RELATIVE_STEP * t)
-        t = np.where(moving, next_t, t)
-        moving &= ~converged
-        if not moving.any():
-            break
-    return np.asarray(t, dtype=float)
-
-
-def _grazing_bound(r: Array, heights_mm: Sequence[Array], m2: Sequence[Array]) -> Array:
-    """Slope at which the asymptote Σ h/sqrt(n² - 1) + t h_air reaches `r`; it is below the root."""
-    sideways: Array | float = 0.0
-    air: Array | float = 0.0
-    for h, b in zip(heights_mm, m2, strict=True):
-        dense = b > 0
-        sideways = sideways + np.where(dense, h / np.sqrt(np.where(dense, b, 1.0)), 0.0)
-        air = air + np.where(dense, 0.0, h)
-    return np.asarray((r - sideways) / air, dtype=float)

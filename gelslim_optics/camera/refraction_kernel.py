@@ -1,109 +1,105 @@
 """Compiled Newton's method for the slopes of many rays. Importing this module loads numba.
 
-Each ray takes the same operations in the same order as in `refraction.newton_slope`.
+Each ray's slope comes from `refraction_newton.newton_slope`, which is compiled here for numbers.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Sequence
+import zlib
+from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
-from gelslim_optics.camera.refraction import MAX_NEWTON_STEPS, RELATIVE_STEP, STEEP_SLOPE
+from gelslim_optics.camera import refraction_newton
+from gelslim_optics.camera.refraction_newton import choose, newton_slope
 
 Array = NDArray[np.float64]
 
 COMPILED = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
-INLINED = {**COMPILED, "forceinline": True}
+INLINED = {"error_model": "numpy", "_nrt": False, "forceinline": True}
 
 
-@njit(**INLINED)
-def slope_of(r: Any, h: Any, n: Any, n2: Any, m2: Any) -> Any:
-    """Slope in air of one ray of reach r >= 0 through layers h (L,), indices n (L,)."""
-    layers = h.size
-    paraxial = 0.0
-    for k in range(layers):
-        paraxial = paraxial + h[k] / n[k]
-    t = r / paraxial
-    if t > STEEP_SLOPE:
-        sideways = 0.0
-        air = 0.0
-        for k in range(layers):
-            if m2[k] > 0:
-                sideways = sideways + h[k] / math.sqrt(m2[k])
-            else:
-                air = air + h[k]
-        bound = (r - sideways) / air
-        if bound > t:
-            t = bound
-    for _ in range(MAX_NEWTON_STEPS):
-        reach_per_t = 0.0
-        growth = 0.0
-        for k in range(layers):
-            w = 1 / math.sqrt(n2[k] + m2[k] * t * t)
-            reach_per_t = reach_per_t + h[k] * w
-            growth = growth + h[k] * w * n2[k] * w * w
-        step = (r - t * reach_per_t) / growth
-        converged = not (step > RELATIVE_STEP * t)
-        t = t + step
-        if converged:
-            break
-    return t
+@overload(choose, strict=False, jit_options=INLINED)
+def _choose_number(condition: Any, if_true: Any, if_false: Any) -> Any:
+    return lambda condition, if_true, if_false: if_true if condition else if_false
 
 
-@njit(**COMPILED)
-def slopes(
-    reach: Any, heights: Any, h_first: Any, h_stride: Any, media: Any, n_first: Any, n_stride: Any,
-    work: Any, out: Any,
-) -> None:  # fmt: skip
-    """Slopes `out` (n,); layer k of ray i has the height heights[h_first[k] + h_stride[k] i]."""
-    h, n, n2, m2 = work[0], work[1], work[2], work[3]
-    for i in range(reach.size):
-        for k in range(h.size):
-            h[k] = heights[h_first[k] + h_stride[k] * i]
-            if i == 0 or n_stride[k] > 0:
-                n[k] = media[n_first[k] + n_stride[k] * i]
-                n2[k] = n[k] * n[k]
-                m2[k] = (n[k] - 1) * (n[k] + 1)
-        out[i] = slope_of(reach[i], h, n, n2, m2)
+def let_compile(functions: Sequence[Callable[..., Any]]) -> None:
+    """Let compiled loops call these plain functions."""
+    for function in functions:
+        register_jitable(**INLINED)(function)
 
 
-@njit(**COMPILED)
-def rays_to_points(
-    points: Any, pinhole: Any, axes: Any, tops: Any, index: Any, work: Any, out: Any
-) -> None:
-    """Rays in air to `points` (n, 3), on the camera's axes; points that are not finite give NaN.
+def source_key(*modules: ModuleType) -> int:
+    """A number that changes with the source of the modules.
 
-    `axes` (3, 3) has right, down and forward as rows; `tops` (L,) are the heights at which the
-    layers end (inf for the last), `index` (L,) their indices, the air first; `work` (4, L) is
-    work space; the result goes to `out` (n, 3).
+    numba compiles cached code again when the file of the loop has changed, but not when the file
+    of a function that the loop calls has. A loop whose closure holds this number follows both.
     """
-    h, n, n2, m2 = work[0], work[1], work[2], work[3]
-    for k in range(index.size):
-        n[k] = index[k]
-        n2[k] = n[k] * n[k]
-        m2[k] = (n[k] - 1) * (n[k] + 1)
-    for i in range(points.shape[0]):
-        x = points[i, 0] - pinhole[0]
-        y = points[i, 1] - pinhole[1]
-        z = points[i, 2]
-        if not math.isfinite(x + y + z):
-            out[i, 0] = out[i, 1] = out[i, 2] = math.nan
-            continue
-        floor = pinhole[2]
-        for k in range(index.size):
-            h[k] = max(min(z, tops[k]) - floor, 0.0)
-            floor = max(floor, tops[k])
-        r = math.sqrt(x * x + y * y)
-        scale = slope_of(r, h, n, n2, m2) / r if r > 0 else 0.0
-        x = x * scale
-        y = y * scale
-        for k in range(3):
-            out[i, k] = axes[k, 0] * x + axes[k, 1] * y + axes[k, 2]
+    return zlib.crc32("".join(map(inspect.getsource, modules)).encode())
+
+
+let_compile(refraction_newton.SHARED)
+
+
+def _compile(source: int) -> tuple[Callable[..., None], Callable[..., None]]:
+    @njit(**COMPILED)
+    def slopes(
+        reach: Any, heights: Any, h_first: Any, h_stride: Any, media: Any, n_first: Any,
+        n_stride: Any, work: Any, out: Any,
+    ) -> None:  # fmt: skip
+        """Slopes `out` (n,); layer k of ray i has the height heights[h_first[k] + h_stride[k] i].
+
+        Its index is found in `media` likewise; `work` (2, L) is work space.
+        """
+        source  # noqa: B018
+        h, n = work[0], work[1]
+        for i in range(reach.size):
+            for k in range(h.size):
+                h[k] = heights[h_first[k] + h_stride[k] * i]
+                n[k] = media[n_first[k] + n_stride[k] * i]
+            out[i] = newton_slope(reach[i], h, n)
+
+    @njit(**COMPILED)
+    def rays_to_points(
+        points: Any, pinhole: Any, axes: Any, tops: Any, index: Any, h: Any, out: Any
+    ) -> None:
+        """Rays in air to `points` (n, 3), on the camera's axes; points not finite give NaN.
+
+        `axes` (3, 3) has right, down and forward as rows; `tops` (L,) are the heights at which the
+        layers end (inf for the last), `index` (L,) their indices, the air first; `h` (L,) is work
+        space; the result goes to `out` (n, 3).
+        """
+        source  # noqa: B018
+        for i in range(points.shape[0]):
+            x = points[i, 0] - pinhole[0]
+            y = points[i, 1] - pinhole[1]
+            z = points[i, 2]
+            if not math.isfinite(x + y + z):
+                out[i, 0] = out[i, 1] = out[i, 2] = math.nan
+                continue
+            floor = pinhole[2]
+            for k in range(index.size):
+                h[k] = max(min(z, tops[k]) - floor, 0.0)
+                floor = max(floor, tops[k])
+            r = math.sqrt(x * x + y * y)
+            scale = newton_slope(r, h, index) / r if r > 0 else 0.0
+            x = x * scale
+            y = y * scale
+            for k in range(3):
+                out[i, k] = axes[k, 0] * x + axes[k, 1] * y + axes[k, 2]
+
+    return slopes, rays_to_points
+
+
+_slopes, _rays_to_points = _compile(source_key(refraction_newton))
 
 
 def solve_rays(
@@ -111,8 +107,8 @@ def solve_rays(
 ) -> Array:
     """`rays.newton_rays` (n, 3), compiled."""
     out = np.empty(points_mm.shape)
-    work = np.empty((4, index.size))
-    rays_to_points(np.ascontiguousarray(points_mm), pinhole_mm, axes, tops, index, work, out)
+    work = np.empty(index.size)
+    _rays_to_points(np.ascontiguousarray(points_mm), pinhole_mm, axes, tops, index, work, out)
     return out
 
 
@@ -125,14 +121,13 @@ def _packed(arrays: Sequence[Array], shape: tuple[int, ...]) -> tuple[Array, Any
 
 
 def solve_slopes(reach: Array, heights_mm: Sequence[Array], indices: Sequence[Array]) -> Array:
-    """`refraction.newton_slope` for a broadcast `reach` of any shape, compiled."""
+    """`newton_slope` for a broadcast `reach` of any shape, compiled."""
     out = np.empty(reach.size)
-    work = np.empty((4, len(heights_mm)))
-    slopes(
+    _slopes(
         np.ascontiguousarray(reach).ravel(),
         *_packed(heights_mm, reach.shape),
         *_packed(indices, reach.shape),
-        work,
+        np.empty((2, len(heights_mm))),
         out,
     )
     return out.reshape(reach.shape)

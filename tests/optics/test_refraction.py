@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from gelslim_optics.camera.rays import ray_slope
-from gelslim_optics.camera.refraction import lateral_reach, newton_slope, reach_growth
+from gelslim_optics.camera.refraction import lateral_reach, reach_growth
+from gelslim_optics.camera.refraction_newton import newton_slope
 
 LAYERS = [
     ([8.0], [1.0]),
