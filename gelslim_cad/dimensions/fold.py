@@ -3,7 +3,10 @@
 Coordinates x (towards the tip) and z (out of the gel) of the sensor frame. A candidate is given
 by the air angles of the two marginal rays that end on the gel's edges and by the mirror angle;
 everything else follows in closed form, exact refraction included (docs/physics.md).
-Every field is an array; candidates broadcast against designs.
+
+Every field is an array; candidates broadcast against designs. The functions of `fold_sight`,
+`fold_mirror`, `fold_camera` and `fold_room` are written once for arrays and for single numbers:
+`fold_search` compiles them (each module's `SHARED`) to score one candidate after the other.
 """
 
 from __future__ import annotations
@@ -12,13 +15,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_camera import Camera, camera
-from gelslim_cad.dimensions.fold_mirror import Mirror, mirror
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
-from gelslim_cad.dimensions.fold_sight import Sight, sight
+from gelslim_cad.dimensions import fold_room as room
+from gelslim_cad.dimensions.fold_camera import Camera, camera, largest, pitch_rad, smallest
+from gelslim_cad.dimensions.fold_mirror import (
+    Mirror,
+    mirror,
+    mirror_depth_mm,
+    mirror_half_width_mm,
+    reflected,
+)
+from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
+from gelslim_cad.dimensions.fold_sight import (
+    Distances,
+    Sight,
+    distances,
+    field_missed,
+    keystone,
+    picture_missed,
+    sight,
+)
+from gelslim_optics.camera.refraction_newton import choose
 
-SCALE_MM = 10
-"""A length missed by this much counts as a ratio missed by all of its limit."""
+FEASIBLE = 1e-9
+"""Limits missed by no more than this in all count as kept."""
+INFEASIBLE_MM = 1000.0
+KEYSTONE_WEIGHT_MM = 0.02
+LENGTH_WEIGHT = 0.002
 
 
 @dataclass(frozen=True)
@@ -52,6 +74,7 @@ class Fold:
     mirror_depth_mm: Array
     camera_depth_mm: Array
     depth_mm: Array
+    keystone: Array
     violations: dict[str, Array]
     """Per constraint, how far it is missed as a part of its scale; <= 0 holds."""
 
@@ -62,16 +85,20 @@ class Fold:
             total = total + np.maximum(value, 0.0)
         return total
 
+    def objective(self) -> Array:
+        """What the search makes least."""
+        return score(self.worst(), self.depth_mm, self.keystone, self.camera_rear_x_mm)
+
 
 def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fold:
     """Lay out candidates: mean ray angle, spread as a part of the field of view, mirror angle."""
     s = sight(p, mid_rad, spread)
-    m = mirror(p, s, mirror_rad)
-    c = camera(p, s, m)
-    ledge_edge = _ledge_edge_x_mm(p, s)
-    bottom = c.bottom_z_mm
-    mirror_depth = m.depth_mm(p)
-    camera_depth = p.window_z_mm - bottom + p.clearance_mm
+    d = distances(p, s)
+    m = mirror(p, s, np.cos(mirror_rad), np.sin(mirror_rad))
+    pitch = pitch_rad(s, mirror_rad)
+    c = camera(p, *reflected(m, s.virtual_x_mm, s.virtual_z_mm), pitch)
+    bottom = smallest(c.corners_z_mm)
+    mirror_depth, camera_depth = mirror_depth_mm(p, m), camera_depth_mm(p, bottom)
     return Fold(
         near_ray_rad=s.near_ray_rad,
         far_ray_rad=s.far_ray_rad,
@@ -80,78 +107,67 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         virtual_x_mm=s.virtual_x_mm,
         virtual_z_mm=s.virtual_z_mm,
         mirror_rad=mirror_rad + 0 * s.air_height_mm,
-        pitch_rad=c.pitch_rad,
+        pitch_rad=pitch,
         mirror_upper_x_mm=m.upper_x_mm,
         mirror_upper_z_mm=m.upper_z_mm,
         mirror_lower_x_mm=m.lower_x_mm,
         mirror_lower_z_mm=m.lower_z_mm,
-        mirror_half_width_mm=m.half_width_mm,
+        mirror_half_width_mm=mirror_half_width_mm(s, m),
         camera_x_mm=c.x_mm,
         camera_z_mm=c.z_mm,
-        camera_top_z_mm=c.top_z_mm,
+        camera_top_z_mm=largest(c.corners_z_mm),
         camera_bottom_z_mm=bottom,
-        camera_front_x_mm=c.front_x_mm,
-        camera_rear_x_mm=c.rear_x_mm,
-        ledge_edge_x_mm=ledge_edge,
-        near_distance_mm=s.near_distance_mm,
-        far_distance_mm=s.far_distance_mm,
+        camera_front_x_mm=largest(c.corners_x_mm),
+        camera_rear_x_mm=smallest(c.corners_x_mm),
+        ledge_edge_x_mm=room.ledge_edge_x_mm(p, s),
+        near_distance_mm=d.near_mm,
+        far_distance_mm=d.far_mm,
         corner_horizontal_tan=s.corner_horizontal_tan,
         corner_vertical_tan=s.corner_vertical_tan,
         mirror_depth_mm=mirror_depth,
         camera_depth_mm=camera_depth,
-        depth_mm=np.maximum(np.maximum(mirror_depth, camera_depth), p.guide_stack_mm),
-        violations={**s.missed(p), **_missed_room(p, s, m, c, ledge_edge)},
+        depth_mm=depth_mm(p, mirror_depth, camera_depth),
+        keystone=keystone(d),
+        violations=_violations(p, s, d, m, c),
     )
 
 
-def _ledge_z_mm(p: FoldProblem) -> Array:
-    """Lower face of the ledge that carries the guide's near end."""
-    return p.window_z_mm - p.ledge_depth_mm
-
-
-def _ledge_edge_x_mm(p: FoldProblem, s: Sight) -> Array:
-    """The ledge's edge: short of the gel and of the view."""
-    return np.minimum(-p.gel_length_mm / 2 - 0.2, s.near_edge_x_mm(_ledge_z_mm(p)) - p.clearance_mm)
-
-
-def _missed_room(
-    p: FoldProblem, s: Sight, m: Mirror, c: Camera, ledge_edge: Array
-) -> dict[str, Array]:
-    """How far mirror, camera, view and ledge are in each other's way, as parts of SCALE_MM."""
-    gap = p.clearance_mm
-    lower_end = m.lower_end_x_mm(p)
-    before_view = [x - s.near_edge_x_mm(z) + gap for x, z in c.corners_mm]
-    below_mirror = [gap - m.height_over_mm(x, z) for x, z in c.corners_mm]
-    before_mirror = [x - lower_end + gap for x, _ in c.corners_mm]
-    missed = {
-        "mirror below window": np.maximum(-m.length_mm, s.virtual_z_mm - m.lower_z_mm),
-        "camera below window": c.top_z_mm - p.window_z_mm + gap,
-        "camera beside view": np.max(before_view, axis=0),
-        "camera clear of mirror": np.minimum(
-            np.max(below_mirror, axis=0), np.max(before_mirror, axis=0)
-        ),
-        "view below ledge": _view_above_ledge_mm(p, m, c, ledge_edge),
-        "mirror before camera": lower_end * -1 + c.x_mm + gap,
-        "camera clear of ledge": _camera_in_ledge_mm(p, c, ledge_edge),
+def _violations(p: FoldProblem, s: Sight, d: Distances, m: Mirror, c: Camera) -> dict[str, Array]:
+    """How far each limit is missed, by the limit's name in words."""
+    ledge_x = room.ledge_edge_x_mm(p, s)
+    picture = field_missed(p, s)._asdict() | picture_missed(p, s, d)._asdict()
+    in_the_way = {
+        "mirror below window": room.mirror_below_window(s, m),
+        "camera below window": room.camera_below_window(p, c),
+        "camera beside view": room.camera_beside_view(p, s, c),
+        "camera clear of mirror": room.camera_clear_of_mirror(p, m, c),
+        "view below ledge": room.view_below_ledge(p, m, c, ledge_x),
+        "mirror before camera": room.mirror_before_camera(p, m, c.x_mm),
+        "camera clear of ledge": room.camera_clear_of_ledge(p, c, ledge_x),
     }
-    return {name: value / SCALE_MM for name, value in missed.items()}
+    return {
+        **{name.replace("_", " "): missed for name, missed in picture.items()},
+        **{name: missed / room.SCALE_MM for name, missed in in_the_way.items()},
+    }
 
 
-def _view_above_ledge_mm(p: FoldProblem, m: Mirror, c: Camera, ledge_edge: Array) -> Array:
-    """How far the view from the camera to the mirror's upper end is above ledge and beam."""
-    climb = (m.upper_z_mm - c.z_mm) / (m.upper_x_mm - c.x_mm)
-    at_edge, at_beam = (
-        np.where(x > c.x_mm, c.z_mm + climb * (x - c.x_mm), -np.inf)
-        + p.clearance_mm
-        - _ledge_z_mm(p)
-        for x in (ledge_edge, ledge_edge - p.ledge_reach_mm)
-    )
-    return np.maximum(at_edge, at_beam)
+def camera_depth_mm(p: FoldProblem, bottom_z_mm: Array) -> Array:
+    """How far the camera, its clearance included, reaches below the window."""
+    return p.window_z_mm - bottom_z_mm + p.clearance_mm
 
 
-def _camera_in_ledge_mm(p: FoldProblem, c: Camera, ledge_edge: Array) -> Array:
-    """How far the camera is in the corner below the beam, or the beam's edge in the camera."""
-    beam_x, ledge_z, gap = ledge_edge - p.ledge_reach_mm, _ledge_z_mm(p), p.clearance_mm
-    corners = [np.minimum(x - beam_x, z - ledge_z + gap) for x, z in c.corners_mm]
-    edge = gap - c.distance_outside_mm(p, beam_x, ledge_z)
-    return np.maximum(np.max(corners, axis=0), edge)
+def depth_mm(p: FoldProblem, mirror_depth: Array, camera_depth: Array) -> Array:
+    """Depth below the window that mirror, camera and guide need."""
+    return larger(larger(mirror_depth, camera_depth), p.guide_stack_mm)
+
+
+def score(missed: Array, depth: Array, keystone: Array, rear_x_mm: Array) -> Array:
+    """Depth in mm; among equals the smaller keystone, then the shorter finger.
+
+    Candidates that miss limits rank behind all others, by how far they miss.
+    """
+    tie = KEYSTONE_WEIGHT_MM * (keystone - 1) - LENGTH_WEIGHT * rear_x_mm
+    return choose(missed > FEASIBLE, INFEASIBLE_MM * (1 + missed), depth + tie)
+
+
+SHARED = (camera_depth_mm, depth_mm, score)

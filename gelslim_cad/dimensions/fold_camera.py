@@ -2,66 +2,89 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_mirror import Mirror
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
 from gelslim_cad.dimensions.fold_sight import Sight
 
+Corners = tuple[Array, Array, Array, Array, Array, Array]
+"""A coordinate of the barrel's front, the housing's front and its rear: upper, lower corner."""
 
-@dataclass(frozen=True)
-class Camera:
+
+class Camera(NamedTuple):
     """Pinhole, pitch of the axis, and corners (x, z) of housing and lens barrel; mm."""
 
     x_mm: Array
     z_mm: Array
-    pitch_rad: Array
-    corners_mm: list[tuple[Array, Array]]
-
-    @property
-    def top_z_mm(self) -> Array:
-        """Highest corner."""
-        return np.max([z for _, z in self.corners_mm], axis=0)
-
-    @property
-    def bottom_z_mm(self) -> Array:
-        """Lowest corner."""
-        return np.min([z for _, z in self.corners_mm], axis=0)
-
-    @property
-    def front_x_mm(self) -> Array:
-        """Corner nearest to the tip."""
-        return np.max([x for x, _ in self.corners_mm], axis=0)
-
-    @property
-    def rear_x_mm(self) -> Array:
-        """Corner farthest from the tip."""
-        return np.min([x for x, _ in self.corners_mm], axis=0)
-
-    def distance_outside_mm(self, p: FoldProblem, x_mm: Array, z_mm: Array) -> Array:
-        """How far a point before or above the camera is outside housing and lens barrel."""
-        dx, dz = x_mm - self.x_mm, z_mm - self.z_mm
-        c, s = np.cos(self.pitch_rad), np.sin(self.pitch_rad)
-        ahead, above = dx * c - dz * s, dx * s + dz * c
-        housing = np.maximum(ahead + p.lens_height_mm, above - p.module_height_mm / 2)
-        barrel = np.maximum(ahead, above - p.lens_diameter_mm / 2)
-        return np.minimum(housing, barrel)
+    cos: Array
+    """Cosine of the pitch."""
+    sin: Array
+    corners_x_mm: Corners
+    corners_z_mm: Corners
 
 
-def camera(p: FoldProblem, s: Sight, m: Mirror) -> Camera:
-    """The camera where the mirror puts the virtual one."""
-    x, z = m.reflected(s.virtual_x_mm, s.virtual_z_mm)
-    pitch = np.pi / 2 - 2 * m.angle_rad - s.tilt_rad
-    return Camera(x, z, pitch, _corners(p, x, z, pitch))
+def pitch_rad(s: Sight, mirror_rad: Array) -> Array:
+    """Pitch of the axis down towards the mirror."""
+    return np.pi / 2 - 2 * mirror_rad - s.tilt_rad
 
 
-def _corners(p: FoldProblem, x: Array, z: Array, pitch: Array) -> list[tuple[Array, Array]]:
-    """Corners (x, z) of housing and lens barrel; the pinhole lies in the barrel's front face."""
-    c, s = np.cos(pitch), np.sin(pitch)
+def camera(p: FoldProblem, x_mm: Array, z_mm: Array, pitch_rad: Array) -> Camera:
+    """The camera about its pinhole, which lies in the barrel's front face."""
+    c, s = np.cos(pitch_rad), np.sin(pitch_rad)
     half, radius = p.module_height_mm / 2, p.lens_diameter_mm / 2
-    face, rear = -p.lens_height_mm, -p.lens_height_mm - p.module_depth_mm
-    local = [(0 * face, radius), (0 * face, -radius)]
-    local += [(a, b) for a in (face, rear) for b in (half, -half)]
-    return [(x + a * c + b * s, z - a * s + b * c) for a, b in local]
+    front, rear = -p.lens_height_mm, -p.lens_height_mm - p.module_depth_mm
+    front_x, front_z = x_mm + front * c, z_mm - front * s
+    rear_x, rear_z = x_mm + rear * c, z_mm - rear * s
+    return Camera(
+        x_mm=x_mm,
+        z_mm=z_mm,
+        cos=c,
+        sin=s,
+        corners_x_mm=(
+            x_mm + radius * s,
+            x_mm - radius * s,
+            front_x + half * s,
+            front_x - half * s,
+            rear_x + half * s,
+            rear_x - half * s,
+        ),
+        corners_z_mm=(
+            z_mm + radius * c,
+            z_mm - radius * c,
+            front_z + half * c,
+            front_z - half * c,
+            rear_z + half * c,
+            rear_z - half * c,
+        ),
+    )
+
+
+def largest(values: Corners) -> Array:
+    """The largest of the corners' values."""
+    found = values[0]
+    for k in range(1, len(values)):
+        found = larger(found, values[k])
+    return found
+
+
+def smallest(values: Corners) -> Array:
+    """The smallest of the corners' values."""
+    found = values[0]
+    for k in range(1, len(values)):
+        found = smaller(found, values[k])
+    return found
+
+
+def distance_outside_mm(p: FoldProblem, camera: Camera, x_mm: Array, z_mm: Array) -> Array:
+    """How far a point before or above the camera is outside housing and lens barrel."""
+    dx, dz = x_mm - camera.x_mm, z_mm - camera.z_mm
+    c, s = camera.cos, camera.sin
+    ahead, above = dx * c - dz * s, dx * s + dz * c
+    housing = larger(ahead + p.lens_height_mm, above - p.module_height_mm / 2)
+    barrel = larger(ahead, above - p.lens_diameter_mm / 2)
+    return smaller(housing, barrel)
+
+
+SHARED = (pitch_rad, camera, largest, smallest, distance_outside_mm)

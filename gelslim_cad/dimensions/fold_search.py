@@ -1,234 +1,181 @@
-"""The search of `solver` compiled, for batches of designs: same grids, same score, same winners.
+"""The best candidates of grids, compiled, for batches of designs. Importing this loads numba.
 
-`fold.fold` is the reference. Candidates are scored one by one against the best so far and left as
-soon as they cannot beat it: missed limits only add up, and a part of the depth bounds the whole.
-Importing this module loads numba.
+Candidates are laid out by the same functions as in `fold.fold`, compiled here for single numbers,
+one by one against the best so far. Each is left as soon as it cannot beat that one: missed limits
+only add up, and a part of the depth bounds the whole.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import fields
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numba.extending import overload
 
-from gelslim_cad.dimensions import solver
-from gelslim_cad.dimensions.fold_problem import FoldProblem
+from gelslim_cad.dimensions import (
+    fold,
+    fold_camera,
+    fold_mirror,
+    fold_problem,
+    fold_room,
+    fold_sight,
+)
+from gelslim_cad.dimensions.fold import (
+    FEASIBLE,
+    INFEASIBLE_MM,
+    camera_depth_mm,
+    depth_mm,
+    score,
+)
+from gelslim_cad.dimensions.fold_camera import camera, pitch_rad, smallest
+from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_candidates
+from gelslim_cad.dimensions.fold_mirror import mirror, mirror_depth_mm, reflected
+from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold_room import (
+    SCALE_MM,
+    camera_below_window,
+    camera_beside_view,
+    camera_clear_of_ledge,
+    camera_clear_of_mirror,
+    ledge_edge_x_mm,
+    mirror_before_camera,
+    mirror_below_window,
+    view_below_ledge,
+)
+from gelslim_cad.dimensions.fold_sight import (
+    distances,
+    field_missed,
+    keystone,
+    picture_missed,
+    sight,
+)
+from gelslim_optics.camera import refraction_kernel, refraction_newton
+from gelslim_optics.camera.refraction_kernel import COMPILED, INLINED, let_compile, source_key
 
-Array = NDArray[np.float64]
-NEWTON_STEPS = 40
-FEASIBLE = 1e-9
-LAST_STEP = 1e-8
-"""Newton's error after a step of this part of the slope is its square, below rounding."""
-
-
-def search(problem: FoldProblem) -> tuple[Array, Array, Array]:
-    """Winning mean ray angle, spread and mirror angle, (n,) each; releases the GIL."""
-    rows = np.column_stack([np.ravel(getattr(problem, f.name)) for f in fields(FoldProblem)])
-    axes = [np.linspace(*a) for a in zip(solver.LOWER, solver.UPPER, solver.COARSE, strict=True)]
-    bands = np.array([len(b) for b in np.array_split(axes[0], solver.STARTS)])
-    width = (solver.UPPER - solver.LOWER) / (np.array(solver.COARSE) - 1)
-    found = _search_all(
-        rows,
-        (axes[0], axes[1], axes[2]),
-        bands,
-        (solver.LOWER, solver.UPPER, width, np.linspace(-1.0, 1.0, solver.FINE)),
-        (solver.LEVELS, solver.SHRINK),
-        (solver.INFEASIBLE_MM, solver.KEYSTONE_WEIGHT_MM, solver.LENGTH_WEIGHT),
-    )
-    return found[:, 0].copy(), found[:, 1].copy(), found[:, 2].copy()
-
-
-def scores(problem: FoldProblem, mid: Array, spread: Array, mirror: Array) -> Array:
-    """Score (n,) of one candidate per design, as `solver.objective` of `fold.fold` gives it."""
-    rows = np.column_stack([np.ravel(getattr(problem, f.name)) for f in fields(FoldProblem)])
-    weights = (solver.INFEASIBLE_MM, solver.KEYSTONE_WEIGHT_MM, solver.LENGTH_WEIGHT)
-    return np.array(
-        [
-            _mirror_score(row, _view(row, m, s), math.cos(a), math.sin(a), np.inf, weights)
-            for row, m, s, a in zip(rows, mid, spread, mirror, strict=True)
-        ]
-    )
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _search_all(rows, axes, bands, box, levels, weights):  # type: ignore[no-untyped-def]
-    found = np.empty((len(rows), 3))
-    for k in range(len(rows)):
-        found[k] = _search_one(rows[k], axes, bands, box, levels, weights)
-    return found
+SOURCES = (fold_sight, fold_mirror, fold_camera, fold_room, fold)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _search_one(row, axes, bands, box, levels, weights):  # type: ignore[no-untyped-def]
-    """Best candidate of one design: each band's best, refined by itself."""
-    lower, upper, first_width, ticks = box
-    winner, best = np.zeros(3), np.inf
-    begin = 0
-    for count in bands:
-        band = (axes[0][begin : begin + count], axes[1], axes[2])
-        begin += count
-        at, score = np.array([band[0][0], band[1][0], band[2][0]]), np.inf
-        score = _grid(row, band, at, score, weights)
-        width = first_width.copy()
-        for _ in range(levels[0]):
-            near = np.empty((3, len(ticks)))
-            for a in range(3):
-                for t in range(len(ticks)):
-                    near[a, t] = min(max(at[a] + ticks[t] * width[a], lower[a]), upper[a])
-            score = _grid(row, (near[0], near[1], near[2]), at, score, weights)
-            width *= levels[1]
-        if score < best:
-            winner, best = at, score
-    return winner
+def search(problem: FoldProblem) -> Best:
+    """The best candidate (n,) of each design; releases the GIL."""
+    records = np.tile(problem.records(), STARTS)
+    return best_candidates(len(problem), partial(best_of_grids, records))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _grid(row, axes, at, known, weights):  # type: ignore[no-untyped-def]
-    """Best score of a grid that holds a candidate of score `known`; `at` moves to the first best.
+def best_of_grids(records: Any, mid: Array, spread: Array, mirror: Array, known: Array) -> Best:
+    """The first best candidate of each grid: axes (n, k), designs and scores to beat (n,)."""
+    # A grid in which nothing is better keeps its middle, the candidate that scored `known`.
+    middle = [axis[:, axis.shape[1] // 2] for axis in (mid, spread, mirror)]
+    found = np.column_stack([*middle, known])
+    _best_of_grids(records, mid, spread, mirror, np.cos(mirror), np.sin(mirror), known, found)
+    return Best(*found.T.copy())
 
-    Equals are scored to the end: the first of them wins, as in the reference.
+
+def _positive_sum(missed: Any) -> Any:
+    """Sum of the parts that are missed."""
+    total = 0.0
+    for k in range(len(missed)):
+        total = total + larger(missed[k], 0.0)
+    return total
+
+
+def _parts(one_mm: Any, other_mm: Any) -> Any:
+    """Two missed lengths as parts of their scale, summed."""
+    return (larger(one_mm, 0.0) + larger(other_mm, 0.0)) / SCALE_MM
+
+
+def _worse(missed: Any, known: Any) -> Any:
+    """Whether a candidate that misses this much is certainly above `known`."""
+    return missed > FEASIBLE and INFEASIBLE_MM * (1 + missed) > known
+
+
+def _least_score(missed: Any, depth: Any, keystone: Any, rear_x: Any) -> Any:
+    """What a candidate scores at least that misses and needs at least this much."""
+    return min(score(missed, depth, keystone, rear_x), INFEASIBLE_MM * (1 + missed))
+
+
+def _score(
+    p: Any, s: Any, missed: Any, ratio: Any, angle: Any, cos: Any, sin: Any, known: Any
+) -> Any:
+    """Score of a candidate that misses `missed` in its picture; inf if certainly above `known`."""
+    m = mirror(p, s, cos, sin)
+    x, z = reflected(m, s.virtual_x_mm, s.virtual_z_mm)
+    missed += _parts(mirror_below_window(s, m), mirror_before_camera(p, m, x))
+    # The pinhole lies in the barrel's front: the housing is no higher and no farther ahead.
+    mirror_depth = mirror_depth_mm(p, m)
+    shallow = depth_mm(p, mirror_depth, camera_depth_mm(p, z))
+    if _least_score(missed, shallow, ratio, x) > known:
+        return np.inf
+    c = camera(p, x, z, pitch_rad(s, angle))
+    missed += _parts(camera_below_window(p, c), camera_beside_view(p, s, c))
+    missed += _parts(camera_clear_of_mirror(p, m, c), 0.0)
+    if _worse(missed, known):
+        return np.inf
+    ledge_x = ledge_edge_x_mm(p, s)
+    missed += _parts(camera_clear_of_ledge(p, c, ledge_x), view_below_ledge(p, m, c, ledge_x))
+    depth = depth_mm(p, mirror_depth, camera_depth_mm(p, smallest(c.corners_z_mm)))
+    return score(missed, depth, ratio, smallest(c.corners_x_mm))
+
+
+def _best_of_grid(
+    p: Any, mids: Any, spreads: Any, mirrors: Any, cos: Any, sin: Any, known: Any, found: Any
+) -> None:
+    """Write the first best candidate and its score to `found` (4,).
+
+    Equals are scored to the end: the first of them wins, as in `solver`.
     """
     best = np.inf
-    cosines, sines = np.cos(axes[2]), np.sin(axes[2])
-    for mid in axes[0]:
-        for spread in axes[1]:
-            view = _view(row, mid, spread)
-            if _worse(view[-1], min(known, best), weights):
+    for i in range(len(mids)):
+        for j in range(len(spreads)):
+            # Where the box cuts a grid off, values repeat; only the first can be the first best.
+            if (i > 0 and mids[i] == mids[i - 1]) or (j > 0 and spreads[j] == spreads[j - 1]):
                 continue
-            for k in range(len(axes[2])):
-                score = _mirror_score(row, view, cosines[k], sines[k], min(known, best), weights)
-                if score < best:
-                    best = score
-                    at[0], at[1], at[2] = mid, spread, axes[2][k]
-    return min(known, best)
+            s = sight(p, mids[i], spreads[j])
+            missed = _positive_sum(field_missed(p, s))
+            if _worse(missed, min(known, best)):
+                continue
+            d = distances(p, s)
+            missed += _positive_sum(picture_missed(p, s, d))
+            if _worse(missed, min(known, best)):
+                continue
+            ratio = keystone(d)
+            for k in range(len(mirrors)):
+                to_beat = min(known, best)
+                value = _score(p, s, missed, ratio, mirrors[k], cos[k], sin[k], to_beat)
+                if value < best:
+                    best = value
+                    found[0], found[1], found[2] = mids[i], spreads[j], mirrors[k]
+                    found[3] = value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _view(p, mid, spread):  # type: ignore[no-untyped-def]
-    """What the two ray angles fix; last, how far its limits are missed."""
-    length, width, gel, n_gel, guide, n_guide, tan_h, tan_v = p[:8]
-    focal, focal_px, aperture, travel_mm, nearest = p[8], p[9], p[10], p[11], p[12]
-    half = math.atan(tan_v)
-    near, far = mid - spread * half, mid + spread * half
-    sn, sf = math.tan(near), math.tan(far)
-    reach_n = _reach(sn, guide, n_guide, gel, n_gel)
-    reach_f = _reach(sf, guide, n_guide, gel, n_gel)
-    air = max((length - (reach_f - reach_n)) / (sf - sn), 1.0)
-    vx = -length / 2 - (air * sn + reach_n)
-    nx, ny = _corner(-length / 2 - vx, width / 2, air, guide, n_guide, gel, n_gel)
-    fx, fy = _corner(length / 2 - vx, width / 2, air, guide, n_guide, gel, n_gel)
-    shallowest, steepest = min(sn, nx), max(sf, fx)
-    lowest, highest = math.atan(shallowest), math.atan(steepest)
-    tilt = min(max(0.0, highest - half), lowest + half)
-    apparent = air + guide / n_guide + gel / n_gel
-    st, ct = math.sin(tilt), math.cos(tilt)
-    z_near, z_far = apparent * (ct + sn * st), apparent * (ct + sf * st)
-    least, most = min(z_near, z_far), max(z_near, z_far)
-    horizontal = max(ny / (nx * st + ct), fy / (fx * st + ct))
-    vertical = math.tan(max(highest - tilt, tilt - lowest))
-    focus = 2 * z_near * z_far / (z_near + z_far)
-    travel = 0.0 if focus >= nearest else focal**2 / max(focus - focal, 1e-3)
-    px = focal_px * p[23] / most * min(1.0, apparent / most)
-    blur = aperture * (most - least) / (2 * least)
-    missed = max(vertical / tan_v - 1, 0.0) + max(horizontal / tan_h - 1, 0.0)
-    missed += max(blur / p[24] - 1, 0.0) + max(p[25] / px - 1, 0.0)
-    missed += max(most / least / p[26] - 1, 0.0) + max(2.0 - air, 0.0)
-    missed += max((travel - travel_mm) / max(travel_mm, 0.1), 0.0)
-    return vx, air, shallowest, steepest, ct, st, most / least, missed
+@overload(larger, strict=False, jit_options=INLINED)
+def _larger_number(a: Any, b: Any) -> Any:
+    return lambda a, b: a if a > b else b
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _mirror_score(p, view, ca, sa, known, weights):  # type: ignore[no-untyped-def]
-    """`solver.objective` of one candidate; inf once it is certain to be above `known`."""
-    vx, air, shallowest, steepest, ct, st, keystone, missed = view
-    gap, border = p[19], p[18]
-    window = -(p[4] + p[2])
-    vz = window - air
-    upper_z = window - gap - border * sa
-    upper_x = vx + steepest * (upper_z - vz)
-    down = (upper_x - vx - shallowest * (upper_z - vz)) / (ca - shallowest * sa)
-    lower_x, lower_z = upper_x - down * ca, upper_z - down * sa
-    away = (vx - upper_x) * -sa + (vz - upper_z) * ca
-    cx, cz = vx + 2 * away * sa, vz - 2 * away * ca
-    lower_end = lower_x - border * ca
-    missed += max(max(-down, vz - lower_z) / 10, 0.0)
-    missed += max((cx + gap - lower_end) / 10, 0.0)
-    mirror_depth = window - (lower_z - border * sa - p[17] * ca)
-    depth, tie = max(mirror_depth, window - cz + gap, p[22]), weights[1] * (keystone - 1)
-    # The barrel's front is about the pinhole: the housing is no higher and no farther ahead.
-    if depth + tie - weights[2] * cx > known or _worse(missed, known, weights):
-        return np.inf
-    # Pitch = 90 deg - 2 mirror - tilt.
-    s2, c2 = 2 * sa * ca, ca * ca - sa * sa
-    c, s = s2 * ct + c2 * st, c2 * ct - s2 * st
-    half, radius, face = p[13] / 2, p[15] / 2, -p[16]
-    rear = face - p[14]
-    ledge_z = window - p[20]
-    ledge = min(-p[0] / 2 - 0.2, vx + shallowest * (ledge_z - vz) - gap)
-    ledge_x = ledge - p[21]
-    top, bottom, back = -np.inf, np.inf, np.inf
-    beside, behind, before, under = -np.inf, -np.inf, -np.inf, -np.inf
-    for k in range(6):
-        a = 0.0 if k < 2 else (face if k < 4 else rear)
-        b = (radius if k < 2 else half) * (1 if k % 2 == 0 else -1)
-        x, z = cx + a * c + b * s, cz - a * s + b * c
-        top, bottom, back = max(top, z), min(bottom, z), min(back, x)
-        beside = max(beside, x - (vx + shallowest * (z - vz)) + gap)
-        behind = max(behind, gap - ((x - upper_x) * -sa + (z - upper_z) * ca))
-        before = max(before, x - lower_end + gap)
-        under = max(under, min(x - ledge_x, z - ledge_z + gap))
-    missed += max((top - window + gap) / 10, 0.0) + max(beside / 10, 0.0)
-    missed += max(min(behind, before) / 10, 0.0)
-    if _worse(missed, known, weights):
-        return np.inf
-    outside = _outside(ledge_x - cx, ledge_z - cz, c, s, p[16], half, radius)
-    missed += max(max(under, gap - outside) / 10, 0.0)
-    climb, seen = (upper_z - cz) / (upper_x - cx), -np.inf
-    for x in (ledge, ledge_x):
-        if x > cx:
-            seen = max(seen, cz + climb * (x - cx))
-    missed += max((seen + gap - ledge_z) / 10, 0.0)
-    if missed > FEASIBLE:
-        return weights[0] * (1 + missed)
-    return max(depth, window - bottom + gap) + tie - weights[2] * back
+@overload(smaller, strict=False, jit_options=INLINED)
+def _smaller_number(a: Any, b: Any) -> Any:
+    return lambda a, b: a if a < b else b
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _worse(missed, known, weights):  # type: ignore[no-untyped-def]
-    return missed > FEASIBLE and weights[0] * (1 + missed) > known
+for shared in (module.SHARED for module in SOURCES):
+    let_compile(shared)
+let_compile((_positive_sum, _parts, _worse, _least_score, _score, _best_of_grid))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _outside(dx, dz, c, s, lens_height, half, radius):  # type: ignore[no-untyped-def]
-    ahead, above = dx * c - dz * s, dx * s + dz * c
-    return min(max(ahead + lens_height, above - half), max(ahead, above - radius))
+def _compile(source: int) -> Callable[..., None]:
+    @njit(**COMPILED)
+    def all_grids(
+        records: Any, mid: Any, spread: Any, mirror: Any, cos: Any, sin: Any, known: Any, found: Any
+    ) -> None:
+        source  # noqa: B018
+        for i in range(len(records)):
+            axes = mid[i], spread[i], mirror[i], cos[i], sin[i]
+            _best_of_grid(records[i], *axes, known[i], found[i])
+
+    return all_grids
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _reach(t, guide, n_guide, gel, n_gel):  # type: ignore[no-untyped-def]
-    """`refraction.lateral_reach`; h s / sqrt(n² - s²) is h t / sqrt(n² + (n² - 1) t²)."""
-    guided = math.sqrt(n_guide**2 + (n_guide**2 - 1) * t * t)
-    return guide * t / guided + gel * t / math.sqrt(n_gel**2 + (n_gel**2 - 1) * t * t)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _corner(along, across, air, guide, n_guide, gel, n_gel):  # type: ignore[no-untyped-def]
-    """Slopes along and across of the ray to a corner, by the Newton of `refraction.ray_slope`.
-
-    Started from the paraxial slope: the reach is concave, so that one, too, is below the root.
-    """
-    reach = math.sqrt(along * along + across * across)
-    g2, p2 = n_guide * n_guide, n_gel * n_gel
-    t = reach / (air + guide / n_guide + gel / n_gel)
-    for _ in range(NEWTON_STEPS):
-        g, p = g2 + (g2 - 1) * t * t, p2 + (p2 - 1) * t * t
-        over_g, over_p = guide / (g * math.sqrt(g)), gel / (p * math.sqrt(p))
-        short = reach - t * (air + over_g * g + over_p * p)
-        step = short / (air + over_g * g2 + over_p * p2)
-        t += step
-        if abs(step) <= LAST_STEP * (1 + t):
-            break
-    return t * along / reach, t * across / reach
+_best_of_grids = _compile(source_key(refraction_newton, refraction_kernel, fold_problem, *SOURCES))

@@ -1,10 +1,8 @@
 """The thinnest finger that lets the camera see the gel: a deterministic search over folds.
 
-Three unknowns (mean ray angle, used part of the field of view, mirror angle) are searched on a
-coarse grid and then on ever smaller grids around the best candidate of each band of ray angles:
-steep and upright views are separate valleys, joined by infeasible folds. Infeasible candidates rank
-by how far they miss, so that slivers of feasible designs are found and a hopeless design ends at
-its least bad fold, which the design rules then report.
+`fold_grids` says where to look. Infeasible candidates rank by how far they miss, so that slivers of
+feasible designs are found and a hopeless design ends at its least bad fold, which the design rules
+then report.
 """
 
 from __future__ import annotations
@@ -14,29 +12,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import fields
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions.fold import Fold, fold
+from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_candidates
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
 
-LOWER = np.array([np.radians(-12.0), 0.25, np.radians(12.0)])
-UPPER = np.array([np.radians(58.0), 1.0, np.radians(50.0)])
-COARSE = (18, 10, 20)
-FINE = 5
-SHRINK = 0.7
-LEVELS = 26
-STARTS = 6
 CHUNK = 64
 COMPILED_FROM = 200
 """Designs from which loading the compiled search pays."""
 PIECE = 64
 """Designs that a thread searches at a time."""
-INFEASIBLE_MM = 1000.0
-KEYSTONE_WEIGHT_MM = 0.02
-LENGTH_WEIGHT = 0.002
-
 _JOBS: ContextVar[int | None] = ContextVar("fold search threads", default=None)
 _AMONG: ContextVar[int] = ContextVar("designs of which this batch is a part", default=0)
 
@@ -58,20 +47,11 @@ def threads(jobs: int | None, among: int = 0) -> Iterator[None]:
         _JOBS.reset(token)
 
 
-def objective(candidates: Fold) -> Array:
-    """Depth in mm; among equals the smaller keystone, then the shorter finger."""
-    ratio = candidates.far_distance_mm / candidates.near_distance_mm
-    keystone = np.maximum(ratio, 1 / ratio)
-    tie = KEYSTONE_WEIGHT_MM * (keystone - 1) - LENGTH_WEIGHT * candidates.camera_rear_x_mm
-    missed = candidates.worst()
-    return np.where(missed > 1e-9, INFEASIBLE_MM * (1 + missed), candidates.depth_mm + tie)
-
-
 def solve_fold(problem: FoldProblem) -> Fold:
     """Best fold per design, every field (n,); infeasible designs keep violations > 0.
 
-    Batches of COMPILED_FROM designs or more, or part of as many, are searched by the compiled twin
-    of the same search, in threads (see `threads`); smaller ones start none.
+    Batches of COMPILED_FROM designs or more, or part of as many, have their candidates scored by
+    the same functions compiled, in threads (see `threads`); smaller ones start none.
     """
     if max(len(problem), _AMONG.get()) >= COMPILED_FROM:
         return _solve_compiled(problem)
@@ -95,8 +75,8 @@ def _solve_compiled(problem: FoldProblem) -> Fold:
     else:
         with ThreadPoolExecutor(jobs) as pool:
             found = list(pool.map(search, pieces))
-    chosen = [np.concatenate(axis)[same, None, None] for axis in zip(*found, strict=True)]
-    return _squeeze(fold(problem, *chosen))
+    best = Best(*(np.concatenate(values)[same] for values in zip(*found, strict=True)))
+    return _laid_out(problem, best)
 
 
 def _distinct(problem: FoldProblem) -> tuple[FoldProblem, NDArray[np.intp]]:
@@ -114,34 +94,14 @@ def _processors() -> int:
 
 
 def _solve_chunk(problem: FoldProblem) -> Fold:
-    count, width = len(problem), (UPPER - LOWER) / (np.array(COARSE) - 1)
-    mids, spreads, mirrors = (
-        np.linspace(lo, hi, n) for lo, hi, n in zip(LOWER, UPPER, COARSE, strict=True)
-    )
-    spread = np.broadcast_to(spreads, (count, len(spreads)))
-    mirror = np.broadcast_to(mirrors, (count, len(mirrors)))
-    starts = []
-    for band in np.array_split(mids, STARTS):
-        mid = np.broadcast_to(band, (count, len(band)))
-        starts.append(_best(problem, mid, spread, mirror))
-    best = [np.concatenate(values) for values in zip(*starts, strict=True)]
-    repeated = problem.rows(np.tile(np.arange(count), STARTS))
-    ticks = np.linspace(-1.0, 1.0, FINE)
-    for _ in range(LEVELS):
-        around = [
-            np.clip(b[:, None] + ticks * w, lo, hi)
-            for b, w, lo, hi in zip(best, width, LOWER, UPPER, strict=True)
-        ]
-        best = _best(repeated, *around)
-        width = width * SHRINK
-    ends = objective(fold(repeated, *(b[:, None, None] for b in best))).reshape(STARTS, count)
-    winner = np.argmin(ends, axis=0) * count + np.arange(count)
-    chosen = [b[winner][:, None, None] for b in best]
-    return _squeeze(fold(problem, *chosen))
+    repeated = problem.rows(np.tile(np.arange(len(problem)), STARTS))
+    return _laid_out(problem, best_candidates(len(problem), partial(best_of_grids, repeated)))
 
 
-def _best(problem: FoldProblem, mid: Array, spread: Array, mirror: Array) -> list[Array]:
-    """Best of the grid spanned by three axes (n, k) per design; three arrays (n,).
+def best_of_grids(
+    problem: FoldProblem, mid: Array, spread: Array, mirror: Array, _known: Array
+) -> Best:
+    """The first best candidate of each grid: one grid of axes (n, k) per design, all at once.
 
     Rays depend on the first two axes only: they broadcast against the mirror axis.
     """
@@ -150,11 +110,19 @@ def _best(problem: FoldProblem, mid: Array, spread: Array, mirror: Array) -> lis
         np.broadcast_to(mid[:, :, None], shape).reshape(len(mid), -1, 1),
         np.broadcast_to(spread[:, None, :], shape).reshape(len(mid), -1, 1),
     ]
-    score = objective(fold(problem, pairs[0], pairs[1], mirror[:, None, :]))
-    winner = np.argmin(score.reshape(len(mid), -1), axis=1)
+    scores = fold(problem, pairs[0], pairs[1], mirror[:, None, :]).objective()
+    scores = scores.reshape(len(mid), -1)
+    winner = np.argmin(scores, axis=1)
     pair, angle = np.divmod(winner, mirror.shape[1])
     row = np.arange(len(mid))
-    return [pairs[0][row, pair, 0], pairs[1][row, pair, 0], mirror[row, angle]]
+    return Best(
+        pairs[0][row, pair, 0], pairs[1][row, pair, 0], mirror[row, angle], scores[row, winner]
+    )
+
+
+def _laid_out(problem: FoldProblem, best: Best) -> Fold:
+    """The folds of the best candidates, every field (n,)."""
+    return _squeeze(fold(problem, *(axis[:, None, None] for axis in best[:3])))
 
 
 def _squeeze(solved: Fold) -> Fold:

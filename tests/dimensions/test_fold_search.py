@@ -12,7 +12,8 @@ from fold_samples import shipped
 
 from gelslim_cad.dimensions import Dimensions, derive_batch, fold_search, solver
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import Fold, fold
+from gelslim_cad.dimensions.fold import INFEASIBLE_MM, Fold, fold
+from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
 from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 SPANS = {
@@ -50,13 +51,30 @@ def test_scores_are_those_of_the_reference(problem: FoldProblem) -> None:
     rng = np.random.default_rng(8)
     feasible = 0
     for _ in range(40):
-        mid, spread, mirror = rng.uniform(solver.LOWER, solver.UPPER, (len(problem), 3)).T
-        shaped = (axis[:, None, None] for axis in (mid, spread, mirror))
-        expected = np.ravel(solver.objective(fold(problem, *shaped)))
-        found = fold_search.scores(problem, mid, spread, mirror)
+        axes = rng.uniform(LOWER, UPPER, (len(problem), 3)).T[:, :, None]
+        expected = np.ravel(fold(problem, *axes[..., None]).objective())
+        unbeaten = np.full(len(problem), np.inf)
+        found = fold_search.best_of_grids(problem.records(), *axes, unbeaten).score
         np.testing.assert_allclose(found, expected, rtol=1e-10)
-        feasible += int((expected < solver.INFEASIBLE_MM).sum())
+        feasible += int((expected < INFEASIBLE_MM).sum())
     assert feasible > 20
+
+
+def test_the_first_best_of_a_grid_is_that_of_the_reference(problem: FoldProblem) -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(10):
+        middle = rng.uniform(LOWER, UPPER, (len(problem), 3)).T[:, :, None]
+        width = ((UPPER - LOWER) * 0.2)[:, None, None]
+        axes = np.clip(
+            middle + np.linspace(-1, 1, 5) * width, LOWER[:, None, None], UPPER[:, None, None]
+        )
+        unbeaten = np.full(len(problem), np.inf)
+        expected = solver.best_of_grids(problem, *axes, unbeaten)
+        for known in (unbeaten, expected.score * (1 + 1e-9)):
+            found = fold_search.best_of_grids(problem.records(), *axes, known)
+            np.testing.assert_allclose(found.score, expected.score, rtol=1e-10)
+            for ours, theirs in zip(found[:3], expected[:3], strict=True):
+                np.testing.assert_array_equal(ours, theirs)
 
 
 def solved(problem: FoldProblem, monkeypatch: pytest.MonkeyPatch, compiled_from: int) -> Fold:

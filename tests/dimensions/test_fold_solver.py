@@ -15,8 +15,8 @@ from scipy.optimize import differential_evolution
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
 from gelslim_cad.dimensions import view as view_module
 from gelslim_cad.dimensions.fold import fold
+from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
 from gelslim_cad.dimensions.fold_problem import FoldProblem
-from gelslim_cad.dimensions.solver import LOWER, UPPER, objective
 
 SPREADS: dict[str, tuple[float, float]] = {
     "design.gel.length_mm": (12.0, 35.0),
@@ -62,7 +62,7 @@ def test_no_global_optimiser_finds_a_thinner_fold(
     d, problem = solved(changes, monkeypatch)
 
     def score(x: np.ndarray) -> np.ndarray:
-        return objective(fold(problem, *(axis.reshape(1, -1, 1) for axis in x))).reshape(-1)
+        return fold(problem, *(axis.reshape(1, -1, 1) for axis in x)).objective().reshape(-1)
 
     best = min(
         differential_evolution(
@@ -78,7 +78,7 @@ def test_no_global_optimiser_finds_a_thinner_fold(
         ).fun
         for seed in range(2)
     )
-    ours = float(objective(d.fold)[0])
+    ours = float(d.fold.objective()[0])
     assert ours < best + 0.05
     assert bool(d.feasible().all()) or best > 1000
 
