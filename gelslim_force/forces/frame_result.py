@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as default
@@ -10,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.forces.field_picture import force_field_png
 from gelslim_force.forces.wrench import Wrench
 from gelslim_force.tracking.tracks import Tracks
 
 Array = NDArray[np.float64]
+_MOST_ARROWS = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class ForceField:
 
     def _repr_png_(self) -> bytes | None:
         """Picture for a notebook; None where matplotlib is not installed."""
-        return force_field_png(self)
+        return _png(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,4 +91,48 @@ class FrameResult:
 
     def _repr_png_(self) -> bytes | None:
         """Picture of the force field for a notebook; None without one, or without matplotlib."""
-        return None if self.field is None else force_field_png(self.field)
+        return None if self.field is None else _png(self.field)
+
+
+def _png(field: ForceField) -> bytes | None:
+    """Draw pressure as colour and tangential traction as arrows, seen from outside the gel.
+
+    Where the normal force is unknown, colour shows the size of the tangential traction.
+
+    Returns:
+        The PNG file's bytes; None where matplotlib is not installed.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        return None
+    figure = Figure(figsize=(5.0, 4.0), dpi=100, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    _draw(figure, figure.add_subplot(), field)
+    with io.BytesIO() as file:
+        canvas.print_png(file)
+        return file.getvalue()
+
+
+def _draw(figure: Any, axes: Any, field: ForceField) -> None:
+    x, y = field.points_mm[:, 0], field.points_mm[:, 1]
+    tangential_kpa = 1000 * field.traction_mpa[:, :2]
+    pressure_kpa = -1000 * field.traction_mpa[:, 2]
+    shown, label = pressure_kpa, "pressure in kPa"
+    if not np.isfinite(pressure_kpa).all():
+        shown, label = np.hypot(*tangential_kpa.T), "tangential traction in kPa"
+    colours = axes.pcolormesh(*_on_lattice(x, y, shown), shading="nearest", cmap="viridis")
+    figure.colorbar(colours, ax=axes, label=label)
+    step = 1 + len(x) // _MOST_ARROWS
+    axes.quiver(x[::step], y[::step], *tangential_kpa[::step].T, color="white", pivot="mid")
+    axes.set(xlabel="x in mm", ylabel="y in mm", aspect="equal")
+
+
+def _on_lattice(x: Array, y: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Coordinates (nx,), (ny,) and values (ny, nx) of nodes (c,) on a lattice; NaN between them."""
+    columns, i = np.unique(np.round(x, 6), return_inverse=True)
+    rows, j = np.unique(np.round(y, 6), return_inverse=True)
+    grid = np.full((len(rows), len(columns)), np.nan)
+    grid[j, i] = values
+    return columns, rows, grid

@@ -125,7 +125,7 @@ class SmoothedForce:
 
 
 def normal_noise_mm(curvature: sparse.csr_array, w_mm: Array) -> float:
-    """Standard deviation of one node's normal motion (c,), by `surface_lattice.curvature_operator`.
+    """Standard deviation of one node's normal motion (c,), by `estimator.curvature_operator`.
 
     The lower quartile is not affected by the nodes that curve around a contact.
     """

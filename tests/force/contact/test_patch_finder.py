@@ -349,7 +349,7 @@ def test_grey_frames_show_a_patch_too():
 
 def test_unfit_pictures_are_refused():
     frame = reference()
-    with pytest.raises(ValueError, match="the reference"):
+    with pytest.raises(ValueError, match="reference"):
         finder().find(frame.image[::2, ::2])
     with pytest.raises(ValueError, match="uint8"):
         finder().find(frame.image.astype(float))
@@ -359,7 +359,7 @@ def test_unfit_pictures_are_refused():
         finder().find(np.zeros((0, 0, 3), np.uint8))
     with pytest.raises(ValueError, match="dark"):
         PatchFinder(CAMERA, np.zeros_like(frame.image), frame.centres_px)
-    with pytest.raises(ValueError, match="frames of this camera"):
+    with pytest.raises(ValueError, match="320 x 240"):
         PatchFinder(CAMERA, frame.image[:240, :320], frame.centres_px)
     with pytest.raises(ValueError, match="least_change"):
         PatchSettings(least_change=0.0)

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from pad_samples import small_bundle
 
-from gelslim_force.forces.estimator import ContactForces, ForceEstimator, ForceSettings
-from gelslim_force.motion.surface_lattice import edge_distance_mm
+from gelslim_force.forces.estimator import (
+    ContactForces,
+    ForceEstimator,
+    ForceSettings,
+    edge_distance_mm,
+)
 from ifem_export.operators.surface_operator import surface_operator
 
 RADIUS_MM = 1.5

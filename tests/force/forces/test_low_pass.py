@@ -7,7 +7,12 @@ import pytest
 from camera_rig import finger_view
 from pad_samples import hertz_like, small_bundle
 
-from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
+from gelslim_force.forces.estimator import (
+    ForceEstimator,
+    ForceSettings,
+    curvature_operator,
+    neighbour_matrix,
+)
 from gelslim_force.forces.low_pass import (
     WIDTHS_IN_CELLS,
     ForceNoise,
@@ -17,7 +22,6 @@ from gelslim_force.forces.low_pass import (
     widths_mm,
 )
 from gelslim_force.motion.marker_motion import MarkerView
-from gelslim_force.motion.surface_lattice import curvature_operator, neighbour_matrix
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.tracking.marker_noise import robust_sigma
 from ifem_export.bundle.bundle import Bundle

@@ -8,8 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from gelslim_force.forces.field_picture import _on_lattice
-from gelslim_force.forces.frame_result import ForceField, FrameResult
+from gelslim_force.forces.frame_result import ForceField, FrameResult, _on_lattice
 from gelslim_force.forces.wrench import Wrench
 
 PNG = b"\x89PNG\r\n\x1a\n"

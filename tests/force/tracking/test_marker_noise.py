@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gelslim_force.forces.estimator import curvature_operator, neighbour_matrix
 from gelslim_force.forces.low_pass import normal_noise_mm
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.motion.surface_lattice import curvature_operator, neighbour_matrix
 from gelslim_force.tracking.marker_noise import noise_px, robust_sigma
 
 ROWS, COLUMNS = 40, 55
