@@ -114,8 +114,8 @@ def value_remedy(shape: Shape | None, unit: Unit | None = None) -> str:
         if shape.default is not None and not isinstance(shape.default, BaseModel | tuple | list):
             default += f" for the default {_yaml(shape.default)}"
     if shape.models:
-        names = (n for n, info in shape.models[0].model_fields.items() if info.is_required())
-        return f"write the fields of the block below it, indented: {', '.join(names) or 'any'}"
+        names = [n for n, info in shape.models[0].model_fields.items() if info.is_required()]
+        return "write its fields below it, indented" + (f": {', '.join(names)}" if names else "")
     if list in shape.types:
         return f"write a list in brackets, as in [1, 2]{default}"
     span = range_text(shape, unit)

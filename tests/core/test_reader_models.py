@@ -44,6 +44,8 @@ class Scene(Frozen):
             raise FieldError("seed", "must not be 13", "choose another seed")
         if self.seed == 14 and self.loads:
             raise FieldError("loads[0].force_n", "must be weaker for seed 14", "reduce the force")
+        if self.seed == 16:
+            raise FieldError("either", "contradicts step_mm", "change one", ("step_mm",))
         if self.seed == 15:
             raise ValueError("this cannot work")
         return self
@@ -73,6 +75,8 @@ def test_a_valid_scene_reads():
         ("seed: true", 2, "seed", "whole", "at least 0"),
         ("seed: 13", 2, "seed", "13", "choose another seed"),
         ("seed: 15", 1, "", "this cannot work", ""),
+        ("seed: 16\nstep_mm: 2", 3, "step_mm", "contradicts", "change one"),
+        ("seed: 16", 1, "either", "contradicts", "change one"),
         ("shape:\n  kind: bxo", 3, "shape.kind", "sphere or box", "box?"),
         ("shape:\n  side_mm: 2", 2, "shape", "kind", "`kind: sphere or box`"),
         ("shape:\n  kind: box\n  side_mm: -2", 4, "shape.side_mm", "> 0 mm", "above 0 mm"),
