@@ -50,3 +50,19 @@ class GelState:
         f = (1 - part) * self.force_n + part * later.force_n
         touch = self.touch if part < 0.5 else later.touch
         return GelState(u, f, touch, self.solver if part < 0.5 else later.solver)
+
+
+@dataclass(frozen=True, eq=False)
+class AnchoredState(GelState):
+    """A state with the displacement (c, 3) at which its sticking nodes are fixed to the tool.
+
+    Without it the errors within the solver's tolerance would add up from step to step.
+    """
+
+    anchor_mm: NDArray[np.float64] | None = None
+
+
+def anchor_mm(state: GelState) -> NDArray[np.float64]:
+    """Displacement (c, 3) at which nodes stick; of a plain state its own displacement."""
+    held = state.anchor_mm if isinstance(state, AnchoredState) else None
+    return state.displacement_mm if held is None else held

@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from gelslim_force.contact.anderson import Anderson
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.coulomb_balance import FREE, STICK, Balance, balanced
+from gelslim_twin.contact.coulomb_contact import FREE, STICK, ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_body import GelBody, Tangent
-from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.contact.held_state import HeldState
-from gelslim_twin.contact.settling import room_to_tool, slack_mm
-from gelslim_twin.contact.solver import REACH, ContactSolver
+from gelslim_twin.contact.gel_state import AnchoredState, GelState
+from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm
+from gelslim_twin.contact.solver import CANDIDATE_SHARE, ContactSolver
 from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
@@ -44,7 +43,7 @@ BALANCE = (0.01, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class SolidState(HeldState):
+class SolidState(AnchoredState):
     """A state of the surface, with displacement (n, 3) and pressure (m,) of the whole gel."""
 
     whole_mm: Array | None = None
@@ -62,7 +61,7 @@ class NewtonContact:
 
     def __post_init__(self) -> None:
         self._tangent: Tangent | None = None
-        self._come: tuple[SolidState, Pose, SolidState] | None = None
+        self._last_step: tuple[SolidState, Pose, SolidState] | None = None
 
     def released(self) -> SolidState:
         """Nothing touches."""
@@ -76,34 +75,34 @@ class NewtonContact:
 
         Raises ContactError where it is not found, FiniteStrainError where `last` is impossible.
         """
-        state = self._walked(last, before, pose)
-        self._come = (last, before, state)
+        state = self._solved(last, before, pose)
+        self._last_step = (last, before, state)
         return state
 
-    def _walked(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
+    def _solved(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
         ahead = self._ahead(last, before, pose)
         if ahead is not None:
             try:
-                return self._found(_Walk(self, last, before, pose, ahead))
+                return self._converged(_NewtonSolve(self, last, before, pose, ahead))
             except (ContactError, FiniteStrainError):
                 pass
-        return self._found(_Walk(self, last, before, pose, self._start(last)))
+        return self._converged(_NewtonSolve(self, last, before, pose, self._start(last)))
 
-    def _found(self, walk: _Walk) -> SolidState:
-        if walk.deepest_mm <= 0:
+    def _converged(self, solve: _NewtonSolve) -> SolidState:
+        if solve.deepest_mm <= 0:
             self._tangent = None
             return self.released()
         for done in range(1, MOST_STEPS + 1):
-            if self._tangent is None or walk.stale:
+            if self._tangent is None or solve.stale:
                 least = 0.0 if self._tangent is None else self._tangent.share
-                self._tangent = self.body.tangent(walk.whole, walk.pressure, walk.held, least)
-            found = walk.forward(self._tangent, done)
+                self._tangent = self.body.tangent(solve.whole, solve.pressure, solve.held, least)
+            found = solve.forward(self._tangent, done)
             if found is not None:
                 return found
         raise ContactError(
-            f"the neo-Hookean gel is off balance by {walk.rest:.1e} of the forces and "
-            f"{walk.off_mm:.1e} mm off the tool after {MOST_STEPS} steps",
-            walk.rest,
+            f"the neo-Hookean gel is off balance by {solve.rest:.1e} of the forces and "
+            f"{solve.off_mm:.1e} mm off the tool after {MOST_STEPS} steps",
+            solve.rest,
         )
 
     def _start(self, state: SolidState) -> _Start:
@@ -116,9 +115,9 @@ class NewtonContact:
 
     def _ahead(self, last: SolidState, before: Pose, pose: Pose) -> _Start | None:
         """Where the gel would be on along the last step, where this one goes the same way."""
-        if self._come is None or self._come[2] is not last:
+        if self._last_step is None or self._last_step[2] is not last:
             return None
-        first, start, _ = self._come
+        first, start, _ = self._last_step
         if not first.force_n.any() or not last.force_n.any():
             return None
         came, goes = _way(start, before), _way(before, pose)
@@ -130,7 +129,7 @@ class NewtonContact:
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """Where a walk begins: displacement and forces (n, 3), pressures (m,)."""
+    """Where a solve begins: displacement and forces (n, 3), pressures (m,)."""
 
     whole_mm: Array
     force_n: Array
@@ -157,7 +156,7 @@ def _way(start: Pose, end: Pose) -> Array:
                              for n in turns])  # fmt: skip
 
 
-class _Walk:
+class _NewtonSolve:
     """Newton's steps to one pose."""
 
     def __init__(
@@ -207,8 +206,8 @@ class _Walk:
         offset = u + free[self.body.surface]
         surface = tool_surface(self.solver.tool, self.pose, points + u, self.surface)
         self.surface = surface = surface.only(self.on_tool)
-        room = room_to_tool(surface, points + u, u - offset)
-        self.wanted |= room < REACH * self.deepest_mm
+        room = allowed_motion_mm(surface, points + u, u - offset)
+        self.wanted |= room < CANDIDATE_SHARE * self.deepest_mm
         nodes = np.flatnonzero(self.wanted)
         balance, pull = self._held(tangent, surface.at(nodes), room, offset, nodes)
         self.force, load = np.zeros_like(points), np.zeros_like(self.whole)
@@ -219,12 +218,12 @@ class _Walk:
         step = free + tangent.motion(pulled)
         self._remember(balance, nodes, tangent)
         self._move(self._accelerated(step) if tangent.stiffened else step)
-        return self._judged(balance, nodes, load, done)
+        return self._checked(balance, nodes, load, done)
 
     def _held(
         self, tangent: Tangent, surface: ToolSurface, room: Array, offset: Array, nodes: Nodes
-    ) -> tuple[Balance, Array]:
-        """Balance, and what the tangent's springs pull at nodes (m, 3) that move.
+    ) -> tuple[ContactForces, Array]:
+        """ContactForces, and what the tangent's springs pull at nodes (m, 3) that move.
 
         The springs are not there: their pull under the motion found is added to the load until
         it is that under which it was found.
@@ -252,13 +251,13 @@ class _Walk:
 
     def _balance(
         self, tangent: Tangent, surface: ToolSurface, room: Array, offset: Array, nodes: Nodes
-    ) -> Balance:
+    ) -> ContactForces:
         frames, goal = surface.frames, (self.target - offset)[nodes]
         sticking = goal if frames is None else np.einsum("kab,ka->kb", frames, goal)
         # Nearly incompressible gel far from balance may not allow the finer tolerance.
         for share in BALANCE:
             try:
-                return balanced(
+                return solve_contact_forces(
                     tangent.block(nodes),
                     room[nodes],
                     np.ascontiguousarray(sticking[:, :2]),
@@ -271,7 +270,7 @@ class _Walk:
                 failure = error
         raise failure
 
-    def _remember(self, balance: Balance, nodes: Nodes, tangent: Tangent) -> None:
+    def _remember(self, balance: ContactForces, nodes: Nodes, tangent: Tangent) -> None:
         """Who touches now; steps of another touch or of another kind are forgotten."""
         touch = np.zeros(len(self.force), dtype=np.int8)
         touch[nodes] = balance.touch
@@ -302,7 +301,9 @@ class _Walk:
                 share /= 2
         raise ContactError("a step turns cells of the gel inside out: take smaller steps")
 
-    def _judged(self, balance: Balance, nodes: Nodes, load: Array, done: int) -> SolidState | None:
+    def _checked(
+        self, balance: ContactForces, nodes: Nodes, load: Array, done: int
+    ) -> SolidState | None:
         rest = self.inner - load
         rest[np.asarray(self.body.bundle.mesh.bonded)] = 0.0
         self.size = float(np.linalg.norm(load)) or self.size
@@ -314,7 +315,7 @@ class _Walk:
         pressed[nodes] = balance.touch > 0
         off = np.abs(np.where(pressed, gap, np.where(self.on_tool, np.minimum(gap, 0.0), 0.0)))
         self.off_mm = float(off.max())
-        slack = slack_mm(self.tolerance, self.deepest_mm)
+        slack = gap_tolerance_mm(self.tolerance, self.deepest_mm)
         into = (gap < -slack) & ~self.wanted
         self.wanted |= into
         self.on_tool |= into

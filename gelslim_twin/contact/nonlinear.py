@@ -22,9 +22,8 @@ from gelslim_force.contact.anderson import Anderson
 from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.gel_body import GelBody
-from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.contact.halved_path import reached, rests
-from gelslim_twin.contact.held_state import held_mm
+from gelslim_twin.contact.gel_state import GelState, anchor_mm
+from gelslim_twin.contact.load_steps import is_stationary, with_halved_steps
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
@@ -83,7 +82,7 @@ class NonlinearContact:
         before: Pose | None = None
         for pose in poses:
             for middle in self.solver.steps_to(state, before, pose):
-                if before is None or not rests(before, middle):
+                if before is None or not is_stationary(before, middle):
                     state = self._advanced(state, before or middle, middle)
                 before = middle
             yield GelState(state.displacement_mm, state.force_n, state.touch, state.solver)
@@ -95,7 +94,7 @@ class NonlinearContact:
                 return self._step(last, before, pose)
             except (FiniteStrainError, ConvergenceError, ContactError):
                 last = self._solid(last, before)
-        return reached(self._newton_step, last, before, pose, self.most_halvings)
+        return with_halved_steps(self._newton_step, last, before, pose, self.most_halvings)
 
     def _newton_step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
         try:
@@ -110,7 +109,7 @@ class NonlinearContact:
             state.force_n,
             state.touch,
             {},
-            held_mm(state),
+            anchor_mm(state),
             self._whole(state.displacement_mm),
         )
         return self._newton_step(guess, pose, pose) if state.force_n.any() else guess

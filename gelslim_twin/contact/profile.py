@@ -1,4 +1,4 @@
-"""Heights of a tool's shapes over their own lowest point, pointing down, upright."""
+"""Profiles: height of the lower surface of each shape of a tool over its lowest point."""
 
 from __future__ import annotations
 
@@ -24,10 +24,9 @@ from gelslim_twin.scene.stl_extent import stl_corners
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]
-"""Height in mm of the lower surface over points x and y (n,); infinite beside the shape."""
+"""Height in mm of the lower surface at points x and y (n,); infinite outside the shape."""
 RIM_MM = 0.01
-"""Points this far beside a rim count as on it: rounding must not decide about whole rows of nodes
-that stick exactly there."""
+"""Margin of a rim, so that rounding does not decide about rows of nodes exactly on it."""
 
 
 def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
@@ -126,7 +125,7 @@ def _within(inside: NDArray[np.bool_], height: Array) -> Array:
 _WAVES = 64
 _MOST_CELLS = 4_000_000
 NEGLIGIBLE = 1e-9
-"""Weight of a grid point that counts as none."""
+"""Weight of a grid point below which it is ignored."""
 
 
 def stl_profile(shape: Stl, folder: Path) -> Profile:
@@ -215,9 +214,9 @@ def _interpolated(x: Array, y: Array, height: Array) -> Profile:
             (1, 1, p * q),
         ):
             corner = height[i + a, j + b]
-            # Rounding must not let a grid point feel a neighbour that is beside the shape.
-            felt = w > NEGLIGIBLE
-            total += np.where(felt, w * np.where(felt, corner, 0.0), 0.0)
+            # Rounding must not make a grid point infinite because of a neighbour outside the shape.
+            counted = w > NEGLIGIBLE
+            total += np.where(counted, w * np.where(counted, corner, 0.0), 0.0)
         return np.where(inside, total, np.inf)
 
     return profile

@@ -1,4 +1,4 @@
-"""The rigid tool at a pose: how high its lower surface stands over the gel, how its points move."""
+"""The rigid tool at a pose: height of its lower surface over the gel, motion of its points."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
 _ABOVE_MM = 1.0
-"""How far above the gel a tilted tool is looked for: the gel bulges by less."""
+"""Height above the gel up to which a tilted tool is searched; the gel bulges by less."""
 _SAMPLES = 16
 _STEPS = 40
 _SETTLED_MM = 1e-10
@@ -24,7 +24,7 @@ _WALL_MM = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Tool:
-    """Shapes carried together: profile, place (x, y) and height of its lowest point on the tool."""
+    """Shapes on one tool: profile, position (x, y) and height of the lowest point of each."""
 
     shapes: tuple[tuple[Profile, tuple[float, float], float], ...]
 
@@ -39,17 +39,17 @@ class Tool:
         )
 
     def local(self, x: Array, y: Array) -> Array:
-        """Height (n,) of the lower surface in the tool's own frame; infinite beside it."""
+        """Height (n,) of the lower surface in the tool's frame; infinite outside its outline."""
         height = np.full(np.broadcast(x, y).shape, np.inf)
         for shape, (dx, dy), raised in self.shapes:
             height = np.minimum(height, shape(x - dx, y - dy) + raised)
         return height
 
     def height_mm(self, pose: Pose, x_mm: Array, y_mm: Array) -> Array:
-        """Height (n,) of the lower surface over points of the sensor frame; infinite beside it.
+        """Height (n,) of the lower surface over points of the sensor frame; infinite outside.
 
-        A tilted tool's surface is where the upward line over a point first enters it. What it
-        enters through an upright wall, or more than a millimetre above the gel, counts as beside.
+        The surface of a tilted tool is where the vertical line through a point first enters it. A
+        line that enters through an upright wall, or more than 1 mm above the gel, is outside.
         """
         turn = rotation(pose)
         origin = np.array([pose.x_mm, pose.y_mm, -pose.depth_mm])
@@ -57,7 +57,7 @@ class Tool:
         if pose.tilt_x_deg == 0 and pose.tilt_y_deg == 0:
             place = np.stack([dx, dy]).T @ turn[:2, :2]
             return self.local(place[..., 0], place[..., 1]) + origin[2]
-        # The tool stands on its base plane: nothing of it is lower.
+        # No point of the tool is below its base plane.
         base = -(dx * turn[0, 2] + dy * turn[1, 2]) / turn[2, 2] - 1e-9
         height = np.full(np.shape(base), np.inf)
         near = np.flatnonzero(base < _ABOVE_MM - origin[2])
@@ -66,12 +66,12 @@ class Tool:
         return height + origin[2]
 
     def _inside(self, flat: Array, line: Array, z: Array) -> Array:
-        """How far points at z (...,) on the lines over `flat` (..., 3) are inside the tool."""
+        """Depth inside the tool of points at z (...,) on the lines over `flat` (..., 3)."""
         own = flat + z[..., None] * line
         return np.asarray(own[..., 2] - self.local(own[..., 0], own[..., 1]))
 
     def _entered(self, flat: Array, line: Array, low: Array, high: float) -> Array:
-        """First z (n,) at which upward lines enter the tool between two heights; inf if none."""
+        """Lowest z (n,) between two heights at which lines enter the tool; infinite if none."""
         steps = low[:, None] + np.linspace(0.0, 1.0, _SAMPLES) * (high - low)[:, None]
         depth = self._inside(flat[:, None], line, steps)
         first = (depth >= 0).argmax(axis=1)
@@ -80,13 +80,13 @@ class Tool:
         a, b = steps[hit, first[hit] - 1], steps[hit, first[hit]]
         fa, fb = depth[hit, first[hit] - 1], depth[hit, first[hit]]
         for turn in range(_STEPS):
-            # False position, and halves in between: walls have no slope to follow.
+            # False position alternates with bisection, because walls have no slope.
             with np.errstate(invalid="ignore"):
                 guess = (a * fb - b * fa) / (fb - fa)
             middle = (a + b) / 2
             guess = np.where(np.isfinite(guess) & (turn % 2 == 0), guess, middle)
             f = self._inside(flat[hit], line, guess)
-            # Exact but for rounding counts as in, so that level faces end the search at once.
+            # Exact but for rounding counts as inside, so that level faces end the search at once.
             into = f >= -_SETTLED_MM
             a, fa = np.where(into, a, guess), np.where(into, fa, f)
             b, fb = np.where(into, guess, b), np.where(into, f, fb)
@@ -97,7 +97,7 @@ class Tool:
         return found
 
     def carried(self, before: Pose, after: Pose, points_mm: Array) -> Array:
-        """Where points (n, 3) fixed to the tool at one pose are at another."""
+        """Positions at another pose of points (n, 3) that are fixed to the tool."""
         start = np.array([before.x_mm, before.y_mm, -before.depth_mm])
         end = np.array([after.x_mm, after.y_mm, -after.depth_mm])
         turn = rotation(after) @ rotation(before).T
@@ -105,7 +105,7 @@ class Tool:
 
 
 def rotation(pose: Pose) -> Array:
-    """(3, 3) of a pose: twist about z first, then tilt about x, then about y."""
+    """Rotation matrix (3, 3) of a pose: twist about z first, then tilt about x, then about y."""
     cz, sz = _cos_sin(pose.twist_deg)
     cx, sx = _cos_sin(pose.tilt_x_deg)
     cy, sy = _cos_sin(pose.tilt_y_deg)

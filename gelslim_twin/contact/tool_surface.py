@@ -1,4 +1,4 @@
-"""How far the tool's surface is from points of the gel, and which way it faces there."""
+"""Gap and normal of the tool's surface at points of the gel."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ from gelslim_twin.scene.pose import Pose
 Array = NDArray[np.float64]
 DIFFERENCE_MM = 1e-4
 MOST_SLOPE = 10.0
-"""Steeper flanks count as this steep: a wall is a flank that nothing slips past."""
+"""Largest slope; steeper flanks and walls are given this one."""
 BENT = 0.03
-"""Rise over the last plane, per way, from which a wall is looked for on the way."""
+"""Rise over the last plane per distance above which a wall is searched on the path."""
 ROUNDING_MM = 1e-7
 _SIDES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * DIFFERENCE_MM
 
 
 @dataclass(frozen=True, eq=False)
 class ToolSurface:
-    """The tool by n points: its tangent plane where it is met along the tool's own axis."""
+    """Tangent planes of the tool at n points, taken along the tool's axis."""
 
     met_mm: Array
-    """(n, 3) a point of each plane; infinite z where the tool is not met."""
+    """(n, 3) a point of each plane; infinite z outside the tool's outline."""
     normal: Array
     """(n, 3) unit normals into the tool."""
 
     def at(self, nodes: NDArray[np.intp]) -> ToolSurface:
-        """The tool by some of the points."""
+        """The planes of some of the points."""
         return ToolSurface(self.met_mm[nodes], self.normal[nodes])
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
-        """(n,)."""
+        """Whether (n,) the tool lies above the point."""
         return np.asarray(np.isfinite(self.met_mm[:, 2]))
 
     def only(self, kept: NDArray[np.bool_]) -> ToolSurface:
-        """The same, not met but at `kept` (n,)."""
+        """The same planes, removed except at `kept` (n,)."""
         met = self.met_mm.copy()
         met[~kept, 2] = np.inf
         return ToolSurface(met, self.normal)
 
     def turned(self, other: ToolSurface, share: Array) -> ToolSurface:
-        """The same points with normals `share` (n,) of the way from another's."""
+        """The same points, with normals interpolated by `share` (n,) from another's."""
         mixed = other.normal + share[:, None] * (self.normal - other.normal)
         return ToolSurface(self.met_mm, mixed / np.linalg.norm(mixed, axis=1)[:, None])
 
     def gap_mm(self, points_mm: Array) -> Array:
-        """Distance (n,) of points (n, 3) to the planes along their normals; below 0 inside."""
+        """Gap (n,) between points (n, 3) and planes along the normals; negative for penetration."""
         return np.asarray(((self.met_mm - points_mm) * self.normal).sum(axis=1))
 
     @property
@@ -73,7 +73,7 @@ class ToolSurface:
 
 
 def clearance_mm(tool: Tool, pose: Pose, points_mm: Array) -> Array:
-    """How far (n,) points (n, 3) are below the tool along its own axis; infinite beside it."""
+    """Distance (n,) of points (n, 3) below the tool along its axis; infinite outside it."""
     own = _own(pose, points_mm)
     return np.asarray(tool.local(own[:, 0], own[:, 1]) - own[:, 2])
 
@@ -85,12 +85,12 @@ def tool_surface(
     before: ToolSurface | None = None,
     reach_mm: float = np.inf,
 ) -> ToolSurface:
-    """The tool by points (n, 3).
+    """Tangent planes of the tool at points (n, 3).
 
-    A point beside the tool meets nothing, or where `before` meets it, that one's plane: a node
-    that slips off an edge on the way to a solution is not let go at once. The same holds where
-    another part of the tool stands above the edge. Planes are tilted as the tool is where a point
-    is nearer than `reach_mm`, else level on the tool.
+    A point outside the tool has no plane, unless `before` has one for it. So a node that slips
+    off an edge within the iteration keeps the plane of the edge, also where another part of the
+    tool stands above it. Slopes are computed for points nearer than `reach_mm` only; the other
+    planes are perpendicular to the tool's axis.
     """
     own, turn = _own(pose, points_mm), rotation(pose)
     height = tool.local(own[:, 0], own[:, 1])
@@ -119,17 +119,17 @@ def tool_surface(
 
 
 def _own(pose: Pose, points_mm: Array) -> Array:
-    """Points in the tool's own frame."""
+    """Points in the frame of the tool."""
     return np.asarray((points_mm - [pose.x_mm, pose.y_mm, -pose.depth_mm]) @ rotation(pose))
 
 
 def _past_walls(
     tool: Tool, last: Array, facing: Array, now: Array, height: Array
 ) -> NDArray[np.bool_]:
-    """Whether (n,) the tool jumps up on the straight ways from `last` (n, 3) on it to `now` (n, 2).
+    """Whether (n,) the path from `last` (n, 3) on the tool to `now` (n, 2) passes an upward wall.
 
-    All in the tool's own frame; `facing` (n, 3) are the normals at `last`, `height` (n,) is that
-    of the tool at `now`.
+    All in the frame of the tool; `facing` (n, 3) are the normals at `last`, `height` (n,) is the
+    height of the tool at `now`.
     """
     way = now - last[:, :2]
     plane = last[:, 2] - (way * facing[:, :2]).sum(axis=1) / np.maximum(facing[:, 2], 1e-9)
@@ -139,7 +139,7 @@ def _past_walls(
     if len(some) == 0:
         return jumps
     a, b, low, high = last[some, :2], now[some], last[some, 2], height[some]
-    # The half with the steeper rise, down to where a slope would be measured.
+    # Bisection towards the steeper half, down to the step of the difference quotients.
     while far[some].max() > DIFFERENCE_MM:
         middle = (a + b) / 2
         between = tool.local(middle[:, 0], middle[:, 1])
@@ -152,12 +152,12 @@ def _past_walls(
 
 
 def _slope(behind: Array, here: Array, ahead: Array) -> Array:
-    """Central difference; at a rim the one to the side where the tool goes on."""
+    """Central difference; at a rim the one-sided difference within the tool."""
     with np.errstate(invalid="ignore"):
         up, down = (ahead - here) / DIFFERENCE_MM, (here - behind) / DIFFERENCE_MM
     up = np.where(np.isfinite(up), up, down)
     down = np.where(np.isfinite(down), down, up)
-    # Beside a wall the tool is as it is on this side of it.
+    # Next to a wall the slope is that of this side.
     up, down = (
         np.where((np.abs(one) > 2 * MOST_SLOPE) & (np.abs(other) <= MOST_SLOPE), other, one)
         for one, other in ((up, down), (down, up))

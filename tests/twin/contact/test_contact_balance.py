@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.coulomb_balance import FREE, SLIP, STICK, balanced
+from gelslim_twin.contact.coulomb_contact import FREE, SLIP, STICK, solve_contact_forces
 from gelslim_twin.contact.coulomb_kernel import node_force
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring, Sphere, Wedge
@@ -54,7 +54,7 @@ class Walk:
         near = np.flatnonzero(height < REACH_MM)
         dof = (3 * near[:, None] + np.arange(3)).ravel()
         block = self.compliance[np.ix_(dof, dof)]
-        found = balanced(
+        found = solve_contact_forces(
             block, height[near], target[near], self.friction, self.force[near], tolerance
         )
         assert found.residual <= max(tolerance, 1e-12)
@@ -148,7 +148,7 @@ def test_random_complementarity_problems() -> None:
         root = rng.standard_normal((3 * n, 3 * n))
         c = root @ root.T + 1e-3 * np.eye(3 * n)
         h = rng.standard_normal(n)
-        found = balanced(c, h, np.zeros((n, 2)), 0.0)
+        found = solve_contact_forces(c, h, np.zeros((n, 2)), 0.0)
         gap = h - found.motion_mm[:, 2]
         size = np.abs(h).max()
         assert (found.force_n[:, 2] <= 0).all()
@@ -168,7 +168,7 @@ def test_first_forces_do_not_matter() -> None:
     target = np.full((len(near), 2), 0.05)
     rng = np.random.default_rng(0)
     starts = [None, walk.force[near], -np.abs(rng.standard_normal((len(near), 3)))]
-    forces = [balanced(block, h, target, 0.3, s, 1e-9).force_n for s in starts]
+    forces = [solve_contact_forces(block, h, target, 0.3, s, 1e-9).force_n for s in starts]
     for one, other in itertools.combinations(forces, 2):
         np.testing.assert_allclose(one, other, atol=1e-7 * np.abs(one).max())
 
@@ -189,8 +189,8 @@ def test_refusals() -> None:
     c = np.eye(3)
     for friction, height in ((-1.0, 0.0), (np.inf, 0.0), (0.5, np.nan)):
         with pytest.raises(ContactError):
-            balanced(c, np.array([height]), np.zeros((1, 2)), friction)
-    nothing = balanced(c, np.array([0.1]), np.ones((1, 2)), 0.5)
+            solve_contact_forces(c, np.array([height]), np.zeros((1, 2)), friction)
+    nothing = solve_contact_forces(c, np.array([0.1]), np.ones((1, 2)), 0.5)
     assert not nothing.force_n.any()
     assert nothing.touch[0] == FREE
     kept = pickle.loads(pickle.dumps(ContactError("why", 0.1)))
@@ -208,7 +208,7 @@ def test_random_compliances_with_friction(friction: float, refused: int) -> None
         c = root @ root.T + 0.05 * np.eye(3 * n)
         height, target = rng.standard_normal(n), rng.standard_normal((n, 2))
         try:
-            found = balanced(c, height, target, friction, tolerance=1e-6)
+            found = solve_contact_forces(c, height, target, friction, tolerance=1e-6)
         except ContactError as error:
             misses.append(error)
             continue

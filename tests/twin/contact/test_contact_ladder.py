@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.halved_path import between
+from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
@@ -36,7 +36,7 @@ SHAPES: dict[str, Indenter] = {
     ),
 }
 PRESS, SHEAR = Pose(depth_mm=0.35), Pose(x_mm=0.5, y_mm=0.2, depth_mm=0.35, tilt_x_deg=1.5)
-POSES = (Pose(), *between(Pose(), PRESS, 4), *between(PRESS, SHEAR, 8))
+POSES = (Pose(), *even_steps(Pose(), PRESS, 4), *even_steps(PRESS, SHEAR, 8))
 
 
 def fields(shape: Indenter, poisson: float, tolerance: float, friction: float = 0.6) -> list[Array]:
@@ -97,7 +97,11 @@ def test_half_the_step_keeps_the_tolerance(name: str) -> None:
         one = ContactSolver(
             kept, Tool.of([SHAPES[name]], Path()), ContactSettings(1e-3, 0.6, longest_step=50)
         )
-        poses = (Pose(), *between(Pose(), PRESS, steps), *between(PRESS, SHEAR, steps))
+        poses = (
+            Pose(),
+            *even_steps(Pose(), PRESS, steps),
+            *even_steps(PRESS, SHEAR, steps),
+        )
         ends.append(list(one.states(poses))[-1].force_n)
     assert np.linalg.norm(ends[0] - ends[1]) < 1e-2 * np.linalg.norm(ends[1])
 
@@ -110,7 +114,11 @@ def test_sticking_adds_no_error_from_step_to_step() -> None:
     for tolerance in (1e-2, 1e-7):
         one = ContactSolver(kept, tool, ContactSettings(tolerance, 5.0))
         over = replace(PRESS, tilt_y_deg=2.0)
-        poses = (Pose(), *between(Pose(), PRESS, 3), *between(PRESS, over, 40))
+        poses = (
+            Pose(),
+            *even_steps(Pose(), PRESS, 3),
+            *even_steps(PRESS, over, 40),
+        )
         ends.append(list(one.states(poses))[-1].force_n)
     assert np.linalg.norm(ends[0] - ends[1]) < 1e-2 * np.linalg.norm(ends[1])
 

@@ -11,7 +11,7 @@ from contact_pads import YOUNGS_MPA, small_pad
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
-from gelslim_twin.contact.coulomb_balance import balanced
+from gelslim_twin.contact.coulomb_contact import solve_contact_forces
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
@@ -61,7 +61,7 @@ def test_hertz_on_a_half_space() -> None:
         c = np.zeros((3 * len(points), 3 * len(points)))
         c[2::3, 2::3] = half_space(points, pitch, YOUNGS_MPA, poisson)
         height = (points**2).sum(axis=1) / (2 * radius) - depth
-        found = balanced(c, height, np.zeros((len(points), 2)), 0.0)
+        found = solve_contact_forces(c, height, np.zeros((len(points), 2)), 0.0)
         push = -found.force_n[:, 2]
         errors.append(abs(push.sum() / force - 1))
         assert (push > 0).sum() * pitch**2 == pytest.approx(math.pi * a * a, rel=2 / count)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.gel_state import ContactStatus, GelState
-from gelslim_twin.contact.halved_path import between, reached
+from gelslim_twin.contact.load_steps import even_steps, with_halved_steps
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, FlatPunch, Indenter, Ring, Sphere, Wedge
@@ -47,7 +47,7 @@ def press(depth: float, steps: int = 4, **place: float) -> list[Pose]:
 
 
 def slide(start: Pose, x: float, steps: int) -> list[Pose]:
-    return list(between(start, replace(start, x_mm=start.x_mm + x), steps))
+    return list(even_steps(start, replace(start, x_mm=start.x_mm + x), steps))
 
 
 def total(state: GelState) -> Array:
@@ -251,7 +251,7 @@ def test_tilting_moves_the_pressure() -> None:
         -1
     ]
     push = -state.force_n[:, 2]
-    # Turning right-handed about y takes the side at +x down.
+    # NormalDamping right-handed about y takes the side at +x down.
     assert (push * one.points_mm[:, 0]).sum() / push.sum() > 0.2
 
 
@@ -264,8 +264,8 @@ def test_halves_where_one_step_fails() -> None:
             raise ContactError("too far", 0.5)
         return state + pose.x_mm - before.x_mm
 
-    assert reached(step, 0.0, Pose(), Pose(x_mm=1.0), 3) == pytest.approx(1.0)
+    assert with_halved_steps(step, 0.0, Pose(), Pose(x_mm=1.0), 3) == pytest.approx(1.0)
     assert tried == [1.0, 0.5, 0.25, 0.25, 0.5, 0.25, 0.25]
     with pytest.raises(ContactError, match="too far") as caught:
-        reached(step, 0.0, Pose(), Pose(x_mm=8.0), 3)
+        with_halved_steps(step, 0.0, Pose(), Pose(x_mm=8.0), 3)
     assert caught.value.residual == 0.5

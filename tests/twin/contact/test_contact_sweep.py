@@ -9,7 +9,7 @@ import pytest
 from contact_pads import small_pad
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
-from gelslim_twin.contact.halved_path import between
+from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import (
@@ -80,7 +80,11 @@ def test_friction_in_finer_and_finer_steps() -> None:
             kept, Tool.of([SHAPES["sphere"]], Path()), ContactSettings(1e-6, 0.5, longest_step=50.0)
         )
         down, side = Pose(depth_mm=0.5), Pose(x_mm=0.4, depth_mm=0.5)
-        poses = (Pose(), *between(Pose(), down, steps), *between(down, side, steps))
+        poses = (
+            Pose(),
+            *even_steps(Pose(), down, steps),
+            *even_steps(down, side, steps),
+        )
         fields.append(list(one.states(poses))[-1].force_n)
     size = np.linalg.norm(fields[-1])
     gaps = [np.linalg.norm(f - fields[-1]) / size for f in fields[:-1]]

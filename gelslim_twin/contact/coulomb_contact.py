@@ -1,8 +1,9 @@
-"""Forces of nodes in reach of a tool, with or without Coulomb friction, to a tolerance.
+"""Contact forces at the candidate nodes of a tool, with or without Coulomb friction.
 
-Frictionless contact is solved exactly by its active set. With friction, block Gauss-Seidel sweeps;
-where they slow down, semismooth Newton steps on who sticks and who slips (Alart and Curnier 1991)
-take over.
+Frictionless contact is a linear complementarity problem, which an active-set method solves to
+rounding. Contact with friction is solved by block Gauss-Seidel sweeps; where these converge slowly,
+semismooth Newton steps on the sets of sticking and slipping nodes take over (Alart and Curnier
+1991).
 """
 
 from __future__ import annotations
@@ -11,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, lu_factor, lu_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
 
-from gelslim_twin.contact.active_set import pressed_nodes
 from gelslim_twin.contact.contact_error import ContactError
 
 Array = NDArray[np.float64]
@@ -22,22 +22,22 @@ FREE, STICK, SLIP = 0, 1, 2
 MOST_SWEEPS = 1000
 CHECK_EVERY = 6
 SLOW = 0.7
-"""Gain of CHECK_EVERY sweeps below which Newton is tried."""
+"""Ratio of residuals over CHECK_EVERY sweeps above which Newton's method is tried."""
 NEWTON_STEPS = 12
 RELAXATIONS = (1.0, 0.6, 0.3)
 PATIENCE = 50
 SURE = 0.1
-"""Share of the tolerance that Newton goes on to: its steps tell nothing of what is left."""
+"""Share of the tolerance at which Newton's method stops, as its steps do not estimate the error."""
 LEAST_RATE = 0.5
-"""Of the sweeps, until three of them have shown theirs."""
+"""Least rate of convergence assumed for the sweeps."""
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
-    """Forces (n, 3) in N, motion (n, 3) in mm, who is free, sticks or slips, and how well.
+class ContactForces:
+    """Forces (n, 3) in N, displacements (n, 3) in mm and contact status (n,) of the nodes.
 
-    `residual` is the root mean square by which nodes would change their forces if each were
-    solved alone, over that of the forces.
+    `residual` is the root mean square of the change of forces if every node were solved alone,
+    over the root mean square of the forces.
     """
 
     force_n: Array
@@ -47,7 +47,7 @@ class Balance:
     sweeps: int
 
 
-def balanced(
+def solve_contact_forces(
     compliance: Array | NDArray[np.float32],
     height_mm: Array,
     target_mm: Array,
@@ -56,34 +56,35 @@ def balanced(
     tolerance: float = 1e-3,
     frames: Array | None = None,
     start_mm: Array | None = None,
-) -> Balance:
-    """Contact of n nodes with a rigid tool.
+) -> ContactForces:
+    """Solve the contact of n nodes with a rigid tool.
 
     Args:
         compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite; single
             precision halves the time of a large one.
-        height_mm: (n,) the most each node may move along its normal; inf for never in contact.
-        target_mm: (n, 2) motion along its tangents of a node that sticks.
+        height_mm: (n,) largest displacement of each node along its normal (the gap at rest);
+            inf for a node that is never in contact.
+        target_mm: (n, 2) displacement along its tangents of a node that sticks.
         friction: coefficient μ >= 0.
         start_n: (n, 3) forces to start from.
-        tolerance: on `Balance.residual`, and on the error of the forces that the sweeps' rate
-            lets expect; frictionless contact is solved to rounding.
+        tolerance: on `ContactForces.residual`, and on the error of the forces that follows from
+            the rate of convergence; frictionless contact is solved to rounding.
         frames: (n, 3, 3), in the columns each node's tangents and the normal into the tool;
             None for x, y, z.
-        start_mm: (n, 3) motion C f under `start_n`, if it is known.
+        start_mm: (n, 3) displacement C f under `start_n`, if it is known.
 
     Raises:
-        ContactError: no balance within the tolerance, or input that cannot be.
+        ContactError: the tolerance is not reached, or the input is invalid.
     """
     n = len(height_mm)
     if not (np.isfinite(friction) and friction >= 0):
-        raise ContactError(f"friction = {friction}: must be 0 or more, and finite")
+        raise ContactError(f"friction = {friction}: must be finite and at least 0")
     if np.isnan(height_mm).any() or not np.isfinite(target_mm).all():
-        raise ContactError("the tool's heights or the sticking places hold NaN")
+        raise ContactError("the heights or the targets of the nodes hold NaN")
     start = np.zeros((n, 3)) if start_n is None else np.array(start_n, dtype=float)
     if not (height_mm < 0).any():
         nothing = np.zeros((n, 3))
-        return Balance(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
+        return ContactForces(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
     if friction == 0:
         return _frictionless(compliance, height_mm, start, frames)
     found = _Frictional(compliance, height_mm, target_mm, friction, frames)
@@ -92,7 +93,7 @@ def balanced(
 
 def _frictionless(
     compliance: Array | NDArray[np.float32], height: Array, start: Array, frames: Array | None
-) -> Balance:
+) -> ContactForces:
     n = len(height)
     if frames is None:
         across = compliance[:, 2::3].astype(float)
@@ -101,19 +102,19 @@ def _frictionless(
         normals = frames[:, :, 2]
         across = np.einsum("ijb,jb->ij", compliance.reshape(3 * n, n, 3), normals)
         normal = np.einsum("iaj,ia->ij", across.reshape(n, 3, n), normals)
-    # Pushed nodes are pushed against their normals.
-    push, pivots = pressed_nodes(normal, height, (start * normals).sum(axis=1) < 0)
+    # Contact forces act against the normals.
+    push, pivots = lcp_forces(normal, height, (start * normals).sum(axis=1) < 0)
     force = push[:, None] * normals
     motion = np.asarray(across @ push).reshape(n, 3)
     own = np.minimum((height - normal @ push) / np.diag(normal) + push, 0.0)
     size = float(np.linalg.norm(push))
     residual = float(np.linalg.norm(own - push)) / size if size > 0 else 0.0
     touch = np.where(push < 0, SLIP, FREE).astype(np.int8)
-    return Balance(force, motion, touch, residual, pivots)
+    return ContactForces(force, motion, touch, residual, pivots)
 
 
 def _left(changes: list[float], relaxation: float) -> float:
-    """What sweeps still have to change, from their last changes: a geometric series' rest."""
+    """Estimated error of the forces: remainder of a geometric series of the last changes."""
     first, _, last = changes[-3], changes[-2], changes[-1]
     rate = max(LEAST_RATE, (last / first) ** 0.5) if 0 < first < np.inf else LEAST_RATE
     return last * (rate / (1 - rate) if rate < 1 else np.inf) / relaxation
@@ -138,8 +139,8 @@ class _Frictional:
         self.mu = float(friction)
         self.touch = np.zeros(len(height), dtype=np.int8)
 
-    def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> Balance:
-        """Sweep until each node's own answer is the force it has."""
+    def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> ContactForces:
+        """Sweep until no node changes its force."""
         from gelslim_twin.contact.coulomb_kernel import sweep
 
         f = np.ascontiguousarray(start).reshape(-1).copy()
@@ -162,7 +163,7 @@ class _Frictional:
                 near = _left(changes, relaxation) <= tolerance * size
                 if near or (turn + 1) % CHECK_EVERY == 0:
                     residual = self._residual(f, u)
-                    # Sweeps that never show a steady rate are judged by what nodes want alone.
+                    # Without a steady rate of convergence the residual decides, with a margin.
                     if residual <= (tolerance if near else SURE * tolerance) and (
                         near or turn >= PATIENCE
                     ):
@@ -180,18 +181,20 @@ class _Frictional:
                             changes = [np.inf, np.inf]
                     last = residual
         raise ContactError(
-            f"the contact of {len(self.height)} nodes with friction {self.mu:g} is not found after "
-            f"{sweeps} sweeps: nodes are off by {best:.1e} of the forces at best, "
-            f"{tolerance:.1e} is asked for; take smaller steps of the motion, a lower friction or "
-            "a larger tolerance",
+            f"the contact of {len(self.height)} nodes with friction {self.mu:g} did not converge "
+            f"in {sweeps} sweeps: the smallest residual is {best:.1e} of the forces, the tolerance "
+            f"{tolerance:.1e}; take smaller steps of the motion, a lower friction or a larger "
+            "tolerance",
             best,
         )
 
-    def _balance(self, f: Array, u: Array, residual: float, sweeps: int) -> Balance:
-        return Balance(f.reshape(-1, 3), u.reshape(-1, 3), self.touch.copy(), residual, sweeps)
+    def _balance(self, f: Array, u: Array, residual: float, sweeps: int) -> ContactForces:
+        return ContactForces(
+            f.reshape(-1, 3), u.reshape(-1, 3), self.touch.copy(), residual, sweeps
+        )
 
     def _motion(self, f: Array) -> Array:
-        """C f afresh."""
+        """The displacement C f."""
         from gelslim_twin.contact.coulomb_kernel import motion
 
         u = np.zeros_like(f)
@@ -199,7 +202,7 @@ class _Frictional:
         return u
 
     def _residual(self, f: Array, u: Array) -> float:
-        """How far nodes are from their own answers under a motion C f; sets `touch`."""
+        """Relative residual under the displacement C f; sets the contact status `touch`."""
         from gelslim_twin.contact.coulomb_kernel import answers
 
         own = np.empty_like(f)
@@ -209,7 +212,7 @@ class _Frictional:
         return off / size if size > 0 else float(off > 0)
 
     def _newton(self, f: Array, residual: float, tolerance: float) -> Array | None:
-        """Forces of a lower residual by Newton's steps, or None."""
+        """Forces of a smaller residual by Newton's method, or None."""
         start, x = residual, f.copy()
         for _ in range(NEWTON_STEPS):
             self._residual(x, self._motion(x))
@@ -217,7 +220,7 @@ class _Frictional:
                 step = self._step(x)
             except (LinAlgError, ValueError):
                 return None
-            # The shortest step that gains, from the whole one down.
+            # Line search: the longest of three steps that lowers the residual.
             for share in (1.0, 0.5, 0.25):
                 trial = x + share * step
                 ahead = self._residual(trial, self._motion(trial))
@@ -231,7 +234,7 @@ class _Frictional:
         return x
 
     def _step(self, f: Array) -> Array:
-        """Newton's step for the touch just found, slip directions turning with the motion."""
+        """Newton's step for the present contact status, with the derivative of slip directions."""
         n, on = len(self.height), np.flatnonzero(self.touch)
         dof, m = (3 * on[:, None] + np.arange(3)).ravel(), len(on)
         q = self.frames[on]
@@ -262,3 +265,49 @@ class _Frictional:
         local = lu_solve(lu_factor(matrix.reshape(3 * m, 3 * m)), right.reshape(-1))
         x[dof] = np.einsum("mab,mb->ma", q, local.reshape(m, 3)).reshape(-1)
         return x - f
+
+
+BLOCK_TRIES = 10
+ROUNDING = 1e-12
+
+
+def lcp_forces(normal: Array, height: Array, guess: NDArray[np.bool_]) -> tuple[Array, int]:
+    """Solve the linear complementarity problem f <= 0, A f <= height, f (A f - height) = 0.
+
+    Block principal pivoting (Júdice and Pires 1994): all nodes that violate a condition change
+    their status at once. Where that cycles, one node at a time does (Murty 1974), which terminates
+    for every positive definite matrix.
+
+    Args:
+        normal: A (n, n) in mm/N, symmetric positive definite.
+        height: (n,) in mm; inf for a node that is never pressed.
+        guess: (n,) initial active set.
+
+    Returns the forces (n,) and the number of factorisations. Raises ContactError where rounding
+    prevents convergence of the active set.
+    """
+    active, reachable = guess & np.isfinite(height), np.isfinite(height)
+    # Rounding must not change the status of a node whose force or gap is zero.
+    narrow = ROUNDING * float(np.abs(height[reachable]).max(initial=0.0))
+    fewest, tries = len(height) + 1, BLOCK_TRIES
+    for factors in range(1, 20 * len(height) + 200):
+        force = np.zeros(len(height))
+        if active.any():
+            factor = cho_factor(normal[np.ix_(active, active)], check_finite=False)
+            force[active] = cho_solve(factor, height[active], check_finite=False)
+        slight = ROUNDING * float(np.abs(force).max())
+        wrong = (active & (force > slight)) | (~active & (height - normal @ force < -narrow))
+        count = int(wrong.sum())
+        if count == 0:
+            return np.minimum(force, 0.0), factors
+        if count < fewest:
+            fewest, tries = count, BLOCK_TRIES
+        elif tries > 0:
+            tries -= 1
+        else:
+            wrong &= np.arange(len(height)) == np.flatnonzero(wrong)[-1]
+        active = active ^ wrong
+    raise ContactError(
+        f"the active set of {len(height)} nodes does not converge: the compliance is too close to "
+        "singular; use cells of an aspect nearer 1 or a Poisson's ratio further from 0.5"
+    )
