@@ -57,6 +57,17 @@ class Wrench:
         """(6,) in N and N mm."""
         return np.sqrt(np.diag(self.covariance))
 
+    def __str__(self) -> str:
+        """One line: value and standard deviation of each component."""
+        names = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+        parts = [
+            f"{name} unknown" if np.isnan(value) else f"{name} {value:+.3f} ± {sigma:.3f} {unit}"
+            for name, (_, unit), value, sigma in zip(
+                names, _ROWS, self.vector, self.standard_deviation, strict=True
+            )
+        ]
+        return ", ".join(parts)
+
     def _repr_html_(self) -> str:
         """Table of the six components for a notebook."""
         rows = [

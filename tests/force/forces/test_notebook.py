@@ -84,3 +84,11 @@ def test_without_matplotlib_the_text_remains(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setitem(sys.modules, name, None)
     assert field()._repr_png_() is None
     assert "ForceField" in repr(field())
+
+
+def test_a_printed_wrench_is_one_line_and_says_what_is_unknown() -> None:
+    text = str(wrench(normal_known=False))
+    assert "\n" not in text
+    assert text.count("unknown") == 3
+    assert text.count("±") == 3
+    assert str(wrench()).count("±") == 6
