@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from light_cases import N_ACRYLIC, finger
 
-from gelslim_optics.light.launch import point_batches
+from gelslim_optics.light.launch import launch, point_batches
 from gelslim_optics.light.scene import default_media
 from gelslim_optics.light.source import Dome, EdgeLaunch, Lambertian, LedRow, MeasuredLaw
 
@@ -78,3 +79,35 @@ def test_pieces_of_a_batch_join_up_and_replicates_differ() -> None:
         assert np.array_equal(whole, split)
         assert not np.array_equal(whole, other)
         assert whole.shape == (4096, 4)
+
+
+@pytest.mark.parametrize("foot", ["foot_left", "foot_right"])
+def test_an_offset_moves_the_leds_from_the_start_of_the_foot_to_its_end(foot: str) -> None:
+    scene = finger(3.0)
+    segment = scene.profile.edge(foot).curve
+    along = np.subtract(segment.end, segment.start) / segment.length_mm
+    middle = np.add(segment.start, segment.end) / 2
+    points = np.random.default_rng(3).random((4096, 4))
+    for offset in (-0.4, 0.0, 0.3):
+        row = LedRow(foot, (1.5,), size_mm=1.0, gap_mm=0.0, offset_mm=offset)
+        rays = launch(scene, row, points)
+        place = (rays[:, 1:3] - middle) @ along
+        assert place.min() == pytest.approx(offset - 0.5, abs=2e-3)
+        assert place.max() == pytest.approx(offset + 0.5, abs=2e-3)
+        assert rays[:, 0].mean() == pytest.approx(1.5, abs=0.02)
+
+
+def test_light_crosses_the_gap_along_its_direction_and_refracts_at_the_foot() -> None:
+    """A tiny LED: where a ray meets the foot, and its direction in the guide, follow from Snell."""
+    scene, gap = finger(3.0), 0.7
+    segment = scene.profile.edge("foot_right").curve
+    along = np.subtract(segment.end, segment.start) / segment.length_mm
+    middle = np.add(segment.start, segment.end) / 2
+    row = LedRow("foot_right", (1.5,), size_mm=1e-9, gap_mm=gap)
+    rays = launch(scene, row, np.random.default_rng(4).random((2000, 4)))
+    sine = N_ACRYLIC * np.column_stack([rays[:, 3], rays[:, 4:6] @ along])
+    cosine = np.sqrt(1 - (sine**2).sum(axis=1))
+    met = np.column_stack([rays[:, 0] - 1.5, (rays[:, 1:3] - middle) @ along])
+    steep = cosine > 0.05
+    np.testing.assert_allclose(met[steep], (gap * sine / cosine[:, None])[steep], atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(rays[:, 3:6], axis=1), 1, atol=1e-12)
