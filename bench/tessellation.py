@@ -5,7 +5,7 @@
     python bench/tessellation.py --quick --docs D   # and writes D/data/tessellation.json
 
 All parts of designs/gelslim2.yaml that are printed go to STL, the whole finger to GLB, at every
-pair of tolerances of `gelslim_cad.export.tessellation.RUNGS` and as a build chooses them. Times are
+pair of tolerances of `gelslim_cad.export.mesh.RUNGS` and as a build chooses them. Times are
 CPU seconds of one thread, for triangulating and for making the files' bytes.
 """
 
@@ -28,10 +28,9 @@ from gelslim_cad.build.work import VOLUME_TOLERANCE
 from gelslim_cad.build.writers import GLB_ANGULAR_DEG, GLB_LINEAR_MM
 from gelslim_cad.dimensions import derive
 from gelslim_cad.export.glb import glb_bytes
-from gelslim_cad.export.mesh import tessellate, volume_mm3, welded
+from gelslim_cad.export.mesh import RUNGS, mesh_for, tessellate, volume_mm3, welded
 from gelslim_cad.export.patch import face_patches
 from gelslim_cad.export.stl import stl_bytes
-from gelslim_cad.export.tessellation import RUNGS, mesh_for
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.finger import finger_parts
 from gelslim_cad.spec.reader import read_spec

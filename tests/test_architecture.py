@@ -52,8 +52,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "effects", "scene", "planning", "contact", "render", "simulation", "validation",
     ),
     "gelslim_cad": (
-        "spec", "markers", "geometry", "light", "dimensions", "checks", "export", "proof",
-        "solids", "report", "sensor", "build", "compare", "explore", "family",
+        "spec", "markers", "pictures", "geometry", "light", "dimensions", "checks", "export",
+        "proof", "solids", "report", "sensor", "build", "compare", "explore", "family",
     ),
     "gelslim": (
         "ending", "examples", "scene_sensor", "design", "contacts", "doctor", "cli", "__main__",

@@ -25,7 +25,7 @@ GL_LIBRARIES = {
 DRAW_S = 120
 _DRAW = """
 import numpy as np
-from gelslim_cad.report.pictures import PictureError, picture_whole
+from gelslim_cad.pictures.finger_pictures import PictureError, picture_whole
 corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 try:

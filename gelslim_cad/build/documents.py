@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from gelslim_cad.build.bom import BomLine
 from gelslim_cad.build.instructions import build_guide
-from gelslim_cad.build.light_writer import LIGHT_JSON
-from gelslim_cad.build.manifest import FileEntry
+from gelslim_cad.build.manifest import FileEntry, json_bytes
 from gelslim_cad.build.page import pictures, report_data
-from gelslim_cad.build.plain_json import checks_json, json_bytes, plain
+from gelslim_cad.build.writers import LIGHT_JSON
+from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions, definition
 from gelslim_cad.report import render_report
 from gelslim_cad.solids.casting import cast_gel
@@ -90,3 +91,15 @@ def report_document(
         shown,
     )
     return render_report(data), "report with 3D viewer, offline"
+
+
+def checks_json(checks: tuple[Check, ...]) -> bytes:
+    """Content of checks.json."""
+    return json_bytes([{k: plain(v) for k, v in asdict(c).items()} for c in checks])
+
+
+def plain(value: Any) -> Any:
+    """Replace tuples and numpy scalars by what JSON can hold."""
+    if isinstance(value, tuple):
+        return [plain(v) for v in value]
+    return value.item() if hasattr(value, "item") else value

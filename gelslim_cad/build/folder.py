@@ -1,7 +1,8 @@
-"""The output folder of a build: filled beside its place, then swapped in whole.
+"""The output folder of a build, which is replaced as a whole.
 
-A killed build leaves the previous output as it was; what it left beside it is removed by the
-next build. Two builds of one folder wait for each other.
+The files are written to a folder next to it, which then takes its place. A build that is killed
+leaves the previous output as it was, and the next build removes what the killed one left. Two
+builds of one folder wait for each other.
 """
 
 from __future__ import annotations
@@ -14,22 +15,20 @@ from pathlib import Path
 
 from gelslim_core.files.beside import beside
 from gelslim_core.files.file_lock import locked as lock_file
+from gelslim_core.files.output_error import OutputError
 from gelslim_core.files.replaced_folder import FolderError, replaced_folder
 
 MANIFEST = "manifest.json"
 FAMILY = "gelslim-build/"
-"""How the format of a build's manifest begins, whatever its version."""
-
-
-class OutputError(OSError):
-    """The output folder cannot be used; the message says why and what to do."""
+"""Beginning of the format in a build's manifest, whatever its version."""
 
 
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[None]:
-    """Hold the folder's lock file while working in it; others wait, and say so.
+    """Hold the folder's lock; another process waits for it and says so.
 
-    Raises OutputError when the folder's parent cannot be written.
+    Raises:
+        OutputError: The folder's parent cannot be written.
     """
     lock = beside(target, ".lock")
     with contextlib.ExitStack() as stack:
@@ -51,8 +50,10 @@ def _say_waiting(target: Path) -> None:
 def staged(target: Path, ours: Collection[str] = ()) -> Iterator[Path]:
     """An empty folder that takes the place of `target` when the block ends without an error.
 
-    `ours` are the files of the last build, which go; others are carried over. Raises OutputError
-    when `target` is a file or a folder that no build made.
+    Files of the last build, `ours`, are removed; any other file is kept.
+
+    Raises:
+        OutputError: `target` is a file or a folder that no build made, or cannot be written.
     """
     require_ours(target)
     try:
@@ -61,8 +62,6 @@ def staged(target: Path, ours: Collection[str] = ()) -> Iterator[Path]:
     except FolderError as error:
         raise OutputError(str(error)) from error
     except OSError as error:
-        if isinstance(error, OutputError):
-            raise
         raise OutputError(
             f"{target}: cannot be written ({error.strerror or error}); "
             "free some disk space or choose another --out"
@@ -77,12 +76,12 @@ def require_ours(target: Path) -> None:
         raise OutputError(f"{target}: is a file; choose another --out")
     if any(target.iterdir()) and not _built(target):
         raise OutputError(
-            f"{target}: holds files that no build wrote and is left alone; choose another --out"
+            f"{target}: holds files that no build wrote, so it stays as it is; choose another --out"
         )
 
 
 def _built(folder: Path) -> bool:
-    """Whether a build's manifest is there: other programs write a manifest.json too."""
+    """Whether the folder holds a build's manifest: other programs write a manifest.json too."""
     try:
         found = json.loads((folder / MANIFEST).read_bytes())
     except (OSError, ValueError):

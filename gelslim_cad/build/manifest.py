@@ -1,4 +1,4 @@
-"""The manifest: what a build wrote, from what, so that the next build can reuse it."""
+"""The manifest of a build: its files and their inputs, so that the next build can reuse them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Manifest:
             },
             "proofs": [dict(p) for p in self.proofs],
         }
-        return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
+        return json_bytes(content)
 
 
 def entry(data: bytes, purpose: str, unit: str) -> FileEntry:
@@ -94,3 +94,8 @@ def intact(folder: Path, manifest: Manifest, paths: list[str]) -> bool:
         if len(data) != stated.size_bytes or hashlib.sha256(data).hexdigest() != stated.sha256:
             return False
     return True
+
+
+def json_bytes(content: object) -> bytes:
+    """Indented UTF-8 JSON with a final newline; the same content gives the same bytes."""
+    return (json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()

@@ -68,13 +68,11 @@ class Stages:
         with interrupts_held():
             import cadquery  # noqa: F401
 
-        from gelslim_cad.build.mould_checks import check_mould
-        from gelslim_cad.build.solid_checks import check_solids
-        from gelslim_cad.solids.finger import blanks, finger_parts
-        from gelslim_cad.solids.tooling import tooling_parts
+        from gelslim_cad.build.solid_checks import check_mould, check_solids
+        from gelslim_cad.solids.finger import finger_parts, tooling_parts
 
         finger = finger_parts(self.dimensions)
-        tooling = (*blanks(self.dimensions), *tooling_parts(self.dimensions, self.grid))
+        tooling = tooling_parts(self.dimensions, self.grid)
         checks = (
             *self.checks,
             *check_solids(self.dimensions, finger),
@@ -104,7 +102,7 @@ class Stages:
 
     def _mould_unit(self, gel: PackedPart) -> Unit:
         """The cavity against the gel: the mould must be the gel grown by the shrinkage."""
-        from gelslim_cad.solids.tooling import cavity_solid
+        from gelslim_cad.solids.tooling.mould import cavity_solid
 
         cavity = replace(gel.unpacked(), name="cavity", solid=cavity_solid(self.dimensions))
         scale = 1 / (1 - self.dimensions["manufacturing.gel_shrinkage_percent"] / 100)

@@ -1,4 +1,4 @@
-"""One variant, from its spec to its folder."""
+"""A build from the spec to the folder: what to do again, the work, the checks, the swap."""
 
 from __future__ import annotations
 
@@ -42,12 +42,20 @@ class BuildRefusedError(GelslimError):
 
 @dataclass(frozen=True)
 class BuildResult:
-    """What a build did."""
+    """What a build did.
+
+    Attributes:
+        folder: Folder of the build.
+        files: Paths of all its files, relative to the folder.
+        rebuilt: Names of the units of work that were done; the others were taken over.
+        checks: The design rules with their results.
+        binding: Sentences that say what sets the finger's thickness.
+        up_to_date: Whether nothing had to be done.
+    """
 
     folder: Path
     files: tuple[str, ...]
     rebuilt: tuple[str, ...]
-    """Units of work that were done; the others were taken over."""
     checks: tuple[Check, ...]
     binding: tuple[str, ...]
     up_to_date: bool = False
@@ -60,11 +68,24 @@ def build_variant(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> BuildResult:
-    """Build every file of a spec into `out_dir`, replacing an earlier build of it whole.
+    """Build every file of a spec; the folder of an earlier build is replaced as a whole.
 
-    `jobs` is the number of worker processes (default: the processors, at most 4); it does not
-    change a byte. Raises InputError for a bad spec, BuildRefusedError when a rule or a proof fails,
-    OutputError when the folder cannot be written.
+    Units of work whose inputs have not changed since that build are taken over.
+
+    Args:
+        spec_path: The YAML file.
+        out_dir: Folder of the files.
+        jobs: Number of worker processes; by default one per processor, at most four. It does not
+            change a byte of the files.
+        progress: Called as the work goes on.
+
+    Returns:
+        The folder, its files, and the design rules with their results.
+
+    Raises:
+        InputError: The spec has faults.
+        BuildRefusedError: A design rule fails, or a written file fails its check.
+        OutputError: The folder cannot be written.
     """
     from gelslim_cad.build.stages import Stages
     from gelslim_cad.spec.reader import read_spec
@@ -148,7 +169,7 @@ def _build(
 def _reusable(
     previous: Manifest | None, target: Path, keys: dict[str, str]
 ) -> dict[str, list[str]]:
-    """Units whose inputs are those of the last build and whose files are intact."""
+    """Paths by unit, for units with the inputs of the last build and intact files."""
     if previous is None:
         return {}
     by_unit: dict[str, list[str]] = {}
@@ -170,7 +191,7 @@ def _kept_proofs(
 
 
 def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
-    """Run units, the dearest first, in worker processes; results by name."""
+    """Run the units in worker processes, those with the highest cost first; results by name."""
     queue = sorted(todo, key=lambda u: -u.cost)
     results: dict[str, Written] = {}
     if jobs <= 1 or len(queue) <= 1:
@@ -178,8 +199,8 @@ def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
             tell(unit.name, done, len(queue))
             results[unit.name] = run(unit)
         return results
-    # Forked workers start with the CAD kernel loaded; elsewhere each worker loads its own.
-    # Booleans run on kernel threads that a fork loses: units only write and read files.
+    # A forked worker starts with the CAD kernel loaded; a spawned one must load it first.
+    # A fork loses the kernel's threads, which Booleans use: units only write and read files.
     with worker_pool(min(jobs, len(queue)), "fork" if _forks() else "spawn") as pool:
         futures = [(unit, pool.submit(run, unit)) for unit in queue]
         for done, (unit, future) in enumerate(futures):

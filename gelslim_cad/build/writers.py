@@ -1,4 +1,4 @@
-"""The kinds of units of work: each writes some files of some parts and proves them as written."""
+"""The kinds of units of work. Each writes some files and checks them by reading them back."""
 
 from __future__ import annotations
 
@@ -7,23 +7,26 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from gelslim_cad.build.light_writer import write_light
-from gelslim_cad.build.view_writer import write_view
+from gelslim_cad.build.manifest import json_bytes
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
 from gelslim_cad.geometry.part import Part
 from gelslim_core.files.scratch import scratch_folder
 
 SECTION_MM = 0.013
-"""Off the mid-plane, so that no section runs along a face."""
+"""Position of the sections: off the mid-plane, so that none runs along a face."""
 GLB_LINEAR_MM = 0.1
 GLB_ANGULAR_DEG = 20.0
 PROOF_DECIMALS = 8
+LIGHT_JSON = "light.json"
+ERROR_PICTURE = "pictures/projection_error.png"
+LEDGER_LIMIT = 1e-9
+LOST_LIMIT = 1e-9
 
 Proofs = list[Any]
 
 
 def write_part(parts: Sequence[Part]) -> Written:
-    """STEP of one part; print meshes and laser outline where its process calls for them."""
+    """STEP of one part, with print meshes or a laser outline where its process needs them."""
     from gelslim_cad.export.step import step_bytes
     from gelslim_cad.proof.step import prove_step
 
@@ -63,9 +66,9 @@ def write_glb(parts: Sequence[Part], name: str) -> Written:
 
 
 def write_pictures(parts: Sequence[Part]) -> Written:
-    """Whole, exploded and two sectioned pictures; none where nothing can be rendered."""
+    """Pictures: assembled, exploded and in two sections; none where VTK cannot draw."""
     from gelslim_cad.export.mesh import tessellate
-    from gelslim_cad.report import pictures
+    from gelslim_cad.pictures import finger_pictures
 
     meshes = []
     for part in parts:
@@ -73,19 +76,19 @@ def write_pictures(parts: Sequence[Part]) -> Written:
         meshes.append((part.name, mesh.vertices_mm, mesh.faces, part.colour, part.explode_mm))
     try:
         files = {
-            "pictures/whole.png": pictures.picture_whole(meshes),
-            "pictures/exploded.png": pictures.picture_exploded(meshes),
-            "pictures/section.png": pictures.picture_section(meshes, "y", SECTION_MM),
-            "pictures/section_across.png": pictures.picture_section(meshes, "x", SECTION_MM),
+            "pictures/whole.png": finger_pictures.picture_whole(meshes),
+            "pictures/exploded.png": finger_pictures.picture_exploded(meshes),
+            "pictures/section.png": finger_pictures.picture_section(meshes, "y", SECTION_MM),
+            "pictures/section_across.png": finger_pictures.picture_section(meshes, "x", SECTION_MM),
         }
-    except pictures.PictureError as error:
+    except finger_pictures.PictureError as error:
         return Written({}, {}, note=str(error))
     return Written(files, dict.fromkeys(files, "picture"))
 
 
 def write_mould(parts: Sequence[Part], scale: float) -> Written:
-    """No file: proves that the mould's cavity is the gel grown by the shrinkage."""
-    from gelslim_cad.proof.mould import prove_mould
+    """Check that the mould's cavity is the gel enlarged by the shrinkage; no file is written."""
+    from gelslim_cad.proof.solids import prove_mould
 
     cavity, gel = parts
     results = prove_mould(cavity.solid, gel.solid, scale)
@@ -115,20 +118,66 @@ def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
     return Written(files, dict.fromkeys(files, "sensor bundle"))
 
 
+def write_light(parts: Sequence[Part], **values: Any) -> Written:
+    """Trace light through this guide and through straight ones; `values` are `light_inputs`."""
+    from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
+    from gelslim_cad.light.record import study_record
+    from gelslim_cad.light.study import study_light
+
+    study = study_light(values)
+    files = {
+        LIGHT_JSON: json_bytes(study_record(study)),
+        "pictures/light_paths.png": paths_png(values),
+        "pictures/irradiance.png": irradiance_png(values, study),
+        "pictures/light_ratio.png": ratio_png(study),
+    }
+    purposes = dict.fromkeys(files, "picture of the light")
+    purposes[LIGHT_JSON] = "light guide: certificate, flux ledger, comparison, exposure"
+    return Written(files, purposes, _light_proofs(study))
+
+
+def write_view(parts: Sequence[Part], **values: Any) -> Written:
+    """Map of the projection errors; `values` are `view_inputs`."""
+    from gelslim_cad.report.view_figures import projection_png
+
+    return Written(
+        {ERROR_PICTURE: projection_png(values)}, {ERROR_PICTURE: "picture of the projection error"}
+    )
+
+
+def _light_proofs(study: Any) -> tuple[dict[str, Any], ...]:
+    """The fluxes add up to that of the sources, and no ray is lost."""
+    lost = max(g.value("lost") for g in (study.light, study.glued, study.air_gap))
+    gap = max(g.ledger_gap() for g in (study.light, study.glued, study.air_gap))
+    return (
+        _light_proof(
+            "flux ledger closes",
+            gap <= LEDGER_LIMIT,
+            gap,
+            f"sums to 1 within {LEDGER_LIMIT:g}",
+        ),
+        _light_proof("no light is lost", lost <= LOST_LIMIT, lost, "share of rays lost at corners"),
+    )
+
+
+def _light_proof(check: str, ok: bool, value: float, detail: str) -> dict[str, Any]:
+    rounded = round(value, 12)
+    return {"file": LIGHT_JSON, "check": check, "ok": ok, "value": rounded, "detail": detail}
+
+
 def _meshes(
     part: Part, files: Files, purposes: dict[str, str]
 ) -> dict[str, Callable[[Path], Proofs]]:
-    from gelslim_cad.export.orient import print_mesh
+    from gelslim_cad.export.mesh import mesh_for, print_mesh
     from gelslim_cad.export.stl import stl_bytes
-    from gelslim_cad.export.tessellation import mesh_for
     from gelslim_cad.export.threemf import NamedMesh, threemf_bytes
     from gelslim_cad.proof.mesh import prove_3mf, prove_stl
 
     mesh, rung = mesh_for(part.solid, VOLUME_TOLERANCE)
-    laid = print_mesh(mesh, part.print_rotation_deg)
+    placed = print_mesh(mesh, part.print_rotation_deg)
     stem = f"{'mould' if 'mould' in part.tags else 'print'}/{part.name}"
-    named = NamedMesh(part.name, laid, part.material, part.colour)
-    files[f"{stem}.stl"] = stl_bytes(laid)
+    named = NamedMesh(part.name, placed, part.material, part.colour)
+    files[f"{stem}.stl"] = stl_bytes(placed)
     files[f"{stem}.3mf"] = threemf_bytes(named)
     purposes[f"{stem}.stl"] = f"print orientation, mm, {rung.triangles} triangles"
     purposes[f"{stem}.3mf"] = "print orientation, with unit and colour"
@@ -165,7 +214,7 @@ def _on_disk(files: Files, prove: Callable[[Path], Proofs]) -> tuple[dict[str, A
 
 
 def _recorded(results: Proofs) -> tuple[dict[str, Any], ...]:
-    """Proofs as the manifest keeps them: the kernel's last bits differ from run to run."""
+    """Proofs for the manifest, rounded because the kernel's last bits differ from run to run."""
     return tuple(asdict(replace(r, value=round(r.value, PROOF_DECIMALS))) for r in results)
 
 
@@ -179,4 +228,4 @@ WRITERS: dict[str, Callable[..., Written]] = {
     "light": write_light,
     "bundle": write_bundle_files,
 }
-"""What writes each kind of unit."""
+"""The function that does each kind of unit."""

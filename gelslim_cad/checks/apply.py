@@ -14,7 +14,14 @@ from gelslim_cad.dimensions import Dimensions
 
 
 def check(d: Dimensions) -> tuple[Check, ...]:
-    """All rules on one design, group by group in the order of definition."""
+    """Apply every design rule to one design.
+
+    Args:
+        d: Dimensions of the design.
+
+    Returns:
+        One result for each rule, group by group in the order of definition.
+    """
     order = [*GROUPS.values(), OTHER]
     ordered = sorted(RULES.values(), key=lambda entry: order.index(entry.group))
     return tuple(_check(entry, d) for entry in ordered)

@@ -15,9 +15,22 @@ Sense = Literal["max", "min"]
 
 @dataclass(frozen=True)
 class Check:
-    """A rule applied to a design.
+    """A design rule applied to a design.
 
-    `margin` is how far the value is from its limit, in the rule's unit; negative when missed.
+    Attributes:
+        id: Name of the rule, such as `finger.thickness_mm`.
+        title: What the rule demands.
+        value: Value of the design, in `unit`.
+        limit: Limit of the rule, in `unit`.
+        unit: Unit of value, limit and margin.
+        margin: Distance of the value from its limit; negative where the rule is broken.
+        status: `pass`, `warn` or `fail`.
+        reason: Why the rule exists, or what breaks it.
+        parameter: Path of the spec field to change.
+        advice: How to change it.
+        sense: Whether the limit is the largest (`max`) or the smallest (`min`) legal value; empty
+            where the sign of the margin tells.
+        group: Heading under which the rule is listed.
     """
 
     id: str
@@ -31,7 +44,6 @@ class Check:
     parameter: str
     advice: str = ""
     sense: Sense | Literal[""] = ""
-    """On which side of the limit good values lie; empty: either, see the margin."""
     group: str = ""
 
 

@@ -36,10 +36,12 @@ def leaves(block: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """Derived values by name, with the way each came about.
+    """Derived values by name, such as `d["finger.thickness_mm"]`.
 
-    `values` holds a float per dimension (or an array (n,) for a batch of designs); `given` holds
-    the spec's leaf values by dotted path; `fold` is the solved fold.
+    Attributes:
+        values: A float for each dimension by dotted name, or an array (n,) for a batch of designs.
+        given: Every value of the spec by dotted path.
+        fold: The solved fold of the camera's view.
     """
 
     values: Mapping[str, Any]
@@ -127,7 +129,14 @@ ORDER = _ordered()
 
 
 def derive(spec: Spec) -> Dimensions:
-    """All dependent dimensions of one spec, as floats."""
+    """Derive all dependent dimensions of one spec.
+
+    Args:
+        spec: The spec.
+
+    Returns:
+        The dimensions, as floats.
+    """
     given = dict(leaves(spec))
     computed = _evaluate(given)
     fold = computed.pop("fold.layout")

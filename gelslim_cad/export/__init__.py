@@ -1,1 +1,7 @@
-"""Files of the finger's parts: STEP, STL, 3MF, GLB and DXF, the same bytes every time."""
+"""Writers of CAD and mesh files: the same solid always gives the same bytes."""
+
+from __future__ import annotations
+
+
+class ExportError(ValueError):
+    """A shape cannot be written. The message names the part, the limit and the remedy."""

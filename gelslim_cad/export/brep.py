@@ -1,6 +1,6 @@
-"""Boundary representations: clean copies, bytes that travel between processes, digests.
+"""Boundary representations (B-rep): copies, bounds, bytes for other processes, digests.
 
-A `Shape` here is anything CadQuery calls one (`cadquery.Shape`), lengths in mm.
+A shape is a `cadquery.Shape` with lengths in mm.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ import io
 import re
 from typing import Any
 
-from gelslim_cad.export.error import ExportError
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_cad.export import ExportError
 
 DIGEST_DECIMALS = 9
 """Reals are rounded to 1e-9 mm before hashing: Boolean operations sum in the order of memory
@@ -21,14 +24,14 @@ _BINARY_MARK = b"\nOpen CASCADE Topology V"
 
 _REAL = re.compile(rb"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+|-0\b")
 _HISTORY_FLAGS = re.compile(rb"^[01]{3}([01]{4})$", re.MULTILINE)
-"""Free, modified and checked say what was done to a shape; what follows says what it is."""
+"""The flags free, modified and checked record what was done to a shape, not what it is."""
 
 
 def bare_copy(shape: Any) -> Any:
     """Copy a shape without triangulation, with its placement worked into the geometry.
 
-    OCCT caches a mesh on the shape, so an export that meshed the original would be decided by
-    whoever meshed it first. The copy shares nothing with the original.
+    OCCT keeps a mesh with the shape and reuses it, so the first mesh of the original would decide
+    every later export. The copy shares nothing with the original.
     """
     import cadquery as cq
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy, BRepBuilderAPI_Transform
@@ -55,6 +58,19 @@ def only_solid(shape: Any, name: str = "shape") -> Any:
             "union touching bodies or make each its own part"
         )
     return solids[0]
+
+
+def bounds_mm(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Low and high corner `(3,)` of the tight bounding box, independent of any cached mesh."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(shape.wrapped, box, False, False)
+    box.SetGap(0.0)
+    corners = (box.CornerMin(), box.CornerMax())
+    low, high = (np.array([c.X(), c.Y(), c.Z()]) for c in corners)
+    return low, high
 
 
 def shape_to_bytes(shape: Any) -> bytes:

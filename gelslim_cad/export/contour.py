@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.export.error import ExportError
+from gelslim_cad.export import ExportError
 
 GAP_MM = 1e-5
 """Ends closer than this meet; OCCT's own tolerance is 1e-7."""

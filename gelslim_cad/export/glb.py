@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.export.error import ExportError
+from gelslim_cad.export import ExportError
 from gelslim_cad.export.patch import Patch, face_patches
 from gelslim_cad.geometry.part import Part
 
@@ -58,13 +58,21 @@ class _Buffer:
 
 
 def glb_bytes(parts: Sequence[Part], *, linear_mm: float = 0.1, angular_deg: float = 20.0) -> bytes:
-    """Write parts as GLB in metres, y up, with true surface normals and hard edges kept.
+    """Write parts as GLB in metres, y up, with the surfaces' own normals and sharp edges.
 
     Each node has the part's name and `extras`: `explode_mm` (sensor frame), `process`,
-    `quantity`, `material`. Colours are taken as sRGB; alpha below 1 blends.
+    `quantity`, `material`. Colours are taken as sRGB; an alpha below 1 is drawn transparent.
+
+    Args:
+        parts: The parts.
+        linear_mm: Largest distance between a chord and its curve.
+        angular_deg: Largest angle between neighbouring chords.
+
+    Returns:
+        Content of the file.
 
     Raises:
-        ExportError: no parts, or a face could not be triangulated.
+        ExportError: There are no parts, or a face cannot be triangulated.
     """
     if not parts:
         raise ExportError("GLB: 0 parts given, at least 1 needed")

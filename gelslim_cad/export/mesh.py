@@ -1,13 +1,15 @@
-"""Closed triangle meshes of solids, for printing."""
+"""Closed triangle meshes of solids: welded, as fine as needed, turned for printing."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_cad.export import ExportError
 from gelslim_cad.export.patch import Key, Patch, face_patches
 
 
@@ -32,7 +34,7 @@ def tessellate(shape: Any, linear_mm: float, angular_deg: float) -> TriangleMesh
 
 
 def welded(patches: Sequence[Patch]) -> TriangleMesh:
-    """Join patches where their keys agree; drop what that or float32 collapses."""
+    """Join patches at equal keys and drop the triangles that collapse."""
     index: dict[Key, int] = {}
     points: list[NDArray[np.float64]] = []
     faces = []
@@ -95,3 +97,89 @@ def area_mm2(mesh: TriangleMesh) -> float:
     """Total area of the triangles."""
     a, b, c = np.moveaxis(mesh.vertices_mm[mesh.faces], 1, 0)
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0)
+
+
+RUNGS = (
+    (0.20, 30.0),
+    (0.10, 20.0),
+    (0.05, 15.0),
+    (0.03, 10.0),
+    (0.02, 7.5),
+    (0.01, 5.0),
+    (0.007, 4.0),
+    (0.005, 3.0),
+    (0.002, 1.5),
+)
+"""Linear (mm) and angular (deg) tolerance, coarse to fine. Both fall together, because a linear
+tolerance alone leaves small curved faces coarse."""
+FIRST = 2
+"""The first rung for files to print. It deviates by at most 10 µm on a finger's parts, less than a
+printer resolves. Coarser rungs keep the volume too, but show their facets."""
+
+
+@dataclass(frozen=True)
+class Tessellation:
+    """The rung that was chosen, its errors relative to the exact solid, and its triangles."""
+
+    linear_mm: float
+    angular_deg: float
+    volume_error: float
+    area_error: float
+    triangles: int
+
+
+def mesh_for(shape: Any, volume_tolerance: float = 1e-3) -> tuple[TriangleMesh, Tessellation]:
+    """Mesh a solid on the coarsest rung from `FIRST` on that is closed and keeps its volume.
+
+    Raises:
+        ExportError: the solid has no positive volume, or no rung qualifies; the message says
+            whether the mesh leaked or was too coarse.
+    """
+    exact, area = float(shape.Volume()), float(shape.Area())
+    if not exact > 0:
+        raise ExportError(f"tessellation: volume is {exact:g} mm3, must be > 0; solid inside out?")
+    reason = ""
+    for linear, angular in RUNGS[FIRST:]:
+        mesh = tessellate(shape, linear, angular)
+        error = abs(volume_mm3(mesh) / exact - 1.0)
+        bad = bad_edges(mesh)
+        if len(bad):
+            middle = np.round(mesh.vertices_mm[bad[0]].mean(axis=0), 3)
+            reason = f"{len(bad)} edges are not shared by 2 faces, one at {middle.tolist()} mm"
+        elif error > volume_tolerance:
+            reason = f"volume is off by {error:.2e} at {linear} mm / {angular} deg"
+        else:
+            area_error = abs(area_mm2(mesh) / area - 1.0)
+            return mesh, Tessellation(linear, angular, error, area_error, len(mesh.faces))
+    raise ExportError(
+        f"tessellation: no rung keeps the volume within {volume_tolerance:g}: {reason}; "
+        "move features that only touch along an edge apart or into each other, keep a sphere's "
+        "pole off other faces, or allow a larger tolerance"
+    )
+
+
+def rotation(angles_deg: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Matrix `(3,3)` that turns about x, then y, then z of the fixed frame.
+
+    Multiples of 90 degrees come out exact, so that a flat face stays flat on the plate.
+    """
+    radians = np.radians(angles_deg)
+    cx, cy, cz = (_exact(c) for c in np.cos(radians))
+    sx, sy, sz = (_exact(s) for s in np.sin(radians))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return np.asarray(about_z @ about_y @ about_x, dtype=np.float64)
+
+
+def _exact(value: float) -> float:
+    nearest = float(np.round(value))
+    return nearest if abs(value - nearest) < 1e-15 else float(value)
+
+
+def print_mesh(mesh: TriangleMesh, angles_deg: tuple[float, float, float]) -> TriangleMesh:
+    """Turn a mesh, centre its bounding box on the plate and put its lowest point at z = 0."""
+    turned = mesh.vertices_mm @ rotation(angles_deg).T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    middle = (low + high) / 2.0
+    return stored(TriangleMesh(turned - np.array([middle[0], middle[1], low[2]]), mesh.faces))

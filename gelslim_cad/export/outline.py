@@ -2,58 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import io
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.export.contour import Circle, Contour, contours_of, frame_of
-from gelslim_cad.export.dxf import document_bytes, new_document
-from gelslim_cad.export.error import ExportError
+from gelslim_cad.export import ExportError
+from gelslim_cad.export.brep import only_solid
+from gelslim_cad.export.contour import Circle, contours_of, frame_of
+from gelslim_cad.markers.drawing import fixed_metadata
 
-CUT, ENGRAVE = "CUT", "ENGRAVE"
-_LAYER_COLOURS = {CUT: 1, ENGRAVE: 5}
+_LAYER_COLOURS = {"CUT": 1, "ENGRAVE": 5}
+_MILLIMETRES = 4
 
 
-def outline_dxf_bytes(
-    cut: Any | Sequence[Any], *, engrave: Sequence[Any] = (), chord_mm: float = 0.002
-) -> bytes:
-    """Draw shapes 1:1 as closed outlines: `cut` on layer CUT, `engrave` on layer ENGRAVE.
+def outline_dxf_bytes(shape: Any, *, chord_mm: float = 0.002) -> bytes:
+    """Draw a flat part 1:1 as closed outlines on layer CUT; layer ENGRAVE is left empty.
 
-    A shape is a planar `cadquery.Face` (its outer and inner wires), a closed planar `Wire`, or
-    a solid of constant thickness (its largest face). All lie in the plane of the first and
-    keep the part's coordinates (`contour.frame_of` says which axes show).
+    Lines and arcs become closed LWPOLYLINEs with bulges, circles become CIRCLEs, and other curves
+    become chords within `chord_mm`. The drawing keeps the part's coordinates; `contour.frame_of`
+    says which axes show.
 
-    Lines and arcs become closed LWPOLYLINEs with bulges, circles CIRCLE; other curves are
-    chords within `chord_mm`.
+    Args:
+        shape: A solid of constant thickness or one planar `cadquery.Face`.
+        chord_mm: Largest distance between a chord and its curve.
 
     Raises:
-        ExportError: nothing to cut, an open or non-planar outline, planes that are not
-            parallel, or a solid that is not flat.
+        ExportError: The solid is not flat, or the face is not planar.
     """
-    cuts = [_flat(s) for s in _listed(cut)]
-    engraved = [_flat(s) for s in engrave]
-    if not cuts:
-        raise ExportError("outline: 0 shapes to cut given, at least 1 needed")
-    normal = _normal(cuts[0])
-    _check_parallel([*cuts, *engraved], normal)
-    frame = frame_of(normal)
-    layers = {
-        CUT: contours_of(_wires(cuts), frame, chord_mm),
-        ENGRAVE: contours_of(_wires(engraved), frame, chord_mm),
-    }
-    return _dxf(layers)
+    face = shape if shape.ShapeType() == "Face" else flat_face(only_solid(shape, "outline"))
+    if face.geomType() != "PLANE":
+        raise ExportError(f"outline: the face is a {face.geomType()}; give a planar face")
+    document = _new_document()
+    for layer, colour in _LAYER_COLOURS.items():
+        document.layers.add(layer, color=colour)
+    space, where = document.modelspace(), {"layer": "CUT"}
+    for contour in contours_of(face.Wires(), frame_of(_normal(face)), chord_mm):
+        if isinstance(contour, Circle):
+            space.add_circle((contour.x_mm, contour.y_mm), contour.radius_mm, dxfattribs=where)
+        else:
+            space.add_lwpolyline(contour.segments, format="xyb", close=True, dxfattribs=where)
+    return _document_bytes(document)
 
 
 def flat_face(solid: Any) -> Any:
-    """The face whose outline cuts a solid of constant thickness from sheet.
+    """Find the face whose outline cuts a solid of constant thickness from sheet.
 
-    Of the planar faces with volume = area x thickness (to 1e-6) the one of least thickness.
+    A planar face qualifies where volume = area x thickness (to 1e-6) and the thickness does not
+    exceed the root of the area: otherwise the solid is a bar or a bent sheet. Of several faces the
+    one with the least thickness is taken.
 
     Raises:
-        ExportError: there is none, or the thickness exceeds the root of the area: such a solid
-            is a bar or a bent sheet, not a flat part.
+        ExportError: No face qualifies.
     """
     planar = [f for f in solid.Faces() if f.geomType() == "PLANE"]
     if not planar:
@@ -71,7 +72,7 @@ def flat_face(solid: Any) -> Any:
             f"outline: volume is {ratio:.6f} x largest face x thickness, must be 1; the solid is "
             "not a flat plate: give the face of its flat blank instead"
         )
-    # Rounding lets top and bottom tie; the tie goes to the face on the positive side.
+    # After rounding, top and bottom are equal; then the face on the positive side is taken.
     return min(sheets, key=lambda s: (round(s[0], 6), -_side(s[1])))[1]
 
 
@@ -86,64 +87,26 @@ def _side(face: Any) -> float:
     return round(float(np.dot(normal, frame_of(normal).normal)), 6)
 
 
-def _listed(shapes: Any) -> list[Any]:
-    return list(shapes) if isinstance(shapes, Iterable) and not _is_shape(shapes) else [shapes]
+def _normal(face: Any) -> NDArray[np.float64]:
+    return np.array(face.normalAt().toTuple())
 
 
-def _is_shape(value: Any) -> bool:
-    import cadquery as cq
+def _new_document() -> Any:
+    import ezdxf
 
-    return isinstance(value, cq.Shape)
-
-
-def _flat(shape: Any) -> Any:
-    kind = shape.ShapeType() if _is_shape(shape) else type(shape).__name__
-    if kind in ("Solid", "Compound"):
-        from gelslim_cad.export.brep import only_solid
-
-        return flat_face(only_solid(shape, "outline"))
-    if kind == "Face" and shape.geomType() != "PLANE":
-        raise ExportError(f"outline: the face is a {shape.geomType()}; give a planar face")
-    if kind not in ("Face", "Wire"):
-        raise ExportError(f"outline: cannot draw a {kind}; give a face, a closed wire or a solid")
-    return shape
+    with fixed_metadata():
+        document = ezdxf.new("R2010")
+    document.header["$INSUNITS"] = _MILLIMETRES
+    document.header["$MEASUREMENT"] = 1
+    return document
 
 
-def _normal(shape: Any) -> NDArray[np.float64]:
-    if shape.ShapeType() == "Face":
-        return np.array(shape.normalAt().toTuple())
-    import cadquery as cq
-
-    try:
-        return np.array(cq.Face.makeFromWires(shape).normalAt().toTuple())
-    except ValueError as error:
-        raise ExportError("outline: a wire is open or not planar; close and flatten it") from error
-
-
-def _check_parallel(shapes: Sequence[Any], normal: NDArray[np.float64]) -> None:
-    for shape in shapes:
-        aligned = abs(float(_normal(shape) @ normal))
-        if aligned < 1 - 1e-9:
-            raise ExportError(
-                f"outline: planes differ by {np.degrees(np.arccos(aligned)):.3g} deg, must be "
-                "parallel; write each plane to its own file"
-            )
-
-
-def _wires(shapes: Sequence[Any]) -> list[Any]:
-    return [w for s in shapes for w in ([s] if s.ShapeType() == "Wire" else s.Wires())]
-
-
-def _dxf(layers: dict[str, list[Contour]]) -> bytes:
-    document = new_document()
-    space = document.modelspace()
-    for layer, contours in layers.items():
-        document.layers.add(layer, color=_LAYER_COLOURS[layer])
-        for contour in contours:
-            where = {"layer": layer}
-            if isinstance(contour, Circle):
-                middle = (contour.x_mm, contour.y_mm)
-                space.add_circle(middle, contour.radius_mm, dxfattribs=where)
-            else:
-                space.add_lwpolyline(contour.segments, format="xyb", close=True, dxfattribs=where)
-    return document_bytes(document)
+def _document_bytes(document: Any) -> bytes:
+    # ezdxf lists the classes in use in the order of a set of strings, which differs between
+    # processes; classes that were added before keep their order.
+    for name in sorted(document.entitydb.dxf_types_in_use()):
+        document.classes.add_class(name)
+    stream = io.StringIO()
+    with fixed_metadata():
+        document.write(stream)
+    return stream.getvalue().encode("utf-8")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_cad.export import ExportError
 from gelslim_cad.export.brep import bare_copy
-from gelslim_cad.export.error import ExportError
 
 Key = tuple[int, ...]
 

@@ -11,13 +11,13 @@ import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any
 
+from gelslim_cad.export import ExportError
 from gelslim_cad.export.brep import bare_copy, only_solid
-from gelslim_cad.export.error import ExportError
 from gelslim_cad.geometry.part import Part
 
-Schema = Literal["AP242DIS", "AP214IS", "AP203"]
+SCHEMA = "AP242DIS"
 
 DECIMALS = 10
 """Reals are rounded to 1e-10 mm, a thousandth of OCCT's modelling tolerance."""
@@ -28,23 +28,28 @@ _TOKEN = re.compile(r"'(?:[^']|'')*'|-?\d+\.\d*(?:E[+-]?\d+)?")
 _CONTINUATION = re.compile(r"(?<!;)\n *")
 
 
-def step_bytes(
-    parts: Part | Sequence[Part], *, name: str = "assembly", schema: Schema = "AP242DIS"
-) -> bytes:
+def step_bytes(parts: Part | Sequence[Part], *, name: str = "assembly") -> bytes:
     """Write a part, or an assembly called `name` of several parts, as STEP in mm.
 
-    Colours are taken as sRGB and alpha becomes STEP transparency. Every part is written in
-    its assembled place.
+    Colours are taken as sRGB and alpha becomes STEP transparency. Every part is written where
+    it is assembled.
+
+    Args:
+        parts: One part, or the parts of an assembly.
+        name: Name of the assembly.
+
+    Returns:
+        Content of the file, as AP242.
 
     Raises:
-        ExportError: no parts, repeated names, or a part that is not a single solid.
+        ExportError: There are no parts, two share a name, or one is not a single solid.
     """
     single = isinstance(parts, Part)
     chosen = [parts] if isinstance(parts, Part) else list(parts)
     _check_names(chosen)
     solids = [bare_copy(only_solid(p.solid, p.name)).wrapped for p in chosen]
     title = chosen[0].name if single else name
-    with _settings(schema):
+    with _settings():
         raw = _write(chosen, solids, title, single)
     return _normalised(raw.decode("ascii")).encode("ascii")
 
@@ -59,13 +64,13 @@ def _check_names(parts: Sequence[Part]) -> None:
 
 
 @contextmanager
-def _settings(schema: Schema) -> Iterator[None]:
-    """Hold OCCT's process-wide writer settings, which others may have changed, and put back."""
+def _settings() -> Iterator[None]:
+    """Set OCCT's writer settings, which hold for the whole process, and restore them."""
     from OCP.Interface import Interface_Static
     from OCP.STEPControl import STEPControl_Controller
 
     STEPControl_Controller.Init_s()
-    texts = {"write.step.schema": schema, "write.step.unit": "MM"}
+    texts = {"write.step.schema": SCHEMA, "write.step.unit": "MM"}
     numbers = {
         "write.precision.mode": -1,
         "write.surfacecurve.mode": 1,
@@ -78,8 +83,7 @@ def _settings(schema: Schema) -> Iterator[None]:
     old_numbers = {key: Interface_Static.IVal_s(key) for key in numbers}
     try:
         for key, text in texts.items():
-            if not Interface_Static.SetCVal_s(key, text):
-                raise ExportError(f"STEP: schema {text!r} unknown; use AP242DIS, AP214IS or AP203")
+            Interface_Static.SetCVal_s(key, text)
         for key, number in numbers.items():
             Interface_Static.SetIVal_s(key, number)
         yield
@@ -190,7 +194,7 @@ def _set_header(model: Any, title: str) -> None:
 
 
 def _normalised(text: str) -> str:
-    """Put each entity on one line (wrapping follows the unrounded digits) and round reals."""
+    """Put each entity on one line, as line breaks depend on the unrounded digits; round reals."""
     head, mark, data = text.partition("DATA;\n")
     return head + mark + _TOKEN.sub(_rounded, _CONTINUATION.sub("", data))
 

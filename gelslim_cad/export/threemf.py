@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from gelslim_cad.export.error import ExportError
+from gelslim_cad.export import ExportError
 from gelslim_cad.export.mesh import TriangleMesh
 
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"

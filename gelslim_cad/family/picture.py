@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.family.member import Member
-from gelslim_cad.report.pictures import render_window
-from gelslim_cad.report.stage import Stage, View
+from gelslim_cad.pictures.finger_pictures import render_window
+from gelslim_cad.pictures.mesh_scene import MeshScene, View
 from gelslim_core.figure import as_png
 
 FRONT, EDGE = View(-62.0, 16.0), View(0.0, 0.0)
@@ -93,7 +93,7 @@ def _row(
 ) -> tuple[Any, list[float], float]:
     """Image, the middle of each finger in px from the left, and mm per px."""
     window = render_window()
-    stage = Stage(window, view)
+    scene = MeshScene(window, view)
     right = view.axes()[0]
     for m, points, middle in zip(members, shapes, middles, strict=True):
         seen = points @ right
@@ -101,14 +101,14 @@ def _row(
         first = 0
         for mesh in m.meshes:
             last = first + len(mesh.vertices_mm)
-            stage.add(points[first:last] + along, mesh.faces, mesh.rgba)
+            scene.add(points[first:last] + along, mesh.faces, mesh.rgba)
             first = last
     half = max(float(np.ptp(p @ FRONT.axes()[0])) for p in (shapes[0], shapes[-1])) / 2
     # Both rows as wide as the wider one, so that they come out at one scale.
-    stage.include(np.outer([middles[0] - half, middles[-1] + half], right))
+    scene.include(np.outer([middles[0] - half, middles[-1] + half], right))
     try:
-        image = stage.image(WIDTH_PX, OVERSAMPLING)
+        image = scene.image(WIDTH_PX, OVERSAMPLING)
     finally:
         window.Finalize()
-    places = stage.placed(np.outer(middles, right), WIDTH_PX)[:, 0]
-    return image, [float(x) for x in places], stage.mm_per_px(WIDTH_PX)
+    places = scene.pixel_positions(np.outer(middles, right), WIDTH_PX)[:, 0]
+    return image, [float(x) for x in places], scene.mm_per_px(WIDTH_PX)

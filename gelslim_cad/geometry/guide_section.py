@@ -27,7 +27,14 @@ def curved_guide(d: Lookup) -> CurvedGuide:
 
 
 def guide_profile(d: Lookup) -> GuideProfile:
-    """Edges of guide and gel, exact arcs, (y, z) of the sensor frame."""
+    """Make the cross-section of guide and gel, with exact arcs.
+
+    Args:
+        d: Dimensions of the finger.
+
+    Returns:
+        The edges in the sensor frame's y and z, in mm.
+    """
     return curved_profile(curved_guide(d), gel_section(d))
 
 

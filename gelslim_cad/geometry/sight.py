@@ -9,7 +9,14 @@ from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
 
 def virtual_camera(d: Lookup) -> VirtualCamera:
-    """The camera of the solved fold, looking through window and gel."""
+    """Make the camera of the solved fold, which looks through window and gel.
+
+    Args:
+        d: Dimensions of the finger.
+
+    Returns:
+        The camera as it is seen in the fold mirror.
+    """
     return VirtualCamera.from_fold(
         camera_mm=(d["camera_pose.x_mm"], 0.0, d["camera_pose.z_mm"]),
         pitch_rad=math.radians(d["camera_pose.pitch_deg"]),

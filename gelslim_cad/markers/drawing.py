@@ -23,7 +23,7 @@ class Drawing:
     def __init__(self) -> None:
         import ezdxf
 
-        with _fixed_metadata():
+        with fixed_metadata():
             self._document: Any = ezdxf.new("R2010", setup=False, units=_MILLIMETRES)
         self._document.header["$MEASUREMENT"] = 1
         self._space: Any = self._document.modelspace()
@@ -76,13 +76,13 @@ class Drawing:
         classes.add_required_classes(self._document.dxfversion)
         classes.classes = dict(sorted(classes.classes.items()))
         text = io.StringIO()
-        with _fixed_metadata():
+        with fixed_metadata():
             self._document.write(text)
         return text.getvalue().encode("utf-8")
 
 
 @contextmanager
-def _fixed_metadata() -> Iterator[None]:
+def fixed_metadata() -> Iterator[None]:
     """Have ezdxf write a fixed date, GUIDs and version note instead of today's."""
     from ezdxf import options
 

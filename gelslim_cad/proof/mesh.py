@@ -50,7 +50,7 @@ def prove_glb(path: Path, parts: Sequence[Part]) -> list[ProofResult]:
     """Reread a GLB: every part by name, its bounding box where it belongs in metres, y up."""
     import trimesh
 
-    from gelslim_cad.export.orient import bounds_mm
+    from gelslim_cad.export.brep import bounds_mm
 
     try:
         scene = trimesh.load_scene(path, file_type="glb")

@@ -1,8 +1,7 @@
-"""What a proof found."""
+"""The result of checking a written file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -26,8 +25,3 @@ def at_most(file: str, check: str, value: float, limit: float, detail: str = "")
 def equal(file: str, check: str, value: float, expected: float, detail: str = "") -> ProofResult:
     """A check that `value` is exactly `expected`, for counts and truths."""
     return ProofResult(file, check, float(value), float(expected), value == expected, detail)
-
-
-def failures(results: Iterable[ProofResult]) -> list[ProofResult]:
-    """The results that are not ok, in their order."""
-    return [r for r in results if not r.ok]

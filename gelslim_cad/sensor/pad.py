@@ -40,7 +40,14 @@ def pad_outline(d: Dimensions) -> RoundedRectangle:
 
 
 def marker_grid(d: Dimensions) -> MarkerGrid:
-    """The printed lattice, dots that would cross the gel's outline left out."""
+    """Make the printed lattice of markers.
+
+    Args:
+        d: Dimensions of the finger.
+
+    Returns:
+        The markers, without those that would cross the gel's outline.
+    """
     grid = build_marker_grid(
         round(d["marker_grid.rows"]),
         round(d["marker_grid.columns"]),
@@ -53,7 +60,15 @@ def marker_grid(d: Dimensions) -> MarkerGrid:
 
 
 def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
-    """Hex-8 mesh of the pad; nodes meet the markers where the cell size allows it."""
+    """Mesh the pad with Hex-8 elements; nodes meet the markers where the cell size allows it.
+
+    Args:
+        d: Dimensions of the finger.
+        grid: Its markers.
+
+    Returns:
+        The mesh, and what was cut off at the pad's outline.
+    """
     outline, shape = pad_outline(d), GelShape.of(d)
     cut = {
         "crown": _crown(shape),

@@ -11,7 +11,11 @@ from gelslim_core.yaml.reader import Loaded, read_model
 
 @dataclass(frozen=True)
 class LoadedSpec(Loaded[Spec]):
-    """A spec read from a file."""
+    """A spec that was read from a file.
+
+    Attributes:
+        spec: The spec.
+    """
 
     @property
     def spec(self) -> Spec:

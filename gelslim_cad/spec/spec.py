@@ -15,7 +15,17 @@ from gelslim_core.yaml.base import Block, require_folder_name
 
 
 class Spec(Block):
-    """A finger: its camera, its design, its materials, its making and its mesh."""
+    """The spec of a finger: everything that a user chooses.
+
+    Attributes:
+        format: Format of the file, `gelslim-spec/1`.
+        name: Name of the finger, which is also that of its output folder.
+        camera: The camera, as its data sheet gives it.
+        design: What the designer chooses.
+        material: Gel and acrylic.
+        manufacturing: Processes, tolerances and stock.
+        mesh: Finite-element mesh of the pad.
+    """
 
     starting_point: ClassVar[str] = "`gelslim new` writes a spec to start from"
 

@@ -18,7 +18,7 @@ pytest.importorskip("cadquery", reason="building needs the [cad] extra")
 
 from gelslim_cad.build import BuildRefusedError, build_variant
 from gelslim_cad.build import variant as variant_module
-from gelslim_cad.build.folder import OutputError
+from gelslim_core.files.output_error import OutputError
 
 Digests = Callable[[Path], dict[str, str]]
 SPEC = Path(__file__).parents[2] / "designs" / "mini20.yaml"
@@ -178,6 +178,6 @@ def test_a_folder_that_no_build_made_is_left_alone(tmp_path: Path) -> None:
     (target / "chapter1.tex").write_text("years of work")
     from gelslim_cad.build.folder import staged
 
-    with pytest.raises(OutputError, match="left alone"), staged(target):
+    with pytest.raises(OutputError, match="thesis"), staged(target):
         pass
     assert (target / "chapter1.tex").read_text() == "years of work"

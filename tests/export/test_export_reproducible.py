@@ -15,8 +15,8 @@ import export_samples as samples
 import pytest
 
 import gelslim_cad
+from gelslim_cad.export import ExportError
 from gelslim_cad.export.brep import shape_digest, shape_from_bytes, shape_to_bytes
-from gelslim_cad.export.error import ExportError
 from gelslim_cad.export.step import step_bytes
 
 ROOT = Path(gelslim_cad.__file__).parent.parent

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import quad
 from tooling_samples import gelslim2
 
-from gelslim_cad.export.tessellation import mesh_for
+from gelslim_cad.export.mesh import mesh_for
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.solids.gel import gel_pad, shaped_gel
 

@@ -119,7 +119,7 @@ def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
     from gelslim.cli.output import replace_file
     from gelslim_cad.explore.table import csv_bytes
     from gelslim_cad.family.picture import family_png
-    from gelslim_cad.report.pictures import PictureError
+    from gelslim_cad.pictures.finger_pictures import PictureError
 
     if not members:
         return [], ""

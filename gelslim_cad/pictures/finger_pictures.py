@@ -1,4 +1,4 @@
-"""Still pictures of the finger: whole, exploded, cut open. Drawn off screen with VTK.
+"""Still pictures of the finger, drawn off screen with VTK: assembled, exploded, in section.
 
 VTK is used without PyVista's plotter, whose import alone takes longer than all three pictures.
 """
@@ -8,13 +8,13 @@ from __future__ import annotations
 import ctypes
 import io
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
-from gelslim_cad.report.data import Picture
-from gelslim_cad.report.stage import Stage, View
+from gelslim_cad.pictures.mesh_scene import MeshScene, View
+from gelslim_core.errors import GelslimError
 from gelslim_core.extras import install_command
 
 Mesh = tuple[
@@ -30,13 +30,13 @@ Axis = Literal["x", "y", "z"]
 
 ISO = View(yaw_deg=-56.0, pitch_deg=27.0)
 SECTIONS = {"x": View(0.0, 0.0), "y": View(-90.0, 0.0), "z": View(-90.0, 90.0)}
-"""The cut faces the viewer: x from the tip, y from the -y side, z from above the gel."""
+"""Views at right angles to a section: x from the tip, y from the -y side, z from above the gel."""
 
 WIDTH_PX = 1200
 OVERSAMPLING = 2
 
 
-class PictureError(RuntimeError):
+class PictureError(GelslimError):
     """No picture can be drawn on this machine; the message says what to install."""
 
 
@@ -56,10 +56,10 @@ def picture_exploded(meshes: Sequence[Mesh], explode: float = 1.0) -> bytes:
 
 
 def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0) -> bytes:
-    """Draw the finger cut at `axis` = `at_mm`, seen square on, cut faces hatched.
+    """Draw a section of the finger at `axis` = `at_mm`, seen at right angles, cut faces hatched.
 
-    What lies before the plane is taken away. Raises as picture_whole, and ValueError where the
-    plane misses every part.
+    Everything between the plane and the viewer is removed. Raises as picture_whole, and
+    ValueError where the plane misses every part.
     """
     index = "xyz".index(axis)
     spans = [(mesh[1][:, index].min(), mesh[1][:, index].max()) for mesh in _checked(meshes)]
@@ -71,44 +71,16 @@ def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0
     return _draw(meshes, SECTIONS[axis], explode=0.0, cut=(index, at_mm))
 
 
-def finger_pictures(meshes: Sequence[Mesh]) -> tuple[Picture, ...]:
-    """Make the report's pictures; where one cannot be made its `problem` says why.
-
-    Raises:
-        ValueError: a mesh is empty or not (n, 3) and (m, 3).
-    """
-    planned: tuple[tuple[str, str, Callable[[], bytes]], ...] = (
-        ("Whole", "As assembled, seen from the tip’s side.", lambda: picture_whole(meshes)),
-        (
-            "Exploded",
-            "Parts moved along their assembly directions.",
-            lambda: picture_exploded(meshes),
-        ),
-        (
-            "Section",
-            "Cut along the middle, y = 0; cut faces are hatched.",
-            lambda: picture_section(meshes, "y", 0.0),
-        ),
-    )
-    made = []
-    for title, caption, draw in planned:
-        try:
-            made.append(Picture(title, caption, draw()))
-        except PictureError as error:
-            made.append(Picture(title, caption, b"", str(error)))
-    return tuple(made)
-
-
 def _draw(
     meshes: Sequence[Mesh], view: View, explode: float, cut: tuple[int, float] | None = None
 ) -> bytes:
     checked = _checked(meshes)
     window = render_window()
-    stage = Stage(window, view, cut)
+    scene = MeshScene(window, view, cut)
     for number, (_, vertices, faces, rgba, shift) in enumerate(checked):
-        stage.add(vertices + explode * np.asarray(shift), faces, rgba, hatch_up=number % 2 == 0)
+        scene.add(vertices + explode * np.asarray(shift), faces, rgba, hatch_up=number % 2 == 0)
     try:
-        return _png(stage.image(WIDTH_PX, OVERSAMPLING))
+        return _png(scene.image(WIDTH_PX, OVERSAMPLING))
     finally:
         window.Finalize()
 
@@ -130,9 +102,12 @@ def _checked(meshes: Sequence[Mesh]) -> list[Mesh]:
 
 
 def render_window() -> Any:
-    """Open an off-screen window that needs no display: EGL, else OSMesa.
+    """Open an off-screen window that needs no display, through EGL or else OSMesa.
 
-    VTK ends the process where neither works, so that is looked at first. Raises PictureError.
+    VTK ends the whole process where neither library works, so this is checked before VTK draws.
+
+    Raises:
+        PictureError: VTK or a system library that it needs is missing.
     """
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:

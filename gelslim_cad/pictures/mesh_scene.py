@@ -1,4 +1,4 @@
-"""A lit scene of closed meshes on white, seen in parallel projection; imports VTK when used."""
+"""A lit scene of closed meshes on white, in parallel projection. VTK is imported when used."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 
 CREASE_DEG = 24.0
-HATCH_MM = 0.035
-"""Distance of the hatch lines as a share of the picture's width."""
-LIFT = 0.07
+HATCH_SPACING = 0.035
+"""Distance of the hatch lines as a fraction of the picture's width."""
+BRIGHTENING = 0.07
 """Black parts are drawn a little lighter, so that their edges and faces can be told apart."""
-FRAME = 1.06
-"""Size of the picture over that of what it shows."""
-NUDGE_MM = 1.3e-4
-"""Keeps the cut off vertices and faces which lie exactly in it, as seams do at y = 0."""
+MARGIN = 1.06
+"""Size of the picture divided by the size of its content."""
+CUT_OFFSET_MM = 1.3e-4
+"""Shifts the cut, so that it avoids vertices and faces that lie exactly in its plane."""
 INK = (0.09, 0.11, 0.14)
 
 
 @dataclass(frozen=True)
 class View:
-    """Where the viewer stands: yaw from +x about z, pitch above the xy plane."""
+    """Direction to the viewer: yaw from +x about z, pitch above the xy plane."""
 
     yaw_deg: float
     pitch_deg: float
@@ -36,11 +36,11 @@ class View:
         return np.array([right, up, back])
 
 
-class Stage:
+class MeshScene:
     """Collects meshes, then draws them once into an RGB array.
 
-    `cut` = (axis, place in mm) removes what lies between the plane and the viewer and closes
-    the opened solids with hatched faces.
+    A `cut` = (axis, position in mm) removes everything between the plane and the viewer and
+    closes the opened solids with hatched faces.
     """
 
     def __init__(self, window: Any, view: View, cut: tuple[int, float] | None = None) -> None:
@@ -64,17 +64,17 @@ class Stage:
     ) -> None:
         """Add a mesh: vertices (n, 3) in mm, faces (m, 3), sRGB colour with opacity."""
         self.include(vertices)
-        shown = (*(LIFT + (1 - LIFT) * channel for channel in rgba[:3]), rgba[3])
+        shown = (*(BRIGHTENING + (1 - BRIGHTENING) * channel for channel in rgba[:3]), rgba[3])
         self._solids.append((_poly_data(vertices, faces), shown, hatch_up))
 
     def include(self, points: np.ndarray) -> None:
-        """Make the picture large enough for points (n, 3) in mm; nothing is drawn there."""
+        """Make the picture large enough to hold points (n, 3) in mm, without drawing them."""
         low, high = view_box(points, self._view)
         self._low = np.minimum(self._low, low)
         self._high = np.maximum(self._high, high)
 
     def image(self, width_px: int, oversampling: int) -> np.ndarray:
-        """Draw; the height follows from what is shown. Returns uint8 (height, width, 3)."""
+        """Draw as uint8 (height, width, 3); the height follows from the content."""
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
@@ -104,19 +104,19 @@ class Stage:
         tall = flat.reshape(height_px, k, width_px, k, 3)[::-1]
         return np.ascontiguousarray(np.rint(tall.mean(axis=(1, 3))).astype(np.uint8))
 
-    def placed(self, points: np.ndarray, width_px: int) -> np.ndarray:
-        """Pixels (n, 2), right and down, of points (n, 3) in mm in an image of `width_px`."""
+    def pixel_positions(self, points: np.ndarray, width_px: int) -> np.ndarray:
+        """Pixel positions (n, 2), right and down, of points (n, 3) in mm."""
         seen = points @ self._view.axes().T[:, :2]
-        middle = (self._low[:2] + self._high[:2]) / 2
+        centre = (self._low[:2] + self._high[:2]) / 2
         height_px = round(width_px * self._shape())
-        offset = (seen - middle) / self.mm_per_px(width_px) * (1.0, -1.0)
+        offset = (seen - centre) / self.mm_per_px(width_px) * (1.0, -1.0)
         return np.asarray(offset + np.array([width_px / 2, height_px / 2]))
 
     def mm_per_px(self, width_px: int) -> float:
         """Size of a pixel of an image of `width_px`."""
         shape = self._shape()
         half = (self._high - self._low) / 2
-        return float(2 * FRAME * max(half[1], half[0] * shape) / round(width_px * shape))
+        return float(2 * MARGIN * max(half[1], half[0] * shape) / round(width_px * shape))
 
     def _shape(self) -> float:
         spread = self._high - self._low
@@ -133,7 +133,7 @@ class Stage:
         camera.SetFocalPoint(*target)
         camera.SetPosition(*(target + 3 * reach * back))
         camera.SetViewUp(*up)
-        self._scale_mm = FRAME * max(half[1], half[0] * shape)
+        self._scale_mm = MARGIN * max(half[1], half[0] * shape)
         camera.SetParallelScale(self._scale_mm)
         camera.SetClippingRange(reach, 5 * reach)
 
@@ -146,7 +146,7 @@ class Stage:
         faces.SetFeatureAngle(CREASE_DEG)
         if plane is None:
             faces.SetInputData(poly)
-        else:  # cut first: the clipper merges points and would mix normals across an edge
+        else:  # cut first: the clipper merges points, which would mix normals across an edge
             clipped = vtkClipPolyData()
             clipped.SetInputData(poly)
             clipped.SetClipFunction(plane)
@@ -181,7 +181,7 @@ class Stage:
             return None
         axis, place = self._cut
         origin, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        origin[axis] = place + NUDGE_MM
+        origin[axis] = place + CUT_OFFSET_MM
         normal[axis] = -math.copysign(1.0, self._view.axes()[2][axis])
         plane = vtkPlane()
         plane.SetOrigin(*origin)
@@ -208,7 +208,7 @@ class Stage:
         stripes = vtkPlane()
         stripes.SetOrigin(0.0, 0.0, 0.0)
         stripes.SetNormal(*((right + (up if hatch_up else -up)) / math.sqrt(2)))
-        step = HATCH_MM * 2 * self._scale_mm
+        step = HATCH_SPACING * 2 * self._scale_mm
         reach = math.ceil(3 * float(np.abs([self._low, self._high]).max()) / step)
         hatch = vtkCutter()
         hatch.SetInputConnection(face.GetOutputPort())
@@ -279,7 +279,7 @@ def view_box(vertices: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _poly_data(vertices: np.ndarray, faces: np.ndarray) -> Any:
-    """Build VTK's mesh with vertices at one place merged, so that edges know both faces."""
+    """Build VTK's mesh; equal vertices are merged, so that every edge knows its two faces."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData

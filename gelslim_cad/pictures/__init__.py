@@ -1,0 +1,1 @@
+"""Pictures of closed meshes, drawn off screen with VTK."""
