@@ -15,10 +15,12 @@ class Block(BaseModel):
     """A frozen block of an input file: strict types, no unknown keys, no NaN.
 
     Units are the last part of the field names.
+
+    Attributes:
+        starting_point: Remedy for a file that is empty or of another kind.
     """
 
     starting_point: ClassVar[str] = "start from an example of this kind of file"
-    """Remedy for a file that is empty or of another kind."""
 
     model_config = ConfigDict(
         frozen=True,

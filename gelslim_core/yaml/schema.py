@@ -16,11 +16,18 @@ _KINDS = {float: "number", int: "whole number", bool: "true or false", str: "tex
 
 
 def schema_text(model: type[BaseModel], identifier: str) -> str:
-    """The JSON Schema (draft 2020-12) of `model` as text with the `$id` `identifier`.
+    """The JSON Schema (draft 2020-12) of a model.
 
     It holds what a single field can say: names, types, limits, choices, defaults and descriptions.
     Rules between fields are checked by the reader alone, and so is one about numbers: JSON Schema
     calls 2.0 an integer, the reader does not.
+
+    Args:
+        model: The class of the model.
+        identifier: The `$id` of the schema.
+
+    Returns:
+        The schema as text.
     """
     body = model.model_json_schema(mode="validation")
     schema = {"$schema": DIALECT, "$id": identifier, **_tidy(body)}
@@ -46,10 +53,17 @@ def _tidy(node: Any, is_names: bool = False) -> Any:
 
 
 def reference_markdown(model: type[BaseModel], level: int = 2) -> str:
-    """A section in Markdown for `model` and for every block below it, each field a row.
+    """A reference page: a section for the model and for every block below it, each field a row.
 
     The fields at the top come first, under the heading "Top"; then the blocks in the order of the
-    fields, each followed by the blocks inside it. Headings are of `level`.
+    fields, each followed by the blocks inside it.
+
+    Args:
+        model: The class of the model.
+        level: Level of the headings.
+
+    Returns:
+        The sections in Markdown.
     """
     return "\n".join(_sections("Top", "", model, "#" * level))
 

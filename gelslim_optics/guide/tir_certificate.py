@@ -300,28 +300,28 @@ def _guiding_text(c: TirCertificate) -> list[str]:
 def _limitations(c: TirCertificate) -> list[str]:
     if c.verdict == "refused":
         return []
-    said = []
+    notes = []
     if c.mirrors and c.verdict == "not_fully_guided":
-        said.append("What the corners of the mirrors lose in addition is not certified.")
+        notes.append("What the corners of the mirrors lose in addition is not certified.")
     if c.tapers:
-        said.append(
+        notes.append(
             f"The legs taper: light reaches the bends with NA {c.bend_na:.3g} at most, and shares "
             "are lower bounds."
         )
     short = [b for b in c.bends if not b.exact]
     if short:
-        said.append(
+        notes.append(
             f"A bend of {short[0].sweep_deg:.3g}° is short: only from "
             f"{short[0].full_sweep_deg:.3g}° on does every ray that can leak meet the outer wall, "
             "so less leaks than stated."
         )
     if c.verdict == "not_fully_guided":
-        said.append(
+        notes.append(
             "Not even collimated light is fully guided here."
             if c.largest_na is None
             else f"Light up to NA {math.floor(c.largest_na * 1000) / 1000:.3f} is fully guided."
         )
-    return said
+    return notes
 
 
 def _gel_text(c: TirCertificate) -> list[str]:
