@@ -1,4 +1,4 @@
-"""A finger's camera for the force tests: strong keystone, off-centre, dots two-fold in size."""
+"""A finger's camera for the force tests: strong keystone, dots two-fold in size."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def finger_view(
     tilt_deg: float = 30.0,
     height_mm: float = 22.0,
     focal_px: float = 640.0,
-    aside_mm: float = -0.6,
-    lens_offset_px: tuple[float, float] = (3.0, 2.0),
+    aside_mm: float = 0.0,
+    lens_offset_px: tuple[float, float] = (0.0, 0.0),
 ):
-    """VGA camera tilted by `tilt_deg` from the gel's normal, looking near the gel's middle.
+    """VGA camera tilted by `tilt_deg` from the gel's normal, looking at the gel's middle.
 
-    It stands aside in y and its lens is off the picture's middle, so that nothing is symmetric.
+    It may stand aside in y, and its lens may be off the picture's middle.
     """
     tilt = math.radians(tilt_deg)
     mirror_angle = math.radians(32)
@@ -42,3 +42,8 @@ def finger_view(
         principal_offset_px=lens_offset_px,
         position_mm=view.position_mm + np.array([0.0, aside_mm, 0.0]),
     )
+
+
+def off_centre_view():
+    """The camera with no symmetry left: x and y, rows and columns cannot be exchanged unnoticed."""
+    return finger_view(aside_mm=-0.6, lens_offset_px=(3.0, 2.0))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from camera_rig import finger_view
+from camera_rig import off_centre_view
 from synthetic import Frame, Look, grid_of_dots, render
 
 from ifem_export.bundle.bundle import Bundle, build_bundle
@@ -56,7 +56,7 @@ def sensor_bundle() -> Bundle:
             "diameter_mm": grid.diameter_mm,
             "kind": grid.kind,
         },
-        camera=finger_view().to_record(),
+        camera=off_centre_view().to_record(),
         with_stiffness=False,
     )
 
@@ -82,7 +82,9 @@ def press() -> Press:
 
 def frame(share: float, look: Look | None = None) -> Frame:
     """The press at a share of its depth; 0 is the reference."""
-    return render(sensor_grid(), finger_view(), look or Look(noise=2.0), share * press().markers_mm)
+    return render(
+        sensor_grid(), off_centre_view(), look or Look(noise=2.0), share * press().markers_mm
+    )
 
 
 def stream(count: int, look: Look | None = None) -> list[Frame]:

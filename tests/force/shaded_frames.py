@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 from bonded_layer import LayerContact, layer_contact
-from camera_rig import finger_view
+from camera_rig import off_centre_view
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from synthetic import Frame, Look, grid_of_dots, render
@@ -19,7 +19,7 @@ from synthetic import Frame, Look, grid_of_dots, render
 Vector = NDArray[np.float64]
 ELEVATION, AMBIENT = np.deg2rad(40.0), 0.33
 GRID = grid_of_dots()
-CAMERA = finger_view()
+CAMERA = off_centre_view()
 PAD_MM = (11.0, 10.5)
 
 

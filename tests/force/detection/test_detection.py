@@ -119,7 +119,7 @@ def test_dots_in_one_wide_dark_region_are_separated_at_a_higher_level():
 )
 def test_the_fast_path_gives_what_the_full_search_gives(look, limit_px):
     """From positions up to half a radius away, to less than the noise of the centres."""
-    frame = render(GRID, finger_view(aside_mm=0.0, lens_offset_px=(0.0, 0.0)), look)
+    frame = render(GRID, look=look)
     detector = detector_for(frame, look.double)
     full = detector.detect(frame.image)
     rng = np.random.default_rng(3)

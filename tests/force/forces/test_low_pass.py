@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from camera_rig import finger_view
+from camera_rig import off_centre_view
 from pad_samples import hertz_like, small_bundle
 
 from gelslim_force.forces.estimator import (
@@ -46,7 +46,7 @@ def seen_motion(bundle: Bundle) -> SurfaceMotion:
     """Every marker, seen from where it is printed."""
     assert bundle.markers is not None
     places = np.asarray(bundle.markers.positions_mm)
-    camera = finger_view()
+    camera = off_centre_view()
     view = MarkerView(camera, camera.project(np.column_stack([places, np.zeros(len(places))])))
     points = np.asarray(bundle.mesh.surface_mm)
     return SurfaceMotion(view, np.arange(len(places)), bundle.markers.sparse, points)

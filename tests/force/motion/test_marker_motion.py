@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from camera_rig import finger_view
+from camera_rig import off_centre_view
 from synthetic import grid_of_dots
 
 from gelslim_force.motion.marker_motion import COMPENSATIONS, MarkerView
@@ -12,7 +12,7 @@ from gelslim_force.motion.marker_motion import COMPENSATIONS, MarkerView
 
 @pytest.fixture(scope="module")
 def pressed():
-    camera, grid = finger_view(), grid_of_dots()
+    camera, grid = off_centre_view(), grid_of_dots()
     rest = np.column_stack([grid.positions_mm, np.zeros(len(grid))])
     rng = np.random.default_rng(3)
     motion = np.column_stack([rng.normal(0, 0.2, (len(grid), 2)), -rng.uniform(0, 0.8, len(grid))])
@@ -44,7 +44,7 @@ def test_zero_motion_is_zero_under_every_model(pressed) -> None:
 
 
 def test_marker_below_the_pinhole_has_no_apparent_motion() -> None:
-    camera = finger_view()
+    camera = off_centre_view()
     foot = np.array([[*camera.position_mm[:2], 0.0], [2.0, 1.0, 0.0]])
     view = MarkerView(camera, camera.project(foot))
     pressed_px = camera.project(foot - [0.0, 0.0, 0.4])

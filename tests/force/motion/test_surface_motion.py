@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from camera_rig import finger_view
+from camera_rig import off_centre_view
 from pad_samples import small_bundle
 
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.surface_motion import SurfaceMotion
 
-CAMERA = finger_view()
+CAMERA = off_centre_view()
 NOT_FOLLOWED = 3
 
 

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from camera_rig import finger_view
+from camera_rig import off_centre_view
 from synthetic import Look, grid_of_dots, render
 
 from gelslim_force.calibration.calibration import calibrate
@@ -41,7 +41,7 @@ def bundle() -> Bundle:
         "bbar",
         marker_positions_mm=grid.positions_mm,
         marker_arrays={name: getattr(grid, name) for name in names},
-        camera=finger_view().to_record(),
+        camera=off_centre_view().to_record(),
         with_stiffness=False,
     )
 
@@ -54,7 +54,7 @@ def heights() -> np.ndarray:
 def seen(motion: np.ndarray | None = None, seed: int = 1) -> np.ndarray:
     at = np.column_stack([np.zeros((len(heights()), 2)), heights()])
     moved = at if motion is None else at + motion
-    return render(grid_of_dots(), finger_view(), Look(noise=1.0, seed=seed), moved).image
+    return render(grid_of_dots(), off_centre_view(), Look(noise=1.0, seed=seed), moved).image
 
 
 def test_heights_are_those_of_the_crown() -> None:
