@@ -209,15 +209,12 @@ def refined(mesh: PadMesh) -> PadMesh:
             field="reference",
         )
     hx, hy, hz = mesh.cell_size_mm
-    plan = np.asarray(mesh.occupancy)[:, :, 0].repeat(2, axis=0).repeat(2, axis=1)
-    cells = np.repeat(plan[:, :, None], REFERENCE_LAYERS, axis=2)
     size = (hx / 2, hy / 2, hz * mesh.layers / REFERENCE_LAYERS)
-    if mesh.fill is None:
-        return PadMesh.from_occupancy(cells, size, mesh.origin_mm)
-    fill = np.asarray(mesh.fill)[:, :, 0].repeat(2, axis=0).repeat(2, axis=1)
-    return PadMesh.from_occupancy(
-        cells, size, mesh.origin_mm, np.repeat(fill[:, :, None], REFERENCE_LAYERS, axis=2)
+    cells, fill = (
+        None if array is None else np.kron(array[:, :, :1], np.ones((2, 2, REFERENCE_LAYERS)))
+        for array in (mesh.occupancy, mesh.fill)
     )
+    return PadMesh.from_occupancy(np.asarray(cells, dtype=bool), size, mesh.origin_mm, fill)
 
 
 def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
