@@ -210,11 +210,10 @@ def refined(mesh: PadMesh) -> PadMesh:
         )
     hx, hy, hz = mesh.cell_size_mm
     size = (hx / 2, hy / 2, hz * mesh.layers / REFERENCE_LAYERS)
-    cells, fill = (
-        None if array is None else np.kron(array[:, :, :1], np.ones((2, 2, REFERENCE_LAYERS)))
-        for array in (mesh.occupancy, mesh.fill)
-    )
-    return PadMesh.from_occupancy(np.asarray(cells, dtype=bool), size, mesh.origin_mm, fill)
+    split = np.ones((2, 2, REFERENCE_LAYERS))
+    cells = np.kron(mesh.occupancy[:, :, :1], split).astype(bool)
+    fill = None if mesh.fill is None else np.kron(mesh.fill[:, :, :1], split).astype(np.float64)
+    return PadMesh.from_occupancy(cells, size, mesh.origin_mm, fill)
 
 
 def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
