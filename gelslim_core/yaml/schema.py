@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -45,11 +46,18 @@ def _tidy(node: Any, is_names: bool = False) -> Any:
         return node
     if is_names:
         return {name: _tidy(item) for name, item in node.items()}
+    if "description" in node:
+        node = {**node, "description": _prose(node["description"])}
     return {
         key: _tidy(item, key in ("properties", "$defs"))
         for key, item in node.items()
         if key != "title" and not (key == "default" and isinstance(item, dict))
     }
+
+
+def _prose(docstring: str) -> str:
+    """A docstring without its sections, which say of the fields what their own rows say."""
+    return re.split(r"\n\s*(?:Attributes|Raises):\n", docstring)[0].strip()
 
 
 def reference_markdown(model: type[BaseModel], level: int = 2) -> str:
@@ -75,7 +83,7 @@ def heading_anchor(title: str) -> str:
 
 
 def _sections(title: str, path: str, model: type[BaseModel], marks: str) -> Iterator[str]:
-    about = " ".join((model.__doc__ or "").split()).rstrip(".")
+    about = " ".join(_prose(model.__doc__ or "").split()).rstrip(".")
     # The field that distinguishes the members of a union heads its table.
     fields = sorted(model_fields(model, path), key=lambda f: len(f.choices) != 1 or bool(f.types))
     yield f"{marks} {title}\n\n{about}.\n\n{_HEADER}" + "".join(map(_row, fields))

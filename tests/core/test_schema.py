@@ -90,3 +90,9 @@ def test_what_the_schema_refuses_the_reader_refuses(text):
     assert not VALIDATOR.is_valid(YAML(typ="safe", pure=True).load(text))
     with pytest.raises(InputError):
         load(text)
+
+
+def test_descriptions_of_blocks_hold_no_sections_of_docstrings():
+    assert "Attributes:" in (Spec.__doc__ or "")
+    for block in _objects(SCHEMA):
+        assert "\n\n" not in block["description"]
