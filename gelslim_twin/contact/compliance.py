@@ -1,9 +1,8 @@
-"""How the surface moves under forces on some of its nodes: columns of C, made once and kept.
+"""Surface compliance C: columns that are computed when needed and stored in a file.
 
-A column holds the displacement of all c surface nodes under 1 N along one axis on one node. They
-are made when a contact first needs them, with one factor of the pad, and a file keeps them. Of
-nodes that are images of one another in a symmetric pad, one is solved for: an eighth of a square
-pad.
+A column is the displacement of all c surface nodes under a force of 1 N along one axis on one node.
+The columns are solved with one factorisation of the pad. Among nodes that are images of each other
+in a symmetric pad, only one is solved; for a square pad that is an eighth.
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ Nodes = NDArray[np.intp]
 BATCH = 64
 FORMAT = "gelslim-compliance/3"
 MOST_BYTES = 4_000_000_000
-"""Largest table: pads of some 18 000 surface nodes need another method."""
+"""Largest table, for about 10 000 surface nodes."""
 MOST_ROW = 1500
-"""Unknowns in a row of columns up to which dense blocks beat a sparse factor."""
+"""Unknowns per row of the lattice up to which dense blocks are faster than a sparse factor."""
 
 
 class SurfaceCompliance:
     """Columns of a bundle's surface compliance, float32 mm/N, in memory and in `folder`.
 
-    The file is `compliance-KEY.npy` with as many rows as there are columns of C; a row whose own
-    entry is zero is not made yet. It is mapped, so that only what is used is read. Without a
-    folder nothing is kept. Not for two threads at once.
+    The file is `compliance-KEY.npy` with one row per column of C; a row whose own entry is zero is
+    not computed yet. The file is memory-mapped, so that only the rows used are read. Without a
+    folder nothing is stored. An instance must not be used by two threads at once.
 
     Raises ContactError for a pad whose table would not fit.
     """
@@ -86,19 +85,19 @@ class SurfaceCompliance:
 
     @cached_property
     def _originals(self) -> Nodes:
-        """(c,) the lowest node that each node is an image of."""
+        """(c,) the node of lowest number among the images of each node."""
         images = np.stack([s.image for s in self._symmetries])
         return np.asarray(images.min(axis=0))
 
     @property
     def key(self) -> str:
-        """Tells one pad's compliance from another's."""
+        """Hash of everything that the compliance depends on."""
         parts = (FORMAT, self.bundle.geometry_hash, repr(self.bundle.material),
                  self.bundle.formulation)  # fmt: skip
         return hashlib.sha256("|".join(parts).encode()).hexdigest()[:16]
 
     def require(self, nodes: Nodes) -> None:
-        """Make the columns of these nodes, and of those that are images of the same."""
+        """Compute the columns of these nodes, and of their images."""
         missing = np.asarray(nodes)[~self._made[nodes]]
         if len(missing) == 0:
             return
@@ -112,7 +111,7 @@ class SurfaceCompliance:
                 self._copy(part, symmetry)
 
     def _filled(self, wanted: Nodes) -> Nodes:
-        """`wanted` and its nearest neighbours in number, to whole batches: those come next."""
+        """`wanted`, filled up to whole batches with nodes that are probably needed next."""
         room = -len(wanted) % BATCH
         unmade = np.flatnonzero(~self._made & (self._originals == np.arange(self.nodes)))
         others = np.setdiff1d(unmade, wanted)
@@ -151,7 +150,10 @@ class SurfaceCompliance:
         return block
 
     def displacement(self, nodes: Nodes, force_n: Array, known_mm: Array | None = None) -> Array:
-        """Motion (c, 3) under forces (n, 3) on `nodes` (n,), theirs `known_mm` (n, 3) if given."""
+        """Displacement (c, 3) under forces (n, 3) on `nodes` (n,).
+
+        `known_mm` (n, 3) is the displacement of `nodes`, where it is known.
+        """
         self.require(nodes)
         from gelslim_twin.contact.compliance_kernel import add_motion
 
@@ -170,14 +172,14 @@ class SurfaceCompliance:
         return found
 
     def whole(self, force_n: Array) -> Array:
-        """Motion (c, 3) under forces (c, 3) on any nodes, solved."""
+        """Displacement (c, 3) under forces (c, 3) on all nodes, by a solve."""
         return self._operator.displacement(force_n)
 
     def store(self) -> None:
-        """Write new columns to the folder, whole; not at all where it takes no file."""
+        """Write new columns to the folder atomically, unless it is not writable."""
         if self._folder is None or not self._fresh:
             return
-        # Read-only or full: the next run makes the columns again.
+        # In a read-only or full folder the next run computes the columns again.
         with contextlib.suppress(OSError), replacement(self._path) as out:
             np.save(out, self._rows)
         self._fresh = False
@@ -191,7 +193,7 @@ class SurfaceCompliance:
         shape = (3 * self.nodes, self.nodes, 3)
         if self._folder is not None and self._path.is_file():
             try:
-                # Copy on write: what is made here is not in the file before `store`.
+                # Copy on write: new columns are in the file only after `store`.
                 held = np.load(self._path, mmap_mode="c", allow_pickle=False)
             except (OSError, ValueError, EOFError):
                 held = np.zeros(0, dtype=np.float32)
@@ -206,8 +208,8 @@ class SurfaceCompliance:
             return np.stack([[self._one(node, axis) for axis in range(3)] for node in nodes])
         unknowns = self._operator.system.stiffness.shape[0]  # type: ignore[attr-defined]
         first = unknowns - 3 * self.nodes
-        # Always as many right-hand sides: with another number the last bits would be others, and
-        # a simulation would depend on what was asked before.
+        # The number of right-hand sides is constant, because it affects the last bits: results
+        # must not depend on which columns were requested before.
         loads = np.zeros((unknowns, 3 * BATCH))
         own = (3 * nodes[:, None] + np.arange(3)).ravel()
         loads[first + own, np.arange(3 * n)] = 1.0

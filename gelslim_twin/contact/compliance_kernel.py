@@ -1,4 +1,4 @@
-"""Compiled reading of compliance columns, without copies of whole columns."""
+"""Compiled access to compliance columns, without copies of whole columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole gel at large strain, and how it answers small changes about a state."""
+"""The whole gel at large strain, and its tangent stiffness at a state."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 SPRINGS = (0.0, 1.0, 10.0, 100.0)
-"""Stiffness of the springs that hold nodes, as a share of the nodes' own at rest."""
+"""Stiffness of the stabilising springs over that of the node in the undeformed gel."""
 STIFFENINGS = (0.1, 0.3, 1.0, 3.0)
-"""Shares of the whole stiffness at rest that are added where springs are not enough."""
+"""Shares of the undeformed gel's stiffness that are added where springs are not enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class GelBody:
 
     @cached_property
     def pad(self) -> NeoHookeanPad:
-        """The law."""
+        """The constitutive law."""
         return NeoHookeanPad(self.bundle.mesh, self.bundle.material)
 
     @cached_property
@@ -57,9 +57,9 @@ class GelBody:
 
     @cached_property
     def _at_rest(self) -> sparse.csr_array:
-        """Stiffness at rest of a gel that is as stiff in shear but easy to compress.
+        """Stiffness of an undeformed gel with the same shear modulus that is compressible.
 
-        The tangent itself keeps the volume. What is added to it must not compete with that.
+        The tangent preserves the volume, and what is added to it must not counteract that.
         """
         shear = self.bundle.material.shear_modulus_mpa
         soft = Material(2.0 * shear, 0.0, self.bundle.material.density_kg_m3)
@@ -91,15 +91,13 @@ class GelBody:
         held: Array,
         least: float = 0.0,
     ) -> Tangent:
-        """The gel about a displacement (n, 3), with springs where a tool holds its surface.
+        """Factored tangent stiffness at a displacement (n, 3) and cell pressures (m,).
 
-        For the pressure of its cells (m,) see `NeoHookeanPad.tangent`; `held` (c, 3, 3) projects
-        each surface node's motion onto the directions in which the tool holds it.
-
-        Pressed hard, the gel would buckle away from under the forces of nodes that a rigid tool
-        holds in place: the tangent is positive definite with springs there only. They do not
-        change where Newton's steps end, as they pull nowhere once nothing moves. `least` is the
-        smallest share tried; raises ContactError, FiniteStrainError.
+        `held` (c, 3, 3) projects the motion of each surface node onto the directions in which the
+        tool constrains it. A gel under large contact forces would buckle if the tool did not hold
+        it, so its tangent is positive definite only with springs in these directions. The springs
+        do not change the solution, since their forces vanish when Newton's method has converged.
+        `least` is the smallest share tried. Raises ContactError, FiniteStrainError.
         """
         matrix = self._tangent(whole_mm, pressure_mpa)
         for share in SPRINGS:
@@ -123,27 +121,27 @@ class GelBody:
 
 @dataclass(eq=False)
 class Tangent:
-    """A factored tangent."""
+    """A factored tangent stiffness."""
 
     body: GelBody
     factor: RowFactor
     springs: Array
-    """(c, 3, 3) in N/mm, at the surface nodes."""
+    """Springs (c, 3, 3) in N/mm at the surface nodes."""
     share: float
-    """Of `SPRINGS`."""
+    """Share of `SPRINGS` that was needed."""
     stiffened: bool = False
-    """Whether its steps are short of Newton's: it is stiffer than the gel, with no springs."""
+    """Whether stiffness was added, so that its steps are shorter than Newton's."""
     _nodes: Nodes = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     _block: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def motion(self, force_n: Array) -> Array:
-        """Displacement (n, 3) under forces (n, 3); those on bonded nodes do nothing."""
+        """Displacement (n, 3) under forces (n, 3); forces on bonded nodes have no effect."""
         found = np.zeros(force_n.size)
         found[self.body.free] = self.factor.solve(force_n.reshape(-1)[self.body.free])
         return found.reshape(-1, 3)
 
     def block(self, nodes: Nodes) -> Array:
-        """Compliance (3m, 3m) among places `nodes` (m,) of the surface; kept for the next call."""
+        """Compliance (3m, 3m) among surface nodes `nodes` (m,), cached for the next call."""
         if not np.array_equal(nodes, self._nodes):
             own = (3 * self.body.surface[nodes][:, None] + np.arange(3)).ravel()
             self._nodes = nodes

@@ -1,13 +1,13 @@
 """Contact of a neo-Hookean gel by Newton's method on the whole gel.
 
-About a displacement U with inner forces F(U) and tangent K, forces f on the surface move it by
-K⁻¹ (E f - F(U)). What the surface does under that is a linear contact, with K's compliance in the
-place of the linear one and -K⁻¹ F(U) as the motion that is there without forces.
+At a displacement U with internal forces F(U) and tangent stiffness K, surface forces f change the
+displacement by K⁻¹ (E f - F(U)). Each Newton step is therefore a linear contact problem with the
+compliance of K, in which -K⁻¹ F(U) is the displacement without contact forces.
 
-Nearly incompressible gel is stiff against errors of the volume only: a displacement that is off
-by little has pressures that are off by far. K therefore takes pressures that are unknowns of
-their own: what the last step predicts, or what was found at the last poses. Without that, K is
-indefinite far from balance, and rounding decides where the steps go.
+Nearly incompressible gel is stiff against changes of volume only, so that a small error of the
+displacement causes a large error of the pressure. K therefore takes the pressures as separate
+unknowns, predicted by the last step or extrapolated from the last poses. Without that, K is
+indefinite far from equilibrium, and rounding decides the direction of the steps.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 MOST_STEPS = 40
 STALE, NEAR = 0.3, 0.1
-"""Gain of a step, and residual over the forces, above which the tangent is made anew."""
+"""Ratio of successive residuals, and relative residual, above which K is computed again."""
 SHORTEST = 1 / 32
 MOST_AHEAD = 2.0
-"""Longest step, of the last one, that is begun on along it."""
+"""Largest ratio to the last load step for which the start is extrapolated from it."""
 ARM_MM = 3.0
 MOST_PULLS, PULLED = 20, 0.3
 BALANCE = (0.01, 1.0)
-"""Tolerances of the linear contact within a step, of that of the whole."""
+"""Tolerances of the linear contact in a step, as shares of the tolerance of the pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +48,12 @@ class SolidState(AnchoredState):
 
     whole_mm: Array | None = None
     pressure_mpa: Array | None = None
-    """None for the cells' own under that displacement."""
+    """None for the pressures that follow from the displacement."""
 
 
 @dataclass(eq=False)
 class NewtonContact:
-    """Steps from pose to pose; keeps the last tangent."""
+    """Solves one pose after the other and stores the last tangent stiffness."""
 
     solver: ContactSolver
     body: GelBody
@@ -64,16 +64,16 @@ class NewtonContact:
         self._last_step: tuple[SolidState, Pose, SolidState] | None = None
 
     def released(self) -> SolidState:
-        """Nothing touches."""
+        """The undeformed gel without contact."""
         still = np.zeros((self.body.bundle.mesh.n_nodes, 3))
         rest = GelState.at_rest(len(self.body.surface))
         none = np.zeros(len(self.body.pad.mesh.hexes))
         return SolidState(rest.displacement_mm, rest.force_n, rest.touch, {}, None, still, none)
 
     def step(self, last: SolidState, before: Pose, pose: Pose) -> SolidState:
-        """State at `pose` after `last` at `before`.
+        """State at `pose` from the state `last` at `before`.
 
-        Raises ContactError where it is not found, FiniteStrainError where `last` is impossible.
+        Raises ContactError where it does not converge, FiniteStrainError for an invalid `last`.
         """
         state = self._solved(last, before, pose)
         self._last_step = (last, before, state)
@@ -100,8 +100,8 @@ class NewtonContact:
             if found is not None:
                 return found
         raise ContactError(
-            f"the neo-Hookean gel is off balance by {solve.rest:.1e} of the forces and "
-            f"{solve.off_mm:.1e} mm off the tool after {MOST_STEPS} steps",
+            f"the residual of the neo-Hookean gel is {solve.rest:.1e} of the forces, the gap "
+            f"{solve.off_mm:.1e} mm after {MOST_STEPS} steps",
             solve.rest,
         )
 
@@ -114,7 +114,7 @@ class NewtonContact:
         return _Start(state.whole_mm, state.force_n, pressure)
 
     def _ahead(self, last: SolidState, before: Pose, pose: Pose) -> _Start | None:
-        """Where the gel would be on along the last step, where this one goes the same way."""
+        """Extrapolation of the last load step, where this one has a similar direction."""
         if self._last_step is None or self._last_step[2] is not last:
             return None
         first, start, _ = self._last_step
@@ -129,17 +129,17 @@ class NewtonContact:
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """Where a solve begins: displacement and forces (n, 3), pressures (m,)."""
+    """Initial guess: displacement (n, 3), surface forces (c, 3) and pressures (m,)."""
 
     whole_mm: Array
     force_n: Array
     pressure_mpa: Array
 
     def ahead_of(self, first: _Start, share: float) -> _Start:
-        """On along the way from another by a share of it.
+        """Linear extrapolation from `first` through this state.
 
-        Pressures go on along their own way. Those under the displacement so found would be
-        mostly error, as a way that goes straight on does not keep the volume.
+        Pressures are extrapolated themselves. Those that follow from the extrapolated displacement
+        would be mostly error, because linear extrapolation does not preserve the volume.
         """
         return _Start(
             self.whole_mm + share * (self.whole_mm - first.whole_mm),
@@ -149,7 +149,7 @@ class _Start:
 
 
 def _way(start: Pose, end: Pose) -> Array:
-    """From one pose to another in mm, angles on an arm of a typical contact."""
+    """Difference of two poses in mm; angles count with the arm of a typical contact."""
     turns = [f"{name}_deg" for name in ("twist", "tilt_x", "tilt_y")]
     moved = [getattr(end, n) - getattr(start, n) for n in ("x_mm", "y_mm", "depth_mm")]
     return np.array(moved + [ARM_MM * np.radians(getattr(end, n) - getattr(start, n))
@@ -157,7 +157,7 @@ def _way(start: Pose, end: Pose) -> Array:
 
 
 class _NewtonSolve:
-    """Newton's steps to one pose."""
+    """Newton's method for one pose."""
 
     def __init__(
         self,
@@ -185,10 +185,10 @@ class _NewtonSolve:
 
     @property
     def held(self) -> Array:
-        """Projections (c, 3, 3) of the nodes' motion onto where the tool holds them.
+        """Projections (c, 3, 3) onto the directions in which the tool constrains each node.
 
-        A node that slips is held along the normal only: springs across it would pull at a node
-        that moves, and what they pull is found more slowly than all the rest.
+        A slipping node is constrained along the normal only: tangential springs would act on a
+        node that moves, and the iteration for their forces would converge slowly.
         """
         points = self.solver.points_mm + self.whole[self.body.surface]
         normal = tool_surface(self.solver.tool, self.pose, points, self.surface).normal
@@ -198,7 +198,7 @@ class _NewtonSolve:
         return held
 
     def forward(self, tangent: Tangent, done: int) -> SolidState | None:
-        """One step; the state once it is there."""
+        """One Newton step; returns the state on convergence."""
         points, u = self.solver.points_mm, self.whole[self.body.surface]
         outer = self.inner.copy()
         outer[np.asarray(self.body.bundle.mesh.bonded)] = 0.0
@@ -223,10 +223,10 @@ class _NewtonSolve:
     def _held(
         self, tangent: Tangent, surface: ToolSurface, room: Array, offset: Array, nodes: Nodes
     ) -> tuple[ContactForces, Array]:
-        """ContactForces, and what the tangent's springs pull at nodes (m, 3) that move.
+        """Contact forces, and forces (m, 3) that cancel the springs of the tangent.
 
-        The springs are not there: their pull under the motion found is added to the load until
-        it is that under which it was found.
+        The springs only stabilise the tangent. Their forces under the displacement found are
+        added to the load by a fixed-point iteration, so that they have no effect on the solution.
         """
         spring, u = tangent.springs[nodes], self.whole[self.body.surface][nodes]
         pull, memory = np.zeros((len(nodes), 3)), Anderson()
@@ -235,7 +235,7 @@ class _NewtonSolve:
             moved = (block @ pull.reshape(-1)).reshape(-1, 3)
             more = offset.copy()
             more[nodes] += moved
-            # Room is what forces may move a node, beyond what it moves without.
+            # The gap left for the displacement by contact forces.
             left = room.copy()
             left[nodes] -= (surface.normal * moved).sum(axis=1)
             balance = self._balance(tangent, surface, left, more, nodes)
@@ -254,7 +254,7 @@ class _NewtonSolve:
     ) -> ContactForces:
         frames, goal = surface.frames, (self.target - offset)[nodes]
         sticking = goal if frames is None else np.einsum("kab,ka->kb", frames, goal)
-        # Nearly incompressible gel far from balance may not allow the finer tolerance.
+        # Nearly incompressible gel far from equilibrium may not allow the finer tolerance.
         for share in BALANCE:
             try:
                 return solve_contact_forces(
@@ -287,7 +287,7 @@ class _NewtonSolve:
         return np.asarray(ahead.reshape(-1, 3) - self.whole)
 
     def _move(self, step: Array) -> None:
-        """Go by as much of a step as keeps every cell from turning inside out."""
+        """Line search: the largest of the halved steps that inverts no cell."""
         share = 1.0
         while share >= SHORTEST:
             try:
@@ -299,7 +299,7 @@ class _NewtonSolve:
                 return
             except FiniteStrainError:
                 share /= 2
-        raise ContactError("a step turns cells of the gel inside out: take smaller steps")
+        raise ContactError("a Newton step inverts cells of the gel: take smaller load steps")
 
     def _checked(
         self, balance: ContactForces, nodes: Nodes, load: Array, done: int

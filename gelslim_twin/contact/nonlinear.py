@@ -1,13 +1,13 @@
-"""Contact with a neo-Hookean gel: the linear contact, moved by what the gel differs.
+"""Contact with a neo-Hookean gel by a fixed-point iteration over linear contacts.
 
-With F(u) the forces that hold the surface at u (`FiniteStrainForce`) and C the linear compliance,
+With the forces F(u) that hold the surface at u (`FiniteStrainForce`) and the linear compliance C,
 
     u = [u - C F(u)] + C f
 
-holds where F(u) = f. The bracket is put into the linear contact as a motion that is there without
-forces, and the whole is iterated with Anderson's acceleration. Where the gel is pressed too deep
-for that, Newton's method on the whole gel takes over until the tool leaves (`newton_contact`); a
-pose that it does not reach in one step is approached in halves.
+holds where F(u) = f. The bracket enters the linear contact as a displacement without contact
+forces, and the iteration uses Anderson acceleration. At larger depths it does not converge; then
+Newton's method on the whole gel takes over until the tool leaves it (`newton_contact`), with load
+steps that are halved where necessary.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 
 
 def unfit(bundle: Bundle) -> tuple[str, str] | None:
-    """Why a pad cannot be strained far, and what to do; None for one that can.
+    """Why the neo-Hookean law does not apply to a pad, and the remedy; None where it applies.
 
-    The neo-Hookean law is made for flat pads of whole cells.
+    The law is implemented for flat pads of whole cells.
     """
     mesh = bundle.mesh
     if mesh.surface_shift is None and mesh.fill is None:
@@ -54,17 +54,17 @@ def unfit(bundle: Bundle) -> tuple[str, str] | None:
 
 @dataclass(eq=False)
 class NonlinearContact:
-    """Follows a tool along poses like `ContactSolver`, on a neo-Hookean gel."""
+    """Solves the contact along a sequence of poses, like `ContactSolver`, on a neo-Hookean gel."""
 
     solver: ContactSolver
     tolerance: float = 1e-2
-    """|F(u) - f| over |f|."""
+    """Largest |F(u) - f| over |f|."""
     most_steps: int = 25
     most_halvings: int = 6
     law: FiniteStrainForce = field(init=False)
 
     def __post_init__(self) -> None:
-        """Raises ContactError for a pad that the neo-Hookean law does not take."""
+        """Raises ContactError for a pad to which the neo-Hookean law does not apply."""
         problem = unfit(self.solver.compliance.bundle)
         if problem is not None:
             raise ContactError("; ".join(problem))
@@ -77,7 +77,7 @@ class NonlinearContact:
         self._newton = NewtonContact(self.solver, body, self.tolerance)
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
-        """A state per pose, from the untouched gel on. Raises ContactError."""
+        """A state per pose, starting from the undeformed gel. Raises ContactError."""
         state: GelState = GelState.at_rest(len(self._zero))
         before: Pose | None = None
         for pose in poses:
@@ -103,7 +103,7 @@ class NonlinearContact:
             raise ContactError(str(error)) from error
 
     def _solid(self, state: GelState, pose: Pose) -> SolidState:
-        """A state found without the inner gel, with it."""
+        """The state with the displacement of the whole gel."""
         guess = SolidState(
             state.displacement_mm,
             state.force_n,
@@ -115,7 +115,7 @@ class NonlinearContact:
         return self._newton_step(guess, pose, pose) if state.force_n.any() else guess
 
     def _whole(self, u: Array) -> Array:
-        """Displacement (n, 3) of the gel under a surface at u, which the law has found before."""
+        """Displacement (n, 3) of the whole gel in equilibrium with the surface displacement u."""
         body, system = self._newton.body, self.law.system
         whole = np.zeros((self.solver.compliance.bundle.mesh.n_nodes, 3))
         whole[body.surface] = u
@@ -142,7 +142,7 @@ class NonlinearContact:
                 return now
             offset = self._offset(u)
             found = self.solver.step(last, before, pose, offset, now)
-            # C (f - F(u)) is the step; what it is in force is judged against the forces.
+            # The step is C (f - F(u)).
             step = found.displacement_mm - u
             size = float(np.abs(found.displacement_mm).max())
             trail.append(float(np.abs(step).max()))
@@ -153,17 +153,17 @@ class NonlinearContact:
             if len(trail) > 8 and trail[-1] > 4 * min(trail):
                 memory = Anderson()
         raise ContactError(
-            f"surface still moves by {trail[-1]:.1e} mm after {self.most_steps} steps"
+            f"the surface still moves by {trail[-1]:.1e} mm after {self.most_steps} iterations"
         )
 
     def _checked(self, state: GelState, steps: int) -> GelState:
-        """The state, with how far its forces are from those of the gel."""
+        """The state with its residual, the difference of contact forces and forces of the gel."""
         held = self.law.force(state.displacement_mm)
         size = float(np.linalg.norm(state.force_n))
         off = float(np.linalg.norm(held - state.force_n))
         residual = off / size if size > 0 else float(off > 0)
         if residual > 3 * self.tolerance and size > 0:
-            raise ContactError(f"forces are off balance by {residual:.1%}")
+            raise ContactError(f"the residual is {residual:.1%} of the forces")
         report = {**state.solver, "residual": residual, "iterations": float(steps)}
         return replace(state, solver=report)
 

@@ -8,8 +8,8 @@ Viscoelasticity, 1.2):
 
 Between two poses the elastic force runs straight, for which the update of q_i is exact (Taylor,
 Pister and Goudreau 1970), whatever the step. The surface is taken to follow the elastic solution:
-exact while nodes in contact stay in contact. A node that the indenter leaves carries no force at
-once, where the real surface would follow for a moment; a force that would pull is none.
+exact while nodes in contact stay in contact. A node that the indenter leaves loses its force at
+once, although the real surface would follow for a moment; tensile forces are set to zero.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class PronySeries:
 
 @dataclass(frozen=True, eq=False)
 class RelaxationState:
-    """What the gel remembers: the elastic force (n, 3) in N and q_i (k, n, 3), one per term."""
+    """Internal variables: elastic force (n, 3) in N and q_i (k, n, 3), one per term."""
 
     elastic_n: Array
     internal_n: Array
@@ -100,7 +100,7 @@ def relax(
 
 
 def _held(force: Array, elastic: Array) -> Array:
-    """`force` without nodes that are not touched, or that would be pulled where they are pushed."""
+    """`force` without nodes that are free, and without tensile forces."""
     pulled = (force[:, 2] > 0) & (elastic[:, 2] <= 0)
     free = ~elastic.any(axis=1)
     force[pulled | free] = 0.0

@@ -1,1 +1,1 @@
-"""Marker frames of a deformed gel: every effect its own module, composed by `FrameRenderer`."""
+"""Rendering of frames of the deformed gel: one module per effect, composed by `FrameRenderer`."""

@@ -1,4 +1,4 @@
-"""What a JPEG stream (as most USB cameras send) leaves of the picture."""
+"""JPEG compression, as of the stream of most USB cameras."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
-"""Blur of a lens focused at one distance while the gel spans many.
+"""Defocus: the lens is focused at one distance, but the gel spans a range of distances.
 
-A point out of focus by the diameter b is a disc of standard deviation b/4 per axis; its Gaussian
-of the same spread stands for it. Discretised by the modified Bessel functions (Lindeberg 1990):
-a kernel on whole pixels whose variance is exactly the wanted one, however small, and which is
-even, so that no dot's centre moves.
+A blur disc of diameter b has the standard deviation b/4 per axis and is replaced by a Gaussian of
+the same variance. The discrete kernel consists of modified Bessel functions (Lindeberg 1990). Its
+variance is exact even for small blurs, and it is even, so that centroids do not move.
 """
 
 from __future__ import annotations
@@ -33,10 +32,11 @@ _SUNKEN_MM = 0.5
 
 @dataclass(frozen=True)
 class Defocus:
-    """Entrance pupil `aperture_mm`, focused at `focus_mm`; `still_px` is the blur in focus.
+    """Defocus of a lens with entrance pupil `aperture_mm`, focused at `focus_mm`.
 
-    `still_px` is a standard deviation (aberrations, diffraction, demosaicing). Aperture and
-    still blur 0 leave the picture as it is. Raises ValueError for values out of range.
+    `still_px` is the standard deviation of the blur in focus (aberrations, diffraction,
+    demosaicing). If both blurs are 0, the picture does not change. Raises ValueError for values
+    out of range.
     """
 
     aperture_mm: float
@@ -57,7 +57,7 @@ class Defocus:
         return self.aperture_mm == 0 and self.still_px == 0
 
     def field(self, camera: VirtualCamera, length_mm: float, width_mm: float) -> BlurField:
-        """Blur diameters over a pad, to be looked up frame by frame."""
+        """Blur diameters over a pad, computed once."""
         return BlurField.of(camera, self.aperture_mm, self.focus_mm, (length_mm, width_mm))
 
     def sigma_px(self, field: BlurField, points_mm: Array, scale_px_per_mm: Array) -> Array:
@@ -69,9 +69,10 @@ class Defocus:
     def soften(
         self, field: BlurField, sight: Sight, planes: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Blur a still picture (h, w, c) as sharp as each place at rest is.
+        """Blur the constant part (h, w, c) of a picture by the local blur at rest.
 
-        Between a few blurs of the whole picture, mixed by variance: exact for second moments.
+        The result is interpolated by variance between a few uniform blurs, which is exact for
+        second moments.
         """
         if self.is_null:
             return planes
@@ -96,9 +97,9 @@ class Defocus:
 
 @dataclass(frozen=True)
 class BlurField:
-    """Blur diameter over the pad at two heights, from `VirtualCamera.blur_map`; between, linear.
+    """Blur diameter over the pad at two heights, interpolated linearly between them.
 
-    Beyond the grid, which reaches half a pad further than the pad, it is that of its edge.
+    Outside the grid, which extends half a pad beyond the pad, the value at its edge is used.
     """
 
     level: HeightGrid
@@ -125,10 +126,10 @@ class BlurField:
 
 
 def kernel_taps(sigma_px: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Half kernels (n, t), middle first, and their reaches (n,); reach 0 where sigma is 0.
+    """Half kernels (n, t), centre first, and their radii (n,) in px; radius 0 where sigma is 0.
 
-    Interpolated in a table over the variance (mixing kernels keeps mean, sum and variance), cut
-    where 1e-4 of the weight is left and normalised.
+    They are interpolated in a table over the variance, which preserves mean, sum and variance,
+    truncated where 1e-4 of the weight is left, and normalised.
     """
     sigma = np.asarray(sigma_px, dtype=float)
     most = float(sigma.max(initial=0.0))
@@ -150,7 +151,7 @@ def kernel_taps(sigma_px: Array) -> tuple[Array, NDArray[np.int64]]:
 
 @cache
 def _kernels(most_px: float) -> Array:
-    """Half kernels (table, t) at even steps of variance up to `most_px`²."""
+    """Half kernels (table, t) at equal steps of variance up to `most_px`²."""
     from scipy.special import ive
 
     reach = int(np.ceil(3.9 * most_px)) + 1

@@ -1,4 +1,4 @@
-"""Specks and hairs between gel and camera: dark, and not part of the print."""
+"""Dirt: dark specks and hairs between gel and camera."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ _CORNERS = 24
 
 @dataclass(frozen=True)
 class Dirt:
-    """So many specks and hairs on a pad, taking `opacity` of the light.
+    """Numbers of specks and hairs on a pad; each absorbs the share `opacity` of the light.
 
-    Specks are ellipses of `speck_mm` and down to a third of it; hairs are arcs `hair_mm` long
-    and a tenth of a speck wide. Raises ValueError for values out of range.
+    Specks are ellipses with axes between a third of `speck_mm` and `speck_mm`. Hairs are arcs of
+    length `hair_mm` and a width of a tenth to a fifth of a speck. Raises ValueError for values
+    out of range.
     """
 
     specks: int = 0
@@ -48,7 +49,7 @@ class Dirt:
     def apply(
         self, camera: VirtualCamera, pad_mm: tuple[float, float], light: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Light (h, w, k) with what the dirt leaves of it."""
+        """The light (h, w, k) that the dirt transmits."""
         if self.is_null:
             return light
         from gelslim_twin.render.dot_kernel import draw_dots
@@ -84,7 +85,7 @@ class Dirt:
 
 
 def _placed(shape: Array, at: Array, turn: Array, pad_mm: tuple[float, float]) -> Array:
-    """Outlines (n, k, 2) turned and put at relative places (n, 2) of the pad."""
+    """Outlines (n, k, 2), rotated and moved to relative positions (n, 2) on the pad."""
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     turned = np.stack(
         [c * shape[..., 0] - s * shape[..., 1], s * shape[..., 0] + c * shape[..., 1]], axis=2

@@ -1,7 +1,7 @@
-"""The gel's outer surface at rest where it is domed: heights under the plane z = 0 at its apex.
+"""The outer surface of a crowned gel at rest: heights relative to the plane z = 0 at its apex.
 
-A motion of the dome is drawn as a motion of that plane, heights included: dots, the points that
-rays meet and slopes then follow by the same formulas as on a flat gel.
+A displacement of the crowned surface is treated as one of that plane that includes the heights.
+Dots, intersections of rays and slopes then follow by the same formulas as on a flat gel.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ _NEAR_MM = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class DomedTop:
-    """Heights as `rest`, whose lateral motion is zero."""
+    """The heights, as a displacement `rest` without lateral part."""
 
     rest: SurfaceState
 
     @classmethod
     def of_nodes(cls, nodes_mm: ArrayLike) -> DomedTop | None:
-        """The top through surface nodes (n, 3) of a regular mesh; None for a flat one at z = 0."""
+        """The surface through nodes (n, 3) of a regular mesh; None for a flat one at z = 0."""
         nodes = np.asarray(nodes_mm, dtype=float)
         if not nodes[:, 2].any():
             return None
@@ -44,7 +44,7 @@ class DomedTop:
         return np.asarray(self.rest.at(points_mm)[:, 2])
 
     def carrying(self, motion: SurfaceState | None) -> SurfaceState:
-        """A motion of the dome (None: at rest) as one of the plane."""
+        """A displacement of the crowned surface (None: at rest) as one of the plane."""
         if motion is None:
             return self.rest
         raised = motion.displacement_mm.copy()
@@ -52,11 +52,11 @@ class DomedTop:
         return replace(motion, displacement_mm=raised)
 
     def seen_mm(self, sight: Sight) -> Array:
-        """Points (h, w, 2) of the dome at rest that the rays of `sight` meet."""
+        """Points (h, w, 2) of the crowned surface at rest where the rays of `sight` meet it."""
         start = sight.rest_mm.reshape(-1, 2)
-        lean, at = sight.lean.reshape(-1, 2), start
+        slope, at = sight.slope.reshape(-1, 2), start
         for _ in range(_ROUNDS):
-            moved = start + lean * self.height_mm(at)[:, None]
+            moved = start + slope * self.height_mm(at)[:, None]
             left = float(np.abs(moved - at).max())
             at = moved
             if left < _NEAR_MM:

@@ -1,8 +1,8 @@
-"""Compiled area coverage of dots, pixel by pixel. Import only where it runs: numba.
+"""Compiled outlines of dots and their exact area coverage. Imported where used (numba).
 
-The share of a pixel inside a polygon follows from its edges alone: an edge adds, for every pixel
-row it crosses, its signed height to all pixels right of it and a trapezium to the pixels it
-passes through. No samples are taken, so a dot's centroid is exact to rounding.
+The covered area of a pixel follows from the edges of the polygon alone: in every row of pixels that
+an edge crosses, it adds its signed height to all pixels right of it and a trapezium to the pixels
+that it passes through. The centroid of a dot is therefore exact to rounding.
 """
 
 from __future__ import annotations

@@ -9,9 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Exposure:
-    """Time and gain over the usual ones, and the exponent 1/gamma of the response curve.
+    """Time and gain relative to the defaults, and the exponent 1/gamma of the response curve.
 
-    Gamma leaves black and white and lifts what is between. Raises ValueError out of range.
+    A gamma above 1 brightens the grey values between black and white. Raises ValueError out of
+    range.
     """
 
     time: float = 1.0

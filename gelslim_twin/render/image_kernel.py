@@ -1,4 +1,8 @@
-"""Compiled passes that put a frame together. Import only where they run: numba."""
+"""Compiled composition of a frame and its noise. Imported where used, as it needs numba.
+
+Noise comes from a counter-based generator: the three values of a pixel are one 64-bit hash of its
+number, the same in any order and on any number of threads.
+"""
 
 from __future__ import annotations
 

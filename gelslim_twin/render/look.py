@@ -1,4 +1,4 @@
-"""Which effects a sensor's frames show, and how strongly."""
+"""The look of frames: which effects are rendered, with which parameters."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Look:
-    """Effects by their parameters; None leaves one out, and its module unloaded.
+    """Parameters of the effects; None leaves an effect out, and its module is not imported.
 
-    `level_dn` is the grey value that unit irradiance gives in a lamp's own colour; where a place
-    gets three times the mean light, the usual one just saturates, and saturation moves dots'
-    centres. `contrast` is the share of light that ink takes. `samples` 0 fills dots by exact area,
-    n > 0 by n x n samples per pixel. Raises ValueError for values out of range.
+    `level_dn` is the grey value of unit irradiance in a lamp's own colour. With the default, three
+    times the mean light just saturates; saturation would move the centres of dots. `contrast` is
+    the share of light that ink absorbs. With `samples` 0 the coverage of pixels is exact, with
+    n > 0 it is taken from n x n samples. Raises ValueError for values out of range.
     """
 
     level_dn: float = 80.0
@@ -69,7 +69,7 @@ SLOTS: Mapping[str, tuple[str, str]] = {
     "sensor_noise": ("noise", "SensorNoise"),
     "compression": ("compression", "Compression"),
 }
-"""Effect to the field of `Look` and the class in the effect's module."""
+"""For each effect the field of `Look` and the class in the effect's module."""
 
 
 def plan_look(
@@ -79,7 +79,7 @@ def plan_look(
     seed: int,
     step_s: float,
 ) -> Look:
-    """What the renderer draws.
+    """The look of the frames of a plan.
 
     Args:
         plan: of the scene; only its effects are imported.

@@ -12,10 +12,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MotionBlur:
-    """`open_share` of the time since the pose before, the shutter is open; up to the pose drawn.
+    """Motion blur by a shutter that is open for the last `open_share` of the time step.
 
-    The path is straight and even in time; it is drawn as the mean of poses no further apart than
-    `px_per_pose`, at most `most_poses`. Raises ValueError for values out of range.
+    Dots move uniformly on straight lines. The blur is the mean of at most `most_poses` poses, no
+    farther apart than `px_per_pose`. Raises ValueError for values out of range.
     """
 
     open_share: float = 1.0

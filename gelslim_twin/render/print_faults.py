@@ -1,4 +1,4 @@
-"""Faults of the marker print: dots off their places, missing, or of odd size and shape."""
+"""Faults of the marker print: displaced, missing, and odd dots."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gelslim_twin.render.random_stream import stream
 
 @dataclass(frozen=True)
 class PrintFaults:
-    """Spread of the places (standard deviation per axis), shares of missing and odd dots.
+    """Standard deviation of positions per axis, and shares of missing and odd dots.
 
-    An odd dot has semi-axes between half and one and a half of the nominal ones, each drawn by
-    itself. Raises ValueError for values out of range.
+    Each semi-axis of an odd dot is drawn between 0.5 and 1.5 times the nominal one. Raises
+    ValueError for values out of range.
     """
 
     jitter_mm: float = 0.0
@@ -36,7 +36,7 @@ class PrintFaults:
         return self.jitter_mm == 0 and self.missing_share == 0 and self.odd_share == 0
 
     def apply(self, dots: PrintedDots) -> PrintedDots:
-        """The print with its faults; each kind from its own stream, dot by dot."""
+        """The print with its faults, each kind from its own random stream."""
         if self.is_null:
             return dots
         count = len(dots)

@@ -1,4 +1,9 @@
-"""The dots as printed on the gel, before it is deformed."""
+"""The printed dots and their outlines in the picture.
+
+A few points of each rim are displaced with the gel and projected exactly. The closed curve through
+them is smooth, so that a short Fourier series gives the corners of the polygon that is filled. The
+true centre is the centroid of this area, which is not the image of the dot's centre.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PrintedDots:
-    """Ellipses of ink on the rest surface: centres (m, 2), semi-axes (m, 2), turn (m,)."""
+    """Ellipses of ink on the undeformed surface: centres (m, 2), semi-axes (m, 2), angles (m,)."""
 
     centres_mm: Array
     semi_axes_mm: Array
@@ -29,7 +34,7 @@ class PrintedDots:
 
     @classmethod
     def nominal(cls, grid: MarkerGrid) -> PrintedDots:
-        """A perfect print of a marker grid: round dots in their places."""
+        """A print of a marker grid without faults."""
         half = np.asarray(grid.diameter_mm, dtype=float) / 2
         return cls(
             centres_mm=np.array(grid.positions_mm, dtype=float),
@@ -64,10 +69,11 @@ def outlines_px(
     rim_points: int = RIM_POINTS,
     corners: int = CORNERS,
 ) -> Array:
-    """Outlines (m, corners, 2) of the dots carried along by the surface; all dots, drawn or not.
+    """Outlines (m, corners, 2) of all dots on the displaced surface, drawn or not.
 
-    The rim is widened so that the polygon has the ellipse's area and second moments to 1 in
-    `corners`⁴. Raises ValueError for dots that the camera cannot project.
+    The rim is scaled so that area and second moments of the polygon equal those of the ellipse up
+    to a relative error of the order `corners`⁻⁴. Raises ValueError for dots that the camera
+    cannot project.
     """
     turn = 2 * np.pi / corners
     rim = dots.rim_mm(rim_points, float(np.sqrt(turn / np.sin(turn))))
@@ -95,7 +101,7 @@ def centroids_px(outlines: Array) -> tuple[Array, Array]:
 
 @cache
 def _series(points: int, corners: int) -> Array:
-    """Weights (corners, points) of trigonometric interpolation, even number of points."""
+    """Weights (corners, points) of trigonometric interpolation for an even number of points."""
     if points % 2 or points < 4:
         raise ValueError(f"{points} rim points: must be an even number, at least 4")
     apart = (

@@ -1,4 +1,4 @@
-"""Random numbers by name and counter: drawing more of one kind changes no other.
+"""Random streams by name and frame, so that one use of random numbers does not affect another.
 
 Every use has its own stream, keyed by seed, name and frame; SeedSequence mixes the three.
 """

@@ -1,4 +1,4 @@
-"""Shot and read noise of the image sensor."""
+"""Shot noise and read noise of the image sensor."""
 
 from __future__ import annotations
 

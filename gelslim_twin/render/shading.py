@@ -1,9 +1,8 @@
 """Shading of the deformed gel: each source's light changes with the slope towards it.
 
-The coat is dull (Lambert). Light that travels along d (unit) and meets a surface of outward
-normal n carries d·n per area, and nothing where that is negative: the surface lies in its own
-shadow. Part of the light has been scattered by the coat before and comes from everywhere; it does
-not mind the slope.
+The coat is a Lambertian reflector. Light in the direction d (unit vector) gives the irradiance d·n
+on a surface with outward normal n, and none where d·n is negative (attached shadow). An ambient
+share of the light, scattered by the coat, does not depend on the slope.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ _NEAR_MM = 1e-3
 
 @dataclass(frozen=True)
 class Shading:
-    """Share of light blind to the slope, and the rung: a value every `pixel_step` pixels.
+    """Ambient share of the light, and spacing `pixel_step` of the lattice that is computed.
 
-    At most `rounds` of the search for the point of the sunken surface that a ray meets.
+    `rounds` limits the iterations for the intersection of a ray with the deformed surface.
     """
 
     ambient_share: float = 0.3
@@ -47,20 +46,20 @@ class Shading:
         return Sight.of(camera, self.pixel_step)
 
     def gain(self, sight: Sight, state: SurfaceState, light: LightMap) -> NDArray[np.float32]:
-        """Light (rows, columns, k) over that of the level surface, on the lattice of `sight`."""
+        """Irradiance (rows, columns, k) over that of a level surface, on the lattice of `sight`."""
         from gelslim_twin.render.surface_kernel import seen_slopes
 
         rest = sight.rest_mm.reshape(-1, 2)
         slopes = np.zeros((len(rest), 2))
         seen_slopes(
             state.padded_mm, state.origin_mm, state.step_mm,
-            rest, sight.lean.reshape(-1, 2), self.rounds, _NEAR_MM, slopes,
+            rest, sight.slope.reshape(-1, 2), self.rounds, _NEAR_MM, slopes,
         )  # fmt: skip
         gain = self.of_slopes(slopes, light)
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
 
     def of_slopes(self, slopes: Array, light: LightMap) -> NDArray[np.float32]:
-        """Light (n, k) over that of the level surface, at slopes (n, 2); exactly 1 where level."""
+        """Irradiance (n, k) over that of a level surface at slopes (n, 2); exactly 1 where level."""
         from gelslim_twin.render.surface_kernel import lambert
 
         gain = np.empty((len(slopes), light.sources), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Which point of the gel each pixel sees: computed once per camera, then only looked up."""
+"""The ray of each pixel within the gel, computed once per camera."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _PROBE_MM = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """Rays of a lattice of pixels in the gel: `rest_mm` (h, w, 2) + `lean` (h, w, 2) z.
+    """Rays of a lattice of pixels: x, y = `rest_mm` (h, w, 2) + `slope` (h, w, 2) z.
 
-    The gel has no upper end for a ray, so the ray is straight above the acrylic and the form is
-    exact. Column i and row j of the lattice are pixels i and j times `pixel_step`.
+    Within the gel a ray is straight, so that this form is exact. Column i and row j of the lattice
+    are the pixels i and j times `pixel_step`.
     """
 
     rest_mm: Array
-    lean: Array
+    slope: Array
     pixel_step: int
 
     @classmethod
     def of(cls, camera: VirtualCamera, pixel_step: int = 1) -> Sight:
-        """Sight of every `pixel_step`-th pixel, the last ones beyond the picture's edge.
+        """Rays of every `pixel_step`-th pixel; the last ones lie beyond the picture's edge.
 
         Raises ValueError for pixels that look away from the window, and a step below 1.
         """
@@ -41,11 +41,11 @@ class Sight:
         pixels = np.column_stack([x.ravel(), y.ravel()]).astype(float)
         rest = camera.backproject(pixels, 0.0)[:, :2]
         below = camera.backproject(pixels, -_depth(camera))[:, :2]
-        lean = (rest - below) / _depth(camera)
-        return cls(rest.reshape(rows, columns, 2), lean.reshape(rows, columns, 2), pixel_step)
+        slope = (rest - below) / _depth(camera)
+        return cls(rest.reshape(rows, columns, 2), slope.reshape(rows, columns, 2), pixel_step)
 
     def pixel_mm(self) -> Array:
-        """Footprint (h, w) of a pixel on the gel: the root of its area, in mm."""
+        """Size (h, w) of a pixel on the gel in mm: the square root of its area."""
         du = np.gradient(self.rest_mm, axis=1) / self.pixel_step
         dv = np.gradient(self.rest_mm, axis=0) / self.pixel_step
         area: Array = np.sqrt(np.abs(du[..., 0] * dv[..., 1] - du[..., 1] * dv[..., 0]))
@@ -53,7 +53,7 @@ class Sight:
 
 
 def _depth(camera: VirtualCamera) -> float:
-    """A height within the gel, below its surface."""
+    """A depth below the surface, within the gel."""
     if not camera.layers or camera.layers[-1].thickness_mm <= 0:
         raise ValueError("the camera has no gel layer: its last layer must be the gel")
     return min(_PROBE_MM, camera.layers[-1].thickness_mm / 2)

@@ -1,4 +1,4 @@
-"""Mirror images of the lamps in the window: bright spots that stand still."""
+"""Specular reflections of the lamps in the window: bright spots that do not move."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gelslim_twin.render.random_stream import stream
 
 @dataclass(frozen=True)
 class Specular:
-    """So many spots of up to `level_dn` grey values and about `radius_px`, in the lamps' colours.
+    """Number of spots with up to `level_dn` grey values and about `radius_px`, in lamp colours.
 
     Raises ValueError for values out of range.
     """

@@ -1,4 +1,4 @@
-"""Compiled cubic interpolation of the gel's displacement. Import only where it runs: numba."""
+"""Compiled cubic interpolation of the gel's displacement. Imported where used (numba)."""
 
 from __future__ import annotations
 

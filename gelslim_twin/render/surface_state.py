@@ -1,4 +1,4 @@
-"""How the gel's outer surface is displaced at one instant."""
+"""Displacement of the gel's outer surface at one instant."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ _EVEN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SurfaceState:
-    """Displacement `displacement_mm` (ny, nx, 3) of material points on even axes (nx,), (ny,).
+    """Displacement `displacement_mm` (ny, nx, 3) at material points on uniform axes (nx,), (ny,).
 
-    In between, cubic convolution (Keys 1981): continuous slopes, exact for linear fields and at
-    the nodes. Raises ValueError for axes that are not even, other shapes, values not finite.
+    It is interpolated by cubic convolution (Keys 1981), which has continuous slopes and is exact
+    for linear fields and at the nodes. Raises ValueError for axes that are not uniform, other
+    shapes, values not finite.
     """
 
     x_mm: Array
@@ -71,7 +72,7 @@ class SurfaceState:
 
     @cached_property
     def padded_mm(self) -> Array:
-        """Displacement with a ring of ghost nodes, continued linearly."""
+        """Displacement with a ring of ghost nodes by linear extrapolation."""
         u = np.pad(self.displacement_mm, ((1, 1), (1, 1), (0, 0)))
         u[0], u[-1] = 2 * u[1] - u[2], 2 * u[-2] - u[-3]
         u[:, 0], u[:, -1] = 2 * u[:, 1] - u[:, 2], 2 * u[:, -2] - u[:, -3]
@@ -83,8 +84,8 @@ class SurfaceState:
         return bool(np.any(self.displacement_mm))
 
     def at(self, points_mm: Array) -> Array:
-        """Displacement (n, 3) of material points (n, 2); beyond the edge, that of the edge."""
-        from gelslim_twin.render.surface_kernel import displacement
+        """Displacement (n, 3) at material points (n, 2); outside the pad that of the
+        nearest edge.""" from gelslim_twin.render.surface_kernel import displacement
 
         points = np.ascontiguousarray(points_mm, dtype=float)
         out = np.zeros((len(points), 3))

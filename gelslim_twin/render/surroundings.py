@@ -1,7 +1,4 @@
-"""What the picture shows at rest, without dots: the lit pad, its edge, the frame about it.
-
-All of it stands still, so it is drawn once per sensor.
-"""
+"""The constant part of the picture: the illuminated pad at rest, its edge, and the frame around it."""
 
 from __future__ import annotations
 
@@ -23,12 +20,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pad:
-    """Outline of the gel and the look of its coat and of the frame around it.
+    """Outline of the gel and appearance of its coat and of the frame around it.
 
-    `frame_level` is the frame's brightness beside the pad over the coat's halfway to the middle,
-    falling off as exp(-distance / frame_decay_mm); `mottle` is the relative standard deviation of
-    the coat's brightness, in patches of `mottle_mm`; `vignetting` weighs the lens' cos⁴ (0: none,
-    1: full).
+    `frame_level` is the brightness of the frame next to the pad over that of the coat halfway to
+    its centre; it decays as exp(-distance / frame_decay_mm). `mottle` is the relative standard
+    deviation of the coat's brightness, in patches of `mottle_mm`. `vignetting` is the weight of the
+    lens's cos⁴ law (0: none, 1: full).
     Raises ValueError for values out of range.
     """
 
@@ -89,7 +86,7 @@ def still_irradiance(
 
 
 def _mottled(pad: Pad, x: Array, y: Array) -> Array:
-    """Relative brightness of the coat: even noise, smoothed on the pad, seen by each pixel."""
+    """Relative brightness of the coat at each pixel: smoothed white noise."""
     if pad.mottle == 0:
         return np.ones_like(x)
     from scipy.ndimage import gaussian_filter, map_coordinates

@@ -1,4 +1,4 @@
-"""What of a tool lies below the gel's undeformed surface, in closed form by depth."""
+"""Footprint of a tool below the gel's undeformed surface, in closed form by depth."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ Pair = Callable[[float], tuple[float, float]]
 def tool_footprint(
     indenters: Sequence[Indenter], folder: Path, pad_mm2: float, node_pitch_mm: float = 0.0
 ) -> Footprint:
-    """Sum over the indenters of a tool, held to a pad of `pad_mm2`; overlaps count twice.
+    """Sum over the indenters of a tool, at most the pad of `pad_mm2`; overlaps count twice.
 
-    As nodes `node_pitch_mm` apart feel it: what is narrower than that is as wide for the node that
-    it meets, and pushes it down by its whole depth.
+    Parts narrower than the distance `node_pitch_mm` of the nodes count with that width, because
+    they push down a node by their whole depth.
 
     Raises ValueError or OSError for an STL file (in `folder`) that cannot be read.
     """
-    shapes = [(_felt(one, folder, node_pitch_mm), one.raised_mm) for one in indenters]
+    shapes = [(_on_nodes(one, folder, node_pitch_mm), one.raised_mm) for one in indenters]
 
     def parts(depth: float) -> list[tuple[float, float, float]]:
         return [shape(depth - raised) for shape, raised in shapes if depth > raised]
@@ -54,13 +54,13 @@ def tool_footprint(
     )
 
 
-def _felt(
+def _on_nodes(
     indenter: Indenter, folder: Path, pitch: float
 ) -> Callable[[float], tuple[float, float, float]]:
-    """Area, volume and width of the narrowest part, as nodes `pitch` apart feel a shape."""
+    """Area, volume and width of the narrowest part of a shape, on nodes `pitch` apart."""
     pair = _pair(indenter, folder)
 
-    def felt(d: float) -> tuple[float, float, float]:
+    def resolved(d: float) -> tuple[float, float, float]:
         area, volume = pair(d)
         length, most = 2 * shape_reach_mm(indenter, folder, d), math.inf
         width = area / length
@@ -77,7 +77,7 @@ def _felt(
             volume = area * d
         return area, volume, max(width, pitch)
 
-    return felt
+    return resolved
 
 
 def _pair(indenter: Indenter, folder: Path) -> Pair:
@@ -159,10 +159,10 @@ def _waves(plane: float, relief: float, d: float) -> tuple[float, float]:
 
 
 def tool_reach_mm(indenters: Sequence[Indenter], folder: Path, depth_mm: float) -> float:
-    """Largest distance from the tool's axis of what lies below the gel's undeformed surface.
+    """Largest distance from the tool's axis of its part below the gel's undeformed surface.
 
-    0 where nothing does. Raises ValueError or OSError for an STL file (in `folder`) that cannot be
-    read.
+    It is 0 where no part is below. Raises ValueError or OSError for an STL file (in `folder`)
+    that cannot be read.
     """
     return max(
         (

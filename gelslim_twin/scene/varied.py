@@ -1,4 +1,4 @@
-"""Scene number so-and-so of a data set."""
+"""One scene of a data set, drawn from the ranges of `vary`."""
 
 from __future__ import annotations
 

@@ -266,6 +266,6 @@ def test_halves_where_one_step_fails() -> None:
 
     assert with_halved_steps(step, 0.0, Pose(), Pose(x_mm=1.0), 3) == pytest.approx(1.0)
     assert tried == [1.0, 0.5, 0.25, 0.25, 0.5, 0.25, 0.25]
-    with pytest.raises(ContactError, match="too far") as caught:
+    with pytest.raises(ContactError) as caught:
         with_halved_steps(step, 0.0, Pose(), Pose(x_mm=8.0), 3)
     assert caught.value.residual == 0.5

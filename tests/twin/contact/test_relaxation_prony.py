@@ -129,9 +129,9 @@ def test_bad_series_are_refused(fractions, times, words):
 
 def test_bad_steps_are_refused():
     state = at_rest(SERIES, 2)
-    with pytest.raises(ValueError, match="not be negative"):
+    with pytest.raises(ValueError, match="-1"):
         relax(SERIES, state, PUSH, -1.0)
     with pytest.raises(ValueError, match=r"must be \(2, 3\)"):
         relax(SERIES, state, PUSH[:1], 1.0)
-    with pytest.raises(ValueError, match="not be negative"):
+    with pytest.raises(ValueError, match="-1"):
         relaxed(SERIES, [1.0, 0.0], np.zeros((2, 1, 3)))

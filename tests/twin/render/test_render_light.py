@@ -28,7 +28,7 @@ def test_points_on_a_pixels_ray_are_seen_at_that_pixel(step):
     rng = np.random.default_rng(0)
     rows, columns = rng.integers(0, [[sight.rest_mm.shape[0]], [sight.rest_mm.shape[1]]], (2, 50))
     for z in (-1.2, -0.3, 0.0):
-        points = sight.rest_mm[rows, columns] + z * sight.lean[rows, columns]
+        points = sight.rest_mm[rows, columns] + z * sight.slope[rows, columns]
         seen = CAMERA.project(np.column_stack([points, np.full(50, z)]))
         assert np.abs(seen - np.column_stack([columns, rows]) * step).max() < 1e-8
 
