@@ -59,7 +59,7 @@ class Shading:
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
 
     def of_slopes(self, slopes: Array, light: LightMap) -> NDArray[np.float32]:
-        """Irradiance (n, k) over that of a level surface at slopes (n, 2); exactly 1 where level."""
+        """Irradiance (n, k) over that of a level surface at slopes (n, 2); exactly 1 at 0."""
         from gelslim_twin.render.surface_kernel import lambert
 
         gain = np.empty((len(slopes), light.sources), dtype=np.float32)

@@ -84,8 +84,8 @@ class SurfaceState:
         return bool(np.any(self.displacement_mm))
 
     def at(self, points_mm: Array) -> Array:
-        """Displacement (n, 3) at material points (n, 2); outside the pad that of the
-        nearest edge.""" from gelslim_twin.render.surface_kernel import displacement
+        """Displacement (n, 3) at material points (n, 2); outside the pad that of its edge."""
+        from gelslim_twin.render.surface_kernel import displacement
 
         points = np.ascontiguousarray(points_mm, dtype=float)
         out = np.zeros((len(points), 3))

@@ -1,4 +1,4 @@
-"""The constant part of the picture: the illuminated pad at rest, its edge, and the frame around it."""
+"""The constant part of the picture: the illuminated pad at rest and the frame around it."""
 
 from __future__ import annotations
 

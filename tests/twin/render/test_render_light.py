@@ -183,20 +183,20 @@ def test_blur_of_the_still_picture_softens_the_pads_edge_only():
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    "change",
     [
-        ({"elevation_deg": [0, 25]}, "rise towards"),
-        ({"irradiance": -np.ones((2, 2, 2))}, "negative"),
-        ({"irradiance": np.ones((2, 3, 2))}, "must be"),
-        ({"x_mm": [1.0, 0.0]}, "increasing"),
+        {"elevation_deg": [0, 25]},
+        {"irradiance": -np.ones((2, 2, 2))},
+        {"irradiance": np.ones((2, 3, 2))},
+        {"x_mm": [1.0, 0.0]},
     ],
 )
-def test_light_that_is_none_is_refused(change, words):
+def test_invalid_light_is_refused_with_the_field(change):
     values = {
         "x_mm": [0.0, 1.0], "y_mm": [0.0, 1.0], "irradiance": np.ones((2, 2, 2)),
         "azimuth_deg": [90, -90], "elevation_deg": [25, 25], "colour": LED_COLOURS,
     }  # fmt: skip
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ValueError, match=next(iter(change))):
         LightMap(**(values | change))
 
 
