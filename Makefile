@@ -61,6 +61,7 @@ docs: $(VENV)/.installed-dev
 	$(BIN)/gelslim schema --scene --markdown -o docs/scene_reference.md
 	$(BIN)/python bench/accuracy_page.py
 	$(BIN)/python tools/sensitivities.py
+	$(BIN)/python bench/page_blocks.py
 	$(BIN)/python tools/gallery.py
 	$(MAKE) site
 

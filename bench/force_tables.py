@@ -1,22 +1,13 @@
-"""Put the measured tables into guide and README, between their comment marks.
-
-python bench/force_tables.py    # from docs/data/force_latency.json and force_ladders.json
-"""
+"""Tables of the force pipeline from docs/data/force_latency.json and force_ladders.json."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
-DATA = ROOT / "docs" / "data"
-GUIDE = ROOT / "docs" / "force_pipeline.md"
-README = ROOT / "README.md"
 SHORT = {
     "depth given, 5%": "depth given",
-    "tangential, 5%": "nothing given: normal force unknown",
-    "sphere seen, 5%": "only the ball's size given, contact sought in the picture",
+    "tangential, 5%": "nothing given, normal force unknown",
+    "sphere seen, 5%": "only the ball's size given, contact found in the picture",
     "paper's choices": "the paper's choices, with our detector",
 }
 STAGES = {
@@ -30,41 +21,15 @@ STAGES = {
 }
 
 
-def main() -> None:
-    """Write what has been measured."""
-    latency = DATA / "force_latency.json"
-    if latency.exists():
-        data = json.loads(latency.read_text(encoding="utf-8"))
-        replace_between(GUIDE, "latency", full_latency(data))
-        replace_between(README, "latency", short_latency(data))
-    ladders = DATA / "force_ladders.json"
-    if ladders.exists():
-        replace_between(
-            GUIDE, "ladders", ladder_tables(json.loads(ladders.read_text(encoding="utf-8")))
-        )
-
-
-def replace_between(path: Path, mark: str, text: str) -> None:
-    """Replace what stands between the marks; a file without them is left alone."""
-    whole = path.read_text(encoding="utf-8")
-    first, last = f"<!-- {mark} -->", f"<!-- /{mark} -->"
-    if first not in whole or last not in whole:
-        print(f"{path.name} has no marks for {mark}")
-        return
-    before, rest = whole.split(first, 1)
-    path.write_text(
-        f"{before}{first}\n{text.strip()}\n{last}{rest.split(last, 1)[1]}", encoding="utf-8"
-    )
-
-
 def full_latency(data: dict[str, Any]) -> str:
-    """Medians per stage of every chain, and what was measured besides."""
+    """Return the medians per stage of every chain, the first frame and the memory."""
     names = ["total", *STAGES]
     parts = [
-        f"Median ms per 640 x 480 frame on one core ({data['processor']}; {data['frames']} frames "
-        "of a push and its release per chain, chains in turns). The paper's chain: whole frame "
-        "searched, nearest dot, printed compensation, Delaunay triangles in each frame, stiffness "
-        "of one layer; with our detector."
+        f"Median time in ms per frame of 640 x 480 px on one core ({data['processor']}). Each "
+        f"chain processed {data['frames']} frames of a push and its release; the chains took "
+        "turns. The chain with the paper's choices searches the whole frame, takes the nearest "
+        "dot, compensates with the printed formula, makes Delaunay triangles in each frame and "
+        "has a stiffness of one layer. It uses our detector."
     ]
     for count in dict.fromkeys(row["markers"] for row in data["chains"]):
         rows = [row for row in data["chains"] if row["markers"] == count]
@@ -82,21 +47,22 @@ def full_latency(data: dict[str, Any]) -> str:
         parts.append("\n".join(lines))
     first = data["first_frame"]
     parts.append(
-        f"A fresh process has the wrench of its first frame after {first['ready_s']:.2f} s "
-        f"(imports {first['imports_s']:.2f}, bundle {first['bundle_s']:.2f}, pipeline "
-        f"{first['pipeline_s']:.2f}, frame {first['frame_s']:.2f}; compiled before)."
+        "A new process whose kernels were compiled before has the wrench of its first frame after "
+        f"{first['ready_s']:.2f} s: imports {first['imports_s']:.2f} s, bundle "
+        f"{first['bundle_s']:.2f} s, pipeline {first['pipeline_s']:.2f} s, frame "
+        f"{first['frame_s']:.2f} s."
     )
     if "soak" in data:
         soak = data["soak"]
         parts.append(
-            f"Over {soak['frames']:,} frames the process grew by {soak['growth_mb']:+.2f} MB after "
-            "the first tenth."
+            f"In a run of {soak['frames']:,} frames the memory of the process grew by "
+            f"{soak['growth_mb']:+.2f} MB after the first tenth of the frames."
         )
     return "\n\n".join(parts)
 
 
 def short_latency(data: dict[str, Any]) -> str:
-    """Medians and 95 % of a frame for the chains within 5 %, and the paper's."""
+    """Return median and 95 % quantile of a frame for the chains within 5 % and the paper's."""
     counts = list(dict.fromkeys(row["markers"] for row in data["chains"]))
     lines = [
         "| camera frame to wrench and force field, ms, median (95 %) | "
@@ -105,15 +71,15 @@ def short_latency(data: dict[str, Any]) -> str:
         "|---|" + "---:|" * len(counts),
     ]
     totals = {(row["chain"], row["markers"]): row["total"] for row in data["chains"]}
-    for chain, told in SHORT.items():
+    for chain, name in SHORT.items():
         of = [totals[chain, count] for count in counts]
         cells = [f"{ms(t['median'])} ({ms(t['p95'])})" for t in of]
-        lines.append(f"| {told} | " + " | ".join(cells) + " |")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def ladder_tables(data: dict[str, Any]) -> str:
-    """One table per ladder."""
+    """Return one table per ladder."""
     parts = [
         table(
             data["detection"],
@@ -149,7 +115,7 @@ def ladder_tables(data: dict[str, Any]) -> str:
 
 
 def table(rows: list[dict[str, Any]], labels: dict[str, str], values: dict[str, Any]) -> str:
-    """Markdown of some columns and the time."""
+    """Return a Markdown table of some columns and the time."""
     heads = [*labels.values(), *(head for head, _ in values.values()), "ms"]
     lines = [
         "| " + " | ".join(heads) + " |",
@@ -165,9 +131,5 @@ def table(rows: list[dict[str, Any]], labels: dict[str, str], values: dict[str, 
 
 
 def ms(value: float) -> str:
-    """Three digits."""
+    """Return milliseconds with three digits."""
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
-
-
-if __name__ == "__main__":
-    main()

@@ -48,7 +48,8 @@ STEPS = (
     Step("refraction", quick=("--points", "100000", "--runs", "3"), writes=False),
     Step("design_batch", quick=("--count", "500", "--jobs", "1", "--repeats", "1"), writes=False),
     Step("force_overlay", quick=None, writes=False),
-    Step("force_tables", quick=None, writes=False),
+    Step("stiffness_cases", quick=None),
+    Step("page_blocks", quick=None, writes=False),
 )
 PAGE = "accuracy_page"
 

@@ -115,8 +115,8 @@ def keep(docs: Path | None, name: str, found: dict[str, Any]) -> None:
 
 def finish(docs: Path) -> None:
     """Figures of what has been measured, and the guide's tables."""
+    from page_blocks import fill_pages
     from twin_figures import draw_contact, draw_scenes
-    from twin_tables import main as write_tables
 
     data = held(docs)
     if "drops" in data:
@@ -124,7 +124,7 @@ def finish(docs: Path) -> None:
     if "contact" in data:
         write_whole(docs / "images" / "twin_contact.png", draw_contact(data))
     if docs == DOCS:
-        write_tables()
+        fill_pages()
 
 
 def effect_line(row: dict[str, Any]) -> str:

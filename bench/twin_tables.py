@@ -1,47 +1,19 @@
-"""Put the twin's measured tables into its guide, between their comment marks.
-
-python bench/twin_tables.py    # from docs/data/twin_ladders.json and twin_validation.json
-"""
+"""Tables of the digital twin from docs/data/twin_ladders.json and twin_validation.json."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
-from force_tables import ms, replace_between
+from force_tables import ms
 
-ROOT = Path(__file__).parents[1]
-DATA = ROOT / "docs" / "data"
-LADDERS, VALIDATION = DATA / "twin_ladders.json", DATA / "twin_validation.json"
-GUIDE = ROOT / "docs" / "digital_twin.md"
 UNITS = {"force_n": "N", "displacement_px": "px", "markers_px": "px", "image_px": "px"}
 Rows = list[dict[str, Any]]
 
 
-def main() -> None:
-    """Write what has been measured."""
-    for mark, text in blocks().items():
-        replace_between(GUIDE, mark, text)
-
-
-def blocks() -> dict[str, str]:
-    """Text per mark of the guide."""
-    found: dict[str, str] = {}
-    if LADDERS.exists():
-        data = json.loads(LADDERS.read_text(encoding="utf-8"))
-        makers = {"drops": scenes_text, "contact": contact_text, "overhead": overhead_text}
-        marks = {"drops": "twin-effects", "contact": "twin-contact", "overhead": "twin-overhead"}
-        found |= {marks[key]: make(data) for key, make in makers.items() if key in data}
-    if VALIDATION.exists():
-        found["validation"] = validation_text(json.loads(VALIDATION.read_text(encoding="utf-8")))
-    return found
-
-
 def where(data: dict[str, Any], part: str) -> str:
-    """Machine and load in words."""
+    """Return on what machine, and under what load, a part was measured."""
     return (
-        f"{data['processor']}, CPU time of one thread, medians; other work on the machine (load "
+        f"Times are medians of the CPU time of one thread ({data['processor']}, load "
         f"{data['load_average'][part]:g} on {data['cores']} cores)"
     )
 
@@ -54,15 +26,15 @@ PARTS = {
 
 
 def scenes_text(data: dict[str, Any]) -> str:
-    """Effects by scene, and the planner's choice by scene."""
+    """Return the effects by scene, and the choice of the planner by scene."""
     rows = data["effects"]
     scenes = list(dict.fromkeys(r["scene"] for r in rows))
     effects = list(dict.fromkeys(r["effect"] for r in rows))
     lines = [
-        f"Milliseconds per pose or frame without → with the effect, and the largest error of "
-        f"leaving it out, by scene and effect; **bold** where the planner takes it in. At most "
-        f"{data['poses_at_most']} poses of a scene, each with the way to it from the last; "
-        f"{where(data, 'scenes')}.",
+        "Each cell gives the milliseconds per pose or frame without → with the effect, and the "
+        "largest error of leaving it out. It is **bold** where the planner includes the effect. "
+        f"At most {data['poses_at_most']} poses of a scene were solved, each with the path to it "
+        f"from the one before. {where(data, 'scenes')}.",
         "",
     ]
     by = {(r["scene"], r["effect"]): r for r in rows}
@@ -82,7 +54,7 @@ def scenes_text(data: dict[str, Any]) -> str:
 
 
 def effect_cell(row: dict[str, Any]) -> str:
-    """Times, and the error as force and as picture."""
+    """Return times and the error as force and as picture."""
     errors = [
         f"{row['error'][key]:.2g} {unit}"
         for key, unit in UNITS.items()
@@ -93,9 +65,9 @@ def effect_cell(row: dict[str, Any]) -> str:
 
 
 def choice_lines(drops: Rows) -> list[str]:
-    """What the planner's choice costs and misses, beside everything on."""
+    """Return cost and error of the planner's choice beside those of all effects."""
     lines = [
-        "| scene | everything on, ms | planner, ms | error of the planner's choice | tolerance "
+        "| scene | all effects, ms | planner, ms | error of the planner's choice | tolerance "
         "used |",
         "|---|---:|---:|---|---:|",
     ]
@@ -113,10 +85,10 @@ def choice_lines(drops: Rows) -> list[str]:
 
 
 def contact_text(data: dict[str, Any]) -> str:
-    """Three ladders, without and with friction side by side."""
+    """Return three ladders, without and with friction side by side."""
     texts = [
-        f"`shear_sphere` in a linear gel. Field: relative L2 error of the nodal forces; "
-        f"{where(data, 'contact')}."
+        "The scene is `shear_sphere` with a linear gel. The error of the field is the relative L2 "
+        f"error of the nodal forces. {where(data, 'contact')}."
     ]
     kinds = [
         ("tolerance", "contact", "solver tolerance (against 1e-9)", "ms per pose"),
@@ -145,7 +117,7 @@ def contact_text(data: dict[str, Any]) -> str:
 
 
 def contact_cells(row: dict[str, Any] | None) -> list[str]:
-    """Field, resultant, time of one rung."""
+    """Return field error, resultant error and time of one rung."""
     if row is None:
         return ["", "", ""]
     if "failed" in row:
@@ -154,40 +126,41 @@ def contact_cells(row: dict[str, Any] | None) -> list[str]:
 
 
 def marks(row: dict[str, Any]) -> list[str]:
-    """Who takes this rung."""
+    """Return who chooses this rung."""
     if row.get("auto"):
         return [f"(planner, μ {row['friction']:g})"]
     return ["(the design's)"] if row.get("design") else []
 
 
 def overhead_text(data: dict[str, Any]) -> str:
-    """One sentence."""
+    """Return the cost of planning and records as sentences."""
     part = data["overhead"]
     low, high = part["quartiles"]
     return (
-        f"`{part['scene']}`, {part['poses']} poses with pictures, written to disk: "
-        f"{part['planned_ms']:.0f} ms of CPU planned, {part['by_hand_ms']:.0f} ms by a loop with "
-        f"the same stages written by hand, the same bytes. What the loop does without, plan, key "
-        f"and records, takes {part['bookkeeping_ms']:.1f} ms on its own, {part['bookkeeping']:.2%} "
-        f"(the plan {part['plan_ms']:.1f} ms). Whole runs scatter by more: their least times "
-        f"differ by {part['overhead']:+.2%}; of the ratios of {part['pairs']} pairs in turns the "
-        f"median is {part['median']:+.2%}, the quartiles {low:+.2%} and {high:+.2%} "
-        f"(load {data['load_average']['overhead']:g} on {data['cores']} cores)."
+        f"The scene `{part['scene']}` with {part['poses']} poses and pictures, written to disk, "
+        f"takes {part['planned_ms']:.0f} ms of CPU time when it is planned. A loop with the same "
+        f"stages written by hand takes {part['by_hand_ms']:.0f} ms and gives the same bytes. "
+        f"Plan, key and records, which that loop does not have, take {part['bookkeeping_ms']:.1f} "
+        f"ms on their own, {part['bookkeeping']:.2%} of the run; the plan alone takes "
+        f"{part['plan_ms']:.1f} ms. Whole runs differ by more than that by chance: the smallest "
+        f"times of both differ by {part['overhead']:+.2%}, and the ratios of {part['pairs']} "
+        f"pairs of runs have the median {part['median']:+.2%} and the quartiles {low:+.2%} and "
+        f"{high:+.2%} (load {data['load_average']['overhead']:g} on {data['cores']} cores)."
     )
 
 
 def validation_text(data: dict[str, Any]) -> str:
-    """Spread per chain beside the paper's, the budget, and the other contacts."""
+    """Return the errors of each chain, the error budget, and the other contacts."""
     paper, seconds = data["paper"], data["seconds"]
     load = data.get("load_average")
-    busy = f" shared with other work (load {load:g})" if load else ""
+    busy = f" (load {load:g})" if load else ""
     took = f", {seconds} s on {data['cores']} cores{busy}" if seconds else ""
     texts = [
         f"`{data['design']}`, seed {data['seed']}{took}. {data['truth']}",
         "\n".join(
             [
-                "| chain | σ of F_x, F_y, F_z, N | bias, N | of the force | frames within 15 % "
-                "| field off | outside the patch | centre, mm | direction |",
+                "| chain | σ of F_x, F_y, F_z, N | bias, N | part of the force | frames in 15 % "
+                "| field error | outside the patch | centre, mm | direction |",
                 "|---|---|---|---:|---:|---:|---:|---:|---:|",
                 f"| the paper, measured | {three(paper['deviation_n'])} | "
                 f"| {paper['relative']:.0%} | | | | | |",
@@ -197,7 +170,7 @@ def validation_text(data: dict[str, Any]) -> str:
     ]
     if data.get("budget"):
         lines = [
-            "| error budget, each alone | σ, N | bias, N | of the force |",
+            "| error budget, one source at a time | σ, N | bias, N | part of the force |",
             "|---|---|---|---:|",
         ]
         lines += [
@@ -208,7 +181,7 @@ def validation_text(data: dict[str, Any]) -> str:
         texts.append("\n".join(lines))
     if data.get("other_contacts"):
         lines = [
-            "| other contacts | chain | true, N | found, N | field off |",
+            "| other contacts | chain | true, N | found, N | field error |",
             "|---|---|---|---|---:|",
         ]
         for name, scores in data["other_contacts"].items():
@@ -222,7 +195,7 @@ def validation_text(data: dict[str, Any]) -> str:
 
 
 def spread_line(s: dict[str, Any]) -> str:
-    """One chain."""
+    """Return the row of one chain."""
     centre, turn = s["centre_error_mm"], s["direction_error_deg"]
     return (
         f"| {s['name']} | {three(s['deviation_n'])} | {three(s['bias_n'])} "
@@ -233,14 +206,10 @@ def spread_line(s: dict[str, Any]) -> str:
 
 
 def three(values: list[float | None]) -> str:
-    """Newtons along x, y, z; what is not known is a dash."""
+    """Return newtons along x, y, z; a dash stands for an unknown value."""
     return ", ".join("–" if v is None else f"{v:.3f}" for v in values)
 
 
 def percent(value: float | None) -> str:
-    """Or nothing."""
+    """Return a share in per cent, or nothing."""
     return "" if value is None else f"{value:.0%}"
-
-
-if __name__ == "__main__":
-    main()

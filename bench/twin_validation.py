@@ -3,7 +3,7 @@
     python bench/twin_validation.py                           # some minutes
     python bench/twin_validation.py --from validation.json    # of a run just made
 
-Writes docs/data/twin_validation.json and, where the guide has marks for it, the table.
+Writes docs/data/twin_validation.json and fills the pages' tables.
 
 The record is the command's own, without its single frames.
 """
@@ -22,7 +22,7 @@ from typing import Any
 
 from bench_data import write_data
 from machine import machine
-from twin_tables import main as write_tables
+from page_blocks import fill_pages
 
 ROOT = Path(__file__).parents[1]
 SPEC = "designs/gelslim2.yaml"
@@ -43,7 +43,7 @@ def main() -> None:
     # Of the last quarter of an hour: how busy the machine was with other work meanwhile.
     kept |= {"load_average": round(os.getloadavg()[2], 1)} if seconds else {}
     write_data("twin_validation", {**machine(0), "design": SPEC, "seconds": seconds, **kept})
-    write_tables()
+    fill_pages()
 
 
 def validated() -> dict[str, Any]:

@@ -1,6 +1,9 @@
-"""How each field acts on a finger: one field at a time, the table of docs/design_guide.md.
+"""Measure how each field acts on a finger, one field at a time, for docs/design_guide.md.
 
-Usage: python tools/sensitivities.py [--check]    (--check: dimensions alone, nothing written)
+Usage: python tools/sensitivities.py [--check]
+
+Writes docs/data/sensitivities.json; bench/page_blocks.py makes the table of it. With --check it
+writes nothing, and compares the dimensions of the program with the stored ones.
 """
 
 from __future__ import annotations
@@ -23,10 +26,9 @@ from gelslim_cad.spec.reader import read_spec
 
 ROOT = Path(__file__).parents[1]
 SPEC = ROOT / "designs" / "mini20.yaml"
-GUIDE = ROOT / "docs" / "design_guide.md"
 DATA = ROOT / "docs" / "data" / "sensitivities.json"
 FREE = "design.envelope.max_thickness_mm=none"
-"""The finger's own limit on thickness is lifted, so that thicker ones are compared too."""
+"""Removes the limit on thickness of the finger, so that thicker ones are compared too."""
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "gel": (
@@ -84,25 +86,20 @@ COLUMNS: Mapping[str, tuple[str, float, int]] = {
 
 
 def main() -> int:
-    """Measure and write, or check."""
+    """Measure and write, or compare."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true")
     if parser.parse_args().check:
         off = differences(json.loads(DATA.read_text("utf-8")))
-        print("\n".join(off) or "dimensions as stored")
+        print("\n".join(off) or "the dimensions are those stored")
         return bool(off)
     stored = measured(Path("out") / "sensitivities")
     _replace(DATA, json.dumps(stored, indent=1) + "\n")
-    text = GUIDE.read_text("utf-8") if GUIDE.exists() else MARKS
-    _replace(GUIDE, with_table(text, stored))
     return 0
 
 
-MARKS = "<!-- sensitivities -->\n<!-- /sensitivities -->\n"
-
-
 def measured(folder: Path) -> dict[str, Any]:
-    """Columns of every field's values, light and force error included, by the field's text."""
+    """Return the columns for the values of every field, light and force error included."""
     spec = read_spec(SPEC).spec
     found = {}
     for texts in GROUPS.values():
@@ -117,7 +114,7 @@ def measured(folder: Path) -> dict[str, Any]:
 
 
 def differences(stored: Mapping[str, Any]) -> list[str]:
-    """Where the program's dimensions and verdicts are no longer those stored, in words."""
+    """Return where dimensions and verdicts of the program differ from the stored ones."""
     spec = read_spec(SPEC).spec
     off = []
     for texts in GROUPS.values():
@@ -150,17 +147,8 @@ def _alike(a: Sequence[Any], b: Sequence[Any]) -> bool:
     )
 
 
-def with_table(text: str, stored: Mapping[str, Any]) -> str:
-    """The guide's text with its table between the marks replaced."""
-    head, mark, rest = text.partition("<!-- sensitivities -->")
-    _, end, tail = rest.partition("<!-- /sensitivities -->")
-    if not mark or not end:
-        raise SystemExit(f"{GUIDE} has no <!-- sensitivities --> marks")
-    return f"{head}{mark}\n{table(stored)}{end}{tail}"
-
-
 def table(stored: Mapping[str, Any]) -> str:
-    """A row per field; a cell holds the column at each value, or nothing where it stays."""
+    """Return a row per field; a cell is empty where the column does not change."""
     heads = ["field", "values", *(head for head, _, _ in COLUMNS.values())]
     lines = ["| " + " | ".join(heads) + " |", "|---|---" + "|---:" * len(COLUMNS) + "|"]
     notes = []
@@ -178,7 +166,7 @@ def table(stored: Mapping[str, Any]) -> str:
             ]
     return (
         "\n".join(lines)
-        + "\n\nNot feasible, hence without light and force error:\n\n"
+        + "\n\nThese values are not feasible; light and force error were not computed for them:\n\n"
         + ("\n".join(notes) + "\n")
     )
 

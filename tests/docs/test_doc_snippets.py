@@ -1,7 +1,4 @@
-"""YAML blocks of the pages are legal; Python blocks run as their readers would run them.
-
-The guides of the force pipeline and of the twin have tests of their own.
-"""
+"""YAML blocks of the pages are legal; Python blocks run as their readers would run them."""
 
 from __future__ import annotations
 
@@ -14,15 +11,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_text import DOCS, PAGES, ROOT, blocks, named
+from page_text import DOCS, PAGES, ROOT, blocks, named, text_of
+
+sys.path.insert(0, str(ROOT / "tests" / "force"))
+sys.path.insert(0, str(ROOT / "tests" / "twin"))
 
 from gelslim.cli import main
 from gelslim_cad.spec.reader import read_spec
+from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.simulation.truth import COLUMNS, FrameTruth, fields_npz, wrench_csv
 
-ELSEWHERE = {"force_pipeline.md", "digital_twin.md"}
-"""Run by test_force_doc.py and test_twin_doc.py."""
-PYTHON = [p for p in PAGES if blocks(p, "python") and p.name not in ELSEWHERE]
+FORCE, TWIN = DOCS / "force_pipeline.md", DOCS / "digital_twin.md"
+"""Their blocks need frames and simulated data, and run in tests of their own."""
+PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN)]
 YAML = [(p, k) for p in PAGES for k in range(len(blocks(p, "yaml")))]
 SMALL = """\
 format: gelslim-spec/1
@@ -32,11 +36,6 @@ camera: {image_width_px: 640, image_height_px: 480, sensor_width_mm: 3.6288,
 design:
   gel: {length_mm: 9, width_mm: 9}
 """
-
-
-def test_all_languages_of_blocks_are_known() -> None:
-    told = {kind for p in PAGES for kind in re.findall(r"^```(\w+)$", p.read_text("utf-8"), re.M)}
-    assert told <= {"python", "yaml"}
 
 
 @pytest.mark.parametrize(("page", "number"), YAML, ids=[f"{named(p)}-{k}" for p, k in YAML])
@@ -52,8 +51,7 @@ def test_yaml_blocks_are_legal(page: Path, number: int, tmp_path: Path) -> None:
         assert scene.sensor_path.is_file(), "the sensor that the block names"
     else:
         # A part of a spec is completed by what every spec needs.
-        whole = text if "gelslim-spec/1" in text else SMALL + text
-        file.write_text(whole, encoding="utf-8")
+        file.write_text(text if "gelslim-spec/1" in text else SMALL + text, encoding="utf-8")
         assert read_spec(file).spec.name
 
 
@@ -67,10 +65,9 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _recorded_run(folder: Path) -> None:
-    sys.path.insert(0, str(ROOT / "tests" / "force"))
     from output_samples import frame
 
-    from gelslim_force.outputs.run_recorder import RunRecorder
+    from gelslim_force import RunRecorder
 
     with RunRecorder(folder) as recorder:
         for k in range(3):
@@ -86,25 +83,80 @@ def test_python_blocks_run(page: Path, bundle: Path, tmp_path: Path) -> None:
         _recorded_run(tmp_path / "out" / "press")
     given = ""
     if page == DOCS / "stiffness.md":
+        from gelslim import load_bundle
+
         # The page's reader has the motion of the surface.
-        np.save(tmp_path / "u.npy", np.zeros((_surface_nodes(bundle), 3)))
+        np.save(tmp_path / "u.npy", np.zeros((len(load_bundle(bundle).mesh.surface), 3)))
         given = "import numpy; surface_displacement_mm = numpy.load('u.npy')\n"
     script = tmp_path / "page.py"
     script.write_text(given + "\n".join(blocks(page, "python")), encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     run = subprocess.run(
-        [sys.executable, str(script)],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
+        [sys.executable, str(script)], cwd=tmp_path, env=environment, capture_output=True, text=True
     )
     assert run.returncode == 0, run.stderr[-2000:]
-    if page == DOCS / "contributing.md":
-        assert re.search(r"^pass \d", run.stdout, re.M), run.stdout
-        assert run.stdout.count("field ") == 3
 
 
-def _surface_nodes(bundle: Path) -> int:
-    from ifem_export.bundle.files import load_bundle
+def _run_blocks(page: Path, names: dict[str, object]) -> None:
+    for number, block in enumerate(blocks(page, "python"), 1):
+        exec(compile(block, f"{page.name}, snippet {number}", "exec"), names)
 
-    return len(load_bundle(bundle).mesh.surface)
+
+def test_the_guide_of_the_force_pipeline_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("PIL")
+    from sensor_samples import frame, press, sensor_bundle, stream
+
+    from gelslim_force.outputs.picture_file import encoded
+    from ifem_export.bundle.files import write_bundle
+
+    write_bundle(tmp_path / "out" / "gelslim2-bundle", sensor_bundle())
+    (tmp_path / "reference.png").write_bytes(encoded(frame(0.0).image, ".png"))
+    (tmp_path / "frames").mkdir()
+    for k, seen in enumerate(stream(5)):
+        (tmp_path / "frames" / f"{k:04d}.png").write_bytes(encoded(seen.image, ".png"))
+    monkeypatch.chdir(tmp_path)
+    names: dict = {"w_mm": press().nodes_mm[:, 2]}
+    _run_blocks(FORCE, names)
+    assert names["summary"].frames == names["summary"].with_forces == 5
+    assert names["run"].complete
+    assert list((tmp_path / "out" / "press" / "pictures").glob("*.png"))
+    # What the guide says is unknown without a normal source is unknown, and known with one.
+    assert np.isnan(names["tangential"].wrench.force_n).tolist() == [False, False, True]
+    assert np.isfinite(names["known"].wrench.vector).all()
+    assert names["known"].wrench.force_n[2] == pytest.approx(-1.0, abs=0.05)
+    assert names["tracked"].tracks.coverage == 1.0
+
+
+def test_the_guide_of_the_twin_runs_and_names_columns_arrays_and_effects(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dataclasses import replace
+
+    rest = GelState.at_rest(3)
+    force = np.zeros((3, 3))
+    force[1, 2] = -1.0
+    seen, drawn = np.zeros((4, 2)), np.ones(4, dtype=bool)
+    frames = [
+        FrameTruth(k, float(k), Pose(float(k)), state, seen, seen, drawn)
+        for k, state in enumerate((rest, replace(rest, force_n=force)))
+    ]
+    folder = tmp_path / "out" / "press_sphere"
+    folder.mkdir(parents=True)
+    every = ("displacement", "force", "markers")
+    (folder / "truth.npz").write_bytes(fields_npz(frames, np.zeros((3, 3)), every))
+    (folder / "truth.csv").write_bytes(wrench_csv(frames, np.zeros((3, 3))))
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    _run_blocks(TWIN, names)
+    assert names["force_n"][-1] == pytest.approx([0.0, 0.0, -1.0])
+    text = text_of(TWIN)
+    with np.load(folder / "truth.npz") as held:
+        for name in (*COLUMNS, *held.files):
+            assert f"`{name}`" in text, name
+    rows = re.findall(r"^\| `(\w+)` \|.*\|.*\|$", text, re.MULTILINE)
+    effects = [e.name for e in EFFECTS]
+    assert [r for r in rows if r in effects] == effects
+    for scene in (ROOT / "designs" / "scenes").glob("*.yaml"):
+        assert f"`{scene.stem}`" in text, scene.stem

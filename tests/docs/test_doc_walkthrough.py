@@ -66,7 +66,7 @@ def done(line: str, place: Path) -> str:
 
 @pytest.fixture(scope="module")
 def sensor(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Bundle, frames and picture without contact of gelslim2, as the pages take for granted."""
+    """Bundle, frames and picture without contact of gelslim2, as the pages assume."""
     folder = tmp_path_factory.mktemp("sensor")
     shutil.copytree(ROOT / "designs", folder / "designs")
     (folder / "scene.yaml").write_text(PRESS, encoding="utf-8")
@@ -125,8 +125,8 @@ def test_start_here_to_the_letter(tmp_path: Path) -> None:
     for line in lines[2:]:
         done(line, tmp_path)
     assert (tmp_path / "out" / "mine" / "report.html").stat().st_size > 100_000
-    _forces_are_as_told(page, tmp_path)
-    _ladder_is_as_told(page, tmp_path)
+    _forces_agree(page, tmp_path)
+    _ladder_agrees(page, tmp_path)
 
 
 def _without_camera_name(path: Path) -> dict[str, Any]:
@@ -135,22 +135,22 @@ def _without_camera_name(path: Path) -> dict[str, Any]:
     return values
 
 
-def _forces_are_as_told(page: Path, place: Path) -> None:
+def _forces_agree(page: Path, place: Path) -> None:
     names = ("fx_n", "fy_n", "fz_n")
     for row, file in (("true", "press/truth.csv"), ("estimated", "force/wrenches.csv")):
         cells = re.search(rf"^\| {row} \|(.*)\|$", text_of(page), re.MULTILINE)
         assert cells is not None
-        told = [float(c.replace("−", "-")) for c in cells.group(1).split("|")]
+        shown = [float(c.replace("−", "-")) for c in cells.group(1).split("|")]
         with (place / "out" / file).open() as lines:
             last = list(csv.DictReader(lines))[-1]
-        assert told == pytest.approx([float(last[n]) for n in names], abs=0.03), row
+        assert shown == pytest.approx([float(last[n]) for n in names], abs=0.03), row
 
 
-def _ladder_is_as_told(page: Path, place: Path) -> None:
+def _ladder_agrees(page: Path, place: Path) -> None:
     ladder = json.loads((place / "out" / "mine-bundle" / "ladder.json").read_text("utf-8"))
     errors = [rung["error_field"] for rung in ladder["rungs"]]
     part = text_of(page).partition("\n## 5.")[2].partition("\n## 6.")[0]
-    told = [float(e) / 100 for e in re.findall(r"\| ([\d.]+) % \|", part)]
-    assert len(told) >= 5
-    for error in told:
+    shown = [float(e) / 100 for e in re.findall(r"\| ([\d.]+) % \|", part)]
+    assert len(shown) >= 5
+    for error in shown:
         assert min(abs(error - e) for e in errors) < 0.05 * error + 5e-4, error
