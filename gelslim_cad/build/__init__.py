@@ -1,4 +1,4 @@
-"""Builds a finger: every file of a spec, proved as written, swapped in whole."""
+"""Builds a finger: writes every file of a spec, checks it, and replaces the output folder."""
 
 from gelslim_cad.build.variant import BuildRefusedError, BuildResult, build_variant
 

@@ -20,14 +20,14 @@ LIBRARIES = (
     "trimesh",
     "vtk",
 )
-NO_SHAPE = frozenset({"__pycache__"})
-"""Folders that shape no file of a build."""
+IGNORED = frozenset({"__pycache__"})
+"""Folders whose content does not affect the files of a build."""
 SUFFIXES = frozenset({".py", ".js", ".css", ".html", ".json"})
 
 
 @functools.cache
 def versions() -> tuple[tuple[str, str], ...]:
-    """Installed versions of the libraries that shape the files; absent ones are left out."""
+    """Installed versions of the libraries that write the files; absent ones are left out."""
     found = []
     for name in ("gelslim-cad", *LIBRARIES):
         try:
@@ -44,14 +44,14 @@ def code_hash() -> str:
     for package in PACKAGES:
         root = Path(str(resources.files(package)))
         for path in sorted(root.rglob("*")):
-            if path.suffix in SUFFIXES and NO_SHAPE.isdisjoint(path.relative_to(root).parts):
+            if path.suffix in SUFFIXES and IGNORED.isdisjoint(path.relative_to(root).parts):
                 digest.update(path.relative_to(root).as_posix().encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
 def combined(*parts: str | bytes) -> str:
-    """SHA-256 of several strings, unambiguous about where each ends."""
+    """SHA-256 of several strings, each preceded by its length."""
     digest = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part

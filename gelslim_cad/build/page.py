@@ -34,7 +34,7 @@ PICTURES = {
     "pictures/section.png": ("Section", "Cut along the mid-plane: camera, mirror, window, gel."),
     "pictures/section_across.png": ("Section across", "Light guide, LED channels and baffles."),
 }
-SIGHT_PICTURES = {
+PROJECTION_PICTURES = {
     "pictures/projection_error.png": (
         "Projection error left by each formula",
         "Against the exact refracted ray, over the pad, for a press of 0.5 mm.",
@@ -172,8 +172,8 @@ def report_data(
             for b in bom
         ),
         light=pictures(drawn, "", LIGHT_PICTURES) if light else (),
-        sight=pictures(drawn, "", SIGHT_PICTURES),
-        sight_notes=(Note("Projection", projection_sentence(d)),),
+        projection=pictures(drawn, "", PROJECTION_PICTURES),
+        projection_notes=(Note("Projection", projection_sentence(d)),),
         light_notes=light_notes(light) if light else (),
         versions=versions(),
     )

@@ -1,4 +1,4 @@
-"""What a build consists of: dimensions, rules, parts, units of work and documents."""
+"""The stages of a build: dimensions, rules, parts, units of work and documents."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ifem_export.markers.grid import MarkerGrid
 
 @dataclass(frozen=True)
 class Plan:
-    """Parts, what is to be written of them, and all design rules, those on solids among them."""
+    """Parts, units of work, and the results of all design rules, also of those on solids."""
 
     finger: tuple[Part, ...]
     tooling: tuple[Part, ...]
@@ -33,7 +33,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Stages:
-    """The cheap beginning of a build: spec, dimensions, rules."""
+    """The part of a build that needs no CAD: spec, dimensions, rules."""
 
     loaded: LoadedSpec
     dimensions: Dimensions
@@ -101,7 +101,7 @@ class Stages:
         return tuple(units)
 
     def _mould_unit(self, gel: PackedPart) -> Unit:
-        """The cavity against the gel: the mould must be the gel grown by the shrinkage."""
+        """Unit that compares the cavity with the gel enlarged by the shrinkage."""
         from gelslim_cad.solids.tooling.mould import cavity_solid
 
         cavity = replace(gel.unpacked(), name="cavity", solid=cavity_solid(self.dimensions))
@@ -115,7 +115,7 @@ class Stages:
         files: Mapping[str, FileEntry],
         missing: str = "",
     ) -> dict[str, tuple[bytes, str]]:
-        """Everything that is quick to write: markers, bundle, tables, instructions, report."""
+        """Everything that is quick to write: markers, tables, instructions, report."""
         from gelslim_cad.build.documents import data_documents, report_document
 
         made = self._marker_files()

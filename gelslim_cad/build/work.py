@@ -1,7 +1,7 @@
-"""Units of work: what is written together, from inputs that a key sums up.
+"""Units of work: files that are written together, with a key over all their inputs.
 
-A unit whose key is that of the last build is not done again: its files are taken over. Units run
-in worker processes, so they carry shapes as bytes and nothing else that is heavy.
+A unit with the same key as in the last build is not done again: its files are taken over. Units
+run in worker processes, so they carry their shapes as bytes.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from gelslim_cad.geometry.part import Part
 
 Files = dict[str, bytes]
 VOLUME_TOLERANCE = 2e-4
-"""Meshes for printing keep the volume this well: finer than the proof asks, for smooth arcs."""
+"""Largest volume error of meshes for printing; smaller than the proof's limit, for smooth arcs."""
 
 
 @dataclass(frozen=True)
 class Written:
-    """What a unit wrote and what was proved of it."""
+    """Files that a unit wrote, and the results of their checks."""
 
     files: Files
     purposes: dict[str, str]
     proofs: tuple[dict[str, Any], ...] = ()
     note: str = ""
-    """Why a file could not be made, where that is no fault of the design."""
+    """Why a file could not be made, where the design is not the reason."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Unit:
 
 
 def run(unit: Unit) -> Written:
-    """Do a unit of work in this process. Raises ExportError and its kin when a file fails."""
+    """Do a unit of work in this process. Raises ExportError when a file cannot be written."""
     from gelslim_cad.build.writers import WRITERS
 
     parts = tuple(p.unpacked() for p in unit.parts)

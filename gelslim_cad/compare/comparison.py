@@ -1,4 +1,4 @@
-"""Two specs against each other: fields, dimensions and design rules; no CAD."""
+"""Changes from one spec to another: fields, dimensions, design rules, bundle. Needs no CAD."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from gelslim_cad.spec import Spec
 from ifem_export.errors import IfemError
 
 SAME = 1e-9
-"""Relative difference below which two numbers are the same: the fold's solver stops there."""
+"""Relative difference below which numbers count as equal: the accuracy of the fold's solver."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """A value that differs; `meaning` says of a dimension what it is."""
+    """A value that differs; `meaning` describes a dimension."""
 
     name: str
     unit: str
@@ -33,7 +33,7 @@ class Change:
 
     @property
     def difference(self) -> float | None:
-        """After less before; None where one is no number."""
+        """`after` minus `before`; None where one of them is no number."""
         pair = (self.before, self.after)
         if any(isinstance(v, bool) or not isinstance(v, int | float) for v in pair):
             return None
@@ -54,7 +54,7 @@ class RuleChange:
 
     @property
     def verdict(self) -> str:
-        """Whether it breaks, is mended, or only moves."""
+        """Whether the status gets worse, gets better, or only the numbers change."""
         order = ("pass", "warn", "fail")
         step = order.index(self.after.status) - order.index(self.before.status)
         return "moves" if step == 0 else "gets worse" if step > 0 else "gets better"
@@ -62,7 +62,7 @@ class RuleChange:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All that changes from one spec to another, short of its parts."""
+    """All changes from one spec to another except those of parts."""
 
     fields: tuple[Change, ...]
     dimensions: tuple[Change, ...]
@@ -117,7 +117,7 @@ def _rules(before: Dimensions, after: Dimensions) -> Iterable[RuleChange]:
 
 @dataclass(frozen=True)
 class BundleChange:
-    """A block of the bundle that differs, in words before and after."""
+    """A block of the bundle that differs, with a description before and after."""
 
     block: str
     before: str
@@ -125,7 +125,7 @@ class BundleChange:
 
 
 def bundle_changes(before: Dimensions, after: Dimensions) -> tuple[BundleChange, ...]:
-    """Blocks that differ, in the bundle's order; their words may agree where they moved only."""
+    """Blocks that differ, in the bundle's order; the descriptions of both sides may be equal."""
     old, new = _blocks(before), _blocks(after)
     return tuple(
         BundleChange(name, old[name][0], new[name][0])
@@ -135,7 +135,7 @@ def bundle_changes(before: Dimensions, after: Dimensions) -> tuple[BundleChange,
 
 
 def _blocks(d: Dimensions) -> dict[str, tuple[str, tuple[Any, ...]]]:
-    """Per block its words and the arrays and values it holds."""
+    """For each block its description and the arrays and values that it holds."""
     e, nu = d["material.gel.youngs_modulus_mpa"], d["material.gel.poissons_ratio"]
     element = (d["mesh.element"], e, nu, d["material.gel.density_kg_m3"])
     return {

@@ -1,4 +1,4 @@
-"""Which parts change, from the solids and the build's units; nothing is written."""
+"""Parts that change from one spec to another, and the units of work to do again."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gelslim_cad.spec.reader import LoadedSpec
 How = Literal["added", "removed", "reshaped", "moved", "detail"]
 """`detail`: shape or description differs while volume, size and place stay."""
 SAME = 1e-6
-"""Relative difference of volumes and sizes below which a solid has only moved."""
+"""Relative difference of volumes and sizes below which a solid counts as moved, not reshaped."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +67,12 @@ def part_changes(first: LoadedSpec, second: LoadedSpec) -> PartChanges:
 
 def _key(part: Part) -> str:
     """Digest of solid and description; the solid's rounded, as its last bits vary by run."""
-    told = replace(part, solid=None, tags=frozenset())
-    return combined(shape_digest(part.solid), repr(told), *sorted(part.tags))
+    description = replace(part, solid=None, tags=frozenset())
+    return combined(shape_digest(part.solid), repr(description), *sorted(part.tags))
 
 
 def _inputs(unit: Unit) -> tuple[Any, ...]:
-    """What makes a unit of work, beside the solids of the finger's parts."""
+    """All inputs of a unit of work except the solids of the finger's parts."""
     return unit.kind, repr(unit.options), unit.content, tuple(p.part.name for p in unit.parts)
 
 

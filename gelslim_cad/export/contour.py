@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gelslim_cad.export import ExportError
 
 GAP_MM = 1e-5
-"""Ends closer than this meet; OCCT's own tolerance is 1e-7."""
+"""Ends closer than this count as one point; OCCT's own tolerance is 1e-7 mm."""
 
 DECIMALS = 8
 
@@ -58,7 +58,7 @@ class Frame:
 
 
 def frame_of(normal: Sequence[float] | Vector) -> Frame:
-    """Frame for drawing a plane, whichever way its normal points.
+    """Frame for drawing a plane, the same for both directions of its normal.
 
     The plane is seen from +z; an upright one from -y, or from +x if it faces along x. The
     drawing's x is the part's x, or its y where the plane faces along x.
@@ -76,7 +76,7 @@ def frame_of(normal: Sequence[float] | Vector) -> Frame:
 
 
 def contours_of(wires: Sequence[Any], frame: Frame, chord_mm: float = 0.002) -> list[Contour]:
-    """Draw closed wires (`cadquery.Wire`) in a frame, sorted so that the order is always one.
+    """Draw closed wires (`cadquery.Wire`) in a frame, always sorted in the same order.
 
     Lines and circular arcs stay exact; other curves become chords within `chord_mm`.
 

@@ -21,11 +21,11 @@ class TriangleMesh(NamedTuple):
 
 
 def tessellate(shape: Any, linear_mm: float, angular_deg: float) -> TriangleMesh:
-    """Mesh a copy of a solid, so that no tessellation leaks from one export to the next.
+    """Mesh a copy of a solid, so that no export depends on the tessellation of an earlier one.
 
-    `linear_mm` bounds the distance from chord to curve, `angular_deg` the turn between
-    neighbouring chords. Vertices are welded by topology, not by distance: the mesh of a solid
-    is closed wherever OCCT meshed the two sides of an edge alike.
+    `linear_mm` limits the distance from chord to curve, `angular_deg` the angle between
+    neighbouring chords. Vertices are joined by topology, not by distance: the mesh of a solid
+    is closed wherever OCCT divided both sides of an edge in the same way.
 
     Raises:
         ExportError: a tolerance is not positive, or a face could not be triangulated.
@@ -52,8 +52,8 @@ def welded(patches: Sequence[Patch]) -> TriangleMesh:
 def stored(mesh: TriangleMesh) -> TriangleMesh:
     """Round vertices to what a file can hold (float32) and merge those that become equal.
 
-    A reader of STL merges equal vertices; doing so first lets the collapsed triangles go while
-    the mesh is still known to be closed.
+    A reader of STL merges equal vertices. They are merged before, so that collapsed triangles can
+    be removed while the mesh is still known to be closed.
     """
     rounded = np.asarray(mesh.vertices_mm, dtype=np.float32).astype(np.float64) + 0.0
     points, merged = np.unique(rounded, axis=0, return_inverse=True)
@@ -76,7 +76,8 @@ def _without_folds(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 def bad_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
     """Edges `(k,2)`, as vertex numbers, that are not used exactly once each way.
 
-    They border a hole, join triangles that face apart, or are where a solid touches itself.
+    Such an edge borders a hole, joins triangles of opposite orientation, or is where a solid
+    touches itself.
     """
     count = len(mesh.vertices_mm)
     starts, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()

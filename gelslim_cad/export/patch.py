@@ -18,9 +18,9 @@ Key = tuple[int, ...]
 class Patch:
     """One CAD face as triangles that turn counter-clockwise seen from outside the solid.
 
-    `nodes_mm (k,3)`, `normals (k,3)` unit vectors out of the solid taken from the surface
-    itself, `triangles (m,3)` into the nodes, `keys` names each node by the vertex, the place on
-    an edge or the place in the face it stands for, so that faces meet exactly where keys agree.
+    `nodes_mm (k,3)`; `normals (k,3)`, unit vectors of the exact surface, pointing out of the
+    solid; `triangles (m,3)`, indices of nodes; `keys`, which identify each node by its CAD vertex,
+    its position on a CAD edge or its position in the face. Equal keys are the same point.
     """
 
     nodes_mm: NDArray[np.float64]

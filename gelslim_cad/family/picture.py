@@ -1,4 +1,4 @@
-"""The family in one picture to scale: upright side by side, gels to the viewer; then edge on."""
+"""A family in one picture to scale: first with the gels towards the viewer, then from the side."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _upright(m: Member) -> Array:
 
 
 def _middles(shapes: Sequence[Array]) -> list[float]:
-    """Where along the picture each finger's middle is, mm: as close as the wider view allows."""
+    """Position of each finger's middle along the picture in mm, the same in both rows."""
     places, start = [], 0.0
     for points in shapes:
         width = max(float(np.ptp(points @ view.axes()[0])) for view in (FRONT, EDGE))

@@ -1,4 +1,4 @@
-"""A DXF R2010 drawing in millimetres whose bytes depend on its content only."""
+"""A DXF R2010 drawing in millimetres; the same content gives the same bytes."""
 
 from __future__ import annotations
 

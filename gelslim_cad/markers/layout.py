@@ -1,4 +1,4 @@
-"""Where things other than dots go on a sheet: registration crosses, scale bar, arrow, words."""
+"""Layout of a sheet around the dots: registration crosses, scale bar, arrow and notes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 CROSS_ARM_MM = 2.0
 """Half the length of a registration cross."""
 CROSS_DISTANCE_MM = 4.0
-"""How far a cross lies outside the gel, both ways."""
+"""Distance of a cross from the gel's bounding box, along x and along y."""
 SCALE_BAR_MM = 10.0
 
 

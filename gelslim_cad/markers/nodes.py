@@ -1,4 +1,4 @@
-"""Which mesh node each marker sits on."""
+"""The mesh node nearest to each marker."""
 
 from __future__ import annotations
 

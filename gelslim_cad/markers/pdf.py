@@ -24,7 +24,7 @@ _PAPERS_MM: dict[str, list[tuple[float, float]]] = {
 _MARGIN_MM = 15.0
 _HEAD_MM = 38.0
 _FOOT_MM = 76.0
-_BESIDE_MM = 12.0
+_SIDE_MM = 12.0
 _LINE_MM = 0.1
 
 
@@ -71,7 +71,7 @@ def _page_mm(layout: SheetLayout, paper: str) -> tuple[float, float]:
     if paper not in _PAPERS_MM:
         raise ValueError(f"paper {paper!r} is unknown: must be one of {', '.join(_PAPERS_MM)}")
     x0, y0, x1, y1 = layout.box_mm
-    need = (x1 - x0 + 2 * _BESIDE_MM, y1 - y0 + _HEAD_MM + _FOOT_MM)
+    need = (x1 - x0 + 2 * _SIDE_MM, y1 - y0 + _HEAD_MM + _FOOT_MM)
     for short, long in _PAPERS_MM[paper]:
         for wide, tall in ((short, long), (long, short)):
             if need[0] <= wide and need[1] <= tall:

@@ -1,4 +1,4 @@
-"""How dots get onto the gel, and what each way can make."""
+"""Processes that put dots on the gel, with the smallest dots and gaps of each."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STENCIL_AREA_RATIO = 0.66
 
 
 def least_stencil_dot_mm(foil_mm: float = STENCIL_FOIL_MM) -> float:
-    """Return the smallest round opening that lets go of its ink or paste.
+    """Return the smallest round opening that releases its ink or paste.
 
     A hole of diameter d in a foil of thickness t has the area ratio (pi d²/4)/(pi d t) = d/(4t),
     which IPC-7525 wants to be at least 0.66.
@@ -21,7 +21,7 @@ def least_stencil_dot_mm(foil_mm: float = STENCIL_FOIL_MM) -> float:
 
 @dataclass(frozen=True)
 class MarkingProcess:
-    """One way to make the dots. `min_gap_mm` is between the rims of neighbouring dots."""
+    """A process that makes the dots; `min_gap_mm` is the distance between neighbouring rims."""
 
     name: str
     title: str
@@ -85,4 +85,4 @@ _ALL = (
 )
 
 MARKING_PROCESSES: dict[str, MarkingProcess] = {process.name: process for process in _ALL}
-"""The known processes by name. The limits are starting values for a careful shop."""
+"""The known processes by name. Their limits are values to start from."""

@@ -18,7 +18,7 @@ _WALL_MM = 2.0
 
 @dataclass(frozen=True, eq=False)
 class StencilSheet:
-    """A flat sheet in the sensor frame, seen from outside the gel; sizes are those wanted."""
+    """A flat sheet in the sensor frame, seen from outside the gel, with its nominal sizes."""
 
     sheet: Outline
     gel: Outline

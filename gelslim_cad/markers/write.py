@@ -13,7 +13,7 @@ from gelslim_core.files.replaced_file import replace_file
 from ifem_export.markers.grid import MarkerGrid
 
 FIRST_FILE = "markers-Alignment.gbr"
-"""Written first; it names its generator."""
+"""The file that is written first; it names its generator."""
 
 
 def render_marker_files(
@@ -64,7 +64,7 @@ def write_marker_files(
 ) -> list[Path]:
     """Write every marker file into `directory` and return the paths, sorted by name.
 
-    Everything is rendered before the first file is touched, and each file is replaced whole.
+    All files are rendered before the first one is written, and each is replaced as a whole.
     Raises ValueError as `render_marker_files`, OSError when the folder cannot be written.
     """
     files = render_marker_files(grid, nodes, gel_outline, kerf_mm=kerf_mm)

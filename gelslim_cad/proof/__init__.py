@@ -1,1 +1,1 @@
-"""Proofs of files as written: each is read back by other code and measured against the part."""
+"""Proofs of written files: each is read back by other code and compared with its part."""

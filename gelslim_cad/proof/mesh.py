@@ -13,7 +13,7 @@ from gelslim_cad.proof.result import ProofResult, at_most, equal
 
 VOLUME_LIMIT = 1e-3
 GLB_LIMIT_MM = 0.25
-"""The viewer's mesh may leave the solid by its linear tolerance, not by a wrong unit."""
+"""The viewer's mesh may deviate by its linear tolerance; a wrong unit deviates by far more."""
 
 
 def prove_stl(path: Path, volume_mm3: float) -> list[ProofResult]:

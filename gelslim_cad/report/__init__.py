@@ -1,4 +1,4 @@
-"""The finger's report: one HTML file that opens in a browser with the network off."""
+"""The finger's report: one HTML file that a browser shows without a network."""
 
 from gelslim_cad.report.data import (
     BomRow,

@@ -1,4 +1,4 @@
-"""What a report shows: plain values only, so that the report needs no CAD to be written."""
+"""Content of a report, as plain values, so that writing it needs no CAD."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class DimensionRow:
 class RuleRow:
     """One design rule: `margin` is positive where the rule holds, in the rule's `unit`.
 
-    `sense` tells on which side of `limit` the legal values lie ("max": value <= limit); left
-    empty it follows from the sign of the margin.
+    `sense` says whether `limit` is the largest ("max") or the smallest ("min") legal value; where
+    it is empty, the sign of the margin decides.
     """
 
     id: str
@@ -184,9 +184,9 @@ class ReportData:
     light: tuple[Picture, ...] = ()
     """Pictures of the light, each as wide as the page."""
     light_notes: tuple[Note, ...] = ()
-    sight: tuple[Picture, ...] = ()
-    """Pictures of the projection, shown below the camera's view, with `sight_notes`."""
-    sight_notes: tuple[Note, ...] = ()
+    projection: tuple[Picture, ...] = ()
+    """Pictures of the projection, shown below the camera's view, with notes."""
+    projection_notes: tuple[Note, ...] = ()
     versions: tuple[tuple[str, str], ...] = field(default=())
 
     @property

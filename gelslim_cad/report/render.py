@@ -1,4 +1,4 @@
-"""Puts the report together: one HTML file that asks nothing of the network."""
+"""Puts the report together as one HTML file that needs no network."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
             "camera",
             "What the camera sees",
             (camera_view(view) if view else '<p class="card empty">No markers were projected.</p>')
-            + _told(data.sight_notes, data.sight),
+            + _notes_and_pictures(data.projection_notes, data.projection),
         ),
         *_light(data),
         ("thickness", "What sets the thickness", _binding(data.binding)),
@@ -110,14 +110,14 @@ def _model(glb: bytes) -> str:
 
 
 def _light(data: ReportData) -> list[tuple[str, str, str]]:
-    told = _told(data.light_notes, data.light)
-    return [("light", "How the gel is lit", told)] if told else []
+    content = _notes_and_pictures(data.light_notes, data.light)
+    return [("light", "How the gel is lit", content)] if content else []
 
 
-def _told(notes: tuple[Note, ...], shown: tuple[Picture, ...]) -> str:
+def _notes_and_pictures(notes: tuple[Note, ...], shown: tuple[Picture, ...]) -> str:
     """Notes, then pictures as wide as the page; empty where there are none."""
-    said = tables.notes(notes) if notes else ""
-    return said + (_pictures(shown, "pictures wide") if shown else "")
+    written = tables.notes(notes) if notes else ""
+    return written + (_pictures(shown, "pictures wide") if shown else "")
 
 
 def _pictures(pictures: tuple[Picture, ...], look: str = "pictures") -> str:
@@ -176,7 +176,7 @@ def _digest(source: str) -> str:
 
 
 def _fill(template: str, values: dict[str, str]) -> str:
-    """Fill `{{name}}` once: what is put in is not looked at again."""
+    """Replace every `{{name}}` once; a value may itself contain `{{`."""
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found.group(1)], template)
 
 

@@ -14,7 +14,7 @@ ORDER: dict[Status, int] = {"fail": 0, "warn": 1, "pass": 2}
 WIDTH = 240.0
 LIMIT_AT = 0.62
 LEAST_MARGIN = 1e-5
-"""Of the larger of value and limit, which are written with four digits."""
+"""Relative to the larger of value and limit, which are written with four digits."""
 
 
 def rules(rows: tuple[RuleRow, ...]) -> str:
@@ -32,7 +32,7 @@ def rules(rows: tuple[RuleRow, ...]) -> str:
 
 
 def verdict(data: ReportData) -> tuple[Status, str]:
-    """Sum up the rules in one word and one phrase."""
+    """Summarise the rules as a status and a phrase."""
     counts = data.counts
     total = sum(counts.values())
     if not total:
@@ -45,13 +45,13 @@ def verdict(data: ReportData) -> tuple[Status, str]:
 
 
 def pill(status: Status, phrase: str) -> str:
-    """Draw a status as a coloured label that also reads without colour."""
+    """Draw a status as a coloured label with a mark, so that it is also legible without colour."""
     mark = f'<span aria-hidden="true">{MARKS[status]}</span>'
     return f'<span class="pill {status}">{mark}{text(phrase)}</span>'
 
 
 def sense_of(row: RuleRow) -> Literal["max", "min", ""]:
-    """Tell on which side of the limit the legal values lie: given, or from the margin's sign."""
+    """Whether the limit is the largest or smallest legal value: given, or by the margin's sign."""
     if row.sense:
         return row.sense
     value, limit = _real(row.value), _real(row.limit)
@@ -82,7 +82,7 @@ def _gauge(row: RuleRow) -> str:
     sign = {"max": "≤ ", "min": "≥ ", "": ""}[sense]
     margin = ""
     if row.margin is not None:
-        margin = f"margin {with_unit(_told_margin(row), row.unit, 3)}"
+        margin = f"margin {with_unit(_shown_margin(row), row.unit, 3)}"
     if isinstance(row.limit, bool | str):
         sign = "wanted: "
     limit = "" if row.limit is None else f"{sign}{with_unit(row.limit, row.unit, 4)}"
@@ -97,7 +97,7 @@ def _bar(row: RuleRow, sense: Literal["max", "min", ""]) -> str:
     value, limit = _real(row.value), _real(row.limit)
     if value is None or limit is None or not sense:
         return ""
-    zero, at_value, at_limit = bar_places(value, limit)
+    zero, at_value, at_limit = bar_positions(value, limit)
     left, width = min(zero, at_value), max(abs(at_value - zero), 1.5)
     bad_left, bad_width = (at_limit, WIDTH - at_limit) if sense == "max" else (0.0, at_limit)
     return (
@@ -111,8 +111,8 @@ def _bar(row: RuleRow, sense: Literal["max", "min", ""]) -> str:
     )
 
 
-def bar_places(value: float, limit: float) -> tuple[float, float, float]:
-    """Place zero, the value and the limit on a bar of `WIDTH`, all inside it.
+def bar_positions(value: float, limit: float) -> tuple[float, float, float]:
+    """Positions of zero, value and limit on a bar of `WIDTH`.
 
     For a positive limit and a value that is not negative the bar starts at zero, the limit sits
     at `LIMIT_AT` and a value far beyond it is cut at the end; otherwise the bar spans all three.
@@ -133,8 +133,8 @@ def _real(value: object) -> float | None:
     return float(value)
 
 
-def _told_margin(row: RuleRow) -> float:
-    """Write a margin that the value and its limit do not show as zero: 3e-7 mm is the solver's."""
+def _shown_margin(row: RuleRow) -> float:
+    """The margin, or 0 where it is smaller than value and limit show: 3e-7 mm is solver noise."""
     assert row.margin is not None
     scale = max((abs(x) for x in (_real(row.value), _real(row.limit)) if x is not None), default=0)
     return 0.0 if abs(row.margin) < LEAST_MARGIN * scale else row.margin

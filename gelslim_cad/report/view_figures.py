@@ -1,4 +1,4 @@
-"""What the projection error costs on this pad: the paper's formulas against the exact ray."""
+"""Projection error over this pad: the paper's formulas compared with the exact ray."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tip bezel: frames the gel, clamps the window's ends and so pre-compresses the stack."""
+"""Tip bezel: it frames the gel and clamps the ends of the window, which compresses the shims."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import BEZEL, PRINTED
-from gelslim_cad.solids.shapes import countersink, eased, rounded_box, single, subtract
+from gelslim_cad.solids.shapes import chamfered, countersink, rounded_box, single, subtract
 
 WINDOW_GAP_MM = 0.3
-EASE_MM = 0.5
+CHAMFER_MM = 0.5
 
 
 def bezel(d: Dimensions) -> Part:
@@ -21,7 +21,7 @@ def bezel(d: Dimensions) -> Part:
     plate = rounded_box(x, (-half, half), z, (0, r, r, 0))
     top = next(f for f in plate.Faces() if abs(f.Center().z - z[1]) < 1e-6)
     edges = [e for e in top.Edges() if abs(e.Center().x - x[0]) > 1e-6]
-    plate = eased(plate, edges, min(EASE_MM, 0.4 * (z[1] - z[0])))
+    plate = chamfered(plate, edges, min(CHAMFER_MM, 0.4 * (z[1] - z[0])))
     length = d["design.gel.length_mm"] / 2 + WINDOW_GAP_MM
     width = d["design.gel.width_mm"] / 2 + WINDOW_GAP_MM
     corner = d["design.gel.corner_radius_mm"]

@@ -14,10 +14,19 @@ from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Hole, Layout
 from gelslim_cad.solids.materials import BODY, PRINTED
-from gelslim_cad.solids.shapes import box, eased, pair, rod, rounded_box, single, subtract, union
+from gelslim_cad.solids.shapes import (
+    box,
+    chamfered,
+    pair,
+    rod,
+    rounded_box,
+    single,
+    subtract,
+    union,
+)
 
 WEB_MM = 1.2
-EASE_MM = 0.5
+CHAMFER_MM = 0.5
 FAR_MM = 1.0
 
 
@@ -25,7 +34,7 @@ def body(d: Dimensions) -> Part:
     """The printed body."""
     at = Layout(d)
     solid = single(_shell(d, at), "body")
-    solid = eased(solid, _outer_top_edges(solid, at), EASE_MM)
+    solid = chamfered(solid, _outer_top_edges(solid, at), CHAMFER_MM)
     solid = single(union([solid, *_inner_walls(d, at)]), "body with its inner walls")
     solid = single(subtract(solid, _openings(d, at)), "body")
     process = d["manufacturing.print_process"]
@@ -41,7 +50,7 @@ def body(d: Dimensions) -> Part:
 
 
 def _shell(d: Dimensions, at: Layout) -> cq.Shape:
-    """Outer block less cover, bezel seat, guide pocket and camera chamber."""
+    """Outer block without the space of cover, bezel, guide pocket and camera chamber."""
     half, wall = at.half_width_mm, d["design.housing.side_wall_mm"]
     tip, prox = d["finger.tip_x_mm"], d["finger.proximal_x_mm"]
     r = d["design.housing.corner_radius_mm"]
@@ -70,7 +79,7 @@ def _shell(d: Dimensions, at: Layout) -> cq.Shape:
 
 
 def _outer_top_edges(solid: cq.Solid, at: Layout) -> list[cq.Edge]:
-    """Edges around the body's outer top face, but not where the bezel joins."""
+    """Edges around the body's outer top face, except the one at the bezel."""
     faces = [f for f in solid.Faces() if abs(f.Center().z - at.top_z_mm) < 1e-6]
     if len(faces) != 1:
         return []
@@ -80,7 +89,7 @@ def _outer_top_edges(solid: cq.Solid, at: Layout) -> list[cq.Edge]:
 
 
 def _inner_walls(d: Dimensions, at: Layout) -> list[cq.Shape]:
-    """Ledges under the window's ends, beam, baffles and the webs that carry them."""
+    """Ledges under the ends of the window, beam, baffles and the webs that support them."""
     low, shim = d["ledge.depth_mm"], d["shim.compressed_mm"]
     window, cover = d["stack.window_bottom_z_mm"], d["cover.top_z_mm"]
     flat = d["guide.flat_width_mm"] / 2
@@ -127,7 +136,7 @@ def _pilot(at: Layout, hole: Hole) -> cq.Solid:
 
 
 def _bolt_holes(d: Dimensions, at: Layout) -> list[cq.Shape]:
-    """Cross bolts of the mount: head sunk in the back, thread above the tongue."""
+    """Holes of the mount's cross bolts: head recessed in the back, thread above the tongue."""
     shapes: list[cq.Shape] = []
     low, high = at.slot_z_mm
     head = min(at.bolt.cap_height_mm + 0.2, (low - at.back_z_mm) - 1.0)

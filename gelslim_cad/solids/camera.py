@@ -16,13 +16,13 @@ SCREW_DEPTH_MM = 5.0
 
 
 def _placed(d: Dimensions, local: cq.Shape) -> cq.Shape:
-    """From the camera's own frame (pinhole at 0, looking along +x) into the finger."""
+    """Move a shape from the camera's frame (pinhole at 0, looking along +x) into the finger."""
     turned = local.rotate(cq.Vector(), cq.Vector(0, 1, 0), d["camera_pose.pitch_deg"])
     return turned.translate(cq.Vector(d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]))
 
 
 def camera(d: Dimensions) -> Part:
-    """Housing and lens barrel as the data sheet gives them."""
+    """Camera housing and lens barrel, with the sizes of the data sheet."""
     face, depth = -d["camera.lens_height_mm"], d["camera.module_depth_mm"]
     half_w, half_h = d["camera.module_width_mm"] / 2, d["camera.module_height_mm"] / 2
     shape: cq.Shape = box((face - depth, face), (-half_w, half_w), (-half_h, half_h))
@@ -45,8 +45,8 @@ def camera(d: Dimensions) -> Part:
     )
 
 
-def clamp_screw_places(d: Dimensions) -> list[Point2]:
-    """Screws (x, y) that hold the clamp's cheeks from below."""
+def clamp_screw_positions(d: Dimensions) -> list[Point2]:
+    """Positions (x, y) of the screws that hold the clamp's cheeks from below."""
     middle = -d["camera.lens_height_mm"] - d["camera.module_depth_mm"] / 2
     x = _placed(d, cq.Vertex.makeVertex(middle, 0, -d["camera.module_height_mm"] / 2)).Center().x
     y = d["clamp.width_mm"] / 2 - CLAMP_CHEEK_MM / 2
@@ -54,7 +54,7 @@ def clamp_screw_places(d: Dimensions) -> list[Point2]:
 
 
 def camera_clamp(d: Dimensions) -> Part:
-    """U-shaped cradle: two cheeks with front lips and a rear bar; open on the gel side."""
+    """U-shaped cradle of two cheeks with front lips and a rear bar, open towards the gel."""
     at = Layout(d)
     fit = d["design.housing.fit_clearance_mm"]
     face = -d["camera.lens_height_mm"]
@@ -84,7 +84,7 @@ def camera_clamp(d: Dimensions) -> Part:
             (d["cover.top_z_mm"] - 0.1, d["cover.top_z_mm"] + SCREW_DEPTH_MM),
             at.screw.pilot_mm,
         )
-        for x, y in clamp_screw_places(d)
+        for x, y in clamp_screw_positions(d)
     ]
     return Part(
         name="camera_clamp",

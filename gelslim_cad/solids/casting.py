@@ -1,4 +1,4 @@
-"""How much silicone to mix for one gel: volumes, masses of A and B, shrinkage. No CAD."""
+"""How much silicone to mix for one gel: volumes, masses of parts A and B. Needs no CAD."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from gelslim_cad.geometry.gel_shape import GelShape
 
 WASTE_RATIO = 0.25
-"""What stays in cup, syringe, gate and vents, as a part of the cavity's volume."""
+"""Volume that stays in cup, syringe, gate and vents, divided by that of the cavity."""
 SCALE_MM3_PER_ML = 1000.0
 
 
@@ -27,7 +27,7 @@ class Casting:
     """Parts A and B by mass."""
     waste_ratio: float = WASTE_RATIO
     batch: float = 1.0
-    """How many times the mass for one gel is mixed."""
+    """Mass that is mixed, as a multiple of that for one gel."""
 
     @property
     def cavity_volume_mm3(self) -> float:

@@ -26,8 +26,8 @@ class Piece:
 def closed_wire(pieces: Sequence[Piece]) -> cq.Wire:
     """Wire through the pieces in turn, the last one ending where the first begins.
 
-    Neighbours are given one vertex. Left to the kernel, ends that coincide are merged into their
-    mean, weighed in the order of memory addresses: the last bits differ between processes.
+    Neighbouring pieces share one vertex. The kernel would merge equal ends into their mean, summed
+    in the order of memory addresses, so that the last bits would differ between processes.
     """
     corners = [BRepBuilderAPI_MakeVertex(p.start_mm.toPnt()).Vertex() for p in pieces]
     wire = BRepBuilderAPI_MakeWire()

@@ -1,7 +1,7 @@
-"""The space that light crosses between gel and camera, as solids: nothing may stand in it.
+"""The space that the camera's view of the gel takes up, as solids; no part may lie in it.
 
-Two convex pieces, bounded by the exact rays to the gel's corners: pinhole to mirror, and mirror
-to the window's lower face.
+It has two convex pieces, bounded by the exact rays to the gel's corners: from the pinhole to the
+mirror, and from the mirror to the window's lower face.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from gelslim_cad.geometry.part import Part
 from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.solids.shapes import single
 
-SEEN_PARTS = frozenset({"light_guide", "gel_pad", "mirror", "camera"})
-"""Parts that the light is meant to meet."""
-GRAZE_MM = 0.02
+OPTICAL_PARTS = frozenset({"light_guide", "gel_pad", "mirror", "camera"})
+"""Parts that bound the view or that the light passes through."""
+INSET_MM = 0.02
 
 Points = NDArray[np.float64]
 
 
 def corner_rays(d: Dimensions) -> tuple[Points, Points, Points]:
-    """Virtual pinhole (3,), and where the corner rays meet mirror and window, (4, 3) each."""
+    """Virtual pinhole (3,), and the points (4, 3) where the corner rays meet mirror and window."""
     camera = virtual_camera(d)
     x, y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
     corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], dtype=float)
@@ -41,12 +41,12 @@ def corner_rays(d: Dimensions) -> tuple[Points, Points, Points]:
 
 
 def view_corridor(d: Dimensions) -> tuple[cq.Solid, cq.Solid]:
-    """Camera-to-mirror pyramid and mirror-to-window frustum, drawn in by 0.02 mm."""
+    """Pyramid from camera to mirror and frustum from mirror to window, inset by 0.02 mm."""
     _, mirror, window = corner_rays(d)
     pinhole = np.array([d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]])
     angle = math.radians(d["mirror.angle_deg"])
-    lift = GRAZE_MM * np.array([-math.sin(angle), 0, math.cos(angle)])
-    face, under = mirror + lift, window - np.array([0, 0, GRAZE_MM])
+    lift = INSET_MM * np.array([-math.sin(angle), 0, math.cos(angle)])
+    face, under = mirror + lift, window - np.array([0, 0, INSET_MM])
     pyramid = [[pinhole, face[k], face[(k + 1) % 4]] for k in range(4)]
     pyramid.append(list(face))
     frustum = [[face[k], face[(k + 1) % 4], under[(k + 1) % 4], under[k]] for k in range(4)]
@@ -57,7 +57,7 @@ def view_corridor(d: Dimensions) -> tuple[cq.Solid, cq.Solid]:
 def _polyhedron(faces: Iterable[list[Points]], name: str) -> cq.Solid:
     planar = []
     for points in faces:
-        # Two triangles instead of a quadrilateral: lifted corners are coplanar only nearly.
+        # Triangles instead of quadrilaterals, whose four corners are not exactly coplanar.
         for k in range(1, len(points) - 1):
             loop = [cq.Vector(*points[0]), cq.Vector(*points[k]), cq.Vector(*points[k + 1])]
             planar.append(cq.Face.makeFromWires(cq.Wire.makePolygon([*loop, loop[0]])))
@@ -67,11 +67,11 @@ def _polyhedron(faces: Iterable[list[Points]], name: str) -> cq.Solid:
 
 
 def blocked_volumes(d: Dimensions, parts: Iterable[Part]) -> dict[str, float]:
-    """Volume in mm³ that each part takes of the view; empty when the view is free."""
+    """Volume in mm³ by which each part obstructs the view; empty when the view is free."""
     pieces = view_corridor(d)
     taken: dict[str, float] = {}
     for part in parts:
-        if part.name in SEEN_PARTS:
+        if part.name in OPTICAL_PARTS:
             continue
         volume = sum(abs(part.solid.intersect(piece).Volume()) for piece in pieces)
         if volume > 1e-4:

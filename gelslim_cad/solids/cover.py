@@ -1,4 +1,4 @@
-"""Back cover: closes the body, carries camera clamp, mirror seat and LED pedestals."""
+"""Back cover: it closes the body and holds camera clamp, mirror seat and LED pedestals."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.camera import clamp_screw_places
+from gelslim_cad.solids.camera import clamp_screw_positions
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import COVER, PRINTED
-from gelslim_cad.solids.mirror import seat_screw_places, sunk_footprint
+from gelslim_cad.solids.mirror import recessed_footprint, seat_screw_positions
 from gelslim_cad.solids.shapes import (
     box,
+    chamfered,
     countersink,
-    eased,
     pair,
     rounded_box,
     single,
@@ -22,7 +22,7 @@ from gelslim_cad.solids.shapes import (
 )
 
 LOWEST_PEDESTAL_MM = 0.3
-EASE_MM = 0.4
+CHAMFER_MM = 0.4
 
 
 def cover(d: Dimensions) -> Part:
@@ -33,7 +33,7 @@ def cover(d: Dimensions) -> Part:
     plate = rounded_box((at.cover_x_mm, tip), (-half, half), (at.back_z_mm, top), (0, r, r, 0))
     bottom = next(f for f in plate.Faces() if abs(f.Center().z - at.back_z_mm) < 1e-6)
     outside = [e for e in bottom.Edges() if abs(e.Center().x - at.cover_x_mm) > 1e-6]
-    plate = eased(plate, outside, min(EASE_MM, 0.4 * (top - at.back_z_mm)))
+    plate = chamfered(plate, outside, min(CHAMFER_MM, 0.4 * (top - at.back_z_mm)))
     solid = union([plate, *_pedestals(d, top)])
     solid = subtract(solid, _cuts(d, at))
     return Part(
@@ -65,12 +65,12 @@ def _pedestals(d: Dimensions, top: float) -> tuple[cq.Solid, ...]:
 def _cuts(d: Dimensions, at: Layout) -> list[cq.Shape]:
     """Recess of the mirror seat and all screw holes."""
     top, wall = d["cover.top_z_mm"], d["design.housing.back_wall_mm"]
-    x0, x1, half = sunk_footprint(d, at)
+    x0, x1, half = recessed_footprint(d, at)
     gap = d["design.housing.fit_clearance_mm"]
     recess = box((x0 - gap, x1 + gap), (-half - gap, half + gap), (top - at.recess_mm, top + 1.0))
     places = [(h.x_mm, h.y_mm) for h in at.cover_holes()]
-    places += clamp_screw_places(d)
-    places += seat_screw_places(d, at)
+    places += clamp_screw_positions(d)
+    places += seat_screw_positions(d, at)
     s = at.screw
     holes = [
         countersink(x, y, at.back_z_mm, 1, s.countersunk_head_mm, s.clearance_mm, wall + 0.5)

@@ -41,20 +41,20 @@ def gel_solid(d: Dimensions) -> cq.Solid:
 
 
 def shaped_gel(shape: GelShape, extra_depth_mm: float = 0.0) -> cq.Solid:
-    """Solid of `shape`, its flat back lowered by `extra_depth_mm` (for use as a cutter)."""
+    """Solid of `shape`; as a cutting tool its flat back is lowered by `extra_depth_mm`."""
     low = -shape.thickness_mm - extra_depth_mm
     if shape.crown_mm <= 0:
         return single(prism(shape.outline, (low, 0.0)), "gel_pad")
-    # The prism ends above the apex, so that only the dome itself cuts it.
+    # The prism ends above the apex, so that its top is cut by the dome alone.
     column = prism(shape.outline, (low, 1.0 + shape.crown_mm))
     return single(column.intersect(_below_dome(shape, low)), "gel_pad")
 
 
 def _below_dome(shape: GelShape, low_mm: float) -> cq.Solid:
-    """All below the paraboloid, over a rectangle that overlaps the outline.
+    """The space below the paraboloid, over a rectangle that contains the outline.
 
-    Over a rectangle the paraboloid is exactly one Bézier patch of degree 2 x 2: no pole, no seam,
-    so meshes of it stay closed.
+    Over a rectangle the paraboloid is exactly one Bézier patch of degree 2 x 2. It has neither a
+    pole nor a seam, so that its meshes are closed.
     """
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism

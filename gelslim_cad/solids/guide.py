@@ -33,7 +33,7 @@ def profile_wire(profile: GuideProfile, x_mm: float) -> cq.Wire:
 
 
 def joined(outline: tuple[Edge, ...]) -> list[Edge]:
-    """The outline with straight runs in one: what lies beside the acrylic does not cut its face."""
+    """Join collinear segments: a change of medium next to the acrylic does not divide its face."""
     merged: list[Edge] = []
     for edge in outline:
         last = merged[-1] if merged else None

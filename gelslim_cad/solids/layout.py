@@ -1,4 +1,4 @@
-"""Where screws and holes sit: one place for what several parts share."""
+"""Positions of screws, holes and slots that several parts share."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.housing import BEAM_MM
 from gelslim_cad.geometry.fasteners import SCREW_EDGE_MM, SCREWS, ScrewSize, stock_length_mm
 
-SEAT_RECESS_SHARE = 0.4
-SEAT_RECESS_MM = 0.5
+RECESS_FRACTION = 0.4
+RECESS_MM = 0.5
 
 
 @dataclass(frozen=True)
 class Hole:
-    """A vertical screw hole: place, surface of the head, direction into the material."""
+    """A vertical screw hole: position, surface under the head, direction into the material."""
 
     x_mm: float
     y_mm: float
@@ -27,13 +27,13 @@ class Hole:
 
     @property
     def screw_length_mm(self) -> float:
-        """Longest stock screw that does not bottom out."""
+        """Longest stock screw that does not touch the bottom of its hole."""
         return stock_length_mm(self.plate_mm + self.pilot_mm - 0.2)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Derived placements that are nobody's dimension but everybody's neighbour."""
+    """Positions that are no dimension of their own, but that neighbouring parts must agree on."""
 
     d: Dimensions
 
@@ -80,12 +80,12 @@ class Layout:
 
     @property
     def screw_y_mm(self) -> float:
-        """Screw rows of bezel and cover beside the mid-plane."""
+        """Distance of the screw rows of bezel and cover from the mid-plane."""
         return self.half_width_mm - self.d["design.housing.side_wall_mm"] - SCREW_EDGE_MM
 
     @property
     def tongue_y_mm(self) -> float:
-        """Middle of a mount tongue."""
+        """Distance of the middle of a mount tongue from the mid-plane."""
         return float(self.d["tongue.inner_y_mm"] + self.d["tongue.outer_y_mm"]) / 2
 
     @property
@@ -100,7 +100,7 @@ class Layout:
     @property
     def recess_mm(self) -> float:
         """Depth of the pocket in the cover that locates the mirror seat."""
-        return min(SEAT_RECESS_MM, SEAT_RECESS_SHARE * float(self.d["design.housing.back_wall_mm"]))
+        return min(RECESS_MM, RECESS_FRACTION * float(self.d["design.housing.back_wall_mm"]))
 
     def bezel_holes(self) -> tuple[Hole, ...]:
         """Bezel screws: two into the tip block, two through the roof."""
@@ -131,5 +131,5 @@ class Layout:
         )
 
     def bolt_x_mm(self) -> float:
-        """Cross bolts of the mount along the finger."""
+        """Position of the mount's cross bolts along the finger."""
         return float(self.d["finger.proximal_x_mm"]) + self.bolt.cap_head_mm / 2 + 1.2

@@ -10,7 +10,7 @@ from gelslim_cad.solids.materials import GREEN_BOARD, RED_BOARD
 from gelslim_cad.solids.shapes import box, single, union
 
 
-def led_places_mm(d: Dimensions) -> list[float]:
+def led_positions_mm(d: Dimensions) -> list[float]:
     """LED centres along the finger."""
     count, pitch = round(d["led.count"]), d["led.pitch_mm"]
     return [(k - (count - 1) / 2) * pitch for k in range(count)]
@@ -29,7 +29,7 @@ def _board(d: Dimensions, side: int) -> cq.Solid:
     ]
     pieces += [
         box((x - package, x + package), (y - package, y + package), (top - 0.05, d["led.top_z_mm"]))
-        for x in led_places_mm(d)
+        for x in led_positions_mm(d)
     ]
     return single(union(pieces), "LED board")
 

@@ -10,7 +10,7 @@ from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import MIRROR, PRINTED, SEAT
 from gelslim_cad.solids.shapes import Point2, prism_across, rod, single, subtract
 
-SUNK_SHARE = 0.4
+SUNK_FRACTION = 0.4
 SCREW_DEPTH_MM = 5.0
 
 
@@ -39,26 +39,26 @@ def mirror(d: Dimensions) -> Part:
 
 
 def seat_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
-    """x from, x to and half width of the seat on the cover."""
+    """First x, last x and half width of the seat on the cover."""
     _, _, _, high_back = _face(d)
     return d["mirror.seat_x_mm"], high_back[0], d["mirror.width_mm"] / 2
 
 
-def sunk_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
-    """The seat's thin end, which is sunk into the cover: it locates the seat."""
+def recessed_footprint(d: Dimensions, at: Layout) -> tuple[float, float, float]:
+    """Footprint of the seat's thin end, which a recess of the cover locates."""
     x0, x1, half = seat_footprint(d, at)
-    return x0, x0 + SUNK_SHARE * (x1 - x0), half
+    return x0, x0 + SUNK_FRACTION * (x1 - x0), half
 
 
-def seat_screw_places(d: Dimensions, at: Layout) -> list[Point2]:
-    """Screws (x, y) that hold the seat from below, where it is thick."""
+def seat_screw_positions(d: Dimensions, at: Layout) -> list[Point2]:
+    """Positions (x, y) of the screws that hold the seat's thick end from below."""
     _, x1, half = seat_footprint(d, at)
     x = x1 - min(3.0, 0.25 * (x1 - d["mirror.lower_x_mm"]))
     return [(x, s * half / 2) for s in (-1, 1)] if seat_pilot_mm(d, at, x) > 0 else []
 
 
 def seat_pilot_mm(d: Dimensions, at: Layout, x: float) -> float:
-    """Depth of the threaded hole in the seat at x; 0 where the wedge is too thin."""
+    """Depth of the threaded hole in the seat at x, or 0 where the wedge is too thin for one."""
     _, _, low_back, high_back = _face(d)
     slope = (high_back[1] - low_back[1]) / (high_back[0] - low_back[0])
     height = low_back[1] + slope * (x - at.screw.pilot_mm / 2 - low_back[0])
@@ -74,12 +74,12 @@ def mirror_seat(d: Dimensions) -> Part:
     base = d["cover.top_z_mm"] - at.recess_mm
     stop = tuple(b + 0.7 * (f - b) for f, b in zip(low, low_back, strict=True))
     x0, x1, half = seat_footprint(d, at)
-    step, floor = sunk_footprint(d, at)[1], d["cover.top_z_mm"]
+    step, floor = recessed_footprint(d, at)[1], d["cover.top_z_mm"]
     foot = [(x1, floor), (step, floor), (step, base), (x0, base)]
     wedge = prism_across([low_back, high_back, *foot, (x0, stop[1]), (stop[0], stop[1])], half)
     holes = [
         rod(x, y, (floor - 0.1, floor + seat_pilot_mm(d, at, x)), at.screw.pilot_mm)
-        for x, y in seat_screw_places(d, at)
+        for x, y in seat_screw_positions(d, at)
     ]
     return Part(
         name="mirror_seat",

@@ -43,8 +43,8 @@ def prism(
 ) -> cq.Solid:
     """Solid over `outline` between two heights, with round holes and windows cut through.
 
-    One planar face with inner wires is extruded once, so hundreds of holes stay cheap. Holes and
-    windows must lie inside the outline and apart from each other.
+    One planar face with inner wires is extruded, which is fast even with hundreds of holes. Holes
+    and windows must lie inside the outline and must not meet.
     """
     up = cq.Vector(0, 0, 1)
     inner = [cq.Wire.makeCircle(d / 2, cq.Vector(x, y, z_mm[0]), up) for x, y, d in holes]
@@ -63,7 +63,7 @@ def rectangle(x: Point2, y: Point2, radius_mm: float = 0.0) -> Outline:
 
 
 def rounded_polygon(points: Sequence[Point2], radius_mm: float) -> Outline:
-    """Polygon whose corners, hollow ones too, are arcs tangent to both sides.
+    """Polygon whose corners, convex and concave, are arcs tangent to both sides.
 
     The radius shrinks where a side is too short: an arc takes at most 0.45 of either side.
     """

@@ -1,4 +1,4 @@
-"""Screws in their places; threads are drawn at core diameter, so they fill their pilot holes."""
+"""Assembled screws. Threads are drawn with the core diameter, so that they fill their holes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import cadquery as cq
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.fasteners import ScrewSize, stock_length_mm
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.camera import clamp_screw_places
+from gelslim_cad.solids.camera import clamp_screw_positions
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import STEEL
-from gelslim_cad.solids.mirror import seat_pilot_mm, seat_screw_places
+from gelslim_cad.solids.mirror import seat_pilot_mm, seat_screw_positions
 from gelslim_cad.solids.shapes import single
 
 PLAY_MM = 0.01
@@ -57,7 +57,7 @@ def _socket(x: float, y: float, z: float, inward: int, across: float, depth: flo
 
 
 def screws(d: Dimensions) -> tuple[Part, ...]:
-    """All screws, one part each; the first of a kind carries the quantity."""
+    """All screws, one part each; the first of each kind and length carries the quantity."""
     at = Layout(d)
     name = d["design.housing.screw"]
     wall = d["design.housing.back_wall_mm"]
@@ -70,12 +70,12 @@ def screws(d: Dimensions) -> tuple[Part, ...]:
             kinds[kind].append((solid, n, -h.inward))
     kinds["clamp"] = [
         (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
-        for x, y in clamp_screw_places(d)
+        for x, y in clamp_screw_positions(d)
         for n in (stock_length_mm(wall + SHORT_MM),)
     ]
     kinds["seat"] = [
         (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
-        for x, y in seat_screw_places(d, at)
+        for x, y in seat_screw_positions(d, at)
         for n in (stock_length_mm(wall + seat_pilot_mm(d, at, x) - 0.2),)
     ]
     for kind, places in kinds.items():

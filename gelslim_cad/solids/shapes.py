@@ -13,7 +13,7 @@ Point2 = tuple[float, float]
 
 
 class SolidError(ValueError):
-    """A solid came out invalid or in pieces; the message names it."""
+    """A solid is invalid or in several pieces; the message names it."""
 
 
 def box(x: Point2, y: Point2, z: Point2) -> cq.Solid:
@@ -93,7 +93,7 @@ def subtract(base: cq.Shape, tools: Iterable[cq.Shape]) -> cq.Shape:
 
 
 def single(shape: cq.Shape, name: str) -> cq.Solid:
-    """The one valid solid of `shape`; raises SolidError when there is none or several."""
+    """Return the one valid solid of `shape`; raise SolidError for none or several."""
     solids = shape.Solids()
     if len(solids) != 1:
         raise SolidError(f"{name} came out as {len(solids)} solids instead of one")
@@ -103,8 +103,8 @@ def single(shape: cq.Shape, name: str) -> cq.Solid:
     return solid
 
 
-def eased(solid: cq.Solid, edges: Sequence[cq.Edge], length: float) -> cq.Solid:
-    """Chamfer `edges`; the solid as it was when the kernel cannot do it cleanly."""
+def chamfered(solid: cq.Solid, edges: Sequence[cq.Edge], length: float) -> cq.Solid:
+    """Chamfer `edges`; where the kernel cannot, return the solid unchanged."""
     if length <= 0 or not edges:
         return solid
     try:

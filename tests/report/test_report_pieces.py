@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gelslim_cad.report.camera_view import LEVELS, colour, levels
 from gelslim_cad.report.data import CameraView, FileRow, ReportData, RuleRow
 from gelslim_cad.report.markup import coordinate, href, number, size, text
-from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_places, rules, sense_of, verdict
+from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_positions, rules, sense_of, verdict
 from gelslim_cad.report.tables import substituted
 
 REAL = st.floats(-1e6, 1e6, allow_nan=False)
@@ -42,7 +42,7 @@ def test_sense_without_margin_or_numbers():
 
 @given(REAL, REAL)
 def test_bar_keeps_order_and_stays_inside(value, limit):
-    zero, at_value, at_limit = bar_places(value, limit)
+    zero, at_value, at_limit = bar_positions(value, limit)
     assert all(0 <= place <= WIDTH for place in (zero, at_value, at_limit))
     if value < limit:
         assert at_value <= at_limit

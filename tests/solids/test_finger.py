@@ -12,7 +12,7 @@ from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof.solids import interferences
 from gelslim_cad.solids.layout import Layout
-from gelslim_cad.solids.leds import led_places_mm
+from gelslim_cad.solids.leds import led_positions_mm
 
 NAMES = list(fingers())
 each_finger = pytest.mark.parametrize("name", NAMES)
@@ -113,7 +113,7 @@ def test_bezel_window_surrounds_the_gel_evenly(name: str) -> None:
 @each_finger
 def test_every_led_stands_on_its_board_under_the_leg(name: str) -> None:
     d = fingers()[name]
-    places = led_places_mm(d)
+    places = led_positions_mm(d)
     assert len(places) == min(
         d["design.leds.max_count"],
         math.ceil(d["design.gel.length_mm"] / d["design.leds.max_pitch_mm"] - 1e-9),

@@ -8,7 +8,7 @@
       '--------------------'             |  |     finger     |  |      side hooks
 
 The middle hole and its neighbour towards the tip are larger: they mark origin and x axis. Rests
-on the bezel keep the lattice plane at z = 0, where the gel is touched and not pressed.
+on the bezel keep the lattice in the plane z = 0, where it touches the gel without pressing it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ HOOK_MM = 2.5
 HOOK_REACH_MM = 4.0
 LIP_MM = 0.6
 REST_GAP_MM = 1.0
-"""Between the gel and the rests."""
+"""Distance between the gel and the rests."""
 LEAST_REST_MM = 0.05
 PITCHES_MM = (1.0, 2.0, 2.5, 5.0, 10.0)
 MOST_ACROSS = 15
@@ -37,13 +37,13 @@ TARGET = (0.12, 0.12, 0.13, 1.0)
 
 
 def target_pitch_mm(length_mm: float, width_mm: float) -> float:
-    """Smallest round pitch that puts at most 15 holes along the longer side."""
+    """Smallest pitch of PITCHES_MM with at most 15 holes along the longer side."""
     longest = max(length_mm, width_mm)
     return next((p for p in PITCHES_MM if longest / p <= MOST_ACROSS), PITCHES_MM[-1])
 
 
 def target_holes(shape: GelShape) -> tuple[Hole, ...]:
-    """Lattice of holes through the origin, as many as the gel's outline holds whole."""
+    """Lattice of holes through the origin, all those that lie within the gel's outline."""
     pitch = target_pitch_mm(shape.length_mm, shape.width_mm)
     plain = 0.4 * pitch
     marked = {(0, 0), (1, 0)}
@@ -78,7 +78,7 @@ def calibration_target(d: Dimensions) -> Part:
     plate = prism(rectangle(*plate_bounds, 2.0), (0.0, PLATE_MM), target_holes(shape))
     down = float(d["design.housing.gel_proud_mm"]) + HOOK_REACH_MM
     down = min(down, float(d["finger.thickness_mm"]) - 1.0)
-    # Hooks and rests root in the plate, which overhangs them so that no faces coincide.
+    # Hooks and rests begin inside the plate, which overhangs them, so that no faces coincide.
     first = start + LIP_MM
     hooks = _u_shape(first, (outer_x, outer_y), (inner_x, inner_y))
     solids = [plate, prism(hooks, (-down, PLATE_MM / 2))]
@@ -106,7 +106,7 @@ def calibration_target(d: Dimensions) -> Part:
 
 
 def _u_shape(start_x: float, outer: Point2, inner: Point2) -> Outline:
-    """U open at `start_x`, its bow at the tip; (x, y) of the outer and the inner corner."""
+    """U, open at `start_x` and closed at the tip, from its outer and inner corners (x, y)."""
     return rounded_polygon(
         [
             (start_x, -outer[1]),

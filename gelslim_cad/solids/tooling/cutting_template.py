@@ -32,7 +32,7 @@ ACRYLIC = (0.95, 0.70, 0.20, 0.75)
 def cutting_template(d: Dimensions, sheet: StencilSheet) -> Part:
     """The template, on the alignment pins of the marker stencil `sheet`.
 
-    Cut and markers are then in register: both sit on the same dowel pins.
+    Cut and markers are then aligned, because both use the same dowel pins.
     """
     shape = GelShape.of(d)
     thickness, _ = plate_stock(d["manufacturing.acrylic_stock_mm"], LEAST_MM)

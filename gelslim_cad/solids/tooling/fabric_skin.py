@@ -21,22 +21,22 @@ from gelslim_cad.solids.shapes import single
 
 THICKNESS_MM = 0.3
 ROUND_MM = 1.0
-SIDE_PART = 0.6
+SIDE_FRACTION = 0.6
 LEAST_CORNER_MM = 2.0
 FABRIC = (0.20, 0.22, 0.30, 1.0)
 
 
 def skin_flap_mm(d: Dimensions) -> float:
-    """How far the skin reaches down the sides: over the gel's height and 60 % of the body."""
+    """Length of the side flaps: the gel's height above the body, and 60 % of the body."""
     proud = float(d["design.housing.gel_proud_mm"])
-    return proud + SIDE_PART * max(float(d["finger.thickness_mm"]) - proud, 5.0)
+    return proud + SIDE_FRACTION * max(float(d["finger.thickness_mm"]) - proud, 5.0)
 
 
 def skin_outline(d: Dimensions) -> Outline:
     """The pattern in the sensor frame, unfolded into the plane of the top.
 
-    The flaps stop short of the finger's rounded corners, and the hollow corners between flap and
-    top are round, so the weave does not tear there.
+    The flaps end before the finger's rounded corners. The concave corners between flap and top are
+    rounded, so that the fabric does not tear there.
     """
     half = float(d["finger.width_mm"]) / 2
     start, tip = float(d["bezel.proximal_x_mm"]), float(d["finger.tip_x_mm"])

@@ -1,4 +1,4 @@
-"""Fit coupon: what the chosen printer makes of clearances, pilot holes and thin walls.
+"""Fit coupon: it shows how the printer reproduces clearances, pilot holes and thin walls.
 
 [ ]   [ ]   [ ]   [ ]   [ ]     slots for the gauge's tongue, clearance growing
  o     o     o     o     o      pilot holes for the housing's screw, -10 % ... +10 %
@@ -126,7 +126,7 @@ def _printed(name: str, shape: cq.Shape, material: str, note: str) -> Part:
 
 
 def coupon_note(p: CouponPlan) -> str:
-    """What each step is, from one dot to five."""
+    """Explain the steps, which are marked with one to five dots."""
 
     def listed(values: tuple[float, ...]) -> str:
         return ", ".join(f"{v:.2f}" for v in values)

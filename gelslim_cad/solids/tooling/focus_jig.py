@@ -81,7 +81,7 @@ def plan_jig(d: Dimensions) -> JigPlan:
     )
     around_lens = lens / 2 + fit + 0.5
     lip_front = -proud + fit + LIP_MM
-    # Lips before the housing, where it is wide enough beside the lens and they are out of view.
+    # Lips in front of the housing, if it is wider than the lens and the camera does not see them.
     lips = (
         width / 2 - around_lens >= LEAST_GRIP_MM
         and lip_front <= 0.5 * focus

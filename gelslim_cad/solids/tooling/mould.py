@@ -7,7 +7,7 @@
       ==============  base           ##############
 
 The cavity is the gel solid scaled by 1 / (1 - shrinkage) about the origin of the sensor frame.
-Its walls are vertical and its floor is nowhere undercut, so the gel lifts out along z.
+Its walls are vertical and its floor has no undercut, so that the gel can be lifted out along z.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Where everything goes in the gel mould, seen from above, the lid towards the viewer.
+"""Layout of the gel mould, seen from above, the lid towards the viewer.
 
       .-------------------------------------.
       | o                                 o |    o  clamp bolts
@@ -26,7 +26,7 @@ from gelslim_cad.markers.outline import Outline
 from gelslim_cad.solids.prism import Hole, rectangle
 
 BORDER_MM = 14.0
-"""Wall around the cavity: clamp bolts in its middle keep more than 5 mm on both sides."""
+"""Wall around the cavity; clamp bolts in its middle leave more than 5 mm on both sides."""
 BOLT_MM = 3.4
 DOWEL_MM = 3.0
 DOWEL_OFFSET_MM = 2.0
@@ -79,10 +79,10 @@ def plan_mould(d: Dimensions) -> MouldPlan:
 
 
 def _vents(cavity: GelShape, gate: Hole) -> tuple[Hole, ...]:
-    """Vents where air ends up: the corners away from the gate first, then wherever there is room.
+    """Vents where air collects: at the far corners first, then where there is room for more.
 
-    The lid's underside is flat, so with the gate end lowered the far corners are the highest
-    points; filled level, the near corners and the far side may hold a bubble as well.
+    The lid's underside is flat. With the gate's end lowered the far corners are the highest
+    points; in a level mould the near corners and the far side may hold a bubble as well.
     """
     cx, cy = cavity.inset_corner_mm(VENT_MM / 2 + INSET_MM)
     far = cavity.length_mm / 2 - VENT_MM / 2 - INSET_MM

@@ -29,7 +29,7 @@ INDENTER = (0.85, 0.86, 0.88, 1.0)
 
 
 def indenter_radius_mm(shape: GelShape) -> float:
-    """Radius of the sphere: 5 mm, less on a gel too small for it."""
+    """Radius of the sphere: 5 mm, or less for a gel that is too small for it."""
     return min(RADIUS_MM, 0.4 * min(shape.length_mm, shape.width_mm))
 
 
@@ -63,7 +63,7 @@ def sphere_indenter(d: Dimensions) -> Part:
 
 
 def _ball(radius: float, centre_z: float) -> cq.Shape:
-    """Sphere with its poles on the x axis and its seam below, where the cap has none of them."""
+    """Sphere with its poles on the x axis and its seam below: the cap contains neither."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 

@@ -19,12 +19,12 @@ from ifem_export.markers.grid import MarkerGrid
 THICKNESS_MM = 0.1
 LEAST_WEB_MM = 0.05
 MOST_HOLES = 2000
-"""Beyond, checking the solid alone takes minutes (the kernel compares every pair of holes)."""
+"""With more holes the check of the solid takes minutes, as it compares every pair of holes."""
 FILM = (0.75, 0.75, 0.80, 0.9)
 
 
 def stencil_problem(grid: MarkerGrid) -> str:
-    """Why no stencil can be cut for the grid; empty when one can."""
+    """Reason why no stencil can be cut for the grid; empty when one can."""
     if grid.smallest_gap_mm < LEAST_WEB_MM:
         return (
             f"only {grid.smallest_gap_mm:.3f} mm of film would stay between two dots, at least "
@@ -41,7 +41,7 @@ def stencil_problem(grid: MarkerGrid) -> str:
 def stencil(sheet: StencilSheet, grid: MarkerGrid) -> Part:
     """The stencil of the layout that the DXF is drawn from; see `markers.lay_out_stencil`.
 
-    Raises SolidError where `stencil_problem` has something to say.
+    Raises SolidError where `stencil_problem` names a reason.
     """
     problem = stencil_problem(grid)
     if problem:
@@ -50,7 +50,7 @@ def stencil(sheet: StencilSheet, grid: MarkerGrid) -> Part:
     dots = zip(*sheet.holes_mm.T.tolist(), sheet.hole_diameter_mm.tolist(), strict=True)
     return Part(
         name="marker_stencil",
-        # Checking hundreds of holes takes a second, and circles that keep apart cannot go wrong.
+        # The solid is not checked: that takes a second, and separate circles are always valid.
         solid=prism(sheet.sheet, (0.0, THICKNESS_MM), [*pins, *dots]),
         material="polyester film",
         process="laser",
