@@ -13,7 +13,7 @@ from gelslim_cad.export.brep import only_solid
 from gelslim_cad.export.contour import Circle, contours_of, frame_of
 from gelslim_cad.markers.drawing import fixed_metadata
 
-_LAYER_COLOURS = {"CUT": 1, "ENGRAVE": 5}
+_CUT_COLOUR, _ENGRAVE_COLOUR = 1, 5
 _MILLIMETRES = 4
 
 
@@ -35,14 +35,14 @@ def outline_dxf_bytes(shape: Any, *, chord_mm: float = 0.002) -> bytes:
     if face.geomType() != "PLANE":
         raise ExportError(f"outline: the face is a {face.geomType()}; give a planar face")
     document = _new_document()
-    for layer, colour in _LAYER_COLOURS.items():
-        document.layers.add(layer, color=colour)
+    document.layers.add("CUT", color=_CUT_COLOUR)
     space, where = document.modelspace(), {"layer": "CUT"}
     for contour in contours_of(face.Wires(), frame_of(_normal(face)), chord_mm):
         if isinstance(contour, Circle):
             space.add_circle((contour.x_mm, contour.y_mm), contour.radius_mm, dxfattribs=where)
         else:
             space.add_lwpolyline(contour.segments, format="xyb", close=True, dxfattribs=where)
+    document.layers.add("ENGRAVE", color=_ENGRAVE_COLOUR)
     return _document_bytes(document)
 
 
