@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.checks import guide, making, mechanics, mount, optics, structure  # noqa: F401
-from gelslim_cad.checks.rule import GROUPS, OTHER, RULES, Check, Finding, Rule, Status
-from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.checks.rule import GROUPS, OTHER, RULES, Check, Checks, Finding, Rule, Status
+from gelslim_cad.checks.rule_ids import RuleId
+from gelslim_cad.dimensions import Dimensions, DimensionsBatch
+from gelslim_cad.dimensions.dimensions import Derived
 
 
-def check(d: Dimensions) -> tuple[Check, ...]:
+def check(d: Dimensions) -> Checks:
     """Apply every design rule to one design.
 
     Args:
@@ -24,12 +26,12 @@ def check(d: Dimensions) -> tuple[Check, ...]:
     """
     order = [*GROUPS.values(), OTHER]
     ordered = sorted(RULES.values(), key=lambda entry: order.index(entry.group))
-    return tuple(_check(entry, d) for entry in ordered)
+    return Checks(_check(entry, d) for entry in ordered)
 
 
-def check_batch(d: Dimensions) -> Mapping[str, NDArray[np.bool_]]:
+def check_batch(d: DimensionsBatch) -> Mapping[RuleId, NDArray[np.bool_]]:
     """For each rule, where (n,) it fails, for the n designs of a batch."""
-    count = np.size(d["finger.thickness_mm"])
+    count = len(d)
     failed = {}
     for entry in RULES.values():
         found = _find(entry, d)
@@ -38,13 +40,13 @@ def check_batch(d: Dimensions) -> Mapping[str, NDArray[np.bool_]]:
     return failed
 
 
-def margins_batch(d: Dimensions) -> Mapping[str, NDArray[np.float64]]:
+def margins_batch(d: DimensionsBatch) -> Mapping[RuleId, NDArray[np.float64]]:
     """For each rule its margin (n,) as a part of its limit; below 0 exactly where it fails.
 
     Limits below 1 in the rule's unit count as 1; infinite where a design has no limit, minus
     infinity where a value is not a number.
     """
-    count = np.size(d["finger.thickness_mm"])
+    count = len(d)
     margins = {}
     for entry in RULES.values():
         found = _find(entry, d)
@@ -62,7 +64,7 @@ def margins_batch(d: Dimensions) -> Mapping[str, NDArray[np.float64]]:
     return margins
 
 
-def _find(entry: Rule, d: Dimensions) -> Finding:
+def _find(entry: Rule, d: Derived) -> Finding:
     return entry.judge(*(d.argument(p)[1] for p in entry.inputs))
 
 

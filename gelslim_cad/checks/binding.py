@@ -40,7 +40,7 @@ LIMITS = {
 def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
     """Plain sentences: what sets the thickness, what gives, and what would make it fit."""
     steps = relaxations(spec)
-    if not bool(np.all(d.feasible())):
+    if not d.feasible():
         return _infeasible(spec, d, steps)
     tried = _try(spec, [(s,) for s in steps])
     thickness = float(d["finger.thickness_mm"])

@@ -79,7 +79,7 @@ class _Tracer:
             return self._field(name)
         entry = definition(name)
         kind: Kind = "solver" if entry.internal else "dimension"
-        value = None if entry.internal else self.d[name]
+        value = None if entry.internal else self.d.value(name)
         first = name not in self.seen
         self.seen.add(name)
         return Node(
@@ -102,8 +102,8 @@ class _Tracer:
         return entry.inputs
 
     def rule(self, name: str) -> Node:
-        entry = RULES[name]
-        result = next(c for c in check(self.d) if c.id == name)
+        entry = next(entry for entry in RULES.values() if entry.id == name)
+        result = check(self.d).of(entry.id)
         limit = "" if result.limit is None else f", limit {result.limit:.4g} {result.unit}".rstrip()
         return Node(
             name,

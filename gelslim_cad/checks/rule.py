@@ -7,7 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from gelslim_cad.dimensions.registry import unit_of
+from gelslim_cad.checks.rule_ids import RuleId
+from gelslim_cad.dimensions.dimensions import PATHS
+from gelslim_cad.dimensions.registry import REGISTRY, unit_of
+from gelslim_core.html_table import table_html
 
 Status = Literal["pass", "warn", "fail"]
 Sense = Literal["max", "min"]
@@ -35,8 +38,8 @@ class Check:
 
     id: str
     title: str
-    value: Any
-    limit: Any
+    value: float
+    limit: float | None
     unit: str
     margin: float | None
     status: Status
@@ -45,6 +48,23 @@ class Check:
     advice: str = ""
     sense: Sense | Literal[""] = ""
     group: str = ""
+
+
+class Checks(tuple[Check, ...]):
+    """All rules on one design, group by group in the order of definition."""
+
+    def of(self, rule_id: RuleId) -> Check:
+        """The result of one rule."""
+        return next(c for c in self if c.id == rule_id)
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: each rule with its value, limit and status."""
+        rows = ((c.id, c.title, _shown(c.value), _shown(c.limit), c.unit, c.status) for c in self)
+        return table_html(("rule", "title", "value", "limit", "unit", "status"), rows)
+
+
+def _shown(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
 
 
 @dataclass(frozen=True)
@@ -69,7 +89,7 @@ class Finding:
 class Rule:
     """A registered rule."""
 
-    id: str
+    id: RuleId
     title: str
     parameter: str
     why: str
@@ -96,12 +116,12 @@ GROUPS = {
 OTHER = "Other"
 """Title of the last group: rules defined elsewhere, as by a user's program."""
 
-RULES: dict[str, Rule] = {}
+RULES: dict[RuleId, Rule] = {}
 """All rules by id, in the order of definition."""
 
 
 def rule(
-    rule_id: str, *, title: str, parameter: str, why: str, advice: str, unit: str | None = None
+    rule_id: RuleId, *, title: str, parameter: str, why: str, advice: str, unit: str | None = None
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
     """Register a rule; `parameter` is the spec path to change when it does not hold."""
 
@@ -109,6 +129,14 @@ def rule(
         if rule_id in RULES:
             raise ValueError(f"rule {rule_id} is defined twice")
         inputs = tuple(inspect.signature(judge).parameters)
+        unknown = [name for name in inputs if name not in REGISTRY and name not in PATHS]
+        if unknown:
+            raise ValueError(
+                f"rule {rule_id} needs {', '.join(unknown)}, which is neither a dimension nor a "
+                "spec field"
+            )
+        if parameter not in PATHS.values():
+            raise ValueError(f"rule {rule_id} names {parameter}, which is no spec field")
         shown = unit_of(rule_id) if unit is None else unit
         RULES[rule_id] = Rule(rule_id, title, parameter, why, advice, shown, inputs, judge)
         return judge

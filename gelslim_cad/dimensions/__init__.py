@@ -1,5 +1,11 @@
 """Dependent dimensions: what follows from the spec, each with its formula."""
 
-from gelslim_cad.dimensions.dimensions import Dimensions, definition, derive, derive_batch
+from gelslim_cad.dimensions.dimensions import (
+    Dimensions,
+    DimensionsBatch,
+    definition,
+    derive,
+    derive_batch,
+)
 
-__all__ = ["Dimensions", "definition", "derive", "derive_batch"]
+__all__ = ["Dimensions", "DimensionsBatch", "definition", "derive", "derive_batch"]

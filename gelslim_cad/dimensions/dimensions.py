@@ -7,15 +7,22 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from gelslim_cad.dimensions import bend, guide, housing, pad, placement, view  # noqa: F401  (registers)
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension
 from gelslim_cad.dimensions.solver import threads
+from gelslim_cad.geometry.lookup import NamedValues
+from gelslim_cad.geometry.names import DimensionName, FloatName, IntName
 from gelslim_cad.spec import Spec
+from gelslim_cad.spec.reader import leaves
+from gelslim_core.html_table import table_html
 
 SHORT_BLOCK = "design."
+KEPT = 1e-6
+"""A fold that misses its limits by no more than this part of their scales keeps them."""
 
 
 def identifier(path: str) -> str:
@@ -23,32 +30,22 @@ def identifier(path: str) -> str:
     return path.removeprefix(SHORT_BLOCK).replace(".", "_")
 
 
-def leaves(block: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted path and value of every leaf field."""
-    for name in type(block).model_fields:
-        value = getattr(block, name)
-        path = f"{prefix}{name}"
-        if isinstance(value, BaseModel):
-            yield from leaves(value, f"{path}.")
-        else:
-            yield path, value
-
-
 @dataclass(frozen=True)
-class Dimensions:
-    """Derived values by name, such as `d["finger.thickness_mm"]`.
+class Derived:
+    """What is derived from one spec or from a batch of specs.
 
     Attributes:
-        values: A float for each dimension by dotted name, or an array (n,) for a batch of designs.
-        given: Every value of the spec by dotted path.
-        fold: The solved fold of the camera's view.
+        values: Each dimension by its dotted name.
+        given: The spec's fields by dotted path.
+        fold: The layout of camera and mirror that the search found.
     """
 
     values: Mapping[str, Any]
     given: Mapping[str, Any]
     fold: Fold
 
-    def __getitem__(self, name: str) -> Any:
+    def value(self, name: str) -> Any:
+        """The value under a name that is known at run time only; KeyError where there is none."""
         if name in self.values:
             return self.values[name]
         if name in self.given:
@@ -68,9 +65,50 @@ class Dimensions:
         entry = definition(name)
         return tuple(self.argument(p) for p in entry.inputs)
 
-    def feasible(self) -> Any:
+
+@dataclass(frozen=True)
+class Dimensions(Derived, NamedValues):
+    """The dimensions of one finger: `d["finger.thickness_mm"]`.
+
+    Attributes:
+        values: Each dimension by its dotted name, in the unit that ends the name.
+        given: The spec's fields by dotted path.
+        fold: The layout of camera and mirror that the search found.
+    """
+
+    def feasible(self) -> bool:
         """Whether the fold keeps every limit."""
-        return self.fold.worst() <= 1e-6
+        return bool(np.all(self.fold.worst() <= KEPT))
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: each dimension with its unit and meaning."""
+        rows = (
+            (entry.name, f"{self.values[entry.name]:.4g}", entry.unit, entry.title)
+            for entry in REGISTRY.values()
+            if not entry.internal
+        )
+        return table_html(("dimension", "value", "unit", "meaning"), rows)
+
+
+@dataclass(frozen=True)
+class DimensionsBatch(Derived):
+    """The dimensions of n fingers: `batch["finger.thickness_mm"]` is an array (n,).
+
+    Attributes:
+        values: Each dimension by its dotted name, arrays (n,).
+        given: The spec's fields by dotted path: arrays (n,) where they differ between designs.
+        fold: The layouts of camera and mirror that the search found.
+    """
+
+    def __getitem__(self, name: DimensionName | FloatName | IntName) -> NDArray[np.float64]:
+        return np.broadcast_to(np.asarray(self.value(name), dtype=float), (len(self),))
+
+    def __len__(self) -> int:
+        return len(self.values["finger.thickness_mm"])
+
+    def feasible(self) -> NDArray[np.bool_]:
+        """Which of the folds (n,) keep every limit."""
+        return np.broadcast_to(self.fold.worst() <= KEPT, (len(self),))
 
 
 def definition(name: str) -> Dimension:
@@ -146,7 +184,7 @@ def derive(spec: Spec) -> Dimensions:
 
 def derive_batch(
     spec: Spec, overrides: Mapping[str, Any], *, jobs: int | None = None, among: int = 0
-) -> Dimensions:
+) -> DimensionsBatch:
     """Dimensions of n designs at once: `overrides` maps spec paths to arrays (n,).
 
     `jobs` threads search the folds of large batches (none: one per processor); the number never
@@ -165,7 +203,7 @@ def derive_batch(
     fold = computed.pop("fold.layout")
     count = max((np.size(v) for v in overrides.values()), default=1)
     values = {name: np.broadcast_to(value, (count,)) for name, value in computed.items()}
-    return Dimensions(values, given, fold)
+    return DimensionsBatch(values, given, fold)
 
 
 def _evaluate(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -50,6 +50,8 @@ def dimension(
         entry = Dimension(name, unit_of(name), formula, source, inputs, function, internal)
         if entry.identifier in REGISTRY:
             raise ValueError(f"dimension {name} is defined twice")
+        if function.__name__ != entry.identifier:
+            raise ValueError(f"the function of {name} must be called {entry.identifier}")
         REGISTRY[entry.identifier] = entry
         return function
 

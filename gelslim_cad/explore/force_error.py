@@ -27,8 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.names import Name
 
-PAD_NAMES = (
+PAD_NAMES: tuple[Name, ...] = (
     "design.gel.thickness_mm",
     "design.markers.diameter_mm",
     "design.markers.pitch_mm",

@@ -9,16 +9,18 @@ import numpy as np
 
 from gelslim_cad.checks import margins_batch
 from gelslim_cad.checks.binding import LIMITS, SETTERS
-from gelslim_cad.dimensions import Dimensions, derive_batch
+from gelslim_cad.checks.rule_ids import RuleId
+from gelslim_cad.dimensions import DimensionsBatch, derive_batch
 from gelslim_cad.explore.axis import Axis, Value
 from gelslim_cad.explore.force_error import PAD_NAMES
 from gelslim_cad.explore.space import changed, grouped, illegal
+from gelslim_cad.geometry.names import DimensionName
 from gelslim_cad.light.inputs import NAMES as LIGHT_NAMES
 from gelslim_cad.spec import Spec
 
 Columns = dict[str, list[Any]]
 VERDICT = ("status", "binding", "thickness_by", "failed", "reason")
-SHOWN = (
+SHOWN: tuple[DimensionName, ...] = (
     "finger.thickness_mm",
     "finger.width_mm",
     "finger.length_mm",
@@ -37,8 +39,8 @@ SHOWN = (
 """Dimensions in every table."""
 REFUSED = "spec"
 """What binds a design that the spec would not accept."""
-FOLD_RULE = "fold.feasible"
-DEPTHS = {
+FOLD_RULE: RuleId = "fold.feasible"
+DEPTHS: dict[str, DimensionName] = {
     "mirror": "finger.mirror_depth_mm",
     "camera": "finger.camera_depth_mm",
     "guide": "guide.stack_mm",
@@ -85,7 +87,7 @@ def judge(
 
 def _derived(
     spec: Spec, fixed: Mapping[str, Value], columns: Mapping[str, Sequence[float]], among: int
-) -> Dimensions:
+) -> DimensionsBatch:
     base = spec
     if fixed:
         # The first row's numbers come along: a fixed value alone might not be legal.
@@ -97,16 +99,16 @@ def _derived(
     return derive_batch(base, arrays, jobs=1, among=among)
 
 
-def _judged(d: Dimensions, count: int, names: Sequence[str]) -> list[dict[str, Any]]:
+def _judged(d: DimensionsBatch, count: int, names: Sequence[str]) -> list[dict[str, Any]]:
     margins = margins_batch(d)
     ids = list(margins)
     room = np.stack([margins[i] for i in ids])
     failed = room < 0
     limits = list(d.fold.violations)
     missed = np.stack([_over(d.fold.violations[n], count) for n in limits])
-    depths = np.stack([_over(d[name], count) for name in DEPTHS.values()])
+    depths = np.stack([d[name] for name in DEPTHS.values()])
     wanted = dict.fromkeys((*names, *LIGHT_NAMES, *PAD_NAMES))
-    columns = {name: _listed(d[name], count) for name in wanted}
+    columns = {name: _listed(d.value(name), count) for name in wanted}
     entries = []
     for k in range(count):
         broken = [ids[r] for r in np.flatnonzero(failed[:, k])]

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
 
-import numpy as np
-
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns, trace
@@ -93,10 +91,10 @@ def measured(spec: Spec, rays: int = RAYS, noise_px: float = MARKER_NOISE_PX) ->
     d = derive(spec)
     failed = tuple(c.id for c in check(d) if c.status == "fail")
     found: dict[str, float | None] = dict.fromkeys(f.name for f in FIGURES)
-    found |= {n: float(d[n]) for n in found if n in d.values}
+    found |= {n: float(d.values[n]) for n in found if n in d.values}
     found["gel.area_mm2"] = d["design.gel.length_mm"] * d["design.gel.width_mm"]
     found["marker.px"] = float(min(d["view.marker_along_px"], d["view.marker_across_px"]))
-    if not bool(np.all(d.feasible())):
+    if not d.feasible():
         found |= dict.fromkeys(n for n in found if n.startswith(("view.", "marker.")))
     if not failed:
         found |= _traced_and_pressed(d, rays, noise_px)
@@ -107,7 +105,7 @@ def _traced_and_pressed(d: Dimensions, rays: int, noise_px: float) -> dict[str, 
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):  # as the tasks of an exploration, so that both say the same
-        light = light_columns(d, _lit(tuple(d[n] for n in TRACED), rays))
+        light = light_columns(d, _lit(tuple(d.value(n) for n in TRACED), rays))
         error = _pressed(Patch.of(d))
     return {
         **{n: v for n, v in light.items() if n in {f.name for f in FIGURES}},

@@ -19,6 +19,7 @@ from gelslim_cad.explore.judge import SHOWN, VERDICT
 from gelslim_cad.explore.space import Space
 from gelslim_cad.explore.store import Store
 from gelslim_cad.explore.task import Task, unpacked
+from gelslim_cad.geometry.lookup import NamedValues
 
 Progress = Callable[[str, int, int], None]
 SCENES = 16
@@ -208,13 +209,13 @@ def _force(
 
 
 @dataclass(frozen=True)
-class _Row:
-    """One design of the table, as a lookup."""
+class _Row(NamedValues):
+    """One design of the table."""
 
     columns: Mapping[str, list[Any]]
     place: int
 
-    def __getitem__(self, name: str, /) -> Any:
+    def value(self, name: str) -> Any:
         return self.columns[name][self.place]
 
 

@@ -42,12 +42,10 @@ class Member:
 
 def member(name: str, d: Dimensions, folder: Path) -> Member:
     """A finger from its dimensions and the GLB of its build."""
-    gel = tuple(float(d[f"design.gel.{n}_mm"]) for n in ("length", "width", "thickness"))
-    size = tuple(float(d[f"finger.{n}_mm"]) for n in ("length", "width", "thickness"))
     return Member(
         name,
-        (gel[0], gel[1], gel[2]),
-        (size[0], size[1], size[2]),
+        (d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.thickness_mm"]),
+        (d["finger.length_mm"], d["finger.width_mm"], d["finger.thickness_mm"]),
         folder,
         (*read_glb(folder / f"{name}.glb"), dots(d)),
     )

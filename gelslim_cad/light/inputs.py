@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.names import Name
 
-NAMES = (
+NAMES: tuple[Name, ...] = (
     "camera.f_number",
     "camera.frame_rate_hz",
     "camera.full_well_e_um2",

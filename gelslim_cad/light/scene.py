@@ -76,9 +76,9 @@ def launched_na(d: Lookup) -> float:
 def media(d: Lookup) -> dict[str, Medium]:
     """Air, acrylic (window and legs) and gel; acrylic with the dispersion of PMMA."""
     n, gel = d["material.acrylic.refractive_index"], d["material.gel.refractive_index"]
+    wavelengths_nm = d["design.leds.red_wavelength_nm"], d["design.leds.green_wavelength_nm"]
     red, green = (
-        n + _pmma(d[f"design.leds.{colour}_wavelength_nm"] / 1000) - _pmma(PMMA_REFERENCE_UM)
-        for colour in ("red", "green")
+        n + _pmma(wavelength / 1000) - _pmma(PMMA_REFERENCE_UM) for wavelength in wavelengths_nm
     )
     acrylic = Medium(n, d["material.acrylic.absorption_per_m"] / 1000, max(red, 1), max(green, 1))
     return {"air": Medium(1.0), "acrylic": acrylic, "leg": acrylic, "gel": Medium(gel)}

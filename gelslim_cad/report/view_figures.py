@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.names import Name
 from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_core.figure import as_png, new_figure
 from gelslim_optics.camera.projection_error import ErrorMap, ErrorModel, error_map
@@ -20,7 +21,7 @@ TITLES = {
     "arctan": "straight ray (tan α = r/z)",
     "effective_height": "apparent height",
 }
-NAMES = (
+NAMES: tuple[Name, ...] = (
     "camera.image_height_px",
     "camera.image_width_px",
     "camera_pose.pitch_deg",

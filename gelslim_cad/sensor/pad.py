@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import partial
+from typing import cast
 
 import numpy as np
 
@@ -17,8 +19,8 @@ from gelslim_cad.spec import Spec
 from gelslim_optics.light.light_map import light_arrays
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
-from ifem_export.markers.grid import MarkerGrid, build_marker_grid
-from ifem_export.mesh.crop import CropReport
+from ifem_export.markers.grid import Anchors, MarkerGrid, build_marker_grid
+from ifem_export.mesh.crop import CropReport, Weighting
 from ifem_export.mesh.crown import Paraboloid
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
@@ -53,7 +55,7 @@ def marker_grid(d: Dimensions) -> MarkerGrid:
         round(d["marker_grid.columns"]),
         d["design.markers.pitch_mm"],
         d["design.markers.diameter_mm"],
-        anchors=d["design.markers.anchors"],
+        anchors=cast(Anchors, d["design.markers.anchors"]),
     )
     outline = pad_outline(d)
     return grid.clipped(lambda points: outline.contains(points[:, 0], points[:, 1]))
@@ -70,21 +72,21 @@ def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
         The mesh, and what was cut off at the pad's outline.
     """
     outline, shape = pad_outline(d), GelShape.of(d)
-    cut = {
-        "crown": _crown(shape),
-        "weighting": d["mesh.weighting"],
-        "floor": d["mesh.least_fill"],
-    }
-    if d["mesh.cells_along"] is not None:
-        cells = (d["mesh.cells_along"], d["mesh.cells_across"], d["mesh.layers"])
-        return build_pad_mesh(outline, shape.thickness_mm, cells=cells, **cut)
-    return build_pad_mesh(
+    build = partial(
+        build_pad_mesh,
         outline,
         shape.thickness_mm,
+        crown=_crown(shape),
+        weighting=cast(Weighting, d["mesh.weighting"]),
+        floor=d["mesh.least_fill"],
+    )
+    along, across = d["mesh.cells_along"], d["mesh.cells_across"]
+    if along is not None and across is not None:
+        return build(cells=(along, across, d["mesh.layers"]))
+    return build(
         pitch_mm=(d["pad_mesh.cell_x_mm"], d["pad_mesh.cell_y_mm"]),
         layers=d["mesh.layers"],
         align_to_mm=grid.positions_mm,
-        **cut,
     )
 
 

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel
 
 from gelslim_cad.spec.spec import Spec
+from gelslim_core.html_table import table_html
+from gelslim_core.yaml.fields import field_at
 from gelslim_core.yaml.reader import Loaded, read_model
 
 
 @dataclass(frozen=True)
 class LoadedSpec(Loaded[Spec]):
-    """A spec that was read from a file.
+    """A spec that was read from a file. In a notebook it shows its fields as a table.
 
     Attributes:
         spec: The spec.
@@ -21,6 +27,29 @@ class LoadedSpec(Loaded[Spec]):
     def spec(self) -> Spec:
         """The spec."""
         return self.model
+
+    def _repr_html_(self) -> str:
+        """A table for notebooks: each field with its value, unit, line in the file and meaning."""
+        rows = []
+        for path, value in leaves(self.model):
+            place = self.source_map.get(path)
+            origin = "default" if place is None else str(place.line)
+            field = field_at(Spec, path)
+            unit = field.unit.label if field and field.unit else ""
+            meaning = field.description if field else ""
+            rows.append((path, "" if value is None else str(value), unit, origin, meaning))
+        return table_html(("field", "value", "unit", "line", "meaning"), rows)
+
+
+def leaves(block: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every field of `block` that is no block itself."""
+    for name in type(block).model_fields:
+        value = getattr(block, name)
+        path = f"{prefix}{name}"
+        if isinstance(value, BaseModel):
+            yield from leaves(value, f"{path}.")
+        else:
+            yield path, value
 
 
 def read_spec(path: str | os.PathLike[str]) -> LoadedSpec:

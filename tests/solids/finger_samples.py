@@ -74,7 +74,7 @@ def fingers() -> dict[str, Dimensions]:
     seed = 0
     while len(found) < len(DESIGNS) + RANDOM:
         d = derive(random_spec(seed))
-        if bool(d.feasible().all()) and not screws_refused(d):
+        if d.feasible() and not screws_refused(d):
             found[f"random{seed}"] = d
         seed += 1
     return found

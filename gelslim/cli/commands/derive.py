@@ -36,7 +36,7 @@ def derive(spec: SpecFile, as_json: AsJson = False) -> int:
 
     loaded = read_spec(spec)
     dimensions = derive_dimensions(loaded.spec)
-    feasible = bool(dimensions.feasible())
+    feasible = dimensions.feasible()
     if as_json:
         print_json(
             {
@@ -62,7 +62,7 @@ def _record(d: Dimensions, name: str) -> dict[str, Any]:
 
     entry = definition(name)
     return {
-        "value": d[name],
+        "value": d.values[name],
         "unit": entry.unit,
         "meaning": entry.title,
         "formula": entry.formula,
@@ -96,5 +96,5 @@ def _print_table(d: Dimensions) -> None:
         table.add_column(overflow="fold", ratio=1, style="dim")
         for name in names:
             entry = definition(name)
-            table.add_row(f"  {name}", number(d[name], entry.unit), entry.title.rstrip("."))
+            table.add_row(f"  {name}", number(d.values[name], entry.unit), entry.title.rstrip("."))
         screen.print(table)

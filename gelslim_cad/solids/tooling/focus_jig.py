@@ -69,11 +69,13 @@ class JigPlan:
 def plan_jig(d: Dimensions) -> JigPlan:
     """Sizes from the camera's data sheet and the best focus distance."""
     fit = float(d["design.housing.fit_clearance_mm"])
-    width, height, depth = (float(d[f"camera.module_{k}_mm"]) for k in ("width", "height", "depth"))
+    width, height = d["camera.module_width_mm"], d["camera.module_height_mm"]
+    depth = d["camera.module_depth_mm"]
     lens, proud = float(d["camera.lens_diameter_mm"]), float(d["camera.lens_height_mm"])
     focus = float(d["view.focus_mm"])
     tangent = [
-        math.tan(math.radians(float(d[f"view.{k}_fov_deg"])) / 2) for k in ("across", "along")
+        math.tan(math.radians(angle_deg) / 2)
+        for angle_deg in (d["view.across_fov_deg"], d["view.along_fov_deg"])
     ]
     half_w, half_h = (
         min(max(0.95 * focus * t, WINDOW_LEAST_MM), most)
