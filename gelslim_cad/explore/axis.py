@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.spec import Spec
+from gelslim_core.errors import GelslimError
 from gelslim_core.yaml.fields import Field, field_table
 
 Value = float | int | str | None
@@ -135,3 +135,7 @@ def shown(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return "none" if value is None else value if isinstance(value, str) else f"{value:g}"
+
+
+class ExploreError(GelslimError, ValueError):
+    """The space cannot be explored as asked; the message says what, why and what to do."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from gelslim_cad.explore.axis import Axis, Value
-from gelslim_cad.explore.border import border
+import numpy as np
+
+from gelslim_cad.explore.axis import Axis, ExploreError, Value
 from gelslim_cad.explore.engine import Engine
-from gelslim_cad.explore.error import ExploreError
+from gelslim_cad.explore.judge import judge
 from gelslim_cad.explore.pareto import Goal
 from gelslim_cad.explore.space import Space
 from gelslim_cad.explore.study import Exploration, Progress, Request, explore
@@ -27,6 +29,8 @@ GOALS: dict[Aim, Goal] = {
 """What each aim makes least. Bright: the shortest exposure, so light and aperture both count."""
 BETWEEN = 2
 """New values between a value and its neighbour in a round of refinement."""
+PIECES, ROUNDS = 32, 2
+"""The interval is divided into this many pieces, and the piece with the border again."""
 
 
 @dataclass(frozen=True)
@@ -219,3 +223,40 @@ def _beside(axis: Axis, value: Value) -> list[Value]:
     below = [v for v in ordered if v < value]
     above = [v for v in ordered if v > value]
     return [*below[-1:], *above[:1]]
+
+
+@dataclass(frozen=True)
+class Border:
+    """The last feasible value of a field, and what rules out the next one."""
+
+    value: float
+    stops: str
+
+
+def border(spec: Spec, values: Mapping[str, Value], path: str, beyond: Value) -> Border | None:
+    """The border between `values[path]` and `beyond`; None where all values between are feasible.
+
+    All other fields keep their values. The border is rounded towards `values[path]`, to a
+    thousandth of the interval or the next greater power of ten.
+    """
+    axes = [Axis(p, (v,)) for p, v in values.items() if p != path]
+    start, end = (float(v) for v in (values[path], beyond))  # type: ignore[arg-type]
+    low, high, stops = start, end, ""
+    for _ in range(ROUNDS):
+        way = [float(f"{v:.10g}") for v in np.linspace(low, high, PIECES + 1)]
+        rows = [(*(a.values[0] for a in axes), v) for v in way]
+        columns = judge(spec, [*axes, Axis(path, tuple(way))], rows)
+        stopped = [k for k, s in enumerate(columns["status"]) if k and s != "feasible"]
+        if not stopped:
+            break
+        first = stopped[0]
+        stops = columns["reason"][first] or columns["binding"][first]
+        low, high = way[first - 1], way[first]
+    return Border(_rounded(low, start, abs(end - start) / PIECES**ROUNDS), stops) if stops else None
+
+
+def _rounded(value: float, towards: float, step: float) -> float:
+    unit = 10.0 ** math.ceil(math.log10(step))
+    up = math.ceil(value / unit - 1e-6), math.floor(value / unit + 1e-6)
+    near = float(f"{(up[0] if towards > value else up[1]) * unit:.10g}")
+    return towards if (near - towards) * (value - towards) <= 0 else near

@@ -10,8 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from gelslim_cad.explore.axis import Axis, Value
-from gelslim_cad.explore.error import ExploreError
+from gelslim_cad.explore.axis import Axis, ExploreError, Value
 from gelslim_cad.spec import Spec
 
 CHUNK = 500

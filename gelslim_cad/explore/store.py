@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_cad.build.folder import locked
-from gelslim_cad.explore.error import ExploreError
+from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.task import Task
 from gelslim_core.files.replaced_file import is_part, replace_file, sweep
 

@@ -11,9 +11,9 @@ from typing import Any
 
 from gelslim_cad.dimensions.dimensions import PATHS
 from gelslim_cad.dimensions.registry import REGISTRY
+from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns
 from gelslim_cad.explore.engine import Engine
-from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX, Patch, PatchError
 from gelslim_cad.explore.judge import SHOWN, VERDICT
 from gelslim_cad.explore.space import Space

@@ -1,4 +1,4 @@
-"""Marker grid, pad mesh and stiffness bundle of a finger: one marker grid serves them all."""
+"""Marker grid, pad mesh, light and bundle of a finger. All of them use the same marker grid."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.geometry.sight import camera_record
+from gelslim_cad.light.scene import light_scene
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline
-from gelslim_cad.sensor.light import pad_light
 from gelslim_cad.spec import Spec
-from gelslim_optics.light.light_map import light_arrays
+from gelslim_optics.light.light_map import LED_COLOURS, LightMap, light_arrays
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
 from ifem_export.markers.grid import Anchors, MarkerGrid, build_marker_grid
@@ -26,6 +27,13 @@ from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.operators.ladder import REFERENCE_LAYERS, Progress, measure_ladder
 from ifem_export.operators.operator_ladder import OperatorLadder
+
+RAYS = 1 << 16
+RED_SHARE = 0.45
+"""Red appears weaker than green in published images of this sensor."""
+ELEVATION_DEG = 25.0
+"""Mean angle at which the light rises through the gel; the tracer does not record directions."""
+SMOOTHING_MM = 0.6
 
 
 def spec_hash(spec: Spec) -> str:
@@ -217,4 +225,27 @@ def measured_ladder(
         progress=progress,
         reference=reference_mesh(d, mesh),
         timed=timed,
+    )
+
+
+def pad_light(d: Dimensions) -> LightMap:
+    """Trace the light of the guide on the untouched gel.
+
+    Args:
+        d: The dimensions of the finger.
+
+    Returns:
+        Irradiance and direction of the red and the green light over the pad.
+    """
+    from gelslim_optics.light.trace import trace_light
+
+    traced = trace_light(light_scene(d, guide_profile(d)), RAYS, seed=0)
+    return LightMap.from_bins(
+        np.stack([RED_SHARE * traced.irradiance("red"), traced.irradiance("green")]),
+        float(d["design.gel.length_mm"]),
+        float(d["design.gel.width_mm"]),
+        azimuth_deg=np.array([90.0, -90.0]),
+        elevation_deg=np.full(2, ELEVATION_DEG),
+        colour=LED_COLOURS,
+        smooth_mm=SMOOTHING_MM,
     )

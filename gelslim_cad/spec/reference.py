@@ -1,7 +1,8 @@
-"""The reference page of the spec, made from its schema."""
+"""The JSON Schema of the spec, for editors, and the reference page made from it."""
 
 from __future__ import annotations
 
+import gelslim_core.yaml.schema
 from gelslim_cad.spec.spec import Spec
 from gelslim_core.yaml.schema import reference_markdown
 
@@ -48,3 +49,11 @@ def reference_text() -> str:
     """The whole page in Markdown, the same for the same program."""
     rules = "".join(f"- `{block}`: {rule}.\n" for block, rule in RULES)
     return f"{_HEAD}\n{reference_markdown(Spec)}{_BETWEEN}{rules}"
+
+
+FORMAT = "gelslim-spec/1"
+
+
+def schema_text() -> str:
+    """The JSON Schema (draft 2020-12) of the spec as text, the same for the same program."""
+    return gelslim_core.yaml.schema.schema_text(Spec, FORMAT)

@@ -1,7 +1,8 @@
-"""A commented spec to start from, generated from the models."""
+"""Texts of specs: a commented one to start from, and one with some values changed."""
 
 from __future__ import annotations
 
+import io
 import json
 import re
 from collections.abc import Iterator, Mapping
@@ -127,3 +128,27 @@ def _is_text(value: str) -> bool:
         return isinstance(resolve(value), str)
     except RefusedScalarError:
         return False
+
+
+def spec_text(text: str, values: Mapping[str, Any]) -> str:
+    """The YAML `text` with the fields at dotted paths set, its comments and order kept.
+
+    Blocks that the text lacks are added.
+    """
+    from ruamel.yaml import YAML
+
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 4096
+    content = yaml.load(text)
+    for path, value in values.items():
+        *blocks, last = path.split(".")
+        inner = content
+        for name in blocks:
+            if inner.get(name) is None:
+                inner[name] = {}
+            inner = inner[name]
+        inner[last] = value
+    stream = io.StringIO()
+    yaml.dump(content, stream)
+    return stream.getvalue()

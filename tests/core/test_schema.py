@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 from reader_cases import MINIMAL, load, with_length
 from ruamel.yaml import YAML
 
-from gelslim_cad.spec.schema import schema_text
+from gelslim_cad.spec.reference import schema_text
 from gelslim_cad.spec.spec import Spec
 from gelslim_cad.spec.starter import starter_text
 from gelslim_core.yaml.errors import InputError

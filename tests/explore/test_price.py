@@ -12,8 +12,8 @@ from explore_samples import MINI20, ROOT, mini20
 from gelslim.cli import main
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
+from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.brightness import RAYS
-from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.force_error import Patch, patch_error
 from gelslim_cad.explore.price import FIGURES, Price, measured, prices
 from gelslim_cad.explore.space import changed

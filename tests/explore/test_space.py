@@ -7,8 +7,7 @@ import itertools
 import pytest
 from explore_samples import mini20, space
 
-from gelslim_cad.explore.axis import parse_axis
-from gelslim_cad.explore.error import ExploreError
+from gelslim_cad.explore.axis import ExploreError, parse_axis
 from gelslim_cad.explore.space import CHUNK, Space, changed, grouped, illegal
 
 

@@ -16,8 +16,8 @@ from explore_samples import MINI20, ROOT, space
 
 from gelslim_cad.explore import space as space_module
 from gelslim_cad.explore import study
+from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.engine import Engine
-from gelslim_cad.explore.error import ExploreError
 from gelslim_cad.explore.study import Request, explore
 from gelslim_cad.explore.table import csv_bytes, parquet_bytes
 

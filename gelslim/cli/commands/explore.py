@@ -61,9 +61,8 @@ def explore(
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.failure import CommandError
-    from gelslim_cad.explore.axis import parse_axis
+    from gelslim_cad.explore.axis import ExploreError, parse_axis
     from gelslim_cad.explore.engine import Engine, processors
-    from gelslim_cad.explore.error import ExploreError
     from gelslim_cad.explore.space import Space
     from gelslim_cad.explore.study import Request
     from gelslim_cad.explore.study import explore as run

@@ -55,9 +55,9 @@ def optimise(
     """
     from gelslim.cli.answer import print_json
     from gelslim.cli.output import replace_file, spare_strangers
-    from gelslim_cad.explore.saved import spec_text
     from gelslim_cad.explore.space import changed
     from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.spec.starter import spec_text
 
     if save is not None:
         spare_strangers(save, b"gelslim-spec/", "spec")
@@ -124,9 +124,8 @@ def _best(
     """The best feasible design. Raises CommandError where the axes are no good or none is."""
     from gelslim.cli.answer import progress_bar
     from gelslim.cli.failure import CommandError
-    from gelslim_cad.explore.axis import parse_axis
+    from gelslim_cad.explore.axis import ExploreError, parse_axis
     from gelslim_cad.explore.engine import Engine, processors
-    from gelslim_cad.explore.error import ExploreError
     from gelslim_cad.explore.optimum import optimise as run
     from gelslim_cad.explore.space import Space
     from gelslim_cad.explore.study import Request

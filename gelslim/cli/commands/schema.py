@@ -41,7 +41,7 @@ def _schema(scene: bool) -> str:
         from gelslim_twin.scene.reader import scene_schema_text
 
         return scene_schema_text()
-    from gelslim_cad.spec.schema import schema_text
+    from gelslim_cad.spec.reference import schema_text
 
     return schema_text()
 

@@ -32,7 +32,7 @@ def thinner(
     """
     from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim.cli.failure import CommandError
-    from gelslim_cad.explore.error import ExploreError
+    from gelslim_cad.explore.axis import ExploreError
     from gelslim_cad.explore.thinner import thinner as run
     from gelslim_cad.spec.reader import read_spec
 
