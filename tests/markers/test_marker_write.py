@@ -47,7 +47,7 @@ def test_files_are_written_whole_and_named(tmp_path, grid, nodes, outline):
 
 def test_a_refused_design_leaves_the_folder_untouched(tmp_path, nodes, outline):
     (tmp_path / "markers.svg").write_text("before")
-    with pytest.raises(ValueError, match="cross the gel outline"):
+    with pytest.raises(ValueError, match="900"):
         write_marker_files(tmp_path, build_marker_grid(30, 30, 1.0, 0.4), nodes, outline)
     assert os.listdir(tmp_path) == ["markers.svg"]
     assert (tmp_path / "markers.svg").read_text() == "before"

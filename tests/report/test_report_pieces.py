@@ -92,7 +92,7 @@ def test_sizes_and_links():
     "path", ["/etc/passwd", "../x", "a/../b", "http://x", "javascript:1", "", "a//b", "a\\b", "."]
 )
 def test_file_paths_that_leave_the_folder_are_refused(path):
-    with pytest.raises(ValueError, match="relative path"):
+    with pytest.raises(ValueError, match="path"):
         FileRow(path, 1, "0")
 
 
@@ -123,13 +123,13 @@ def test_camera_view_refuses_what_cannot_be_drawn():
         return CameraView.from_arrays(**(given | changed))
 
     assert view().markers_px == ((1.0, 2.0),)
-    with pytest.raises(ValueError, match="blur_px has 2 entries for 1"):
+    with pytest.raises(ValueError, match="blur_px"):
         view(blur_px=[1, 2])
-    with pytest.raises(ValueError, match="markers_px holds a value that is not finite"):
+    with pytest.raises(ValueError, match="markers_px"):
         view(markers_px=[(math.nan, 2)])
-    with pytest.raises(ValueError, match="must be > 0 px"):
+    with pytest.raises(ValueError, match="width"):
         view(image_size_px=(0, 80))
-    with pytest.raises(ValueError, match=r"outside 0\.\.0"):
+    with pytest.raises(ValueError, match="anchor"):
         view(anchors=(1,))
 
 
