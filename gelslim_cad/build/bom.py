@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from gelslim_cad.geometry.part import Part
+from gelslim_cad.report import BomLine
 
 DENSITY_G_CM3 = {
     "tough resin": 1.15,
@@ -20,21 +20,8 @@ DENSITY_G_CM3 = {
 """Typical densities, for masses in the BOM only."""
 
 
-@dataclass(frozen=True)
-class BomLine:
-    """One line: a part, how many, of what."""
-
-    name: str
-    quantity: int
-    material: str
-    process: str
-    tooling: bool
-    mass_g: float | None
-    note: str
-
-
 def bill_of_materials(parts: Iterable[Part], gel_density_kg_m3: float) -> tuple[BomLine, ...]:
-    """Lines in the order of the parts; repeated screws count once."""
+    """Lines in the order of the parts; screws of one kind share a line."""
     lines = []
     for part in parts:
         if part.quantity < 1:
@@ -48,9 +35,9 @@ def bill_of_materials(parts: Iterable[Part], gel_density_kg_m3: float) -> tuple[
                 part.quantity,
                 part.material,
                 part.process,
-                not part.in_assembly,
                 _mass_g(part, gel_density_kg_m3),
                 part.note,
+                not part.in_assembly,
             )
         )
     return tuple(lines)

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from gelslim_cad.build.bom import BomLine
 from gelslim_cad.build.instructions import build_guide
 from gelslim_cad.build.manifest import FileEntry, json_bytes
 from gelslim_cad.build.page import pictures, report_data
 from gelslim_cad.build.writers import LIGHT_JSON
 from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions, definition
-from gelslim_cad.report import render_report
+from gelslim_cad.report import BomLine, render_report
 from gelslim_cad.solids.casting import cast_gel
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gelslim_cad.build.bom import BomLine
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.report import BomLine
 from gelslim_cad.solids.casting import Casting
 from ifem_export.markers.grid import MarkerGrid
 

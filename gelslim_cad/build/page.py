@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
 
-from gelslim_cad.build.bom import BomLine
 from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.checks import Check
@@ -16,14 +15,13 @@ from gelslim_cad.dimensions import Dimensions, definition
 from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.report import (
-    BomRow,
+    BomLine,
     CameraView,
     DimensionRow,
     FileRow,
     Note,
     Picture,
     ReportData,
-    RuleRow,
 )
 from gelslim_cad.report.view_figures import projection_sentence
 from ifem_export.markers.grid import MarkerGrid
@@ -68,25 +66,6 @@ def dimension_rows(d: Dimensions) -> tuple[DimensionRow, ...]:
             )
         )
     return tuple(rows)
-
-
-def rule_rows(checks: Iterable[Check]) -> tuple[RuleRow, ...]:
-    """The design rules as the report lists them."""
-    return tuple(
-        RuleRow(
-            id=c.id,
-            title=c.title,
-            value=c.value,
-            limit=c.limit,
-            unit=c.unit,
-            margin=c.margin,
-            status=c.status,
-            reason=". ".join(filter(None, (c.reason, c.advice))),
-            parameter=c.parameter,
-            sense=c.sense,
-        )
-        for c in checks
-    )
 
 
 def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
@@ -152,7 +131,7 @@ def report_data(
         spec_hash=spec_hash,
         headline=headline(d),
         dimensions=dimension_rows(d),
-        rules=rule_rows(checks),
+        rules=checks,
         binding=binding,
         glb=glb,
         pictures=shown,
@@ -160,17 +139,7 @@ def report_data(
         files=tuple(
             FileRow(path, e.size_bytes, e.sha256, e.purpose) for path, e in sorted(files.items())
         ),
-        bom=tuple(
-            BomRow(
-                b.name + (" (tooling)" if b.tooling else ""),
-                b.quantity,
-                b.material,
-                b.process,
-                b.mass_g,
-                b.note,
-            )
-            for b in bom
-        ),
+        bom=bom,
         light=pictures(drawn, "", LIGHT_PICTURES) if light else (),
         projection=pictures(drawn, "", PROJECTION_PICTURES),
         projection_notes=(Note("Projection", projection_sentence(d)),),

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
-Status = Literal["pass", "warn", "fail"]
+if TYPE_CHECKING:
+    from gelslim_cad.checks.rule import Check, Status
+
+
 Scalar = float | int | str | bool | None
 """A value as shown: number, text, yes/no, or nothing."""
 
@@ -23,26 +26,6 @@ class DimensionRow:
     inputs: tuple[tuple[str, Scalar], ...]
     source: str
     group: str
-
-
-@dataclass(frozen=True)
-class RuleRow:
-    """One design rule: `margin` is positive where the rule holds, in the rule's `unit`.
-
-    `sense` says whether `limit` is the largest ("max") or the smallest ("min") legal value; where
-    it is empty, the sign of the margin decides.
-    """
-
-    id: str
-    title: str
-    value: Scalar
-    limit: Scalar
-    unit: str
-    margin: float | None
-    status: Status
-    reason: str
-    parameter: str
-    sense: Literal["max", "min", ""] = ""
 
 
 @dataclass(frozen=True)
@@ -144,7 +127,7 @@ class FileRow:
 
 
 @dataclass(frozen=True)
-class BomRow:
+class BomLine:
     """One line of the bill of materials."""
 
     name: str
@@ -153,6 +136,7 @@ class BomRow:
     process: str
     mass_g: float | None = None
     note: str = ""
+    tooling: bool = False
 
 
 @dataclass(frozen=True)
@@ -173,13 +157,13 @@ class ReportData:
     headline: tuple[tuple[str, str], ...] = ()
     summary: str = ""
     dimensions: tuple[DimensionRow, ...] = ()
-    rules: tuple[RuleRow, ...] = ()
+    rules: tuple[Check, ...] = ()
     binding: tuple[str, ...] = ()
     glb: bytes = b""
     pictures: tuple[Picture, ...] = ()
     camera_view: CameraView | None = None
     files: tuple[FileRow, ...] = ()
-    bom: tuple[BomRow, ...] = ()
+    bom: tuple[BomLine, ...] = ()
     notes: tuple[Note, ...] = ()
     light: tuple[Picture, ...] = ()
     """Pictures of the light, each as wide as the page."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from gelslim_cad.report.data import ReportData, RuleRow, Status
+from gelslim_cad.report.data import ReportData
 from gelslim_cad.report.markup import anchor, coordinate, text, with_unit
+
+if TYPE_CHECKING:
+    from gelslim_cad.checks.rule import Check, Status
 
 MARKS: dict[Status, str] = {"pass": "✓", "warn": "!", "fail": "✕"}
 ORDER: dict[Status, int] = {"fail": 0, "warn": 1, "pass": 2}
@@ -17,7 +20,7 @@ LEAST_MARGIN = 1e-5
 """Relative to the larger of value and limit, which are written with four digits."""
 
 
-def rules(rows: tuple[RuleRow, ...]) -> str:
+def rules(rows: tuple[Check, ...]) -> str:
     """List the rules, failures first, then warnings, then the rest, each in the given order."""
     if not rows:
         return '<p class="card empty">No design rules were checked.</p>'
@@ -50,7 +53,7 @@ def pill(status: Status, phrase: str) -> str:
     return f'<span class="pill {status}">{mark}{text(phrase)}</span>'
 
 
-def sense_of(row: RuleRow) -> Literal["max", "min", ""]:
+def sense_of(row: Check) -> Literal["max", "min", ""]:
     """Whether the limit is the largest or smallest legal value: given, or by the margin's sign."""
     if row.sense:
         return row.sense
@@ -63,7 +66,8 @@ def sense_of(row: RuleRow) -> Literal["max", "min", ""]:
     return "max" if (value < limit) == holds else "min"
 
 
-def _rule(row: RuleRow) -> str:
+def _rule(row: Check) -> str:
+    reason = ". ".join(filter(None, (row.reason, row.advice)))
     change = ""
     if row.parameter:
         change = f'<p class="change">Change: <code>{text(row.parameter)}</code></p>'
@@ -73,11 +77,11 @@ def _rule(row: RuleRow) -> str:
         f'<span class="mark" role="img" aria-label="{row.status}">{MARKS[row.status]}</span>'
         f"<div><h3>{text(row.title)}</h3><code>{text(row.id)}</code></div></div>"
         f'<div class="gauge">{_gauge(row)}</div>'
-        f'<div class="why"><p>{text(_sentences(row.reason))}</p>{change}</div></article>'
+        f'<div class="why"><p>{text(_sentences(reason))}</p>{change}</div></article>'
     )
 
 
-def _gauge(row: RuleRow) -> str:
+def _gauge(row: Check) -> str:
     sense = sense_of(row)
     sign = {"max": "≤ ", "min": "≥ ", "": ""}[sense]
     margin = ""
@@ -93,7 +97,7 @@ def _gauge(row: RuleRow) -> str:
     )
 
 
-def _bar(row: RuleRow, sense: Literal["max", "min", ""]) -> str:
+def _bar(row: Check, sense: Literal["max", "min", ""]) -> str:
     value, limit = _real(row.value), _real(row.limit)
     if value is None or limit is None or not sense:
         return ""
@@ -133,7 +137,7 @@ def _real(value: object) -> float | None:
     return float(value)
 
 
-def _shown_margin(row: RuleRow) -> float:
+def _shown_margin(row: Check) -> float:
     """The margin, or 0 where it is smaller than value and limit show: 3e-7 mm is solver noise."""
     assert row.margin is not None
     scale = max((abs(x) for x in (_real(row.value), _real(row.limit)) if x is not None), default=0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from gelslim_cad.report.data import BomRow, DimensionRow, FileRow, Note, Scalar
+from gelslim_cad.report.data import BomLine, DimensionRow, FileRow, Note, Scalar
 from gelslim_cad.report.markup import anchor, href, number, size, text, with_unit
 
 
@@ -106,12 +106,13 @@ def files(rows: tuple[FileRow, ...]) -> str:
     )
 
 
-def bom(rows: tuple[BomRow, ...]) -> str:
+def bom(rows: tuple[BomLine, ...]) -> str:
     """List what to make and to buy."""
     if not rows:
         return '<p class="card empty">No bill of materials was given.</p>'
     lines = "".join(
-        f'<tr><td class="num">{row.quantity}</td><td>{text(row.name)}</td>'
+        f'<tr><td class="num">{row.quantity}</td><td>{text(row.name)}'
+        f"{' (tooling)' if row.tooling else ''}</td>"
         f"<td>{text(row.material)}</td><td>{text(row.process)}</td>"
         f'<td class="num">{text(number(row.mass_g, 3))}</td><td>{text(row.note)}</td></tr>'
         for row in rows

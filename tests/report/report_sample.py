@@ -12,15 +12,15 @@ import numpy as np
 import trimesh
 from trimesh.creation import box, cylinder, torus
 
+from gelslim_cad.checks import Check
 from gelslim_cad.report import (
-    BomRow,
+    BomLine,
     CameraView,
     DimensionRow,
     FileRow,
     Note,
     Picture,
     ReportData,
-    RuleRow,
 )
 
 Piece = tuple[
@@ -204,36 +204,36 @@ def camera() -> CameraView:
     )
 
 
-def rules() -> tuple[RuleRow, ...]:
+def rules() -> tuple[Check, ...]:
     """Rules of every status, on both sides of a limit, around zero, and without numbers."""
     return (
-        RuleRow(
+        Check(
             "optics.coverage_x", "The image covers the gel along the finger", 1.04, 1.0, "",
             0.04, "pass", "The far edge lies 0.8 mm inside the image.", "design.gel.length_mm",
         ),
-        RuleRow(
+        Check(
             "optics.blur", "Blur in gel space at the far edge", 0.19, 0.2, "mm", 0.01, "warn",
             "Less than 10 % of the limit is left; a focus error of 0.05 mm uses it up.",
             "camera.focal_number",
         ),
-        RuleRow(
+        Check(
             "optics.keystone", "Keystone ratio", 1.71, 1.5, "", -0.21, "fail",
             "The near edge is imaged 1.71 times larger than the far one; tracking wants 1.5.",
             "design.mirror.tilt_deg",
         ),
-        RuleRow(
+        Check(
             "optics.marker_pixels", "Pixels per marker at the far edge", 14.2, 5.0, "px", 9.2,
             "pass", "The smallest dot spans 14.2 px.", "design.markers.diameter_mm",
         ),
-        RuleRow(
+        Check(
             "parts.clearance", "Smallest gap between parts", 0.15, 0.0, "mm", 0.15, "pass",
             "body to mirror", "manufacturing.clearance_mm",
         ),
-        RuleRow(
+        Check(
             "parts.interference", "Parts do not overlap", 0.0, 0.0, "mm³", 0.0, "pass",
             "55 pairs were cut with each other.", "",
         ),
-        RuleRow(
+        Check(
             "light.led_hidden", "No LED is visible to the lens", True, True, "", None, "pass",
             "Total reflection keeps 0 of 14 chips in sight.", "design.light.led_offset_mm",
         ),
@@ -300,8 +300,8 @@ def report(name: str = "gelslim2", pictures: tuple[Picture, ...] = ()) -> Report
             for i, path in enumerate((*listed, "manifest.json"))
         ),
         bom=(
-            BomRow("body", 1, "PA12", "print", 24.1, "sand the mirror seat <flat>"),
-            BomRow("screw M2×8", 4, "steel A2", "buy", None),
+            BomLine("body", 1, "PA12", "print", 24.1, "sand the mirror seat <flat>"),
+            BomLine("screw M2×8", 4, "steel A2", "buy", None),
         ),
         notes=(Note("Light guide", "12 LEDs a side; all flux within 3 % of even."),),
         versions=(("gelslim-cad", "0.1.0"), ("cadquery", "2.8")),

@@ -14,14 +14,14 @@ from pathlib import Path
 import pytest
 import report_sample
 
+from gelslim_cad.checks import Check
 from gelslim_cad.report import (
-    BomRow,
+    BomLine,
     DimensionRow,
     FileRow,
     Note,
     Picture,
     ReportData,
-    RuleRow,
     render_report,
 )
 
@@ -88,10 +88,10 @@ def hostile() -> ReportData:
         report_sample.report(),
         name=bad, spec_text=bad, spec_hash=bad, summary=bad, headline=((bad, bad),),
         dimensions=(DimensionRow(bad, bad, bad, bad, ((bad, bad),), bad, bad),),
-        rules=(RuleRow(bad, bad, bad, bad, bad, 0.5, "fail", bad, bad),),
+        rules=(Check(bad, bad, bad, bad, bad, 0.5, "fail", bad, bad),),
         binding=(bad,), pictures=(Picture(bad, bad, PNG), Picture(bad, bad, b"", bad)),
         files=(FileRow("a<b>&\"'/javascript ?#%.step", 1, bad, bad),),
-        bom=(BomRow(bad, 1, bad, bad, 1.0, bad),), notes=(Note(bad, bad),),
+        bom=(BomLine(bad, 1, bad, bad, 1.0, bad),), notes=(Note(bad, bad),),
         versions=((bad, bad),),
     )  # fmt: skip
 

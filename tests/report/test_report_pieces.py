@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gelslim_cad.checks import Check
 from gelslim_cad.report.camera_view import LEVELS, colour, levels
-from gelslim_cad.report.data import CameraView, FileRow, ReportData, RuleRow
+from gelslim_cad.report.data import CameraView, FileRow, ReportData
 from gelslim_cad.report.markup import coordinate, href, number, size, text
 from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_positions, rules, sense_of, verdict
 from gelslim_cad.report.tables import substituted
@@ -19,7 +20,7 @@ REAL = st.floats(-1e6, 1e6, allow_nan=False)
 
 
 def rule(value, limit, margin, status="pass", sense=""):
-    return RuleRow("a.b", "t", value, limit, "mm", margin, status, "r", "p", sense)
+    return Check("a.b", "t", value, limit, "mm", margin, status, "r", "p", sense=sense)
 
 
 @given(st.floats(1e-3, 1e6), st.floats(1e-3, 1e6))
@@ -152,5 +153,6 @@ def test_a_margin_below_what_value_and_limit_show_is_none():
 
 
 def test_every_sentence_of_a_reason_starts_large():
-    row = RuleRow("a", "t", 1, 2, "mm", 1, "pass", "stop it by f²/(s - f). take more", "p", "max")
+    reason = "stop it by f²/(s - f). take more"
+    row = Check("a", "t", 1, 2, "mm", 1, "pass", reason, "p", sense="max")
     assert "<p>Stop it by f²/(s - f). Take more</p>" in rules((row,))
