@@ -1,8 +1,8 @@
-"""The page of all ladders, and its figures, from the JSON that the benches wrote.
+"""Make the page of all ladders, with its figures, from the JSON files of the benches.
 
     python bench/accuracy_page.py              # from docs/data to docs
     python bench/accuracy_page.py --docs D     # from D/data to D
-    python bench/accuracy_page.py --check      # says what is out of date, writes nothing
+    python bench/accuracy_page.py --check      # writes nothing; fails if the page is out of date
 
 Writes accuracy_vs_time.md, images/accuracy_*.png and data/accuracy.json, which holds every ladder
 in one form. A ladder whose bench has not been run yet is named as missing.
@@ -35,35 +35,35 @@ SOURCES: dict[str, Convert] = {
     "twin_ladders": twin,
     "rendering": rendering,
 }
-"""File in docs/data and what makes ladders of it, in the order of the page."""
+"""Files in docs/data with the functions that make ladders of them, in the order of the page."""
 HEADER = ("machine", "system", "processor", "cores", "threads", "python", "numpy", "scipy",
           "numba", "opencv", "cadquery", "gelslim_cad", "seed")  # fmt: skip
 PAGE = "accuracy_vs_time.md"
 INTRODUCTION = """\
 # What accuracy costs in time
 
-Almost every step of this project can be done more or less accurately, and accuracy takes time. This
-page shows how much: for each step that offers a choice, the error of every way to do it against an
-independent reference, and the time it takes. A grey line joins the ways that no other beats in both
-error and time (the Pareto front). A black star is what the GelSlim 2.0 paper does, where it says; a
-red ring is what this project does unless told otherwise. A default is called beaten where another
-way was no worse in both and by 5 % better in one, on this one measure. Times are of one machine and
-compare ways on it; errors do not depend on the machine.
+Almost every step of this project can be done more or less accurately, and accuracy takes time. For
+each step that offers a choice, this page shows the error of every way against an independent
+reference, and the time that it takes. A grey line joins the ways that no other beats in both error
+and time (the Pareto front). A black star is the choice of the GelSlim 2.0 paper, where the paper
+states it. A red ring is the default of this project. A default is called beaten if another way is
+no worse in both and at least 5 % better in one of them. The times are those of one machine and
+compare the ways on it. The errors do not depend on the machine.
 """
 CLOSING = """\
 ## How this page is made
 
-    make bench          # every ladder in full, then this page
-    make bench-quick    # every ladder at reduced size into out/bench, under five minutes
+    make bench          # measures every ladder in full and then makes this page
+    make bench-quick    # measures all at reduced size into out/bench, in under five minutes
 
-Text, tables and figures come from the JSON files in `docs/data` by `python bench/accuracy_page.py`;
-`docs/data/accuracy.json` holds all ladders in one form. Tests hold the page to these files, and the
-files to limits on errors and operation counts; no test looks at a time.
+`python bench/accuracy_page.py` makes text, tables and figures from the JSON files in `docs/data`.
+`docs/data/accuracy.json` holds all ladders in one form. Tests compare this page with these files,
+and the files with limits on errors and operation counts; no test depends on a time.
 """
 
 
 def main() -> None:
-    """Write, or say what is out of date."""
+    """Write the page, or say that it is out of date."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -89,7 +89,7 @@ def main() -> None:
 
 
 def read_ladders(docs: Path) -> list[LadderRecord]:
-    """Ladders of all benches that have been run."""
+    """Return the ladders of all benches that have been run."""
     found: list[LadderRecord] = []
     for name, convert in SOURCES.items():
         path = docs / "data" / f"{name}.json"
@@ -100,12 +100,12 @@ def read_ladders(docs: Path) -> list[LadderRecord]:
 
 
 def picture(ladder: LadderRecord) -> str:
-    """Path of a ladder's figure under docs."""
+    """Return the path of the figure of a ladder under docs."""
     return f"images/accuracy_{ladder.name.replace('-', '_')}.png"
 
 
 def page(ladders: list[LadderRecord]) -> str:
-    """The whole page."""
+    """Return the text of the page."""
     present = {ladder.source for ladder in ladders}
     missing = [name for name in SOURCES if name not in present]
     parts = [INTRODUCTION, overview(ladders), *map(section, ladders)]
@@ -116,7 +116,7 @@ def page(ladders: list[LadderRecord]) -> str:
 
 
 def overview(ladders: list[LadderRecord]) -> str:
-    """One row per ladder."""
+    """Return the table at the top, with one row per ladder."""
     lines = ["| step | ours | the paper | ours is |", "|---|---|---|---|"]
     for ladder in ladders:
         link = f"[{ladder.title}](#{anchor(ladder.title)})"
@@ -125,13 +125,13 @@ def overview(ladders: list[LadderRecord]) -> str:
 
 
 def anchor(title: str) -> str:
-    """Link to a heading, as forges make it."""
+    """Return the fragment of a link to a heading."""
     kept = "".join(c for c in title.lower() if c.isalnum() or c in " -_")
     return kept.replace(" ", "-")
 
 
 def section(ladder: LadderRecord) -> str:
-    """One ladder: conclusion, figure, table, what it is against and where it was measured."""
+    """Return the section of a ladder: conclusion, figure, table, reference, machine."""
     return f"""\
 ## {ladder.title}
 
@@ -143,19 +143,19 @@ def section(ladder: LadderRecord) -> str:
 
 {table(ladder)}
 
-Error against: {sentence(ladder.reference)} Paper: {ladder.paper}
+The error is against: {sentence(ladder.reference)} The paper: {sentence(ladder.paper)}
 
 <sub>`data/{ladder.source}.json`: {measured_on(ladder.header)}</sub>
 """
 
 
 def sentence(text: str) -> str:
-    """With a full stop."""
+    """Return a text that ends with a full stop."""
     return text if text.endswith(".") else f"{text}."
 
 
 def measured_on(header: Mapping[str, Any]) -> str:
-    """Machine, versions and seed as a line."""
+    """Return machine, versions and seed as a line."""
     machine = ", ".join(
         str(header[key]) for key in ("processor", "machine", "system") if header.get(key)
     )
@@ -166,11 +166,11 @@ def measured_on(header: Mapping[str, Any]) -> str:
     seed = header.get("seed")
     seeds = f"seed {seed}"
     if isinstance(seed, dict):
-        told = (
+        named = (
             f"{key} {value[0]} to {value[-1]}" if isinstance(value, list) else f"{key} {value}"
             for key, value in seed.items()
         )
-        seeds = f"seeds: {', '.join(told)}"
+        seeds = f"seeds: {', '.join(named)}"
     return f"{machine}; {versions}; {'no random numbers' if seed is None else seeds}"
 
 

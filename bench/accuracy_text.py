@@ -1,4 +1,4 @@
-"""Sentences and tables of the page, from ladders alone."""
+"""Sentences and tables of docs/accuracy_vs_time.md, from the ladders alone."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from ladder_record import LadderRecord, RungRecord
 
 MOST_ROWS = 9
 SEEN_PX = 0.05
-"""What a good detector tells apart."""
+"""Smallest shift that a good detector can see."""
 ALIKE = 1.05
-"""Errors or times within this factor are called the same."""
+"""Errors or times within this factor count as the same."""
 
 
 def error_text(ladder: LadderRecord, error: float) -> str:
-    """An error with its unit."""
+    """Return an error with its unit."""
     if ladder.error_unit in ("relative", "share"):
         return f"{100 * error:.3g} %" if error >= 1e-7 or error == 0 else f"{error:.1e}"
     unit = {"um": "µm"}.get(ladder.error_unit, ladder.error_unit)
@@ -24,7 +24,7 @@ def error_text(ladder: LadderRecord, error: float) -> str:
 
 
 def time_text(ladder: LadderRecord, time: float) -> str:
-    """A time with its unit; milliseconds for what is short."""
+    """Return a time with its unit, in milliseconds if it is short."""
     if ladder.time_unit == "s" and time < 0.1:
         return f"{1000 * time:.3g} ms"
     if ladder.time_unit == "ms" and time >= 1000:
@@ -33,12 +33,12 @@ def time_text(ladder: LadderRecord, time: float) -> str:
 
 
 def span(texts: Sequence[str]) -> str:
-    """Least and largest of some values as text, or the one."""
+    """Return the first and the last of some values as text, or one if they agree."""
     return texts[0] if texts[0] == texts[-1] else f"{texts[0]} to {texts[-1]}"
 
 
 def spoken(ladder: LadderRecord, rungs: Sequence[RungRecord]) -> str:
-    """Error and time of some rungs."""
+    """Return error and time of some rungs for a table."""
     errors = sorted(r.error for r in rungs)
     times = sorted(r.time for r in rungs)
     low, high = (error_text(ladder, e) for e in (errors[0], errors[-1]))
@@ -47,29 +47,35 @@ def spoken(ladder: LadderRecord, rungs: Sequence[RungRecord]) -> str:
 
 
 def times(factor: float) -> str:
-    """A factor in words, 1 and more."""
+    """Return a factor of 1 or more as text."""
     return f"{factor:.2g} times" if factor < 99.5 else f"{float(f'{factor:.2g}'):,.0f} times"
 
 
+def stated(ladder: LadderRecord, rungs: Sequence[RungRecord]) -> str:
+    """Return error and time of some rungs as the end of a sentence."""
+    error, _, time = spoken(ladder, rungs).partition(" in ")
+    return f"has an error of {error} and takes {time}"
+
+
 def conclusion(ladder: LadderRecord) -> str:
-    """What the figure says, in a sentence or two."""
+    """Return what the figure shows, in a few sentences."""
     if ladder.kind == "omissions":
         return _omitted(ladder)
     if not ladder.ours:
         quick, good = ladder.fronts[0][0], ladder.fronts[0][-1]
         return (
-            f"The front goes from {quick.label} ({spoken(ladder, [quick])}) to {good.label} "
-            f"({spoken(ladder, [good])})."
+            f"The fastest rung of the front, {quick.label}, {stated(ladder, [quick])}. The most "
+            f"accurate one, {good.label}, {stated(ladder, [good])}."
         )
     name = f" ({ladder.ours[0].label})" if len(ladder.ours) == 1 else ""
-    text = f"Our default{name} errs {spoken(ladder, ladder.ours)}"
+    parts = [f"Our default{name} {stated(ladder, ladder.ours)}."]
     if ladder.papers:
-        text += f", the paper's choice {spoken(ladder, ladder.papers)}"
-    return f"{text}{_beaten(ladder)}."
+        parts.append(f"The paper's choice {stated(ladder, ladder.papers)}.")
+    return " ".join([*parts, _beaten(ladder)])
 
 
 def beating(ladder: LadderRecord, ours: RungRecord) -> list[RungRecord]:
-    """Rungs that are no worse in error and time and clearly better in one."""
+    """Return the rungs that are no worse in both and clearly better in one."""
     return [
         r
         for r in ladder.rivals(ours)
@@ -78,7 +84,7 @@ def beating(ladder: LadderRecord, ours: RungRecord) -> list[RungRecord]:
 
 
 def _beaten(ladder: LadderRecord) -> str:
-    """Whether something measured beats our choice, and what more accuracy would cost."""
+    """Return whether a rung beats our choice, and what more accuracy would cost."""
     better = [
         (ours, min(beating(ladder, ours), key=lambda r: r.error))
         for ours in ladder.ours
@@ -87,19 +93,24 @@ def _beaten(ladder: LadderRecord) -> str:
     if better:
         cases = "; ".join(dict.fromkeys(f"{b.label} ({spoken(ladder, [b])})" for _, b in better))
         part = f" in {len(better)} of {len(ladder.ours)} problems" if len(ladder.ours) > 1 else ""
-        return f"; **it is beaten in both**{part} by {cases}"
+        return f"**It is beaten in both error and time**{part} by {cases}."
     if len(ladder.ours) > 1:
-        return "; nothing measured beats it in both"
+        return "No other measured rung is better in both error and time."
     (ours,) = ladder.ours
     finer = [r for r in ladder.fronts[0] if r.error < ours.error / ALIKE]
     if not finer or ours.error == 0:
-        return "; nothing measured is more accurate"
+        return "No other measured rung is more accurate."
     nxt, best = finer[0], finer[-1]
-    text = f"; the next better rung, {nxt.label}, takes {times(nxt.time / ours.time)} the time for "
-    text += error_text(ladder, nxt.error)
-    if best is not nxt:
-        text += f", the best {times(best.time / ours.time)} for {error_text(ladder, best.error)}"
-    return text
+    text = (
+        f"The next more accurate rung, {nxt.label}, takes {times(nxt.time / ours.time)} the time "
+        f"and has an error of {error_text(ladder, nxt.error)}."
+    )
+    if best is nxt:
+        return text
+    return (
+        f"{text} The most accurate one, {best.label}, takes {times(best.time / ours.time)} the "
+        f"time and has an error of {error_text(ladder, best.error)}."
+    )
 
 
 def _omitted(ladder: LadderRecord) -> str:
@@ -108,15 +119,16 @@ def _omitted(ladder: LadderRecord) -> str:
     most = max(ladder.rungs, key=lambda r: r.error)
     quiet = [r.series for r in ladder.rungs if r.error < SEEN_PX]
     text = (
-        f"{len(seen)} of {len(ladder.rungs)} effects shift markers by {SEEN_PX:g} px or more when "
-        f"left out, {most.series} the most ({error_text(ladder, most.error)}); the dearest is "
-        f"{dear.series} ({time_text(ladder, dear.time)}, {error_text(ladder, dear.error)})"
+        f"{len(seen)} of {len(ladder.rungs)} effects move markers by {SEEN_PX:g} px or more if "
+        f"they are left out. {most.series} moves them most ({error_text(ladder, most.error)}). "
+        f"{dear.series} takes the most time ({time_text(ladder, dear.time)}, "
+        f"{error_text(ladder, dear.error)})."
     )
-    return text + (f"; below that: {', '.join(quiet)}." if quiet else ".")
+    return text + (f" Below {SEEN_PX:g} px are: {', '.join(quiet)}." if quiet else "")
 
 
 def table(ladder: LadderRecord) -> str:
-    """Rungs by time: all where they are few, else front, paper's and ours, of three problems."""
+    """Return the rungs by time: all if they are few, else the front, the paper's and ours."""
     rungs = list(ladder.rungs)
     if len(rungs) > MOST_ROWS and ladder.kind != "omissions":
         rungs = _thinned(ladder)
@@ -136,12 +148,12 @@ def table(ladder: LadderRecord) -> str:
 
 
 def count_text(count: float) -> str:
-    """A number of things, or a figure beside error and time."""
+    """Return a count or another figure as text."""
     return f"{count:,.0f}" if count >= 1000 and count == int(count) else f"{count:.3g}"
 
 
 def _thinned(ladder: LadderRecord) -> list[RungRecord]:
-    """What matters: ours, the paper's, and the front, evenly thinned where it is long."""
+    """Return ours, the paper's, and the front, thinned evenly if it is long."""
     chosen = [r for r in ladder.rungs if r.is_ours or r.is_paper]
     if ladder.kind != "ladder":
         some = {ladder.series[k] for k in (0, len(ladder.series) // 2, -1)}
@@ -155,14 +167,14 @@ def _thinned(ladder: LadderRecord) -> list[RungRecord]:
 
 
 def marks(ladder: LadderRecord, rung: RungRecord) -> str:
-    """Ours, the paper's, on the front."""
+    """Return whether a rung is ours, the paper's, on the front."""
     on_front = any(rung in f for f in ladder.fronts)
     flags = ((rung.is_ours, "**ours**"), (rung.is_paper, "paper"), (on_front, "front"))
     return ", ".join(text for is_so, text in flags if is_so)
 
 
 def overview(ladder: LadderRecord, link: str) -> str:
-    """One row of the table at the top: ours, the paper's, and whether ours is on the front."""
+    """Return the row of a ladder in the table at the top of the page."""
     ours = spoken(ladder, ladder.ours) if ladder.ours else ""
     papers = spoken(ladder, ladder.papers) if ladder.papers else ""
     verdict = ""

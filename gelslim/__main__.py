@@ -1,7 +1,8 @@
 """The program: `gelslim` and `python -m gelslim`.
 
-Its first lines see to Ctrl-C, before anything else is imported. Worker processes import this module
-too and leave Ctrl-C to their parent. Import `gelslim.cli` to run commands from Python.
+It installs its handlers of Ctrl-C and SIGTERM before it imports anything else. Worker processes
+import this module too, but leave Ctrl-C to their parent. Import `gelslim.cli` to run commands from
+Python.
 """
 
 try:
@@ -14,7 +15,7 @@ try:
     if "__mp_main__" not in sys.modules:
         _ending.arm()
 except KeyboardInterrupt:
-    # In the middle of the lines that are to see to it.
+    # Ctrl-C came before the handlers were installed.
     import os
 
     os.write(2, b"Interrupted; every file that is there is whole.\n")
@@ -29,11 +30,11 @@ def main() -> int:
 
 
 def run(command: Callable[..., int]) -> int:
-    """Run a command line, which is to call what it is given as `begun` as its work begins."""
+    """Run a command line, which calls its argument `begun` when its work begins."""
     try:
         status = _ending.end(command(begun=_ending.begin))
     except KeyboardInterrupt as error:
-        # In the middle of the command's last words.
+        # Ctrl-C came while the command printed its last lines.
         status = _ending.end(128 + number_of(error))
         say(status - 128)
     if status > 128:
@@ -43,7 +44,7 @@ def run(command: Callable[..., int]) -> int:
 
 
 def _tidy() -> None:
-    """Remove what workers had no time to remove, and close what an error still holds open."""
+    """Remove temporary files of workers and close files that an error still holds open."""
     import gc
 
     from gelslim_core.files.scratch import sweep_scratch

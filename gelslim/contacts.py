@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def scene_of(scene: SceneLike) -> LoadedScene:
-    """Return what was read of a scene, reading it first where a file is named.
+    """Return a scene that was read; a file is read first.
 
     Raises:
         InputError: The file has faults.
@@ -69,7 +69,7 @@ def simulate(
 ) -> dict[str, Any]:
     """Simulate a contact scene: frames, true surface motion and true forces.
 
-    Only the effects that the tolerance calls for are simulated. A run that was interrupted goes on
+    Only the effects that the tolerance needs are simulated. A run that was interrupted continues
     where it stopped.
 
     Args:
@@ -77,7 +77,7 @@ def simulate(
         out: Folder of the results; `out/NAME` by default.
         budget: Error and time allowed; replaces the tolerance of the scene.
         count: Number of scenes of the data set that the scene's `vary` block describes; None for
-            the scene as it stands.
+            the scene itself.
         jobs: Number of processes for a data set.
         scheduler: Address of a Dask scheduler, in place of processes.
         overwrite: Replace another simulation in the folder.
@@ -166,11 +166,11 @@ def validate(
 def with_budget(
     loaded: LoadedScene, budget: Budget | None
 ) -> tuple[LoadedScene, tuple[Choice, bool] | None]:
-    """Give a scene the tolerance that a budget comes to.
+    """Give a scene the tolerance of a budget.
 
     Returns:
-        The scene, unchanged without a budget; and the choice that was made with whether the times
-        are those of this machine, or None.
+        The scene, unchanged without a budget; and the choice with whether its times are those of
+        this machine, or None without a budget.
 
     Raises:
         BudgetError: No plan keeps the budget.
@@ -197,9 +197,9 @@ def twin_key(figures: SensorFigures) -> str:
 
 
 def machine_paces(figures: SensorFigures) -> Mapping[str, float]:
-    """Return this machine's times over the declared ones by group of effects.
+    """Return the times of this machine over the declared ones, by group of effects.
 
-    Empty where `gelslim bench` has not measured them.
+    Empty if `gelslim bench` has not measured them.
     """
     from gelslim_core.budget.machine_times import read_times
 
@@ -207,7 +207,7 @@ def machine_paces(figures: SensorFigures) -> Mapping[str, float]:
 
 
 def _sensor_folder(folder: Path) -> Path:
-    """Return where the sensor of a simulation is kept, so that the next one finds it."""
+    """Return the folder of the sensor of a simulation, where the next one finds it."""
     return folder.parent / ".sensor" if folder.parent != folder else folder / ".sensor"
 
 
@@ -222,7 +222,7 @@ def _one(
 
     place = _sensor_folder(folder)
     job = job_of(loaded, stored_sensor(place), place)
-    # As in the workers of a data set: threads that wait for each other cost more than they save.
+    # As in the workers of a data set, where several threads are slower than one.
     with threadpool_limits(limits=1, user_api="blas"):
         ledger = simulated(job, folder, overwrite=overwrite, progress=progress)
     return {"folder": str(folder), "scenes": 1, "poses": len(loaded.poses), **ledger.to_record()}

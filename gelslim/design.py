@@ -25,7 +25,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def spec_of(spec: SpecLike) -> Spec:
-    """Return the spec itself, whether it is given as a spec, as what was read, or as a file.
+    """Return the spec of any of the accepted arguments.
 
     Args:
         spec: A spec, the result of `read_spec`, or the path of a YAML file.
@@ -91,7 +91,7 @@ def build(
     Args:
         spec: Path of the YAML file.
         out: Folder of the files; `out/NAME` by default. An earlier build of the same spec in it
-            is replaced as a whole; what has not changed is taken over.
+            is replaced in one step; what has not changed is reused.
         jobs: Number of processes; by default one per processor, at most four. It does not change
             a byte of the files.
         progress: Called as the work goes on.
@@ -118,7 +118,7 @@ class MeasuredBundle:
         bundle: The bundle.
         ladder: Error and time of every operator; None where none was measured.
         operator: Label of the operator that the force pipeline starts with; empty for none.
-        remarks: What lies outside the calibrated range of the choice.
+        remarks: What lies outside the measured range of the choice.
     """
 
     bundle: Bundle
@@ -172,12 +172,12 @@ def make_bundle(
 
 
 def chosen_operator(ladder: OperatorLadder, budget: Budget | None) -> tuple[str, tuple[str, ...]]:
-    """Choose the operator that a budget asks for, else the one a bundle starts with.
+    """Choose the operator of a budget, or without one the default operator of a bundle.
 
-    The ladder was measured here and now, so that its times are those of this machine.
+    The ladder must have been measured on this machine, so that its times are valid.
 
     Returns:
-        The operator's label, and what lies outside the calibrated range.
+        The label of the operator, and what lies outside the measured range.
 
     Raises:
         BudgetError: No operator keeps the budget.

@@ -22,10 +22,10 @@ class Example:
     """A design or a scene that comes with the program.
 
     Attributes:
-        name: By which `gelslim new --from` finds it.
+        name: Name for `gelslim new --from`.
         kind: `design` or `scene`.
         path: The YAML file.
-        summary: First sentence of the remark at the head of the file.
+        summary: First sentence of the comment at the beginning of the file.
     """
 
     name: str
@@ -60,7 +60,7 @@ def examples() -> tuple[Example, ...]:
         The examples, designs first.
 
     Raises:
-        ExampleError: They are not installed.
+        ExampleError: The examples are not installed.
     """
     folder = next((f for f in _FOLDERS if f.is_dir()), None)
     if folder is None:
@@ -88,7 +88,7 @@ def example(name: str) -> Example:
 
 
 def _summary(text: str) -> str:
-    """Return the first sentence of the remark at the head of a file."""
+    """Return the first sentence of the comment at the beginning of a file."""
     remark: list[str] = []
     for line in text.splitlines():
         if not line.startswith("#") or not line.strip("# "):

@@ -1,4 +1,4 @@
-"""The sensor that a scene names, resolved: from its spec, or from a bundle."""
+"""The sensor of a scene, made from its spec or read from a bundle."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 DEEPEST_SHARE = 0.9
-"""Largest depth of a contact, as a part of the gel's thickness."""
+"""Largest depth of a contact as a part of the thickness of the gel."""
 
 
 def sensor_figures(loaded: LoadedScene) -> SensorFigures:
-    """The figures that planning needs, without a stiffness.
+    """Return the figures of a sensor that planning needs; they need no stiffness.
 
-    Raises `InputError` for a sensor that is missing or a spec with faults, IfemError for a folder
-    that is no bundle.
+    Raises InputError if the sensor is missing or its spec has faults, IfemError if the folder is
+    not a bundle.
     """
     from gelslim_twin.planning.sensor_figures import bundle_figures
 
@@ -31,9 +31,9 @@ def sensor_figures(loaded: LoadedScene) -> SensorFigures:
 
 
 def scene_bundle(loaded: LoadedScene, with_light: bool = True) -> Bundle:
-    """The bundle of the scene's sensor: read, or made from the spec without a ladder.
+    """Return the bundle of a scene's sensor, read or made from the spec without a ladder.
 
-    Raises as `sensor_figures`.
+    Raises the same errors as `sensor_figures`.
     """
     _require_present(loaded)
     if loaded.scene.sensor.bundle is not None:
@@ -44,9 +44,9 @@ def scene_bundle(loaded: LoadedScene, with_light: bool = True) -> Bundle:
 
 
 def spec_bundle(path: Path, with_light: bool = True) -> Bundle:
-    """The bundle of a spec without a ladder; light is traced only when it is asked for.
+    """Return the bundle of a spec without a ladder; light is traced only with `with_light`.
 
-    Raises `InputError` for a spec with faults.
+    Raises InputError if the spec has faults.
     """
     from gelslim_cad.dimensions import derive
     from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
@@ -59,7 +59,7 @@ def spec_bundle(path: Path, with_light: bool = True) -> Bundle:
 
 
 def require_within_gel(loaded: LoadedScene, thickness_mm: float) -> None:
-    """Raise `InputError` for a tool that is pressed through nearly the whole gel."""
+    """Raise InputError if the tool goes deeper than `DEEPEST_SHARE` of the gel."""
     most = DEEPEST_SHARE * thickness_mm
     lowest = min(indenter.raised_mm for indenter in loaded.scene.indenters)
     depth = max(pose.depth_mm for pose in loaded.poses) - lowest

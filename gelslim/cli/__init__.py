@@ -1,4 +1,4 @@
-"""The command line `gelslim`: one module per command, everything heavy imported when used."""
+"""The command line `gelslim`: one module per command. Heavy libraries load when they are used."""
 
 from gelslim.cli.main import main
 

@@ -1,4 +1,4 @@
-"""What a command answers: JSON for programs, tables and words for people."""
+"""Answers of the commands: JSON for programs, tables and sentences for people."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def print_json(content: object) -> None:
 
 
 def plain(value: Any) -> Any:
-    """`value` with numpy scalars unwrapped, tuples as lists, and NaN and infinity as None."""
+    """Return a value with Python's own scalars, lists for tuples, and None for NaN and infinity."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, tuple | list):
@@ -34,7 +34,7 @@ def plain(value: Any) -> Any:
 
 
 def number(value: Any, unit: str = "") -> str:
-    """A value for people: four digits that count, no exponent where avoidable, then the unit."""
+    """Return a value as text for people: about four significant digits, then the unit."""
     if value is None:
         return "none"
     if isinstance(value, bool | str):
@@ -57,12 +57,12 @@ def number(value: Any, unit: str = "") -> str:
 
 
 def shown_ms(milliseconds: float | None) -> str:
-    """Return a time of the ladder; a dash where it was not measured."""
+    """Return a time of a ladder as text; a dash if it was not measured."""
     return "-" if milliseconds is None else f"{milliseconds:.3f} ms"
 
 
 def given(value: Any, unit: str = "") -> str:
-    """A value of the spec as it stands there, up to six digits, then its unit."""
+    """Return a value of the spec with up to six digits, as the spec has it, then its unit."""
     if isinstance(value, tuple | list) and not value:
         return "none"
     if isinstance(value, float) and math.isfinite(value) and 1e-4 <= abs(value) < 1e6:
@@ -71,12 +71,12 @@ def given(value: Any, unit: str = "") -> str:
 
 
 def console() -> Console:
-    """A console on standard output: colours only on a terminal, at most `WIDEST` wide."""
+    """Return a console on standard output, at most `WIDEST` wide, with colours on a terminal."""
     from rich.console import Console
 
     class Screen(Console):
         def on_broken_pipe(self) -> None:
-            # rich would exit with 1, which here says that a design rule fails.
+            # rich would exit with 1, but that status means that a design rule fails.
             raise BrokenPipeError
 
     screen = Screen(highlight=False, markup=False, emoji=False)
@@ -86,7 +86,7 @@ def console() -> Console:
 
 
 def say(text: str, style: str = "") -> None:
-    """Print words, wrapped at the console's width."""
+    """Print text, wrapped at the width of the console."""
     console().print(text, style=style or None)
 
 
@@ -100,7 +100,7 @@ CLOSED_PIPE = 141
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[str, int, int], None] | None]:
-    """A progress bar on a terminal's standard error, nothing elsewhere."""
+    """Show a progress bar on standard error if that is a terminal and `quiet` is false."""
     from rich.console import Console
 
     screen = Console(stderr=True, highlight=False)
@@ -116,7 +116,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, int, int], None] | None
     )
 
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"))
-    # No refreshing thread: the build forks its workers.
+    # No thread refreshes the bar, because a build forks its workers.
     with Progress(
         *columns, TimeElapsedColumn(), console=screen, transient=True, auto_refresh=False
     ) as bar:

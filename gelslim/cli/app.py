@@ -1,4 +1,4 @@
-"""The application: its commands and options."""
+"""The commands of the command line and its global options."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "This program": ("doctor", "bench", "schema"),
 }
 LONGEST = 200
-"""Characters of a command's first sentence: all of it; the formatter breaks the line."""
+"""Largest length of the first sentence of a command, which the list of commands shows."""
 
 
 class CommandList(TyperGroup):
-    """Lists commands under headings; one that no heading names comes last."""
+    """Lists the commands under headings; commands without a heading come last."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a section for each heading."""
@@ -67,13 +67,17 @@ class CommandList(TyperGroup):
                     formatter.write_dl(rows)
 
 
-EPILOG = "Exit status: 0 done, 1 a design rule fails, 2 bad input, 3 a fault of gelslim itself."
+EPILOG = (
+    "Exit status: 0 after success, 1 if a design rule fails, 2 after bad input, 3 after a fault of "
+    "gelslim itself."
+)
 
 app = typer.Typer(
     name="gelslim",
     cls=CommandList,
-    help="From one YAML spec to a GelSlim-type tactile finger: CAD, marker print, stiffness, "
-    "report.\n\nNew here? `gelslim new my_finger`, then `gelslim check my_finger.yaml`.",
+    help="Design a tactile finger of the GelSlim type from one YAML file, make its files, and turn "
+    "the pictures of its camera into forces.\n\nTo start, run `gelslim new my_finger`, then "
+    "`gelslim check my_finger.yaml`.",
     epilog=EPILOG,
     no_args_is_help=True,
     add_completion=True,
@@ -93,10 +97,12 @@ def _version(wanted: bool) -> None:
 def _options(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+        typer.Option(
+            "--version", callback=_version, is_eager=True, help="Print the version and exit."
+        ),
     ] = False,
 ) -> None:
-    """Options before any command."""
+    """Take the options that stand before a command."""
 
 
 for _command in (

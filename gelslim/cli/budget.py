@@ -1,4 +1,4 @@
-"""The options `--error` and `--time` that several commands take, and this machine's times."""
+"""The options `--error` and `--time` of several commands, and the times of this machine."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
 FieldError = Annotated[
     str | None,
-    typer.Option("--error", help="Error of the force field that is allowed, as 3% or 0.03."),
+    typer.Option("--error", help="Largest error of the force field, such as 3% or 0.03."),
 ]
 FrameTime = Annotated[
     str | None,
     typer.Option(
         "--time",
         "--time-ms",
-        help="Time that the operator may take per frame, as 2ms or 1s; a bare number is ms.",
+        help="Largest time of the operator per frame, such as 2ms or 1s; a bare number is in ms.",
     ),
 ]
 
 
 def budget_of(error: str | None, time: str | None) -> Budget:
-    """The budget of both options. Raises CommandError for words that are no error or time."""
+    """Return the budget of both options. Raises CommandError if one of them cannot be read."""
     from gelslim.cli.failure import CommandError
     from gelslim_core.budget.budget import Budget, BudgetError
 
@@ -43,9 +43,9 @@ def budget_of(error: str | None, time: str | None) -> Budget:
 
 
 def on_this_machine(bundle: Bundle) -> Bundle:
-    """The bundle with its ladder's times as `gelslim bench` measured them here, if it did.
+    """Return the bundle with the times that `gelslim bench` measured on this machine, if any.
 
-    Errors and operators stay as they are: only a budget of time can see the difference.
+    Errors and operators do not change, so only a budget of time can give another result.
     """
     from dataclasses import replace
 
@@ -57,20 +57,20 @@ def on_this_machine(bundle: Bundle) -> Bundle:
 
 
 def note_choice(choice: Choice, budget: Budget, calibrated: bool, bench: str) -> None:
-    """Say on standard error what lies outside the calibration of the rung chosen.
+    """Print on standard error what lies outside the measured range of the chosen rung.
 
-    `calibrated` tells whether the times were measured on this machine; else `bench` is the command
-    that does.
+    `calibrated` says whether the times were measured on this machine; if not, `bench` is the
+    command that measures them.
     """
     remarks = list(choice.remarks)
     if budget.time_ms is not None and not calibrated:
-        remarks.append(f"times are not this machine's; `{bench}` measures them here")
+        remarks.append(f"the times are not those of this machine; `{bench}` measures them")
     for remark in remarks:
         print(f"gelslim: {remark}", file=sys.stderr)
 
 
 def keep_times(ladder_key: str, times_ms: Mapping[str, float]) -> None:
-    """Keep times of this machine for the next command; where they cannot be kept, go on."""
+    """Keep times of this machine for the next command. Continue if they cannot be kept."""
     from gelslim_core.budget.machine_times import write_times
 
     with suppress(OSError):
@@ -81,8 +81,8 @@ SceneError = Annotated[
     str | None,
     typer.Option(
         "--error",
-        help="Error allowed, as 3%: of the deepest contact's force and, in pictures, of its depth. "
-        "Replaces the scene's tolerance.",
+        help="Largest error, such as 3%, of the force of the deepest contact and, in pictures, of "
+        "its depth. It replaces the tolerance of the scene.",
     ),
 ]
 PoseTime = Annotated[
@@ -90,15 +90,15 @@ PoseTime = Annotated[
     typer.Option(
         "--time",
         "--time-ms",
-        help="Time that a pose may take as planned, as 50ms or 1s; a bare number is ms.",
+        help="Largest planned time of a pose, such as 50ms or 1s; a bare number is in ms.",
     ),
 ]
 
 
 def budgeted_scene(loaded: LoadedScene, error: str | None, time: str | None) -> LoadedScene:
-    """The scene with the tolerance that a budget asks for; as it is without one.
+    """Return the scene with the tolerance of a budget, unchanged without one.
 
-    Raises CommandError for words that are no budget, BudgetError where no plan keeps it.
+    Raises CommandError if an option cannot be read, BudgetError if no plan keeps the budget.
     """
     from gelslim.cli.budget import budget_of, note_choice
     from gelslim.contacts import with_budget

@@ -1,4 +1,4 @@
-"""What to print and which status to return when a command cannot do its work."""
+"""Message and exit status of a command that fails."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _COMMAND_ERROR = typer.BadParameter.__mro__[2]
 
 
 class CommandError(GelslimError):
-    """A command refuses its arguments or its output place."""
+    """A command refuses its arguments or its output folder."""
 
     def __init__(self, message: str, status: int = BAD_INPUT) -> None:
         super().__init__(message)
@@ -32,9 +32,9 @@ class CommandError(GelslimError):
 
 
 def explain_failure(error: BaseException, as_json: bool) -> int:
-    """Print what happened and return the exit status. Never raises, never prints a traceback.
+    """Print the message of an error and return the exit status. It never raises an error itself.
 
-    With GELSLIM_DEBUG set, the traceback of an unexpected error follows.
+    If GELSLIM_DEBUG is set, the traceback of an unexpected error follows.
     """
     if isinstance(error, _USAGE_ERROR) and not as_json:
         _show_usage(error)
@@ -66,9 +66,9 @@ def _first_line(error: BaseException) -> str:
 
 
 def _judge(error: BaseException) -> tuple[int, str]:
-    """Exit status and message."""
+    """Return exit status and message."""
     name = type(error).__name__
-    # Libraries turn Ctrl-C into errors of their own, such as that they cannot be imported.
+    # Libraries turn Ctrl-C into errors of their own, such as a failed import.
     number = signal.SIGINT if name == "Abort" else asked_to_end(error)
     if number is not None:
         return 128 + number, SAID[signal.Signals(number)][1]
@@ -79,7 +79,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
             return answer(error)
     return FAULT, (
         f"gelslim: unexpected {name}: {_one_line(str(error))}\n"
-        "This is a fault of gelslim, not of your spec. Please report it with the spec; "
+        "This is a fault of gelslim and not of your spec. Please report it with the spec; "
         "GELSLIM_DEBUG=1 shows where it happened."
     )
 
@@ -94,14 +94,14 @@ def _missing(error: ImportError) -> tuple[int, str]:
         )
     if extra or ".so" in str(error):
         return BAD_INPUT, (
-            f"gelslim: {top or 'a library'} cannot load ({_one_line(str(error))}); "
+            f"gelslim: {top or 'a library'} cannot be loaded ({_one_line(str(error))}); "
             "on Debian or Ubuntu: apt-get install libgl1 libx11-6 libxrender1 libegl1"
         )
     return FAULT, f"gelslim: a module is missing ({_one_line(str(error))}); install gelslim again"
 
 
 def _os_message(error: OSError) -> str:
-    # The project's own output errors are whole sentences; the system's name a file and a reason.
+    # Our own errors are sentences; those of the system have a file and a reason.
     if error.strerror is None:
         return str(error)
     place = f"{error.filename}: " if error.filename else ""
@@ -121,7 +121,7 @@ _ANSWERS: dict[type[BaseException], Callable[[Any], tuple[int, str]]] = {
         "gelslim: not enough memory; use fewer mesh cells or fewer --jobs",
     ),
 }
-"""Errors of others that have an exit status and a message of their own."""
+"""Errors of other libraries, with the function that gives exit status and message."""
 
 
 def _as_json(error: BaseException, message: str, status: int) -> str:

@@ -1,4 +1,4 @@
-"""What takes the results of `gelslim force`: run folder, recording, video, view, pictures."""
+"""Options and outputs of `gelslim force`: run folder, recording, video, view, pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunOutputs:
-    """What a run is to write, and where."""
+    """What a run writes, and where."""
 
     folder: Path
     fields: str
@@ -28,7 +28,7 @@ class RunOutputs:
     video: Path | None
     mcap: Path | None
     view: bool
-    """Show the run in a browser meanwhile."""
+    """Show the run in a browser while it takes place."""
     overwrite: bool
     quiet: bool
 
@@ -40,9 +40,9 @@ def result_sinks(
     chosen: dict[str, Any],
     frames_per_s: float,
 ) -> tuple[list[Any], PictureSink | None]:
-    """What takes the results; and the picture sink, which writes at the end.
+    """Return the sinks of the results, and the picture sink, which writes at the end.
 
-    `chosen` goes into the run's manifest. Raises CommandError for files that are not to be
+    `chosen` goes into the manifest of the run. Raises CommandError for a file that must not be
     replaced.
     """
     from gelslim_force.outputs.run_manifest import bundle_identity
@@ -120,7 +120,7 @@ def _overlay(pipeline: ForcePipeline) -> Overlay:
 Frames = Annotated[
     str,
     typer.Argument(
-        metavar="FRAMES", help="Folder of pictures, video, .npy array, or camera:0 for live."
+        metavar="FRAMES", help="Folder of pictures, video, .npy array, or camera:0 for a camera."
     ),
 ]
 Reference = Annotated[
@@ -128,33 +128,40 @@ Reference = Annotated[
 ]
 Calibration = Annotated[
     Path | None,
-    typer.Option("-c", "--calibration", help="File of `gelslim calibrate`, in its place."),
+    typer.Option(
+        "-c", "--calibration", help="File of `gelslim calibrate`, in place of the picture."
+    ),
 ]
 RunFolder = Annotated[
-    Path | None, typer.Option("-o", "--out", help="Run folder; out/NAME-force if left out.")
+    Path | None, typer.Option("-o", "--out", help="Run folder to write; by default out/NAME-force.")
 ]
 KnownIndenter = Annotated[
     str | None,
-    typer.Option(help="Known indenter: sphere:10, cylinder:6, flat:5, flat:4x8 (mm)."),
+    typer.Option(help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm)."),
 ]
 KnownDepth = Annotated[
-    float | None, typer.Option(min=0, help="Known depth of the indenter; a flat one needs it.")
+    float | None,
+    typer.Option(min=0, help="Known depth of the indenter in mm; a flat one needs it."),
 ]
 DepthMaps = Annotated[
     Path | None,
-    typer.Option(help=".npy of heights (frames, h, w) in mm, registered to the pictures."),
+    typer.Option(help="File .npy of heights (frames, h, w) in mm, registered to the pictures."),
 ]
-OperatorName = Annotated[str | None, typer.Option(help="Operator by name, such as fft.")]
-Method = Annotated[str, typer.Option(help="auto, direct, low_pass or masked; see the guide.")]
-Compensation = Annotated[str, typer.Option(help="Projection: exact, arctan, printed or none.")]
-Interpolation = Annotated[str, typer.Option(help="sparse or thin_plate.")]
-GelLaw = Annotated[str, typer.Option(help="linear or neo_hookean.")]
-Friction = Annotated[float, typer.Option(min=0, help="Coulomb coefficient.")]
-FieldFormat = Annotated[str, typer.Option(help="Force fields as npz, parquet or none.")]
-OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video, .mp4 or .avi.")]
-Recording = Annotated[Path | None, typer.Option(help="Recording with ROS 2 messages.")]
-LiveView = Annotated[bool, typer.Option("--view", help="Watch in a browser meanwhile.")]
-ReplaceRun = Annotated[bool, typer.Option("--force", help="Replace an earlier run.")]
+OperatorName = Annotated[str | None, typer.Option(help="Name of the force operator, such as fft.")]
+Method = Annotated[str, typer.Option(help="Force method: auto, direct, low_pass or masked.")]
+Compensation = Annotated[
+    str, typer.Option(help="Correction for projection: exact, arctan, printed or none.")
+]
+Interpolation = Annotated[str, typer.Option(help="From markers to nodes: sparse or thin_plate.")]
+GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear or neo_hookean.")]
+Friction = Annotated[float, typer.Option(min=0, help="Coefficient of Coulomb friction.")]
+FieldFormat = Annotated[str, typer.Option(help="Format of the force fields: npz, parquet or none.")]
+OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video to write, .mp4 or .avi.")]
+Recording = Annotated[
+    Path | None, typer.Option(help="Recording with ROS 2 messages to write, .mcap.")
+]
+LiveView = Annotated[bool, typer.Option("--view", help="Show the run in a browser.")]
+ReplaceRun = Annotated[bool, typer.Option("--force", help="Replace an earlier run in the folder.")]
 
 
 def answer_json(
@@ -182,7 +189,7 @@ def answer_json(
 
 
 def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]) -> None:
-    """Say how many frames got forces, the last wrench, problems, times and where all is."""
+    """Print the number of frames with forces, the last wrench, problems, times and folder."""
     from gelslim.cli.answer import say
 
     say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")

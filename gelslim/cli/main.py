@@ -1,4 +1,4 @@
-"""Entry point: runs a command and turns every failure into a message and an exit status."""
+"""Entry point: runs a command and turns every error into a message and an exit status."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import ParamSpec
 P = ParamSpec("P")
 
 SPELLED = "gelslim-spelled"
-"""Name of the error handler that writes signs which a terminal lacks in ASCII."""
+"""Name of the error handler that spells characters in ASCII if a terminal cannot show them."""
 _SPELLING = {
     "≥": ">=", "≤": "<=", "°": " deg", "²": "^2", "³": "^3", "·": "*", "×": "x", "π": "pi",
     "α": "alpha", "γ": "gamma", "θ": "theta", "ψ": "psi", "Φ": "Phi", "Δ": "delta ",
@@ -23,11 +23,11 @@ _SPELLING = {
 }  # fmt: skip
 
 command_starts: ContextVar[Callable[[], None]] = ContextVar("command_starts")
-"""Called when typer has parsed the arguments and the command itself starts."""
+"""Function to call when typer has parsed the arguments and the command itself starts."""
 
 
 class CarriedError(Exception):
-    """Carries what a command raised past typer, which would turn some errors into a status."""
+    """Carries an error of a command past typer, which would turn some errors into a status."""
 
     def __init__(self, cause: BaseException) -> None:
         super().__init__(str(cause))
@@ -56,15 +56,15 @@ def main(argv: Sequence[str] | None = None, begun: Callable[[], None] = lambda: 
         begun: Called when the command itself starts. Until then there is nothing to clean up.
 
     Returns:
-        The exit status. 0: done. 1: a design rule fails. 2: bad input. 3: a fault of the program
-        itself. As in shells 130 after an interrupt, 141 when the reader of a pipe has gone, and
-        143 after SIGTERM.
+        The exit status: 0 after success, 1 if a design rule fails, 2 after bad input, 3 after a
+        fault of the program itself. As in shells it is 130 after an interrupt, 141 if the reader of
+        a pipe has closed it, and 143 after SIGTERM.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         return _run(arguments, begun)
     except SystemExit as ended:
-        # Only shell completion ends this way: it has printed its answer.
+        # Only shell completion ends like this, after it has printed its answer.
         return ended.code if isinstance(ended.code, int) else 0
     except BaseException as raised:
         return _failed(raised, as_json="--json" in arguments)
@@ -88,7 +88,7 @@ def _run(arguments: list[str], begun: Callable[[], None]) -> int:
 def _open_streams() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
-            # The caller closed it, as with `>&-`: what is printed is dropped.
+            # The caller closed it, as with `>&-`. Output is dropped.
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
         stream = getattr(sys, name)
         if isinstance(stream, TextIOWrapper):
@@ -107,20 +107,20 @@ def _failed(raised: BaseException, as_json: bool) -> int:
         status = explain_failure(error, as_json=as_json)
         sys.stdout.flush()
     except OSError:
-        # Standard output accepts nothing: a full disk, or a pipe without a reader.
+        # Standard output cannot be written: a full disk, or a pipe without a reader.
         _drop_output()
         status = explain_failure(error, as_json=False)
     return status
 
 
 def _drop_output() -> None:
-    """Send the rest of standard output nowhere, so that the interpreter's exit does not fail."""
+    """Discard the rest of standard output, so that the exit of the interpreter does not fail."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _nothing() -> None:
-    """Do nothing, where no caller asked to be told."""
+    """Do nothing; the default if no caller wants to know that the command starts."""
 
 
 def _spell(error: UnicodeError) -> tuple[str | bytes, int]:

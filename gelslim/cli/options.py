@@ -8,15 +8,17 @@ from typing import Annotated
 import typer
 
 SpecFile = Annotated[Path, typer.Argument(metavar="SPEC", help="The finger's YAML file.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Answer in JSON, for programs.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON, for programs.")]
 Force = Annotated[
-    bool, typer.Option("--force", help="Write even where a rule on gel, mesh or markers fails.")
+    bool, typer.Option("--force", help="Write even if a rule on gel, mesh or markers fails.")
 ]
-DrawPictures = Annotated[bool, typer.Option(help="Draw the pictures.")]
+DrawPictures = Annotated[bool, typer.Option(help="Write pictures.")]
 OverlayPictures = Annotated[
-    int, typer.Option(min=0, help="Overlay pictures to write, spread over the run.")
+    int, typer.Option(min=0, help="Number of overlay pictures, spread over the run.")
 ]
 MostFrames = Annotated[
-    int | None, typer.Option("--frames", min=1, help="Stop after so many frames.")
+    int | None, typer.Option("--frames", min=1, help="Stop after this number of frames.")
 ]
-SensorBundle = Annotated[Path, typer.Argument(metavar="BUNDLE", help="The sensor's bundle.")]
+SensorBundle = Annotated[
+    Path, typer.Argument(metavar="BUNDLE", help="Folder of the sensor's bundle.")
+]

@@ -1,4 +1,4 @@
-"""Files and folders that commands write: whole or not at all."""
+"""Files and folders that commands write, completely or not at all."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
 MARK_BYTES = 1 << 16
 PAD_RULES = ("gel.", "mesh.", "marker.")
-"""Beginnings of the ids of rules that bear on pad, mesh and marker print."""
+"""Beginnings of the ids of rules on pad, mesh and marker print."""
 
 
 def replace_file(target: Path, data: bytes) -> None:
-    """Write `data` to `target` in one step; folders above it are made. Raises OSError."""
+    """Write `data` to `target` in one step and make the folders above it. Raises OSError."""
     whole_file(target, data, parents=True)
 
 
 def spare_strangers(target: Path, mark: bytes, what: str) -> None:
-    """Raise CommandError where `target` is a file without `mark` near its beginning.
+    """Raise CommandError if `target` is a file without `mark` near its beginning.
 
-    What an earlier run wrote may be replaced; what the user has there must not be.
+    A file of an earlier run may be replaced, a file of the user must not.
     """
     from gelslim.cli.failure import CommandError
 
@@ -34,13 +34,13 @@ def spare_strangers(target: Path, mark: bytes, what: str) -> None:
     with open(target, "rb") as stream:
         if mark in stream.read(MARK_BYTES):
             return
-    raise CommandError(f"{target} exists and is no {what}; give another name or remove it")
+    raise CommandError(f"{target} exists and is not a {what}; give another name or remove the file")
 
 
 def spare_strangers_in(folder: Path, names: Iterable[str], first: str, mark: bytes) -> None:
-    """Raise CommandError where `folder` has files of these names that no earlier run wrote.
+    """Raise CommandError if `folder` has files of these names that no earlier run wrote.
 
-    A run writes the file `first` before all others, and it has `mark` near its beginning.
+    A run writes the file `first` before all others, with `mark` near its beginning.
     """
     from gelslim.cli.failure import CommandError
 
@@ -54,18 +54,18 @@ def spare_strangers_in(folder: Path, names: Iterable[str], first: str, mark: byt
     except OSError:
         pass
     raise CommandError(
-        f"{folder}: holds a {there[0]} of other origin, which this would replace; "
+        f"{folder}: the file {there[0]} was not written by gelslim and would be replaced; "
         "choose another --out"
     )
 
 
 def written(folder: Path, files: Sized) -> str:
-    """One line that says what was written where."""
+    """Return a line with the number of files and their folder."""
     return f"Wrote {len(files)} files to {folder}{os.sep}"
 
 
 def require_pad_rules(d: Dimensions, command: str, force: bool) -> None:
-    """Raise CommandError (status 1) where a rule on gel, mesh or markers fails."""
+    """Raise CommandError (status 1) if a rule on gel, mesh or markers fails."""
     from gelslim.cli.answer import RULE_FAILED
     from gelslim.cli.failure import CommandError
     from gelslim_cad.checks import check

@@ -1,4 +1,4 @@
-"""The price of a changed finger, for people and for programs."""
+"""The price of a changed finger, as a table and as data."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 STYLE = {"better": "green", "worse": "bold red", "": ""}
 SHARES = ("force.error",)
-"""Figures that are parts of a whole, told in per cent."""
+"""Figures that are shown in per cent."""
 
 
 def price_record(prices: Sequence[Price]) -> list[dict[str, Any]]:
-    """Each figure with both values, its relative change, and whether it is better or worse."""
+    """Return each figure with both values, its relative change, and `better` or `worse`."""
     return [
         {
             "name": p.figure.name,
@@ -31,7 +31,7 @@ def price_record(prices: Sequence[Price]) -> list[dict[str, Any]]:
 
 
 def print_prices(title: str, prices: Sequence[Price], before: str, after: str) -> None:
-    """A table of all figures: both values, the difference in per cent, better or worse."""
+    """Print a table of all figures with both values and the change in per cent."""
     from rich.table import Table
     from rich.text import Text
 
@@ -43,8 +43,8 @@ def print_prices(title: str, prices: Sequence[Price], before: str, after: str) -
     for p in prices:
         table.add_row(
             p.figure.words,
-            told(p.figure, p.before),
-            told(p.figure, p.after),
+            figure_text(p.figure, p.before),
+            figure_text(p.figure, p.after),
             per_cent(p.change),
             Text(p.verdict, style=STYLE[p.verdict]),
         )
@@ -53,15 +53,15 @@ def print_prices(title: str, prices: Sequence[Price], before: str, after: str) -
 
 
 def print_broken(name: str, found: Measured) -> None:
-    """Say which rules leave a finger without light and force error."""
+    """Print which rules fail, so that light and force error were not computed."""
     from gelslim.cli.answer import say
 
     if found.failed:
-        say(f"{name} breaks {', '.join(found.failed)}: no light and no force error of it.")
+        say(f"{name} breaks {', '.join(found.failed)}, so light and force error were not computed.")
 
 
-def told(figure: Figure, value: float | None) -> str:
-    """A figure for people."""
+def figure_text(figure: Figure, value: float | None) -> str:
+    """Return a figure as text."""
     from gelslim.cli.answer import number
 
     if value is None:
@@ -72,7 +72,7 @@ def told(figure: Figure, value: float | None) -> str:
 
 
 def per_cent(change: float | None) -> str:
-    """A relative change for people."""
+    """Return a relative change as text."""
     from gelslim_cad.explore.price import SAME
 
     if change is None:

@@ -1,4 +1,4 @@
-"""A validation in words and tables for people."""
+"""A validation as sentences, tables and plots."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NONE = "-"
 
 
 def print_validation(found: Validation) -> None:
-    """What was done, the chains beside the paper, the error budget, the other contacts."""
+    """Print the experiment, the chains and the paper, the error budget, the other contacts."""
     from gelslim.cli.answer import console, say
 
     screen = console()
@@ -35,16 +35,16 @@ def print_validation(found: Validation) -> None:
     )
     say(f"{found.truth}\n")
     say(
-        "Resultant, found minus true: standard deviation and mean of x, y, z in N; error: root "
-        "mean square over that of the force; good: frames within 15 % of the force:"
+        "Error of the resultant, found minus true: its standard deviation and mean along x, y, z "
+        "in N, its root mean square over that of the force, and frames within 15 % of the force:"
     )
     screen.print(_resultants("chain", found.chains))
     print("\nForce field, medians over the frames:")
     screen.print(_fields(found.chains))
     if found.budget:
         say(
-            "\nError budget: the paper's one layer on exact markers, no noise, one thing wrong at "
-            "a time:"
+            "\nError budget: the paper's one layer on exact markers without noise, one source of "
+            "error at a time:"
         )
         screen.print(_resultants("source", found.budget))
     print("\nOther contacts, last frame, N:")
@@ -120,13 +120,13 @@ SHOWN = {
     "paper, depth known": ("#e09d3c", "s"),
     "paper, shape known": ("#c23b3b", "x"),
 }
-"""Chains drawn, with colour and marker."""
+"""Chains that are drawn, with colour and marker."""
 _AXES = ("x", "y", "z")
 _COLOURS = ("#1b6ca8", "#5fb14b", "#c23b3b")
 
 
 def resultants_png(found: Validation) -> bytes:
-    """The paper's four panels: F_x, F_y, F_z against truth, and the tangential plane."""
+    """Return the four panels of the paper: F_x, F_y, F_z against truth, and the F_x-F_y plane."""
     figure, axes = new_figure(9.0, 8.6, 2, 2)
     for k, axis in enumerate(axes.ravel()[:3]):
         _identity(axis, found.scores, k)
@@ -159,7 +159,7 @@ def resultants_png(found: Validation) -> bytes:
 
 
 def budget_png(budget: Sequence[Spread], paper_n: Sequence[float], paper_relative: float) -> bytes:
-    """Standard deviations per source, and their share of the force, beside the paper's."""
+    """Return the error of each source, in N and as a part of the force, beside the paper's."""
     figure, (left, right) = new_figure(11.0, 0.55 * len(budget) + 1.4, 2, 1)
     rows = np.arange(len(budget))[::-1]
     for k in range(3):
@@ -180,7 +180,7 @@ def budget_png(budget: Sequence[Spread], paper_n: Sequence[float], paper_relativ
 
 
 def fields_png(found: Validation, sample: Sample) -> bytes:
-    """Nodal forces of one frame: truth, then every chain that gives normal forces."""
+    """Return the nodal forces of one frame: truth, then every chain with normal forces."""
     fields: list[tuple[str, Any]] = [("true", sample.truth.force_n)]
     for name in SHOWN:
         result = sample.results.get(name)
@@ -214,7 +214,7 @@ def fields_png(found: Validation, sample: Sample) -> bytes:
 
 
 def _pairs(scores: Sequence[Score], chain: str) -> Any:
-    """(n, 2, 3) true and found."""
+    """Return true and found forces, (n, 2, 3)."""
     return np.array([(s.true_n, s.found_n) for s in scores if s.chain == chain])
 
 

@@ -1,1 +1,1 @@
-"""What this machine has for gelslim: libraries, processors, rendering, real-time readiness."""
+"""What this machine offers: libraries, processors, rendering and speed of the force operators."""

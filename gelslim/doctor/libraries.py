@@ -21,7 +21,7 @@ DISTRIBUTIONS = {
     "gerber_writer": "gerber-writer",
     "mcap_ros2": "mcap-ros2-support",
 }
-"""Distributions that are called otherwise than their module."""
+"""Distributions whose name differs from that of their module."""
 LOAD_S = 120
 _LOADER = """
 import importlib, json, sys
@@ -38,7 +38,7 @@ for name in sys.argv[1:]:
 
 @dataclass(frozen=True)
 class Library:
-    """A module: its version, empty where it is missing, and why it does not load, if so."""
+    """A module with its version (empty if it is missing) and the reason if it does not load."""
 
     module: str
     version: str
@@ -47,7 +47,7 @@ class Library:
 
 @dataclass(frozen=True)
 class ExtraState:
-    """An extra: whether all of it is there and loads, what it enables, how to get it."""
+    """An extra: whether all of it loads, what it enables, and how to install it."""
 
     name: str
     ready: bool
@@ -57,12 +57,12 @@ class ExtraState:
 
 
 def required() -> tuple[Library, ...]:
-    """What every installation needs."""
+    """Return the libraries that every installation needs."""
     return tuple(Library(name, version(name)) for name in REQUIRED)
 
 
 def extras(*, load: bool) -> tuple[ExtraState, ...]:
-    """Every extra; with `load` each module is imported, in a process of its own."""
+    """Return every extra; with `load` its modules are imported in another process."""
     present = [m for e in EXTRAS for m in e.modules if installed(m)]
     problems = loading(present) if load else {}
     states = []
@@ -77,7 +77,7 @@ def extras(*, load: bool) -> tuple[ExtraState, ...]:
 
 
 def version(module: str) -> str:
-    """Version of the distribution that brings the module; `unknown` where it does not say."""
+    """Return the version of the module's distribution, or `unknown`."""
     if not installed(module):
         return ""
     try:
@@ -87,9 +87,9 @@ def version(module: str) -> str:
 
 
 def loading(modules: Sequence[str]) -> dict[str, str]:
-    """Why each module does not load; empty where it does.
+    """Return why each module does not load; empty if it does.
 
-    A library may end its process, so this one does not import it.
+    A library may end its process, so the modules are imported in another one.
     """
     left, problems = list(modules), dict[str, str]()
     while left:

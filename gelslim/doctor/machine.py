@@ -1,4 +1,4 @@
-"""Processors, threads, compiled kernels and what rendering needs."""
+"""Processors, threads, compiled kernels, and the libraries that rendering needs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GL_LIBRARIES = {
     "libX11.so.6": "libx11-6",
     "libXrender.so.1": "libxrender1",
 }
-"""What CAD and rendering load on Linux, and the Debian package of each."""
+"""Libraries that CAD and rendering load on Linux, with the Debian package of each."""
 DRAW_S = 120
 _DRAW = """
 import numpy as np
@@ -43,14 +43,14 @@ class Threads:
     processors: int
     usable: int
     limits: dict[str, str]
-    """Environment variables that are set."""
+    """Environment variables that limit the threads."""
     pools: tuple[tuple[str, int], ...]
     """Thread pools of BLAS and OpenMP with their number of threads."""
 
 
 @dataclass(frozen=True)
 class Kernels:
-    """Compiled kernels kept on disk; cold ones cost seconds at the first call."""
+    """Compiled kernels on disk. Without them the first call takes seconds longer."""
 
     cached: int
     folder: str
@@ -58,12 +58,12 @@ class Kernels:
 
     @property
     def warm(self) -> bool:
-        """Whether some are kept."""
+        """Whether there are compiled kernels on disk."""
         return self.cached > 0
 
 
 def threads() -> Threads:
-    """What this process would use."""
+    """Return the processors and threads that this process would use."""
     import numpy as np
     import scipy.linalg  # noqa: F401  (loads its BLAS)
     from threadpoolctl import threadpool_info
@@ -76,12 +76,12 @@ def threads() -> Threads:
 
 
 def kernels() -> Kernels:
-    """Where numba keeps what it has compiled of this project, and how much is there."""
+    """Return where numba keeps the compiled kernels of this project, and how many there are."""
     other = os.environ.get("NUMBA_CACHE_DIR")
     roots = [Path(other)] if other else [Path(str(resources.files(p))) for p in _packages()]
     found = [index for root in roots for index in root.rglob("*.nbi")]
     writable = all(os.access(r if r.exists() else r.parent, os.W_OK) for r in roots)
-    return Kernels(len(found), other or "beside the sources", writable)
+    return Kernels(len(found), other or "the folders of the sources", writable)
 
 
 def _packages() -> tuple[str, ...]:
@@ -89,7 +89,7 @@ def _packages() -> tuple[str, ...]:
 
 
 def missing_graphics() -> tuple[tuple[str, str], ...]:
-    """Shared libraries that do not load, each with its Debian package; none but on Linux."""
+    """Return the shared libraries that do not load with their Debian packages (on Linux)."""
     if not sys.platform.startswith("linux"):
         return ()
     return tuple((lib, package) for lib, package in GL_LIBRARIES.items() if not _loads(lib))
@@ -104,7 +104,7 @@ def _loads(library: str) -> bool:
 
 
 def drawing() -> str:
-    """Why no picture can be drawn off screen; empty where a test picture comes out."""
+    """Return why no picture can be drawn off screen; empty if a test picture was drawn."""
     if not installed("vtkmodules"):
         return f"VTK is not installed: {install_command('view')}"
     try:
@@ -118,7 +118,7 @@ def drawing() -> str:
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        return f"the test picture did not come out: {error}"
+        return f"the test picture was not drawn: {error}"
     said = run.stdout.strip().splitlines()
     if said and said[-1] == "drawn":
         return ""
@@ -126,5 +126,5 @@ def drawing() -> str:
 
 
 def system() -> str:
-    """Operating system, machine and Python in one line."""
+    """Return operating system, machine and version of Python in one line."""
     return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"

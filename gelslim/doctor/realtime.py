@@ -1,4 +1,4 @@
-"""How fast forces come on this machine: the operators of a small pad, timed."""
+"""How fast this machine computes forces: times of the operators of a small pad."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 CELLS, CELL_MM, LAYERS = 32, 0.6, 4
 PASSES = 4
-"""Of forces per frame: the pipeline calls the operator about so often with a contact model."""
+"""Calls of the operator per frame, about as many as the pipeline makes with a contact model."""
 FRAME_RATE_HZ = 90.0
-"""Of the Raspberry Pi spy camera at 640 × 480."""
+"""Frame rate of the Raspberry Pi spy camera at 640 × 480."""
 
 
 @dataclass(frozen=True)
 class Timed:
-    """An operator: time of a call in ms on one BLAS thread and on as many as the library takes."""
+    """Time of a call of an operator in ms, on one BLAS thread and on the default number."""
 
     operator: str
     one_thread_ms: float
@@ -24,13 +24,13 @@ class Timed:
 
     @property
     def best_ms(self) -> float:
-        """The quicker of the two."""
+        """The smaller of the two times in ms."""
         return min(self.one_thread_ms, self.all_threads_ms)
 
 
 @dataclass(frozen=True)
 class RealTime:
-    """Operators timed on a pad of 32 × 32 cells in four layers."""
+    """Times of operators on a pad of 32 × 32 cells in four layers."""
 
     operators: tuple[Timed, ...]
 
@@ -46,7 +46,7 @@ class RealTime:
 
     @property
     def advice(self) -> str:
-        """What to set, where threads hurt; empty where they do not."""
+        """What to set if more threads are slower; empty if they are not."""
         worse = [t for t in self.operators if t.all_threads_ms > 1.5 * t.one_thread_ms]
         if not worse:
             return ""
@@ -58,7 +58,7 @@ class RealTime:
 
 
 def time_operators() -> RealTime:
-    """Time the FFT, iterative and factored operators: a second or two."""
+    """Measure the FFT, iterative and factored operators, which takes a second or two."""
     from threadpoolctl import threadpool_limits
 
     from ifem_export.elements.material import Material

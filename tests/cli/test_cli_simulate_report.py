@@ -15,7 +15,7 @@ ANSWER = {
 
 
 @pytest.mark.parametrize(
-    ("scenes", "drawn", "told"),
+    ("scenes", "drawn", "listed"),
     [
         (1, True, "In {}/: truth.csv, truth.npz, plan.json, ledger.json, frames/."),
         (1, False, "In {}/: truth.csv, truth.npz, plan.json, ledger.json."),
@@ -24,7 +24,7 @@ ANSWER = {
     ],
 )
 def test_last_line_names_what_is_there(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], scenes: int, drawn: bool, told: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], scenes: int, drawn: bool, listed: str
 ) -> None:
     """No frames where no picture is observed; a folder per scene where there are several."""
     for k in range(scenes):
@@ -33,4 +33,4 @@ def test_last_line_names_what_is_there(
         if drawn:
             (frames / "frame_000000.png").write_bytes(b"")
     _report(tmp_path, {**ANSWER, "scenes": scenes})
-    assert capsys.readouterr().out.splitlines()[-1] == told.format(tmp_path)
+    assert capsys.readouterr().out.splitlines()[-1] == listed.format(tmp_path)

@@ -145,4 +145,6 @@ def test_a_scene_in_the_place_of_a_spec_is_not_to_be_relabelled(
 ) -> None:
     scene = ROOT / "designs" / "scenes" / "press_sphere.yaml"
     assert main(["check", str(scene)]) == 2
-    assert "give a file that has `format: gelslim-spec/1`" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert str(scene) in error
+    assert "gelslim-spec/1" in error

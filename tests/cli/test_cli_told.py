@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -17,13 +18,11 @@ def test_diff_shows_no_row_whose_two_sides_read_the_same(
     other = altered(tmp_path, "length_mm: 20", "length_mm: 20.5")
     assert main(["diff", str(MINI20), str(other), "--no-parts"]) == 0
     shown = capsys.readouterr().out
-    table = shown.split("dimensions that follow")[1].split("design rules")[0].splitlines()[1:]
-    rows = [line.split() for line in table if "." in line.split(" ")[0]]
+    rows = [line.split() for line in shown.splitlines() if re.match(r"[a-z_]+\.[a-z_]+ ", line)]
     assert len(rows) > 10
     for name, *cells in rows:
         numbers = [c for c in cells if c not in ("mm", "px")]
         assert numbers[0] != numbers[1], name
-    assert "in digits not shown" in shown
 
 
 def test_diff_shows_every_field_that_differs(

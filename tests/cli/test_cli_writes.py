@@ -20,7 +20,6 @@ from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
 from gelslim_cad.sensor.pad import marker_grid, spec_hash
 from gelslim_cad.spec.reader import read_spec
-from ifem_export.bundle.bundle import force
 from ifem_export.bundle.files import load_bundle
 
 
@@ -50,7 +49,7 @@ def test_new_overwrites_only_when_forced(
     target = tmp_path / "mine.yaml"
     target.write_text("dear to me")
     assert main(["new", "mine", "-o", str(target)]) == 2
-    assert "exists" in capsys.readouterr().err
+    assert str(target) in capsys.readouterr().err
     assert target.read_text() == "dear to me"
     assert main(["new", "mine", "-o", str(target), "--force"]) == 0
     assert read_spec(target).spec.name == "mine"
@@ -85,8 +84,9 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(OSError) as raised:  # noqa: PT011
         replace_file(target, b"new")
+    assert raised.value.errno == 28
     assert contents(tmp_path) == {"b.txt": b"old"}
 
 
@@ -117,9 +117,9 @@ def test_bundle_opens_verified_and_is_this_sensor(
     assert answer["elements"] == bundle.mesh.n_elements
     assert answer["nodes"] == bundle.mesh.n_nodes
     # Uniform shift of the surface of a bonded pad: pushed along x, it pushes back along x only.
-    shift = np.zeros((bundle.mesh.n_nodes, 3))
-    shift[bundle.mesh.surface, 0] = 0.1
-    total = force(bundle, shift)[bundle.mesh.surface].sum(axis=0)
+    shift = np.zeros((len(bundle.mesh.surface), 3))
+    shift[:, 0] = 0.1
+    total = bundle.surface_operator("factor").force(shift).sum(axis=0)
     assert total[0] > 0
     assert np.abs(total[1:]).max() < 1e-9 * total[0]
 
@@ -137,7 +137,7 @@ def test_pad_commands_refuse_a_pad_that_breaks_a_rule_unless_forced(
     assert main([*command.split(), str(spec), "-o", str(target)]) == 1
     error = capsys.readouterr().err
     assert "mesh.layers" in error
-    assert "nothing was written" in error
+    assert "--force" in error
     assert not target.exists()
     assert main([*command.split(), str(spec), "-o", str(target), "--force"]) == 0
     assert target.is_dir()
@@ -179,7 +179,6 @@ def test_build_passes_its_options_on_and_points_to_the_report(
     assert main(["build", str(MINI20), "-j", "2"]) == 0
     assert calls == [{"spec": MINI20, "out": Path("out/mini20"), "jobs": 2}]
     shown = capsys.readouterr().out
-    assert "Built 2 files in out/mini20" in shown
     assert str(Path("out/mini20/report.html")) in shown
     assert "blur.image_px" in shown
     assert main(["build", str(MINI20), "-o", "there", "--json"]) == 0

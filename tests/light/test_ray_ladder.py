@@ -138,7 +138,9 @@ def test_extrapolated_rays_that_miss_are_told(
     _note_missed(study, Budget(half))
     assert capsys.readouterr().err == ""
     _note_missed(study, Budget(half / 2))
-    assert f"came out within {100 * half:.3g} % with 2048 rays" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"{100 * half:.3g} % with 2048 rays" in said
+    assert "--rays 4096" in said
 
 
 @pytest.fixture

@@ -90,7 +90,7 @@ def test_pictures_of_others_stop_a_validation_before_it_starts(
 ) -> None:
     (tmp_path / name).write_text("mine")
     assert main(["validate", str(MINI20), "-o", str(tmp_path)]) == 2
-    assert f"holds a {name} of other origin" in capsys.readouterr().err
+    assert name in capsys.readouterr().err
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [(name, "mine")]
 
 

@@ -1,1 +1,1 @@
-"""One module for each command; each is imported when it is called."""
+"""The commands of `gelslim`, one module for each."""

@@ -1,4 +1,4 @@
-"""`gelslim bench`: what each rung of a sensor takes on this machine."""
+"""`gelslim bench`: times of the rungs of a sensor on this machine."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ HERE, BUNDLE = "this machine", "bundle"
 
 @dataclass(frozen=True)
 class Part:
-    """Times by rung; `before` are those that budgets used until now."""
+    """Times by rung; `before` holds those that budgets have used until now."""
 
     name: str
     unit: str
     key: str
-    """Under which this machine's times are kept."""
+    """Key under which the times of this machine are kept."""
     now: Mapping[str, float]
     before: Mapping[str, float]
     source: str = ""
-    """Where `before` is from, HERE or BUNDLE; empty where there was nothing."""
+    """Origin of `before`, HERE or BUNDLE; empty if there were no times."""
 
     def to_record(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return the part as plain values for JSON."""
         return {
             "name": self.name,
             "unit": self.unit,
@@ -52,19 +52,20 @@ class Part:
 
 def bench(
     sensor: Annotated[
-        Path, typer.Argument(metavar="BUNDLE|SPEC", help="A stiffness bundle, or a spec.")
+        Path,
+        typer.Argument(metavar="BUNDLE|SPEC", help="Folder of a bundle, or YAML file of a spec."),
     ],
     simulation: Annotated[
-        bool, typer.Option(help="Time the simulation too (up to a minute).")
+        bool, typer.Option(help="Measure a simulated pose too (up to a minute).")
     ] = True,
     as_json: AsJson = False,
 ) -> int:
-    """Measure what a sensor's rungs take on this machine.
+    """Measure the times of a sensor's rungs on this machine.
 
-    Times the force operators, of a spec also the light tracer, and a simulated pose. The times are
-    kept in the user's cache, outside the bundle, and budgets of time (--time) use them from then
-    on. No bundle and no result is changed by them. Other programs running meanwhile count as
-    slowness.
+    Measures the force operators, the light tracer if a spec is given, and a simulated pose. Writes
+    the times to the cache of the user, outside the bundle. Budgets of time (--time) use them from
+    then on; no bundle and no result changes. Let no other program run meanwhile, because it would
+    slow down the measurement.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim_core.budget.machine_times import cache_folder, require_keeping, this_machine
@@ -77,7 +78,7 @@ def bench(
         return 0
     for part in found:
         _table(part)
-    print(f"Kept for {this_machine()}, in {cache_folder()}/.")
+    print(f"The times of {this_machine()} are kept in {cache_folder()}/.")
     return 0
 
 
@@ -117,7 +118,7 @@ def _table(part: Part) -> None:
 
 
 def bench_operators(bundle: Bundle, progress: Progress | None = None) -> Part:
-    """Time the force operators: those of the bundle's ladder, else all that its pad has."""
+    """Measure the force operators of the bundle's ladder, or all of its pad without a ladder."""
     from ifem_export.operators.ladder import operator_choices, time_operators
 
     given: Mapping[str, float] = {}
@@ -130,7 +131,7 @@ def bench_operators(bundle: Bundle, progress: Progress | None = None) -> Part:
 
 
 def bench_light(path: Path, progress: Progress | None = None) -> Part:
-    """Time the study of a spec's light at each number of rays."""
+    """Measure the study of the light of a spec for each number of rays."""
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.ray_ladder import measure_times, times_key
     from gelslim_cad.sensor.pad import spec_hash
@@ -142,7 +143,7 @@ def bench_light(path: Path, progress: Progress | None = None) -> Part:
 
 
 def bench_simulation(sensor: TwinSensor, progress: Progress | None = None) -> Part:
-    """Time a simulated pose against what its effects declare."""
+    """Measure a simulated pose relative to the times that its effects declare."""
     from gelslim.contacts import twin_key
     from gelslim_twin.simulation.pace import measure_paces
 
@@ -157,7 +158,7 @@ def _kept(
     now: Mapping[str, float],
     given: Mapping[str, float] | None = None,
 ) -> Part:
-    """Keep the times; raises OSError where they cannot be kept."""
+    """Keep the times. Raises OSError if they cannot be kept."""
     from gelslim_core.budget.machine_times import read_times, write_times
 
     before = read_times(key)

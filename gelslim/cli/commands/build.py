@@ -1,4 +1,4 @@
-"""`gelslim build`: the whole finger."""
+"""`gelslim build`: all files of a finger."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def build(
     spec: SpecFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME if left out.")
+        Path | None, typer.Option("-o", "--out", help="Folder to write; by default out/NAME.")
     ] = None,
     jobs: Annotated[
         int | None,
@@ -28,15 +28,16 @@ def build(
             "--jobs",
             min=1,
             max=256,
-            help="Processes; one per processor, at most 4, if left out.",
+            help="Number of processes; by default one per processor, at most 4.",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Build every file of the finger.
+    """Build every file of a finger.
 
-    CAD, print, mould, laser, markers, bundle, report. Only what changed is made again. Nothing is
-    written when a design rule fails (status 1).
+    Writes a folder with CAD, print, mould, laser and marker files, the sensor's bundle, building
+    instructions and a report. Only what changed is made again. If a design rule fails, nothing is
+    written and the exit status is 1.
     """
     from gelslim.cli.answer import RULE_FAILED, print_json, progress_bar
     from gelslim.cli.commands.check import print_checks
@@ -55,7 +56,7 @@ def build(
             print_json({"ok": False, "message": str(refused), "failed": failures})
         elif failed:
             print_checks(failed, brief=True)
-            print(f"{str(refused).splitlines()[0]}. `gelslim check {spec}` says what would help.")
+            print(f"{str(refused).splitlines()[0]}. `gelslim check {spec}` shows what would help.")
         else:
             print(refused, file=sys.stderr)
         return RULE_FAILED
@@ -93,6 +94,9 @@ def _report(result: BuildResult, seconds: float) -> None:
         if result.binding:
             say(result.binding[0])
         print(f"Built {len(result.files)} files in {shown} ({seconds:.1f} s)")
-    for name, purpose in (("report.html", "look here first"), ("BUILD.md", "how to make it")):
+    for name, purpose in (
+        ("report.html", "open this first"),
+        ("BUILD.md", "how to make the finger"),
+    ):
         if name in result.files:
             print(f"  {shown / name}  {purpose}")

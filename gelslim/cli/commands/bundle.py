@@ -1,4 +1,4 @@
-"""`gelslim bundle`: the stiffness bundle alone, with its measured ladder of operators."""
+"""`gelslim bundle`: the bundle of a sensor alone, with its measured ladder of operators."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 def bundle(
     spec: SpecFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-bundle if left out.")
+        Path | None,
+        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-bundle."),
     ] = None,
     error: FieldError = None,
     within: FrameTime = None,
@@ -30,15 +31,19 @@ def bundle(
         bool, typer.Option("--dense", help="Measure the dense operator too (up to a minute).")
     ] = False,
     with_k: Annotated[
-        bool, typer.Option("--with-k", help="Store the stiffness matrix, not its recipe alone.")
+        bool,
+        typer.Option(
+            "--with-k", help="Also store the stiffness matrix, which is otherwise assembled."
+        ),
     ] = False,
     force: Force = False,
     as_json: AsJson = False,
 ) -> int:
-    """Write the stiffness bundle alone.
+    """Write the bundle of a sensor alone, without CAD.
 
-    Pad mesh, element recipe, markers, camera, and the ladder of surface operators with the error
-    and time measured for this sensor. A budget chooses the operator that the pipeline starts with.
+    The bundle holds the mesh of the pad, its stiffness, markers, camera and light, and the ladder
+    of force operators with error and time measured for this sensor. A budget (--error, --time)
+    chooses the operator that the force pipeline starts with.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budget_of
@@ -50,7 +55,9 @@ def bundle(
 
     budget = budget_of(error, within)
     if not (ladder or budget.unlimited):
-        raise CommandError("--no-ladder leaves a budget nothing to choose from: give one of them")
+        raise CommandError(
+            "--no-ladder and a budget exclude each other, because a budget chooses from the ladder"
+        )
     loaded = read_spec(spec).spec
     require_pad_rules(derive(loaded), "gelslim bundle", force)
     with progress_bar(quiet=as_json) as tell:
@@ -85,7 +92,7 @@ def _record(made: Bundle, markers: int) -> dict[str, Any]:
 
 
 def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
-    """A table of the rungs, the chosen one marked."""
+    """Print a table of the rungs with a mark at the chosen one."""
     from rich.table import Table
 
     from gelslim.cli.answer import console, shown_ms
@@ -103,4 +110,4 @@ def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
             "chosen" if rung.label == chosen else "",
         )
     console().print(table)
-    print(f"Errors against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")
+    print(f"The errors are against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")

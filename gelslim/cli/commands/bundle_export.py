@@ -1,4 +1,4 @@
-"""`gelslim bundle-export`: a bundle's stiffness matrix for other programs."""
+"""`gelslim bundle-export`: the stiffness matrix of a bundle for other programs."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ MARKS = {
 
 
 def bundle_export(
-    path: Annotated[Path, typer.Argument(metavar="BUNDLE", help="The bundle.")],
+    path: Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder of the bundle.")],
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="NAME.mtx, NAME.mat or NAME.safetensors.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="File to write: NAME.mtx, NAME.mat or NAME.safetensors."
+        ),
     ],
 ) -> int:
-    """Write a bundle's stiffness matrix for other programs.
+    """Write the stiffness matrix of a bundle for other programs.
 
-    The ending chooses the format: Matrix Market (.mtx), MATLAB (.mat, counting from 1) or
-    safetensors. The bundle is verified first.
+    The ending of the file chooses the format: Matrix Market (.mtx), MATLAB (.mat, indices from 1)
+    or safetensors. The bundle is verified first.
     """
     from gelslim.cli.answer import BAD_INPUT
     from gelslim.cli.failure import CommandError
@@ -36,7 +39,7 @@ def bundle_export(
             f"{file}: the ending {file.suffix!r} names no format; use {', '.join(EXPORTS)}",
             BAD_INPUT,
         )
-    # Each kind of file says where it comes from in its head.
+    # Each kind of file names its origin near its beginning.
     spare_strangers(file, MARKS[file.suffix], "export of a bundle")
     export_matrix(load_bundle(path), file)
     print(f"Wrote {file} ({file.stat().st_size / 1e6:.2f} MB)")

@@ -1,4 +1,4 @@
-"""`gelslim bundle-info`: what a stiffness bundle holds and whether it can be trusted."""
+"""`gelslim bundle-info`: content of a bundle, and whether it is valid."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from gelslim.cli.options import AsJson
 
 
 def bundle_info(
-    path: Annotated[Path, typer.Argument(metavar="BUNDLE", help="The bundle.")],
+    path: Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder of the bundle.")],
     as_json: AsJson = False,
 ) -> int:
-    """Describe a stiffness bundle and verify it.
+    """Describe a bundle and verify it.
 
-    Every file's hash, all values and the stored pair of displacement and force are checked
-    (status 2 where something is wrong).
+    Prints mesh, material, markers and operators. Checks the hash of every file, all values, and
+    the stored pair of displacement and force. The exit status is 2 if something is wrong.
     """
     from gelslim.cli.answer import BAD_INPUT, print_json
     from ifem_export.bundle.files import summarise_bundle

@@ -1,4 +1,4 @@
-"""`gelslim calibrate`: the built sensor from one picture without contact."""
+"""`gelslim calibrate`: the built camera from one picture without contact."""
 
 from __future__ import annotations
 
@@ -25,22 +25,23 @@ def calibrate(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Calibration file to write; none if left out."),
+        typer.Option("-o", "--out", help="Calibration file to write; by default none is written."),
     ] = None,
     allow_contact: Annotated[
         bool,
         typer.Option(
             "--allow-contact",
-            help="Accept dots that are off together at one place: a print warped there.",
+            help="Accept dots that deviate together at one place, if the print is warped there.",
         ),
     ] = False,
     as_json: AsJson = False,
 ) -> int:
     """Calibrate a built sensor against its design.
 
-    Finds pose, focal length and distortion of the camera and every marker's place from one
-    picture without contact and the known print, says how far the sensor is from its design, and
-    refuses pictures of another sensor, turned ones, and contact (status 2).
+    From one picture without contact and the known print it finds pose, focal length and distortion
+    of the camera and the position of every marker, and prints how far the sensor is from its
+    design. With -o it writes the calibration. It refuses pictures of another sensor, rotated
+    pictures, and pictures with contact (exit status 2).
     """
     from gelslim.cli.answer import print_json
     from gelslim.cli.output import replace_file, spare_strangers
@@ -61,7 +62,7 @@ def calibrate(
         print_json(record)
         return 0
     _describe(found)
-    print(f"Wrote {out}" if out else "Not kept: -o FILE writes the calibration.")
+    print(f"Wrote {out}" if out else "The calibration was not written; -o FILE writes it.")
     return 0
 
 
@@ -71,4 +72,4 @@ def _describe(found: Calibration) -> None:
     for line in found.diagnosis:
         say(line)
     for line in found.warnings:
-        say(f"Look at this: {line}.", style="yellow")
+        say(f"Warning: {line}.", style="yellow")

@@ -1,4 +1,4 @@
-"""`gelslim check`: the design rules and what binds the thickness."""
+"""`gelslim check`: the design rules and what limits the thickness."""
 
 from __future__ import annotations
 
@@ -23,11 +23,15 @@ MARK = {"fail": "FAIL", "warn": "warn", "pass": "ok"}
 def check(
     spec: SpecFile,
     as_json: AsJson = False,
-    brief: Annotated[bool, typer.Option("--brief", help="Leave out the rules that hold.")] = False,
+    brief: Annotated[
+        bool, typer.Option("--brief", help="Print only the rules that warn or fail.")
+    ] = False,
 ) -> int:
-    """Check the design rules and say what binds.
+    """Check the design rules and say what limits the thickness.
 
-    Makes no CAD and takes about a second. Exit status 1 when a rule fails.
+    Prints each rule that fails or warns with reason and remedy, a table of the others, and what
+    each concession would save. Makes no CAD and takes about a second. The exit status is 1 if a
+    rule fails.
     """
     from gelslim.cli.answer import OK, RULE_FAILED, print_json, say
     from gelslim_cad.checks import check as apply_rules
@@ -59,7 +63,7 @@ def check(
 
 
 def summary(name: str, checks: Sequence[Check]) -> str:
-    """One line: how many rules fail and warn."""
+    """Return a line with the number of rules that fail and warn."""
     count = {s: sum(c.status == s for c in checks) for s in ORDER}
     if count["fail"]:
         some = f"{count['fail']} of {len(checks)} design rules fail"
@@ -70,7 +74,7 @@ def summary(name: str, checks: Sequence[Check]) -> str:
 
 
 def print_checks(checks: Sequence[Check], *, brief: bool) -> None:
-    """First the failures and warnings, each with reason and remedy, then a table of the rest."""
+    """Print failures and warnings with reason and remedy, then a table of the other rules."""
     from rich.table import Table
     from rich.text import Text
 

@@ -26,9 +26,9 @@ FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
 
 
 def derive(spec: SpecFile, as_json: AsJson = False) -> int:
-    """Print every dependent dimension.
+    """Print every dependent dimension of a finger.
 
-    `gelslim explain` tells how one comes about.
+    `gelslim explain` shows where one of them comes from.
     """
     from gelslim.cli.answer import print_json, say
     from gelslim_cad.dimensions import derive as derive_dimensions
@@ -50,8 +50,8 @@ def derive(spec: SpecFile, as_json: AsJson = False) -> int:
     _print_table(dimensions)
     if not feasible:
         say(
-            "No finger keeps every limit: these are the values of the least bad one. "
-            "See `gelslim check`.",
+            "No finger keeps every limit. These are the values of the one that misses least; "
+            "`gelslim check` shows the rules that fail.",
             style="bold red",
         )
     return 0
@@ -86,7 +86,7 @@ def _print_table(d: Dimensions) -> None:
 
     order = [*TITLES.values(), HOUSING]
     names_in_order = [*FIRST, *(n for n in d.values if n not in FIRST)]
-    # sorted is stable: within a group the order of definition stays.
+    # sorted is stable, so the order of definition remains within a group.
     ordered = sorted(names_in_order, key=lambda n: order.index(title(n)))
     for group, names in groupby(ordered, title):
         screen.print(group, style="bold")

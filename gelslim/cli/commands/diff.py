@@ -21,24 +21,25 @@ if TYPE_CHECKING:
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
 FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
 WIDE = 100
-"""From this width on the table says what each dimension is."""
+"""Width in characters from which the table has a column with the meaning."""
 
 
 def diff(
     first: SpecFile,
     second: SpecFile,
     parts: Annotated[
-        bool, typer.Option(help="Compare the solids too (some seconds; needs the cad extra).")
+        bool, typer.Option(help="Compare the solids too (some seconds; needs the extra cad).")
     ] = True,
     price: Annotated[
-        bool, typer.Option(help="Trace the light and measure the force error of both.")
+        bool, typer.Option(help="Trace the light and compute the force error of both.")
     ] = True,
     as_json: AsJson = False,
 ) -> int:
     """Compare two specs.
 
-    Fields, dimensions, rules, parts and bundle that change, and what the second finger costs
-    against the first. Nothing is built. Exit status 0 whether or not they differ.
+    Prints the fields, dimensions, rules, parts and blocks of the bundle that change, and what the
+    second finger costs against the first. Nothing is built. The exit status is 0 whether or not
+    they differ.
     """
     from gelslim.cli.answer import print_json
     from gelslim_cad.compare.comparison import compare
@@ -83,7 +84,7 @@ def _report_price(first: str, second: str, costs: Sequence[Measured]) -> None:
 
 
 def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
-    """Changed parts, or why they could not be compared."""
+    """Return the changed parts, or why they could not be compared."""
     from gelslim_core.extras import installed
 
     if not installed("cadquery"):
@@ -155,7 +156,7 @@ def _report(first: str, second: str, found: Comparison) -> None:
 
 
 def _shows(change: RuleChange) -> bool:
-    """Whether the change is to be seen in the digits that are written."""
+    """Return whether the printed digits show the change."""
     from gelslim.cli.answer import number
 
     b, a = change.before, change.after
@@ -165,7 +166,7 @@ def _shows(change: RuleChange) -> bool:
 
 def _note_unshown(count: int) -> None:
     if count:
-        print(f"{count} more differ{'s' if count == 1 else ''} in digits not shown.")
+        print(f"{count} more differ{'s' if count == 1 else ''} only in digits that are not shown.")
 
 
 def _limit(before: float | None, after: float | None) -> str:
@@ -178,7 +179,7 @@ def _limit(before: float | None, after: float | None) -> str:
 
 
 def _changes(title: str, changes: Sequence[Change], every: bool = False) -> None:
-    """A table of the changes: of `every` one, or of those that the digits show."""
+    """Print a table of the changes: of `every` one, or of those that the digits show."""
     from rich.table import Table
 
     from gelslim.cli.answer import console, given, number
@@ -237,7 +238,7 @@ def _report_parts(made: PartChanges | None, note: str) -> None:
         say(f"Only moved: {', '.join(moved)}.")
     if made.kept:
         say(f"Unchanged: {', '.join(made.kept)}.")
-    say(f"A build does {len(made.units)} units of work again.")
+    say(f"A build has to repeat {len(made.units)} units of work.")
 
 
 def _size(sides: tuple[float, float, float] | None) -> str:

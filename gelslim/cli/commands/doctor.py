@@ -1,4 +1,4 @@
-"""`gelslim doctor`: what is installed, what is missing, how fast this machine is."""
+"""`gelslim doctor`: what is installed, what is missing, and how fast this machine is."""
 
 from __future__ import annotations
 
@@ -17,14 +17,16 @@ if TYPE_CHECKING:
 
 def doctor(
     quick: Annotated[
-        bool, typer.Option("--quick", help="Only look; load, draw and time nothing.")
+        bool,
+        typer.Option("--quick", help="Only look for the libraries; do not load, draw or measure."),
     ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Tell what is installed and what is missing.
+    """Print what is installed and what is missing.
 
-    Says what each missing extra would enable. Loads every library, draws a test picture and times
-    a small force operator: about ten seconds. Exit status 0 whatever is missing.
+    Says what each missing extra would enable. Loads every library, draws a test picture and
+    measures small force operators, which takes about ten seconds. The exit status is 0 even if
+    something is missing.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.doctor.libraries import extras, required
@@ -59,15 +61,15 @@ def doctor(
         return 0
     print(f"gelslim {__version__} on {system()}")
     print("  " + ", ".join(f"{lib.module} {lib.version or 'MISSING'}" for lib in base))
-    _tell_extras(optional)
-    _tell_rendering(graphics, picture)
-    _tell_machine(cores, cache)
-    _tell_speed(speed, problem)
+    _print_extras(optional)
+    _print_rendering(graphics, picture)
+    _print_machine(cores, cache)
+    _print_speed(speed, problem)
     return 0
 
 
 def _speed() -> tuple[RealTime | None, str]:
-    """The timing, or why there is none: whatever is wrong here, the rest is still told."""
+    """Return the times, or why there are none. An error here must not hide the other answers."""
     from gelslim.doctor.realtime import time_operators
 
     try:
@@ -80,7 +82,7 @@ def _speed_record(speed: RealTime) -> dict[str, Any]:
     return {**asdict(speed), "ready": speed.ready, "advice": speed.advice}
 
 
-def _tell_extras(optional: tuple[ExtraState, ...]) -> None:
+def _print_extras(optional: tuple[ExtraState, ...]) -> None:
     from rich.table import Table
     from rich.text import Text
 
@@ -101,35 +103,35 @@ def _tell_extras(optional: tuple[ExtraState, ...]) -> None:
     print()
 
 
-def _tell_rendering(graphics: tuple[tuple[str, str], ...], picture: str) -> None:
+def _print_rendering(graphics: tuple[tuple[str, str], ...], picture: str) -> None:
     from gelslim.cli.answer import say
 
     if graphics:
         packages = " ".join(package for _, package in graphics)
         names = ", ".join(lib for lib, _ in graphics)
         say(f"rendering: {names} cannot load; on Debian or Ubuntu: apt-get install {packages}")
-    say(f"rendering: {picture or 'a test picture came out'}")
+    say(f"rendering: {picture or 'a test picture was drawn'}")
 
 
-def _tell_machine(cores: Threads, cache: Kernels) -> None:
+def _print_machine(cores: Threads, cache: Kernels) -> None:
     from gelslim.cli.answer import say
 
     limits = "".join(f", {name}={value}" for name, value in cores.limits.items())
-    told = dict.fromkeys(f"{name} {count}" for name, count in cores.pools)
-    pools = ", ".join(told) or "none found"
+    counts = dict.fromkeys(f"{name} {count}" for name, count in cores.pools)
+    pools = ", ".join(counts) or "none found"
     say(f"processors: {cores.usable} of {cores.processors} usable; thread pools: {pools}{limits}")
     if cache.warm:
-        say(f"compiled kernels: {cache.cached} kept {cache.folder}")
+        say(f"compiled kernels: {cache.cached} files in {cache.folder}")
     else:
-        say("compiled kernels: none kept yet; the first run of a command compiles them")
+        say("compiled kernels: none yet; the first run of a command compiles them")
     if not cache.writable:
         say(
-            "compiled kernels: their folder is read-only, so each process compiles anew; "
+            "compiled kernels: their folder is read-only, so each process compiles them again; "
             "set NUMBA_CACHE_DIR to a folder that can be written"
         )
 
 
-def _tell_speed(speed: RealTime | None, problem: str) -> None:
+def _print_speed(speed: RealTime | None, problem: str) -> None:
     from gelslim.cli.answer import say
     from gelslim.doctor.realtime import CELLS, FRAME_RATE_HZ, LAYERS, PASSES
 

@@ -8,7 +8,7 @@ from gelslim.cli.options import AsJson
 def examples(as_json: AsJson = False) -> int:
     """List the designs and scenes that come with the program.
 
-    `gelslim new --from NAME MINE` copies one.
+    `gelslim new --from NAME MINE` copies one of them.
     """
     from rich.table import Table
 

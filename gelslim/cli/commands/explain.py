@@ -1,4 +1,4 @@
-"""`gelslim explain`: how one value comes about."""
+"""`gelslim explain`: where one value comes from."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def explain(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A dimension (finger.thickness_mm), a rule (blur.gel) or a spec field.",
+            help="A dimension (finger.thickness_mm), a rule (blur.gel) or a field of the spec.",
         ),
     ],
     as_json: AsJson = False,
 ) -> int:
-    """Print how a value comes about.
+    """Print where a value comes from.
 
-    Formulas with numbers, back to the lines of the spec.
+    Shows the formulas with their numbers, back to the lines of the spec.
     """
     from gelslim.cli.answer import console, print_json
     from gelslim.cli.failure import CommandError

@@ -1,4 +1,4 @@
-"""`gelslim explore`: thousands of designs, what is feasible and what it costs."""
+"""`gelslim explore`: thousands of designs, with what is feasible and what it costs."""
 
 from __future__ import annotations
 
@@ -17,17 +17,22 @@ if TYPE_CHECKING:
 
 Vary = Annotated[
     list[str],
-    typer.Option("--vary", metavar="PATH=VALUES", help="Field and values: 16:50:1 or 2,2.9,4."),
+    typer.Option(
+        "--vary", metavar="PATH=VALUES", help="Field and its values, such as 16:50:1 or 2,2.9,4."
+    ),
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option("-j", "--jobs", min=1, help="Processes; left out: one per processor."),
+    typer.Option("-j", "--jobs", min=1, help="Number of processes; by default one per processor."),
 ]
 Scheduler = Annotated[
-    str, typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, as tcp://host:8786.")
+    str,
+    typer.Option(
+        metavar="ADDRESS", help="Dask scheduler in place of processes, such as tcp://host:8786."
+    ),
 ]
 NoisePx = Annotated[
-    float, typer.Option(min=0.0, help="Error of a marker's position in px, for --force-error.")
+    float, typer.Option(min=0.0, help="Noise of a marker's position in px, for --force-error.")
 ]
 MOST_REASONS = 5
 Rays = Annotated[int, typer.Option(min=1024, max=1 << 24, help="Rays per guide, for --light.")]
@@ -37,14 +42,15 @@ def explore(
     spec: SpecFile,
     vary: Vary,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-explore if left out.")
+        Path | None,
+        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-explore."),
     ] = None,
-    light: Annotated[bool, typer.Option("--light", help="Trace the light of each.")] = False,
+    light: Annotated[bool, typer.Option("--light", help="Trace the light of each design.")] = False,
     force_error: Annotated[
-        bool, typer.Option("--force-error", help="Expected force error of each.")
+        bool, typer.Option("--force-error", help="Compute the expected force error of each design.")
     ] = False,
     column: Annotated[
-        list[str] | None, typer.Option(help="A further dimension for the table; repeatable.")
+        list[str] | None, typer.Option(help="A further dimension for the table; may be repeated.")
     ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = "",
@@ -55,9 +61,10 @@ def explore(
 ) -> int:
     """Explore every combination of some values.
 
-    Dimensions and design rules of each design, on request light and expected force error: a table
-    (CSV, and Parquet where pyarrow is installed), Pareto plots and a map of what is feasible and
-    what binds. Run again after an interrupt, it goes on where it stopped.
+    Computes dimensions and design rules of each design, and on request its light and expected
+    force error. Writes a table (CSV, and Parquet if pyarrow is installed), Pareto plots, and a map
+    of what is feasible and what limits the other designs. After an interrupt, run it again: it
+    continues where it stopped.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.failure import CommandError
@@ -88,7 +95,7 @@ def explore(
 
 
 def write_exploration(folder: Path, found: Exploration, *, pictures: bool) -> list[str]:
-    """Write table and pictures and return their names; what cannot be made here is left out."""
+    """Write table and pictures and return their names; leave out what needs a missing library."""
     import sys
 
     from gelslim.cli.output import replace_file
@@ -100,13 +107,13 @@ def write_exploration(folder: Path, found: Exploration, *, pictures: bool) -> li
     if installed("pyarrow"):
         made["designs.parquet"] = parquet_bytes(found.columns)
     else:
-        notes.append(f"no Parquet table: {install_command('record')}")
+        notes.append(f"the Parquet table was left out; run: {install_command('record')}")
     if pictures and installed("matplotlib"):
         from gelslim_cad.explore.figures import feasibility_png, pareto_png
 
         made |= {"pareto.png": pareto_png(found), "feasibility.png": feasibility_png(found)}
     elif pictures:
-        notes.append(f"no pictures: {install_command('plot')}")
+        notes.append(f"the pictures were left out; run: {install_command('plot')}")
     for name, data in made.items():
         replace_file(folder / name, data)
     for note in notes:
@@ -137,14 +144,14 @@ def _record(found: Exploration) -> dict[str, object]:
 
 
 def binding_counts(found: Exploration) -> dict[str, int]:
-    """How many designs fail for each reason, most frequent first."""
+    """Return the number of designs that fail for each reason, the most frequent first."""
     pairs = zip(found.columns["status"], found.columns["binding"], strict=True)
     names = [b for s, b in pairs if s != "feasible"]
     return dict(sorted(((n, names.count(n)) for n in set(names)), key=lambda p: (-p[1], p[0])))
 
 
 def refusals(found: Exploration) -> dict[str, int]:
-    """Why the spec would not accept designs, the most frequent reasons first."""
+    """Return why the spec refuses designs, the most frequent reasons first."""
     counts = Counter(r for r in found.columns["reason"] if r)
     return dict(sorted(counts.items(), key=lambda p: (-p[1], p[0]))[:MOST_REASONS])
 
@@ -158,7 +165,7 @@ def _report(found: Exploration) -> None:
     from gelslim_cad.explore.pareto import THICKNESS, TRADES, front
 
     rows = found.rows_where("feasible")
-    resumed = f", {found.taken_over} tasks taken over" if found.taken_over else ""
+    resumed = f", {found.taken_over} tasks reused from before" if found.taken_over else ""
     say(f"{found.space.count} designs, {len(rows)} feasible{resumed}.")
     for name, count in binding_counts(found).items():
         if name == REFUSED:

@@ -1,4 +1,4 @@
-"""`gelslim family`: several fingers built and drawn side by side."""
+"""`gelslim family`: several fingers, built and drawn side by side."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ def family(
         "out/family"
     ),
     jobs: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=1, help="Worker processes of each build.")
+        int | None, typer.Option("-j", "--jobs", min=1, help="Number of processes of each build.")
     ] = None,
     as_json: AsJson = False,
 ) -> int:
     """Build several fingers and draw them to scale.
 
-    Each goes to a folder of its own, where what has not changed is taken over. Exit status 1 when
-    a finger breaks a design rule; the others are built and drawn all the same.
+    Writes each finger to a folder of its own, and reuses what has not changed. Writes family.png
+    and family.csv with their sizes. The exit status is 1 if a finger breaks a design rule; the
+    others are still built and drawn.
     """
     from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim_cad.spec.reader import read_spec
@@ -66,17 +67,17 @@ def family(
 
 @dataclass(frozen=True)
 class _Built:
-    """What came of each finger, by name."""
+    """The result of each finger, by name."""
 
     members: list[Member]
     units: dict[str, int]
-    """Units of work that were not taken over from an earlier build."""
+    """Number of units of work that were not reused from an earlier build."""
     refused: dict[str, str]
-    """Why a finger is not built."""
+    """Reason why a finger is not built."""
 
 
 def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: bool) -> _Built:
-    """Every finger built into a folder of its own, those that break a design rule apart."""
+    """Build every finger into a folder of its own; list those that break a design rule."""
     from gelslim.cli.answer import progress_bar
     from gelslim_cad.build import build_variant
     from gelslim_cad.build.variant import BuildRefusedError
@@ -103,8 +104,8 @@ def _distinct(names: list[str]) -> None:
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
         raise CommandError(
-            f"gelslim family: two specs are called {twice[0]}; give each a name of its own, "
-            "as it names the folder"
+            f"gelslim family: two specs have the name {twice[0]}; give each its own name, "
+            "because it is also the name of the folder"
         )
 
 
@@ -115,7 +116,7 @@ def _named(tell: Any, name: str) -> Any:
 
 
 def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
-    """Table and picture; why there is no picture, if so."""
+    """Write table and picture; return their names and why there is no picture, if so."""
     from gelslim.cli.output import replace_file
     from gelslim_cad.explore.table import csv_bytes
     from gelslim_cad.family.picture import family_png
@@ -129,7 +130,7 @@ def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
     try:
         replace_file(out / "family.png", family_png(members))
     except PictureError as error:
-        return ["family.csv"], f"no picture: {error}"
+        return ["family.csv"], f"the picture was not drawn: {error}"
     return ["family.csv", "family.png"], ""
 
 

@@ -1,4 +1,4 @@
-"""`gelslim force`: marker frames to forces."""
+"""`gelslim force`: from marker frames to forces."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def force(
 ) -> int:
     """Estimate forces from marker frames.
 
-    Follows the markers, corrects for projection, and applies the bundle's stiffness: force per
-    node, pressure and traction, wrench with its standard deviation. Without an indenter, a depth
-    or depth maps the normal force stays unknown. Writes a run folder: wrenches.csv, fields,
-    overlay pictures.
+    Follows the markers, corrects their motion for projection, and applies the stiffness of the
+    bundle. Writes a run folder with the wrench of each frame and its standard deviation
+    (wrenches.csv), the force at every node (fields), and overlay pictures. Without an indenter or
+    depth maps the normal force stays unknown.
     """
     from gelslim.cli.answer import BAD_INPUT
     from gelslim.cli.budget import budget_of
@@ -82,13 +82,13 @@ def force(
     with open_frames(frames) as source:
         normal = _normal_source(sensor, built, settings, picture, indenter, depth_mm, depth_maps)
         pipeline = ForcePipeline(sensor, built, settings, normal)
-        told = {
+        manifest = {
             "bundle": str(bundle), "frames": frames,
             **chosen, "operator": pipeline.operator_name, "indenter": indenter,
             "reference": str(reference) if reference else None,
             "calibration": str(calibration) if calibration else None,
         }  # fmt: skip
-        summary, drawn = _run(pipeline, source, most_frames, outputs, told)
+        summary, drawn = _run(pipeline, source, most_frames, outputs, manifest)
     say = answer_json if as_json else report
     say(folder, pipeline, summary, drawn)
     return 0 if summary.with_forces else BAD_INPUT
@@ -98,13 +98,13 @@ def _require_consistent(fields: str, indenter: str | None, depth_maps: Path | No
     from gelslim.cli.failure import CommandError
 
     if fields not in ("npz", "parquet", "none"):
-        raise CommandError(f"--fields {fields}: npz, parquet or none")
+        raise CommandError(f"--fields {fields}: give npz, parquet or none")
     if indenter and depth_maps:
-        raise CommandError("give an indenter or depth maps, not both")
+        raise CommandError("give --indenter or --depth-maps, not both")
 
 
 def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
-    """The pipeline's settings for the options of these names. Raises CommandError."""
+    """Return the settings of the pipeline for these options. Raises CommandError."""
     from gelslim.cli.failure import CommandError
     from gelslim_force.forces.estimator import ForceSettings
     from gelslim_force.settings import PipelineSettings
@@ -129,7 +129,7 @@ def _run(
     outputs: RunOutputs,
     chosen: dict[str, Any],
 ) -> tuple[RunSummary, list[str]]:
-    """Put the frames through the pipeline; what came of it, and the pictures drawn."""
+    """Process the frames; return the summary and the paths of the pictures."""
     from itertools import islice
 
     from gelslim.cli.answer import progress_bar
@@ -145,7 +145,7 @@ def _run(
 
 
 def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
-    """The sensor with this machine's times; what a budget cannot know of it is said."""
+    """Return the sensor with the times of this machine, and print the remarks on the budget."""
     from gelslim.cli.budget import note_choice, on_this_machine
     from gelslim_core.budget.machine_times import read_times
 
@@ -153,8 +153,10 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
     if timed.ladder is not None:
         choice = timed.ladder.choose(budget)
         if gel != "linear":
-            told = f"the ladder was measured on a linear gel; its errors say little of {gel}"
-            choice = replace(choice, remarks=(*choice.remarks, told))
+            remark = (
+                f"the ladder was measured on a linear gel, so its errors are not those of {gel}"
+            )
+            choice = replace(choice, remarks=(*choice.remarks, remark))
         here = choice.rung.name in read_times(sensor.times_key)
         note_choice(choice, budget, here, f"gelslim bench {path}")
     return timed
@@ -169,8 +171,8 @@ def _calibrated(
     from gelslim_force.calibration.reference_picture import read_reference
 
     if reference is None and (file is None or needs_picture):
-        wanted = "the contact patch shows against it" if needs_picture else "or --calibration FILE"
-        raise CommandError(f"give --reference PICTURE, one without contact ({wanted})")
+        wanted = "the contact patch is found by it" if needs_picture else "or --calibration FILE"
+        raise CommandError(f"give --reference PICTURE, a picture without contact ({wanted})")
     picture = None if reference is None else read_reference(reference)
     if file is not None:
         return read_calibration(file), picture

@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 PICTURES = ("light_paths.png", "irradiance.png", "light_ratio.png")
 FIRST = "delivered"
-"""Entry of the ledger that is told first; the others follow by size."""
+"""Entry of the ledger that is printed first; the others follow by size."""
 LEAST_SHARE = 5e-4
-"""Of all light: less is not told."""
+"""Smallest part of all light that is printed."""
 MARK = "gelslim light"
-"""In the first picture's text: it is one of an earlier run."""
+"""Text in the first picture, by which a picture of an earlier run is recognised."""
 
 RaysPerGuide = Annotated[
     int | None,
-    typer.Option(min=1024, max=1 << 28, help="Rays traced per guide; 131072 if left out."),
+    typer.Option(min=1024, max=1 << 28, help="Number of rays per guide; by default 131072."),
 ]
 LightError = Annotated[
     str | None,
     typer.Option(
-        help="Error allowed in either colour's light on the coat (half of its 95 % interval), as "
-        "1%; picks the rays."
+        help="Largest error of the light of either colour on the coat (half of its 95 % interval), "
+        "such as 1%; it chooses the rays."
     ),
 ]
 TraceTime = Annotated[
@@ -44,7 +44,7 @@ TraceTime = Annotated[
     typer.Option(
         "--time",
         "--time-ms",
-        help="Time that the study may take, as 2s, pictures and choosing left out; picks the rays.",
+        help="Largest time of the study, such as 2s, without pictures; it chooses the rays.",
     ),
 ]
 
@@ -53,19 +53,19 @@ def light(
     spec: SpecFile,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Folder of the pictures; out/NAME-light if left out."),
+        typer.Option("-o", "--out", help="Folder of the pictures; by default out/NAME-light."),
     ] = None,
     rays: RaysPerGuide = None,
     error: LightError = None,
     within: TraceTime = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the rays.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random numbers of the rays.")] = 0,
     pictures: DrawPictures = True,
     as_json: AsJson = False,
 ) -> int:
     """Trace the light guide and compare it with straight guides.
 
-    Certificate of total internal reflection, where the light goes, brightness against straight
-    guides with 45° mirrors, exposure and frame rate.
+    Prints the certificate of total internal reflection, where the light goes, the brightness
+    against straight guides with 45° mirrors, exposure and frame rate. Writes pictures.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budget_of
@@ -81,7 +81,7 @@ def light(
     d = derive(loaded.spec)
     budget = budget_of(error, within)
     if rays is not None and not budget.unlimited:
-        raise CommandError("give --rays or a budget, not both")
+        raise CommandError("give --rays or a budget (--error, --time), not both")
     folder = out or Path("out") / f"{loaded.spec.name}-light"
     if pictures:
         spare_strangers_in(folder, PICTURES, PICTURES[0], MARK.encode())
@@ -113,7 +113,7 @@ def _draw(folder: Path, d: Dimensions, study: LightStudy) -> None:
 def _budgeted(
     spec: Spec, d: Dimensions, budget: Budget, seed: int, path: Path, tell: Progress | None
 ) -> int:
-    """Rays per guide for a budget; without times of this machine, one of time measures them."""
+    """Return the rays per guide for a budget; a budget of time measures missing times first."""
     from gelslim.cli.budget import keep_times, note_choice
     from gelslim_cad.light.ray_ladder import (
         TRACED,
@@ -138,7 +138,7 @@ def _budgeted(
 
 
 def _note_missed(study: LightStudy, budget: Budget) -> None:
-    """Say where the answer's own interval is wider than asked: only extrapolated rays can be."""
+    """Print a remark if the interval of the result is wider than the budget allows."""
     from gelslim_cad.light.ray_ladder import half_widths
     from gelslim_core.budget.budget import shown_share
 
@@ -146,8 +146,8 @@ def _note_missed(study: LightStudy, budget: Budget) -> None:
     if not budget.allows_error(half):
         rays = study.light.rays
         print(
-            f"gelslim: the light came out within {shown_share(half)} with {rays} rays; "
-            f"--rays {2 * rays} errs less",
+            f"gelslim: the error of the light is {shown_share(half)} with {rays} rays; "
+            f"--rays {2 * rays} makes it smaller",
             file=sys.stderr,
         )
 
@@ -169,7 +169,7 @@ def _report(name: str, study: LightStudy) -> None:
 
 
 def _comparisons(name: str, found: Sequence[Comparison]) -> None:
-    """How many times the light of each other guide, with what its interval allows to say."""
+    """Print the ratio to the light of each other guide, with interval and verdict."""
     from rich.table import Table
 
     from gelslim.cli.answer import console, say
@@ -190,7 +190,7 @@ def _comparisons(name: str, found: Sequence[Comparison]) -> None:
 
 
 def _ledger(result: LightResult) -> None:
-    """The ledger, in the finger's terms: light that leaves ends in its black inside."""
+    """Print the ledger; light that leaves the guide of a finger ends in its black housing."""
     from rich.table import Table
 
     from gelslim.cli.answer import console

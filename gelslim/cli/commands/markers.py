@@ -13,14 +13,15 @@ from gelslim.cli.options import AsJson, Force, SpecFile
 def markers(
     spec: SpecFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-markers if left out.")
+        Path | None,
+        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-markers."),
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> int:
     """Write the marker print alone.
 
-    SVG, DXF, PDF, Gerber, CSV and stencil, as `build` writes them.
+    Writes the same SVG, DXF, PDF, Gerber, CSV and stencil files as `gelslim build`.
     """
     from gelslim.cli.answer import print_json
     from gelslim.cli.output import require_pad_rules, spare_strangers_in, written

@@ -11,20 +11,21 @@ import typer
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the finger.")],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File to write; NAME.yaml if left out.")
+        Path | None, typer.Option("-o", "--out", help="File to write; by default NAME.yaml.")
     ] = None,
     source: Annotated[
         str,
-        typer.Option("--from", help="Copy this example in place; `gelslim examples` lists them."),
+        typer.Option("--from", help="Copy this example; `gelslim examples` lists them."),
     ] = "",
-    length: Annotated[float, typer.Option(help="Gel length along the finger, mm.")] = 24.0,
-    width: Annotated[float, typer.Option(help="Gel width across the finger, mm.")] = 22.0,
+    length: Annotated[float, typer.Option(help="Length of the gel along the finger in mm.")] = 24.0,
+    width: Annotated[float, typer.Option(help="Width of the gel across the finger in mm.")] = 22.0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> int:
     """Write a commented spec to start from, or copy an example.
 
-    A new spec has the Raspberry Pi spy camera filled in and shows every default. With --from, a
-    design or a scene that comes with the program is copied under the new name.
+    A new spec has the data of the Raspberry Pi spy camera, and shows every other field with its
+    default. With --from, a design or a scene that comes with the program is copied under the new
+    name.
     """
     from gelslim.cli.failure import CommandError
     from gelslim.cli.output import replace_file
@@ -39,7 +40,7 @@ def new(
         same = path != target and path.is_file() and path.read_text(encoding="utf-8") == text
         if path.exists() and not (force or same):
             raise CommandError(
-                f"gelslim new: {path} exists and is left as it is; give another -o, or --force"
+                f"gelslim new: {path} exists and was not changed; give another -o, or --force"
             )
     for path, text in files.items():
         replace_file(path, text.encode())
@@ -49,7 +50,7 @@ def new(
 
 
 def _texts(name: str, source: str, length: float, width: float) -> tuple[dict[str, str], str]:
-    """Return the texts by file name, and the command that goes on with the first."""
+    """Return the texts by file name, and the command to use on the first file."""
     from gelslim_cad.spec.starter import require_name, starter_text
 
     if not source:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Aim(StrEnum):
-    """What to make best."""
+    """Quantity to optimise."""
 
     thin = "thin"
     bright = "bright"
@@ -31,16 +31,17 @@ def optimise(
     vary: Vary,
     aim: Annotated[
         Aim,
-        typer.Option("--for", help="Thinnest finger, shortest exposure or least force error."),
+        typer.Option("--for", help="Least thickness, exposure or force error."),
     ] = Aim.thin,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-optimise if left out.")
+        Path | None,
+        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-optimise."),
     ] = None,
     save: Annotated[
-        Path | None, typer.Option(help="Write the best design to this file, as a spec.")
+        Path | None, typer.Option(help="Write the best design as a spec to this file.")
     ] = None,
     rounds: Annotated[
-        int, typer.Option(min=0, max=12, help="Rounds of finer steps around the best.")
+        int, typer.Option(min=0, max=12, help="Number of rounds of finer steps around the best.")
     ] = 3,
     jobs: Jobs = None,
     scheduler: Scheduler = "",
@@ -48,10 +49,11 @@ def optimise(
     marker_noise_px: NoisePx = 0.05,
     as_json: AsJson = False,
 ) -> int:
-    """Find the best feasible design, what binds it, and what it costs.
+    """Find the best feasible design, what limits it, and what it costs.
 
-    Every combination of the values, then finer steps around the best; its price is against the
-    spec as it is. Exit status 1 when no design is feasible.
+    Tries every combination of the values, then finer steps around the best one. Prints the best
+    design, what a further step would do, and its price against the spec as it is. With --save it
+    writes the design as a spec. The exit status is 1 if no design is feasible.
     """
     from gelslim.cli.answer import print_json
     from gelslim.cli.output import replace_file, spare_strangers
@@ -81,7 +83,7 @@ def optimise(
 
 @dataclass(frozen=True)
 class _Effort:
-    """What the search may use, and how closely it looks."""
+    """Resources of the search and its accuracy."""
 
     jobs: int | None
     scheduler: str
@@ -92,7 +94,7 @@ class _Effort:
 
 @dataclass(frozen=True)
 class _Price:
-    """The best design against the spec as it is."""
+    """Figures of the spec as it is and of the best design."""
 
     before: Measured
     after: Measured
@@ -121,7 +123,7 @@ class _Price:
 def _best(
     spec: Spec, vary: list[str], aim: Aim, folder: Path, effort: _Effort, *, quiet: bool
 ) -> Optimum:
-    """The best feasible design. Raises CommandError where the axes are no good or none is."""
+    """Return the best feasible design. Raises CommandError for bad axes or if there is none."""
     from gelslim.cli.answer import progress_bar
     from gelslim.cli.failure import CommandError
     from gelslim_cad.explore.axis import ExploreError, parse_axis
@@ -200,7 +202,7 @@ def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
 
 
 def _stop(n: Neighbour) -> str:
-    """What stops a step further, and from where on."""
+    """Return what stops a further step, and beyond which value."""
     from gelslim_cad.explore.axis import shown
 
     if n.status == "feasible":

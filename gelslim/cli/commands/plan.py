@@ -22,10 +22,10 @@ def plan(
     within: PoseTime = None,
     as_json: AsJson = False,
 ) -> int:
-    """Print which effects a contact scene needs.
+    """Print which physical effects a contact scene needs.
 
-    Each effect, in or out and why, the largest error of leaving it out, the rung chosen and the
-    time predicted for it. Nothing is simulated.
+    For each effect it says whether it is included and why, the largest error of leaving it out,
+    the chosen rung and the predicted time. Nothing is simulated or written.
     """
     from gelslim.cli.budget import budgeted_scene
     from gelslim.contacts import plan as planned
@@ -40,7 +40,7 @@ def plan(
 
 
 def print_plan(made: Plan) -> None:
-    """A table for people, and what exceeds the tolerance."""
+    """Print a table of the effects, and which of them exceed the tolerance."""
     from rich.table import Table
 
     from gelslim.cli.answer import console, say

@@ -1,4 +1,4 @@
-"""`gelslim schema`: the JSON Schema of the spec or of scenes, or the same as a page to read."""
+"""`gelslim schema`: the JSON Schema of specs or scenes, or a reference page of it."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ import typer
 
 def schema(
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Write to this file instead.")
+        Path | None,
+        typer.Option("-o", "--out", help="Write to this file instead of standard output."),
     ] = None,
     scene: Annotated[
-        bool, typer.Option("--scene", help="Of contact scenes instead of specs.")
+        bool, typer.Option("--scene", help="Print the schema of contact scenes instead of specs.")
     ] = False,
     markdown: Annotated[
-        bool, typer.Option("--markdown", help="As a page to read: every field in tables.")
+        bool,
+        typer.Option("--markdown", help="Print a page for reading, with every field in tables."),
     ] = False,
 ) -> int:
     """Print the JSON Schema of the spec.
 
-    Editors check and complete the YAML by it.
+    Editors use it to check and to complete the YAML.
     """
     text = _page(scene) if markdown else _schema(scene)
     if out is None:

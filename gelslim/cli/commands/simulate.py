@@ -1,10 +1,10 @@
-"""`gelslim simulate`: a contact scene to frames with their true forces."""
+"""`gelslim simulate`: frames of a contact scene with their true forces."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -12,22 +12,21 @@ from gelslim.cli.budget import PoseTime, SceneError
 from gelslim.cli.commands.plan import SceneFile
 from gelslim.cli.options import AsJson
 
-if TYPE_CHECKING:
-    pass
-
 
 def simulate(
     scene: SceneFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME if left out.")
+        Path | None, typer.Option("-o", "--out", help="Folder to write; by default out/NAME.")
     ] = None,
     count: Annotated[
         int | None,
-        typer.Option(min=1, max=100_000, help="Scenes of the data set that `vary` describes."),
+        typer.Option(
+            min=1, max=100_000, help="Number of scenes of the data set that `vary` describes."
+        ),
     ] = None,
-    jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Processes.")] = 1,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Number of processes.")] = 1,
     scheduler: Annotated[
-        str, typer.Option(help="Dask scheduler, such as tcp://host:8786, in place of processes.")
+        str, typer.Option(help="Dask scheduler in place of processes, such as tcp://host:8786.")
     ] = "",
     error: SceneError = None,
     within: PoseTime = None,
@@ -38,10 +37,10 @@ def simulate(
 ) -> int:
     """Simulate a contact scene.
 
-    Writes frames, true surface motion and forces, the plan and a ledger of time and residuals.
-    Simulates only the effects that the scene's tolerance calls for. An interrupted run goes on
-    where it stopped. With --count, every scene is drawn anew from the scene's `vary` block, all
-    with the tolerance that a budget gives the scene as it stands.
+    Writes the frames, the true motion of the surface, the true forces, the plan, and a ledger of
+    times and residuals. Only the effects that the tolerance of the scene needs are simulated. An
+    interrupted run continues where it stopped. With --count, the command makes a data set: each
+    scene is drawn from the `vary` block, with the tolerance that a budget gives the scene itself.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budgeted_scene

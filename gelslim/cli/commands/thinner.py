@@ -18,17 +18,21 @@ def thinner(
     spec: SpecFile,
     to: Annotated[
         float | None,
-        typer.Option(metavar="MM", min=0.1, help="Thickness to reach; a usual step if left out."),
+        typer.Option(
+            metavar="MM",
+            min=0.1,
+            help="Thickness to reach; by default each field changes by one usual step.",
+        ),
     ] = None,
     rays: Rays = 1 << 13,
     marker_noise_px: NoisePx = 0.05,
     as_json: AsJson = False,
 ) -> int:
-    """Say what a thinner finger costs.
+    """Print what a thinner finger costs.
 
-    Each field that can give way, alone: the thickness it leaves and, against the finger as it is,
-    keystone, blur, brightness, exposure, force error and stiffness in per cent. Exit status 1
-    where no field alone reaches the thickness.
+    For each single field that can make the finger thinner it prints the thickness and the changes
+    of keystone, blur, brightness, exposure, force error and stiffness in per cent. Nothing is
+    written. The exit status is 1 if no single field reaches the thickness.
     """
     from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim.cli.failure import CommandError
@@ -73,12 +77,12 @@ def _record(name: str, offer: Offer) -> dict[str, Any]:
 
 def _report(name: str, path: str, offer: Offer) -> None:
     from gelslim.cli.answer import say
-    from gelslim.cli.price_table import told
+    from gelslim.cli.price_table import figure_text
     from gelslim_cad.explore.price import FIGURES
 
     aim = "" if offer.to_mm is None else f", {offer.to_mm:g} mm asked for"
     say(f"{name} is {offer.present_mm:.2f} mm thick{aim}.", style="bold")
-    present = (f"{f.words} {told(f, offer.present.figures[f.name])}" for f in FIGURES[1:])
+    present = (f"{f.words} {figure_text(f, offer.present.figures[f.name])}" for f in FIGURES[1:])
     say(f"As it is: {', '.join(present)}.")
     reached = [c for c in offer.concessions if c.reaches]
     if offer.to_mm is not None and not reached:
@@ -90,15 +94,15 @@ def _report(name: str, path: str, offer: Offer) -> None:
     elif not reached:
         say("No usual step makes it thinner.")
     for c in offer.concessions:
-        _tell(c, offer)
+        _print_concession(c, offer)
 
 
-def _tell(c: Concession, offer: Offer) -> None:
-    """What one field gives, and what it costs, gains and changes."""
+def _print_concession(c: Concession, offer: Offer) -> None:
+    """Print the thickness that one field gives, and what it costs, gains and changes."""
     from gelslim.cli.answer import number, say
     from gelslim_cad.explore.price import SAME
 
-    short = "" if c.reaches or c.breaks or offer.to_mm is None else ", the thinnest it can do alone"
+    short = "" if c.reaches or c.breaks or offer.to_mm is None else ", the thinnest by this field"
     print()
     say(
         f"{c.path.removeprefix('design.')} {number(c.before)} → {number(c.after)}: "
@@ -125,6 +129,6 @@ def _indented(text: str, style: str = "") -> None:
 
 
 def _change(p: Price) -> str:
-    from gelslim.cli.price_table import per_cent, told
+    from gelslim.cli.price_table import figure_text, per_cent
 
-    return f"{p.figure.words} {per_cent(p.change)} ({told(p.figure, p.after)})"
+    return f"{p.figure.words} {per_cent(p.change)} ({figure_text(p.figure, p.after)})"

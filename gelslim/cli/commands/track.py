@@ -1,4 +1,4 @@
-"""`gelslim track`: the dots of any marker sensor followed in pixels, without a bundle."""
+"""`gelslim track`: the dots of any marker sensor, followed in pixels without a bundle."""
 
 from __future__ import annotations
 
@@ -20,31 +20,32 @@ if TYPE_CHECKING:
 
 
 FILES = ("tracks.npz", "frames.csv", "summary.json")
-"""What a run writes, in this order."""
+"""Files of a run, in the order of writing."""
 
 
 Frames = Annotated[
     str,
     typer.Argument(
         metavar="FRAMES",
-        help="Folder of pictures, picture, video, .npy or .npz array, or camera:0 for live.",
+        help="Folder of pictures, picture, video, .npy or .npz array, or camera:0 for a camera.",
     ),
 ]
 Reference = Annotated[
     Path | None,
-    typer.Option("-r", "--reference", help="Picture without contact; the first frame if left out."),
+    typer.Option("-r", "--reference", help="Picture without contact; by default the first frame."),
 ]
 TrackFolder = Annotated[
-    Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-track if left out.")
+    Path | None, typer.Option("-o", "--out", help="Folder to write; by default out/NAME-track.")
 ]
 Diameters = Annotated[
     str | None,
     typer.Option(
-        "--diameters", help="Smallest and largest dot in px, as 4:12; estimated if left out."
+        "--diameters", help="Smallest and largest dot in px, such as 4:12; by default estimated."
     ),
 ]
 FrameRate = Annotated[
-    float | None, typer.Option("--rate", help="Frames per second, where the source has none.")
+    float | None,
+    typer.Option("--rate", help="Frames per second, if the source does not know them."),
 ]
 
 
@@ -60,9 +61,10 @@ def track(
 ) -> int:
     """Follow the dots of any marker sensor, in pixels.
 
-    Needs no bundle: dot size and lattice are found in the picture without contact. Writes
-    tracks.npz (places, displacements and status of every marker), frames.csv with the coverage
-    per frame, summary.json, and overlay pictures. Ctrl-C ends a live camera and keeps the run.
+    Needs no bundle, because it finds the size of the dots and their lattice in the picture without
+    contact. Writes tracks.npz (position, displacement and status of every marker), frames.csv with
+    the coverage of each frame, summary.json, and overlay pictures. Ctrl-C ends a run with a camera
+    and keeps its files.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.output import spare_strangers_in
@@ -70,7 +72,7 @@ def track(
     from gelslim_force.outputs.track_record import TrackRecord
 
     settings = _settings(diameters_px)
-    # A reference that is no good must not cost the run: look at it before the source opens.
+    # A bad reference must be refused before the source opens and frames are lost.
     rest = None if reference is None else _at_rest(_picture(reference), settings, str(reference))
     folder = out or Path("out") / f"{_name(frames)}-track"
     spare_strangers_in(folder, FILES, FILES[0], b"places_px")
@@ -102,7 +104,7 @@ def _write(folder: Path, record: TrackRecord, summary: dict[str, Any]) -> None:
 
 
 class _Frames:
-    """The frames of a source, those looked at in advance included."""
+    """The frames of a source, including those that were read in advance."""
 
     def __init__(self, source: FrameSource, most: int | None, tell: Any) -> None:
         self.live, self._count, self._most, self._tell = source.live, source.count, most, tell
@@ -110,7 +112,7 @@ class _Frames:
         self._ahead: list[Any] = []
 
     def first_picture(self) -> NDArray[np.uint8]:
-        """The first frame that can be read; it and those before it are still to come."""
+        """Return the first frame that can be read; the iteration still yields it."""
         from gelslim_force.frames.source import FrameSourceError
 
         for frame in self._frames:
@@ -118,7 +120,7 @@ class _Frames:
             if frame.image is not None:
                 return frame.image
         why = self._ahead[0].problem if self._ahead else "there are no frames"
-        raise FrameSourceError(f"not one frame can be read: {why}")
+        raise FrameSourceError(f"no frame can be read: {why}")
 
     def __iter__(self) -> Any:
         from itertools import chain, islice
@@ -148,7 +150,7 @@ def _follow(
             if kept is not None:
                 kept.take(frame.image, result)
     except KeyboardInterrupt:
-        # A camera has no end but this one.
+        # Ctrl-C is the only way to end a camera.
         if not frames.live:
             raise
 
@@ -167,7 +169,7 @@ def _settings(diameters: str | None) -> Any:
         return DetectorSettings.for_diameters(np.array([low, high]), "double")
     except ValueError as error:
         raise CommandError(
-            f"--diameters {diameters}: give smallest and largest dot in px as 4:12 ({error})"
+            f"--diameters {diameters}: give smallest and largest dot in px, such as 4:12 ({error})"
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""`gelslim validate`: what a sensor will measure, against known forces."""
+"""`gelslim validate`: errors of a sensor on simulated contacts with known forces."""
 
 from __future__ import annotations
 
@@ -23,21 +23,22 @@ PLOTS = ("resultants.png", "fields.png", "error_budget.png")
 def validate(
     spec: SpecFile,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder; out/NAME-validation if left out.")
+        Path | None,
+        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-validation."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of noise, dirt and print faults.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of noise, dirt and print faults.")] = 0,
     error: FieldError = None,
     within: FrameTime = None,
     pictures: Annotated[bool, typer.Option(help="Write plots and overlay pictures.")] = True,
     as_json: AsJson = False,
 ) -> int:
-    """Try a sensor on contacts of known force.
+    """Compare the forces of a sensor with simulated contacts of known force.
 
-    The experiment of the GelSlim 2.0 paper: a ball pressed into the gel and slid in many
-    directions, simulated on a finer gel at large strain, drawn as this sensor's camera would see
-    it, and put through the force pipeline and through the paper's choices. Then an error budget,
-    and rods and a punch. --error and --time pick the pipeline's operator from a ladder measured
-    first.
+    Repeats the experiment of the GelSlim 2.0 paper. A ball is pressed into the gel and slid in
+    many directions, simulated on a finer gel at large strain and drawn as the camera of the sensor
+    would see it. The frames go through the force pipeline and through the paper's choices. An
+    error budget, rods and a punch follow. Writes validation.json and pictures. --error and --time
+    choose the operator of the pipeline from a ladder that is measured first.
     """
     from gelslim.cli.answer import print_json, progress_bar
     from gelslim.cli.budget import budget_of
@@ -75,7 +76,7 @@ def validate(
 
 
 def _draw(found: Validation, folder: Path) -> list[str]:
-    """Plots, and the last frame of some contacts with what our pipeline finds in it."""
+    """Write plots, and the last frame of some contacts with the result of the pipeline."""
     from gelslim.cli.output import replace_file
     from gelslim.cli.validate_report import budget_png, fields_png, resultants_png
     from gelslim_force.outputs.arrow_scale import scale_of_run
@@ -103,7 +104,7 @@ def _draw(found: Validation, folder: Path) -> list[str]:
 
 
 def picture_names(sensor: TwinSensor) -> list[str]:
-    """All that `_draw` may write, known before the minutes that the experiment takes."""
+    """Return the names of all files that `_draw` may write, before the long experiment."""
     from gelslim_twin.validation.experiment import DIRECTIONS, other_contacts
 
     mesh = sensor.bundle.mesh
@@ -113,5 +114,5 @@ def picture_names(sensor: TwinSensor) -> list[str]:
 
 
 def picture_name(sample: str) -> str:
-    """The file that shows a sample of this name."""
+    """Return the name of the picture of a sample."""
     return f"{sample.replace(' ', '_').replace(',', '')}.png"
