@@ -1,4 +1,4 @@
-"""What binds the finger's thickness, and what it would gain from giving way."""
+"""Which limits set the finger's thickness, and what relaxing each of them would gain."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.checks.relaxation import Relaxation, given, ladders, relaxations
+from gelslim_cad.checks.relaxation import Relaxation, given, growing_changes, relaxations
 from gelslim_cad.dimensions import Dimensions, derive_batch
 from gelslim_cad.spec import Spec
 
@@ -38,7 +38,7 @@ LIMITS = {
 
 
 def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
-    """Plain sentences: what sets the thickness, what gives, and what would make it fit."""
+    """Sentences on what sets the thickness, what would reduce it and what would make it fit."""
     steps = relaxations(spec)
     if not d.feasible():
         return _infeasible(spec, d, steps)
@@ -133,15 +133,15 @@ def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tup
 
 
 def _what_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> tuple[str, ...]:
-    """What makes the design feasible and thin enough: one step, one field, or two steps."""
-    rungs = ladders(spec)
-    sets = [(s,) for s in steps] + [(s,) for ladder in rungs for s in ladder]
+    """Changes that make the design feasible and thin enough: one step, one field or two steps."""
+    series = growing_changes(spec)
+    sets = [(s,) for s in steps] + [(s,) for changes in series for s in changes]
     fits = _fitting(spec, sets, limit)
     single = [(fits[(s,)], s.words) for s in steps if (s,) in fits]
     if single:
         best, words = min(single)
         return (f"It would fit with {words}: {best:.2f} mm.",)
-    alone = [next((s for s in ladder if (s,) in fits), None) for ladder in rungs]
+    alone = [next((s for s in changes if (s,) in fits), None) for changes in series]
     ways = [f"{s.words} ({fits[(s,)]:.2f} mm)" for s in alone if s is not None]
     if ways:
         return (f"It would fit with {' or with '.join(ways)}.",)

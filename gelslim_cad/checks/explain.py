@@ -1,4 +1,4 @@
-"""How a value comes about: the chain of formulas with numbers, back to the lines of the spec."""
+"""The derivation of a value: its formulas with numbers, back to the lines of the spec."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from gelslim_core.yaml.fields import field_at
 
 Kind = Literal["dimension", "field", "solver", "rule"]
 BEND, BEND_FIELD = "guide.bend_ratio", "design.light_guide.bend_radius_ratio"
-AT_WORK = 0.004
-"""A limit closer than this part of its scale is said to be at work."""
+ACTIVE = 0.004
+"""A limit whose margin is less than this part of its scale is listed as active."""
 
 
 class UnknownNameError(GelslimError, ValueError):
@@ -66,7 +66,7 @@ def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
 
 
 class _Tracer:
-    """Walks from a value to its inputs, each only once."""
+    """Collects the tree of inputs; each value is expanded only once."""
 
     def __init__(self, loaded: LoadedSpec, d: Dimensions) -> None:
         self.loaded = loaded
@@ -90,13 +90,13 @@ class _Tracer:
             entry.title,
             formula=entry.formula,
             source=entry.source,
-            note=_limits_at_work(self.d.fold) if entry.internal else "",
+            note=_active_limits(self.d.fold) if entry.internal else "",
             repeated=not first,
-            inputs=self._inputs(self._heeded(entry)) if first else (),
+            inputs=self._inputs(self._used_inputs(entry)) if first else (),
         )
 
-    def _heeded(self, entry: Dimension) -> tuple[str, ...]:
-        """The inputs that the value depends on: a given bend asks nothing of the light."""
+    def _used_inputs(self, entry: Dimension) -> tuple[str, ...]:
+        """The inputs that the value depends on; a bend ratio in the spec depends on no light."""
         if entry.name == BEND and not chosen_here(self.d.given[BEND_FIELD]):
             return tuple(p for p in entry.inputs if self.d.argument(p)[0] == BEND_FIELD)
         return entry.inputs
@@ -134,7 +134,7 @@ class _Tracer:
 
 
 def _used_by(d: Dimensions, path: str) -> str:
-    """Which dimensions and rules take the field directly."""
+    """The dimensions and rules that use the field directly."""
     entries: tuple[Dimension | Rule, ...] = (*REGISTRY.values(), *RULES.values())
     users = [
         entry.id if isinstance(entry, Rule) else entry.name
@@ -144,11 +144,11 @@ def _used_by(d: Dimensions, path: str) -> str:
     return "Used by: " + (", ".join(dict.fromkeys(users)) or "the files only")
 
 
-def _limits_at_work(fold: Fold) -> str:
+def _active_limits(fold: Fold) -> str:
     missed = [n for n, v in fold.violations.items() if float(v.flat[0]) > 1e-6]
     if missed:
         return "no fold keeps every limit; missed: " + ", ".join(missed)
-    active = [n for n, v in fold.violations.items() if float(v.flat[0]) > -AT_WORK]
+    active = [n for n, v in fold.violations.items() if float(v.flat[0]) > -ACTIVE]
     return "limits at work: " + (", ".join(active) or "none")
 
 

@@ -1,8 +1,8 @@
-"""The closed forms published with GelSlim 1, for comparison, and where they go wrong.
+"""The closed forms published with GelSlim 1, for comparison, and where they do not hold.
 
 Donlon et al. (IROS 2018) give the mirror's size and the sensing length of a folded view without
-refraction. Their formulas hold, but for some angles they describe a finger that cannot exist: the
-camera would stand between gel and mirror. Here that case is named.
+refraction. For some angles the formulas describe a finger that cannot exist, because the camera
+would stand between gel and mirror. `mirror_behind_camera` tells that case.
 """
 
 from __future__ import annotations

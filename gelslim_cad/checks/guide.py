@@ -27,13 +27,13 @@ def bend_ratio(guide_bend_ratio: Any, guide_full_guidance_ratio: Any) -> Finding
     "led.fits_mm",
     title="LED package fits the guide's edge",
     parameter="design.leds.package_mm",
-    why="light beside the edge is lost and stray",
+    why="light that misses the edge is lost and becomes stray light",
     advice="use a smaller LED, a thicker guide, or place the LEDs more exactly",
 )
 def led_fits(
     leds_package_mm: Any, light_guide_thickness_mm: Any, leds_placement_tolerance_mm: Any
 ) -> Finding:
-    """Package against t - 2 placement tolerance."""
+    """Package size against the thickness t minus two placement tolerances."""
     return Finding(leds_package_mm, light_guide_thickness_mm - 2 * leds_placement_tolerance_mm)
 
 
@@ -45,7 +45,7 @@ def led_fits(
     advice="allow a larger LED pitch or use smaller LEDs",
 )
 def led_gap(led_pitch_mm: Any, leds_package_mm: Any, leds_min_gap_mm: Any) -> Finding:
-    """Pitch less package."""
+    """Gap between neighbouring packages: pitch minus package size."""
     return Finding(led_pitch_mm - leds_package_mm, leds_min_gap_mm, least=True)
 
 
@@ -57,7 +57,7 @@ def led_gap(led_pitch_mm: Any, leds_package_mm: Any, leds_min_gap_mm: Any) -> Fi
     advice="allow more LEDs",
 )
 def led_pitch(led_pitch_mm: Any, leds_max_pitch_mm: Any) -> Finding:
-    """Pitch against the largest wanted."""
+    """Pitch against the largest pitch that the spec allows."""
     return Finding(led_pitch_mm, leds_max_pitch_mm, advisory=True, tolerance=1e-9)
 
 
@@ -76,7 +76,7 @@ def led_on_board(
     guide_proximal_end_x_mm: Any,
     guide_distal_end_x_mm: Any,
 ) -> Finding:
-    """Board beyond the outermost LED, at both ends."""
+    """Length of the board beyond the outermost LED at each end."""
     middle = (guide_proximal_end_x_mm + guide_distal_end_x_mm) / 2
     outer = gel_length_mm / 2 - led_pitch_mm / 2 + leds_package_mm / 2
     room = led_board_length_mm / 2 - np.abs(middle) - outer
@@ -91,7 +91,7 @@ def led_on_board(
     advice="use a smaller LED or a thicker guide",
 )
 def led_board_width(leds_package_mm: Any, led_board_width_mm: Any) -> Finding:
-    """Package against board width."""
+    """Package size against the width of the board."""
     return Finding(leds_package_mm, led_board_width_mm)
 
 
@@ -131,7 +131,7 @@ def _off(value: Any, stock: tuple[float, ...]) -> Any:
     advice="widen the side margin",
 )
 def gel_on_window(light_guide_side_margin_mm: Any) -> Finding:
-    """Flat window beside the gel."""
+    """Width of the flat window beyond the gel on each side."""
     return Finding(light_guide_side_margin_mm, 0.1, least=True, caution=0.3)
 
 
@@ -146,7 +146,7 @@ def gel_on_window(light_guide_side_margin_mm: Any) -> Finding:
 def gel_index(
     material_gel_refractive_index: Any, material_acrylic_refractive_index: Any
 ) -> Finding:
-    """Critical angle of the acrylic-gel face must leave light to enter."""
+    """Index of the gel over that of the acrylic, which limits the light that enters the gel."""
     return Finding(
         material_gel_refractive_index / material_acrylic_refractive_index,
         0.8,

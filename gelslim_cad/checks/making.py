@@ -10,7 +10,7 @@ from gelslim_cad.checks.rule import Finding, rule
 from gelslim_cad.markers.process import MARKING_PROCESSES
 
 LONGEST_BRIDGE_MM = {"sla": 60.0, "fdm": 30.0, "sls": 1e9}
-"""Roof of the camera chamber, printed as a bridge: fdm sags beyond about 30 mm."""
+"""The roof of the camera chamber is printed as a bridge, which sags in FDM beyond about 30 mm."""
 
 
 @rule(
@@ -37,7 +37,7 @@ def overhang(
     unit="",
 )
 def mould_cure(manufacturing_mould_process: str) -> Finding:
-    """1 where the mould inhibits the cure."""
+    """Value 1 where the material of the mould inhibits the cure of the silicone."""
     return Finding(1.0 if manufacturing_mould_process == "sla" else 0.0, 0.0, advisory=True)
 
 
@@ -73,7 +73,7 @@ def shrinkage(manufacturing_gel_shrinkage_percent: Any) -> Finding:
     advice="use a lower crown",
 )
 def crown(gel_crown_height_mm: Any, gel_length_mm: Any, gel_width_mm: Any) -> Finding:
-    """Crown against a sixth of the shorter side."""
+    """Height of the crown against a sixth of the shorter side."""
     side = np.minimum(gel_length_mm, gel_width_mm)
     return Finding(gel_crown_height_mm, side / 6, caution=side / 20)
 
@@ -99,7 +99,7 @@ def marker_pitch(markers_pitch_mm: Any, markers_diameter_mm: Any) -> Finding:
     advice="use larger dots or another marking process",
 )
 def marker_diameter(markers_diameter_mm: Any, manufacturing_marking_process: str) -> Finding:
-    """Diameter against the process."""
+    """Diameter against the smallest that the marking process can make."""
     process = MARKING_PROCESSES[manufacturing_marking_process]
     return Finding(markers_diameter_mm, process.min_diameter_mm, least=True)
 
@@ -114,7 +114,7 @@ def marker_diameter(markers_diameter_mm: Any, manufacturing_marking_process: str
 def marker_gap(
     markers_pitch_mm: Any, markers_diameter_mm: Any, manufacturing_marking_process: str
 ) -> Finding:
-    """Gap against the process, an odd-sized anchor beside a dot included."""
+    """Gap between dots, also next to a larger anchor, against the smallest of the process."""
     process = MARKING_PROCESSES[manufacturing_marking_process]
     gap = markers_pitch_mm - 1.25 * markers_diameter_mm
     return Finding(gap, process.min_gap_mm, least=True)
@@ -134,7 +134,7 @@ def marker_inside(
     marker_grid_span_y_mm: Any,
     markers_diameter_mm: Any,
 ) -> Finding:
-    """Gel beyond the outermost dots; dots that cross a rounded corner are left out."""
+    """Gel beyond the outermost dots, without the dots that would cross a rounded corner."""
     beyond = np.minimum(gel_length_mm - marker_grid_span_x_mm, gel_width_mm - marker_grid_span_y_mm)
     return Finding(
         beyond / 2 - markers_diameter_mm / 2, 0.0, least=True, caution=0.1, tolerance=1e-9
@@ -156,7 +156,7 @@ def marker_corner(
     marker_grid_span_y_mm: Any,
     markers_diameter_mm: Any,
 ) -> Finding:
-    """Gel beyond the dot in the lattice's corner, along the corner's radius."""
+    """Gel beyond the dot in the corner of the lattice, measured along the corner's radius."""
     to_x = (gel_length_mm - marker_grid_span_x_mm) / 2
     to_y = (gel_width_mm - marker_grid_span_y_mm) / 2
     dx, dy = gel_corner_radius_mm - to_x, gel_corner_radius_mm - to_y
@@ -177,7 +177,7 @@ def marker_corner(
 def marker_lattice(
     marker_grid_rows: Any, marker_grid_columns: Any, markers_anchors: str
 ) -> Finding:
-    """Smaller side of the lattice."""
+    """Number of dots along the shorter side of the lattice."""
     least = 2 if markers_anchors == "none" else 5
     return Finding(np.minimum(marker_grid_rows, marker_grid_columns), least, least=True, caution=8)
 
@@ -191,5 +191,5 @@ def marker_lattice(
     unit="",
 )
 def marker_anchors(markers_anchors: str) -> Finding:
-    """1 with anchors."""
+    """Value 1 where the lattice has anchors."""
     return Finding(0.0 if markers_anchors == "none" else 1.0, 1.0, least=True, advisory=True)

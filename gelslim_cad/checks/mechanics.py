@@ -21,7 +21,7 @@ MOST_NODES = 400_000
     unit="MPa",
 )
 def gel_modulus(material_gel_youngs_modulus_mpa: Any, material_allow_stiff_gel: bool) -> Finding:
-    """E against the stiff end of the range, unless the spec insists."""
+    """Young's modulus against the upper limit, unless the spec allows a stiffer gel."""
     limit = np.inf if material_allow_stiff_gel else STIFF_GEL_MPA
     return Finding(material_gel_youngs_modulus_mpa, limit, caution=1.0)
 
@@ -35,7 +35,7 @@ def gel_modulus(material_gel_youngs_modulus_mpa: Any, material_allow_stiff_gel: 
     unit="MPa",
 )
 def gel_soft(material_gel_youngs_modulus_mpa: Any) -> Finding:
-    """E against the soft end of the range."""
+    """Young's modulus against the lower limit of tactile gels."""
     return Finding(material_gel_youngs_modulus_mpa, 0.02, least=True, advisory=True)
 
 
@@ -48,7 +48,7 @@ def gel_soft(material_gel_youngs_modulus_mpa: Any) -> Finding:
     unit="",
 )
 def mesh_layers(mesh_layers: Any, mesh_element: str, material_gel_poissons_ratio: Any) -> Finding:
-    """Poisson's ratio against what the mesh can carry."""
+    """Poisson's ratio against the largest that layers and element can represent."""
     one = np.asarray(mesh_layers) <= 1
     full = mesh_element == "full"
     limit = np.where(one, 0.45, 0.48 if full else 0.49995)
@@ -79,7 +79,7 @@ def mesh_alignment(pad_mesh_alignment_mm: Any) -> Finding:
 def mesh_aspect(
     pad_mesh_cell_x_mm: Any, pad_mesh_cell_y_mm: Any, pad_mesh_cell_z_mm: Any
 ) -> Finding:
-    """Longest over shortest edge of a cell."""
+    """Ratio of the longest to the shortest edge of a cell."""
     edges = np.broadcast_arrays(pad_mesh_cell_x_mm, pad_mesh_cell_y_mm, pad_mesh_cell_z_mm)
     ratio = np.maximum.reduce(edges) / np.minimum.reduce(edges)
     return Finding(ratio, 50.0, caution=5.0)
@@ -93,7 +93,7 @@ def mesh_aspect(
     advice="use more layers, a thicker gel or a lower crown",
 )
 def mesh_crown(gel_thickness_mm: Any, gel_crown_height_mm: Any, pad_mesh_cell_z_mm: Any) -> Finding:
-    """Thickness at the rim against the height of a cell."""
+    """Thickness of the gel at its rim against the height of a cell."""
     crowned = np.asarray(gel_crown_height_mm) > 0
     least = np.where(crowned, pad_mesh_cell_z_mm, 0.0)
     return Finding(gel_thickness_mm, least, least=True, tolerance=1e-9)
@@ -108,7 +108,7 @@ def mesh_crown(gel_thickness_mm: Any, gel_crown_height_mm: Any, pad_mesh_cell_z_
     unit="nodes",
 )
 def mesh_size(pad_mesh_node_count: Any) -> Finding:
-    """Nodes of the pad."""
+    """Number of nodes of the pad mesh."""
     return Finding(pad_mesh_node_count, MOST_NODES, caution=100_000)
 
 

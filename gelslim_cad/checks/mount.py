@@ -17,7 +17,7 @@ from gelslim_cad.geometry.fasteners import SCREWS
     advice="use a smaller bolt or a narrower cable",
 )
 def mount_bolt(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
-    """Tongue width less the hole."""
+    """Width of the tongue minus the diameter of the hole."""
     width = tongue_outer_y_mm - tongue_inner_y_mm
     return Finding(width - SCREWS[mount_bolt].clearance_mm, 3.0, least=True)
 
@@ -30,7 +30,7 @@ def mount_bolt(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) 
     advice="use a smaller bolt",
 )
 def mount_head(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
-    """Half the tongue and side wall against half the head."""
+    """Half the width of the tongue minus half the diameter of the head."""
     half = (tongue_outer_y_mm - tongue_inner_y_mm) / 2
     return Finding(half - SCREWS[mount_bolt].cap_head_mm / 2, 0.0, least=True)
 
@@ -48,7 +48,7 @@ def mount_block(
     mount_tongue_thickness_mm: Any,
     housing_fit_clearance_mm: Any,
 ) -> Finding:
-    """Material above the slot."""
+    """Thickness of the material above the slot."""
     height = finger_thickness_mm - housing_gel_proud_mm
     land = (height - mount_tongue_thickness_mm) / 2 - housing_fit_clearance_mm
     return Finding(land, 2.0, least=True)
@@ -80,7 +80,7 @@ def mount_cover_screw(
     advice="lengthen the tongue or use a smaller bolt",
 )
 def mount_tongue(mount_tongue_length_mm: Any, mount_bolt: str) -> Finding:
-    """Tongue beyond the hole."""
+    """Length of the tongue beyond the hole."""
     size = SCREWS[mount_bolt]
     centre = size.cap_head_mm / 2 + 1.2
     return Finding(mount_tongue_length_mm - centre - size.clearance_mm / 2, 1.2, least=True)
@@ -96,7 +96,7 @@ def mount_tongue(mount_tongue_length_mm: Any, mount_bolt: str) -> Finding:
 def cable_bend(
     camera_pose_rear_x_mm: Any, chamber_rear_x_mm: Any, camera_cable_bend_radius_mm: Any
 ) -> Finding:
-    """Chamber behind the camera."""
+    """Length of the chamber behind the camera against the bend radius of the cable."""
     room = camera_pose_rear_x_mm - chamber_rear_x_mm
     return Finding(room, camera_cable_bend_radius_mm, least=True)
 
@@ -109,5 +109,5 @@ def cable_bend(
     advice="use a narrower cable or a wider finger",
 )
 def cable_slot(camera_cable_width_mm: Any, tongue_outer_y_mm: Any) -> Finding:
-    """Cable against the mount's width."""
+    """Half the cable, with gap and tongue beside it, against the outer side of the tongues."""
     return Finding(camera_cable_width_mm / 2 + TONGUE_ROOM_MM, tongue_outer_y_mm)

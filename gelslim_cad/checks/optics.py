@@ -9,7 +9,7 @@ import numpy as np
 from gelslim_cad.checks.rule import Finding, rule
 
 TOLERANCE = 1e-4
-"""Of limits that the solver drives the design to."""
+"""Tolerance for limits at which the search places the design."""
 TOLERANCE_OF_FOLD = 1e-6
 
 
@@ -79,7 +79,7 @@ def blur_gel(view_near_blur_mm: Any, view_far_blur_mm: Any, markers_diameter_mm:
     "blur.limit",
     title="Blur the design allows",
     parameter="design.optics.blur_per_diameter",
-    why="the solver was told to keep this",
+    why="the search keeps this limit of the spec",
     advice="allow more blur, stop the lens down, or use larger markers",
     unit="mm",
 )
@@ -126,7 +126,7 @@ def marker_far(
     unit="",
 )
 def keystone(view_keystone: Any, optics_max_keystone: Any) -> Finding:
-    """Far over near distance, or its inverse where the axis leans back."""
+    """Ratio of far to near distance, or its inverse where the axis is tilted back."""
     ratio = np.maximum(view_keystone, 1 / np.asarray(view_keystone))
     return Finding(ratio, optics_max_keystone, tolerance=TOLERANCE)
 
@@ -148,11 +148,11 @@ def mirror_before_camera(mirror_lower_x_mm: Any, camera_pose_front_x_mm: Any) ->
     title="Camera, mirror and gel fit each other",
     parameter="design.gel.length_mm",
     why="every limit of the folded view must hold at once",
-    advice="see the rules that fail beside this one and the advice on what binds",
+    advice="see the other rules that fail and the advice on what limits the thickness",
     unit="",
 )
 def fold_feasible(fold_layout: Any) -> Finding:
-    """Sum of the missed parts of all limits."""
+    """Sum of the parts by which limits of the fold are missed."""
 
     def reason() -> str:
         missed = {n: float(np.max(v)) for n, v in fold_layout.violations.items()}
@@ -201,7 +201,7 @@ def led_hidden(
 def mirror_between(
     mirror_width_mm: Any, baffle_inner_y_mm: Any, housing_fit_clearance_mm: Any
 ) -> Finding:
-    """Room beside the mirror."""
+    """Gap between the mirror and the baffle on each side."""
     room = baffle_inner_y_mm - mirror_width_mm / 2
     return Finding(room, 2 * housing_fit_clearance_mm, least=True)
 

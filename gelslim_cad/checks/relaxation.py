@@ -1,4 +1,4 @@
-"""Ways to give way: spec fields changed by a usual step, or as far as it takes."""
+"""Relaxations of a design: spec fields changed by a usual step or by growing amounts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gelslim_cad.spec import Spec
 
 @dataclass(frozen=True)
 class Relaxation:
-    """One way to give way: which spec field changes, to what, and in words."""
+    """A change of one spec field that relaxes the design: its path, its new value, its name."""
 
     path: str
     value: float
@@ -66,8 +66,8 @@ def relaxations(spec: Spec) -> tuple[Relaxation, ...]:
     return _legal(spec, steps)
 
 
-def ladders(spec: Spec) -> tuple[tuple[Relaxation, ...], ...]:
-    """Per field, larger and larger changes, to find how far one field alone must give way."""
+def growing_changes(spec: Spec) -> tuple[tuple[Relaxation, ...], ...]:
+    """For each field growing changes, to find how far that field alone must change."""
     c, g, o = spec.camera, spec.design, spec.design.optics
     lengths = [0.5 * math.floor(2 * g.gel.length_mm * (1 - 0.08 * k)) for k in range(1, 11)]
     stops = [c.f_number * math.sqrt(2) ** k for k in range(2, 7)]
@@ -105,7 +105,7 @@ def _tighter_bend(spec: Spec) -> Iterable[Relaxation]:
 
 
 def _thinner_acrylic(spec: Spec) -> Iterable[Relaxation]:
-    """The next thinner sheet on sale that still takes the LEDs."""
+    """The next thinner sheet on sale that still holds the LEDs."""
     leds = spec.design.leds
     least = leds.package_mm + 2 * leds.placement_tolerance_mm
     here = spec.design.light_guide.thickness_mm
@@ -118,7 +118,7 @@ def _thinner_acrylic(spec: Spec) -> Iterable[Relaxation]:
 
 
 def _legal(spec: Spec, steps: Iterable[Relaxation]) -> tuple[Relaxation, ...]:
-    """Those that change something and that the spec would accept."""
+    """The steps that change a value and that the spec would accept."""
     gel, markers = spec.design.gel, spec.design.markers
 
     def least(count: int | None) -> float:

@@ -14,7 +14,7 @@ THINNEST_WALL_MM = {
     "fdm": (0.8, "two lines of a 0.4 mm nozzle; a single line has no bond across the layer"),
     "sls": (0.7, "thinner sintered walls do not survive depowdering"),
 }
-"""Thinnest wall per process, and why. Starting values for a careful shop."""
+"""Smallest wall thickness of each process, with the reason. They are starting values."""
 SMALLEST_GAP_MM = {"sla": 0.1, "fdm": 0.15, "sls": 0.15}
 
 
@@ -58,7 +58,7 @@ def fit(
     manufacturing_print_tolerance_mm: Any,
     manufacturing_print_process: str,
 ) -> Finding:
-    """Clearance against tolerance and process."""
+    """Clearance against the print tolerance and the smallest gap of the process."""
     least = SMALLEST_GAP_MM[manufacturing_print_process]
     return Finding(
         housing_fit_clearance_mm,
@@ -76,7 +76,7 @@ def fit(
     advice="let the gel stand less proud, use a thicker gel, or a smaller screw",
 )
 def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
-    """Plate against the head's cone, which is 90° down to the thread's core."""
+    """Thickness of the plate against the conical head, a cone of 90° down to the thread's core."""
     size = SCREWS[housing_screw]
     cone = (size.countersunk_head_mm - size.pilot_mm) / 2
     return Finding(bezel_thickness_mm, cone, least=True, caution=size.countersunk_height_mm)
@@ -90,7 +90,7 @@ def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
     advice="thicken the back wall or use a smaller screw",
 )
 def cover_thickness(housing_back_wall_mm: Any, housing_screw: str) -> Finding:
-    """Cover against head height."""
+    """Thickness of the cover against the height of the screw's head."""
     size = SCREWS[housing_screw]
     return Finding(housing_back_wall_mm, size.countersunk_height_mm, least=True, tolerance=1e-9)
 
@@ -103,7 +103,7 @@ def cover_thickness(housing_back_wall_mm: Any, housing_screw: str) -> Finding:
     advice="let the gel stand at least 0.2 mm proud",
 )
 def gel_proud(housing_gel_proud_mm: Any) -> Finding:
-    """Height over the bezel."""
+    """Height of the gel above the bezel."""
     return Finding(housing_gel_proud_mm, 0.0, least=True, caution=0.2)
 
 
@@ -115,7 +115,7 @@ def gel_proud(housing_gel_proud_mm: Any) -> Finding:
     advice="lengthen the tip wall or use a smaller screw",
 )
 def screw_wall(housing_tip_wall_mm: Any, housing_screw: str) -> Finding:
-    """Plastic beside the pilot hole in the tip block, and under the head."""
+    """Smallest wall around the pilot hole in the tip block and around the head."""
     size = SCREWS[housing_screw]
     beside = (housing_tip_wall_mm - size.countersunk_head_mm) / 2
     return Finding(beside, 0.3, least=True)
@@ -129,7 +129,7 @@ def screw_wall(housing_tip_wall_mm: Any, housing_screw: str) -> Finding:
     advice="widen the gel or use a smaller screw",
 )
 def screw_apart(finger_width_mm: Any, housing_side_wall_mm: Any, housing_screw: str) -> Finding:
-    """Distance of the two screws, less the heads."""
+    """Distance between the two screws minus the diameter of a head."""
     apart = finger_width_mm - 2 * (housing_side_wall_mm + SCREW_EDGE_MM)
     return Finding(apart - SCREWS[housing_screw].countersunk_head_mm, 1.0, least=True)
 
@@ -171,7 +171,7 @@ def precompression_tolerance(
     light_guide_thickness_mm: Any,
     manufacturing_print_tolerance_mm: Any,
 ) -> Finding:
-    """Compression against acrylic and print tolerances, both at their worst."""
+    """Compression against the worst case of the acrylic and print tolerances."""
     stack = (
         manufacturing_acrylic_tolerance_ratio * light_guide_thickness_mm
         + manufacturing_print_tolerance_mm
@@ -205,7 +205,7 @@ def clamp_beside(
     guide_proximal_end_x_mm: Any,
     housing_fit_clearance_mm: Any,
 ) -> Finding:
-    """Gap beside the clamp, or in front of it."""
+    """Gap between the clamp and the LED channel, at its side or in front of it."""
     beside = baffle_inner_y_mm - clamp_width_mm / 2
     before = guide_proximal_end_x_mm - housing_fit_clearance_mm - 1.2 - camera_pose_front_x_mm
     return Finding(np.maximum(beside, before), 0.15, least=True)
@@ -227,7 +227,7 @@ def screw_shortest(
     housing_fit_clearance_mm: Any,
     cover_top_z_mm: Any,
 ) -> Finding:
-    """Depth of plate and hole: bezel and roof, cover and mount block."""
+    """Depth of plate and hole for the screws of bezel and cover."""
     slot = tongue_z_mm - mount_tongue_thickness_mm / 2 - housing_fit_clearance_mm
     under_slot = housing_back_wall_mm + slot - cover_top_z_mm - 0.6
     room = np.minimum(bezel_thickness_mm + light_guide_thickness_mm, under_slot)
@@ -244,5 +244,5 @@ def screw_shortest(
 def clamp_before_seat(
     mirror_seat_x_mm: Any, clamp_front_x_mm: Any, housing_fit_clearance_mm: Any
 ) -> Finding:
-    """Gap between the clamp's lips and the seat's stop."""
+    """Gap between the lips of the clamp and the stop of the mirror's seat."""
     return Finding(mirror_seat_x_mm - clamp_front_x_mm, housing_fit_clearance_mm, least=True)

@@ -34,7 +34,7 @@ _AMONG: ContextVar[int] = ContextVar("designs of which this batch is a part", de
 def threads(jobs: int | None, among: int = 0) -> Iterator[None]:
     """Let `solve_fold` use `jobs` threads for batches; None: as many as there are processors.
 
-    `among` says of how many designs a batch is a part, where they come in several batches.
+    `among` is the number of all designs, where they come in several batches.
     Raises ValueError for less than one job. The number of jobs never changes a result.
     """
     if jobs is not None and jobs < 1:

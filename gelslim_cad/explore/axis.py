@@ -131,11 +131,11 @@ def _number(word: str, text: str) -> float:
 
 
 def shown(value: Any) -> str:
-    """A value as the table writes it."""
+    """A value in the form that the table shows."""
     if isinstance(value, bool):
         return str(value).lower()
     return "none" if value is None else value if isinstance(value, str) else f"{value:g}"
 
 
 class ExploreError(GelslimError, ValueError):
-    """The space cannot be explored as asked; the message says what, why and what to do."""
+    """The request cannot be explored; the message names the reason and the remedy."""

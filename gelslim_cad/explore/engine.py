@@ -1,4 +1,4 @@
-"""Where an exploration's tasks are done; results of workers with other code are refused."""
+"""Runs the tasks of an exploration; results of workers with other code are refused."""
 
 from __future__ import annotations
 

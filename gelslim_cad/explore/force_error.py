@@ -97,11 +97,11 @@ class PatchError:
         return float(self.noise_gain * sigma_mm / DEPTH_MM)
 
     def total(self, d: Lookup, noise_px: float) -> float:
-        """Mesh and noise together, as errors that do not know of each other."""
+        """Error of mesh and noise together, as independent errors."""
         return math.hypot(self.mesh, self.noise(d, noise_px))
 
     def stiffness(self, d: Lookup) -> float:
-        """Of the gel against the bump, N/mm: u·f over the square of the depth."""
+        """Stiffness of the gel against the bump in N/mm: u·f over the square of the depth."""
         return rounded(self.press_mm * d["material.gel.youngs_modulus_mpa"])
 
 

@@ -1,4 +1,4 @@
-"""Dimensions, rules and what binds, for a chunk of designs."""
+"""Dimensions, rules and active limits of a chunk of designs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SHOWN: tuple[DimensionName, ...] = (
 )
 """Dimensions in every table."""
 REFUSED = "spec"
-"""What binds a design that the spec would not accept."""
+"""The entry in `binding` of a design that the spec does not accept."""
 FOLD_RULE: RuleId = "fold.feasible"
 DEPTHS: dict[str, DimensionName] = {
     "mirror": "finger.mirror_depth_mm",

@@ -1,4 +1,4 @@
-"""The best feasible design of a space, refined between the values given, and what holds it."""
+"""The best feasible design of a space, refined between the given values, and its active limits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GOALS: dict[Aim, Goal] = {
     "bright": Goal("light.exposure_ms", "exposure", "ms"),
     "accurate": Goal("force.error", "expected force error"),
 }
-"""What each aim makes least. Bright: the shortest exposure, so light and aperture both count."""
+"""What each aim minimises. The brightest design has the shortest exposure time."""
 BETWEEN = 2
 """New values between a value and its neighbour in a round of refinement."""
 PIECES, ROUNDS = 32, 2

@@ -1,4 +1,4 @@
-"""Designs that no other design beats in every respect."""
+"""Pareto-optimal designs: no other design is at least as good in every goal."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Goal:
 
     @property
     def better(self) -> str:
-        """Which way it is better, in words."""
+        """Whether a smaller or a larger value is better, in words."""
         return "nearer to 1" if self.ratio else "more" if self.larger else "less"
 
     def costs(self, values: Sequence[float]) -> list[float]:
@@ -40,7 +40,7 @@ TRADES = (
     Goal("light.irradiance_uw_mm2", "brightness on the coat", "µW/mm²", larger=True),
     Goal("force.error", "expected force error"),
 )
-"""What thickness is traded against."""
+"""The goals that compete with thickness."""
 
 
 def front(first: Sequence[float], second: Sequence[float], *, larger: bool = False) -> list[int]:

@@ -1,4 +1,4 @@
-"""What a changed finger costs: its figures beside those of another, in the unit and in per cent."""
+"""Comparison of two fingers: their figures and the changes in per cent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gelslim_cad.spec import Spec
 SAME = 5e-4
 """Relative change below which a figure is the same: the solver stops near its limits."""
 KEPT = 64
-"""Guides and patches kept: fingers that differ elsewhere share them."""
+"""Number of traced guides and measured patches that are cached for similar fingers."""
 Wanted = Literal["less", "more", "one", ""]
 
 

@@ -96,7 +96,7 @@ def illegal(spec: Spec, overrides: Mapping[str, Any]) -> str:
 def grouped(
     axes: Sequence[Axis], rows: Sequence[tuple[Value, ...]]
 ) -> Iterator[tuple[dict[str, Value], dict[str, list[float | int]], list[int]]]:
-    """Rows by their values that are no numbers.
+    """Groups of rows that share all values that are not numbers.
 
     Yields those values, the numbers of the group as columns, and the rows' places.
     """

@@ -1,4 +1,4 @@
-"""Results of finished tasks, one file each: a killed run goes on where it stopped."""
+"""Results of finished tasks, one file each, so that a killed run can be continued."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Store:
         """
         target = Path(os.path.abspath(folder))
         with locked(target):
-            strange = target.exists() and (not target.is_dir() or _foreign(target))
-            if strange:
+            occupied = target.exists() and (not target.is_dir() or _foreign(target))
+            if occupied:
                 raise ExploreError(
                     f"{folder} exists and holds no exploration; give another -o or remove it"
                 )
@@ -52,8 +52,8 @@ class Store:
             found = json.loads(self._place(task).read_bytes())
         except (OSError, ValueError):
             return None
-        whole = isinstance(found, dict) and found.get("key") == task.key
-        return found["result"] if whole else None
+        complete = isinstance(found, dict) and found.get("key") == task.key
+        return found["result"] if complete else None
 
     def write(self, task: Task, result: dict[str, Any]) -> None:
         """Store a result in one step."""
@@ -72,7 +72,7 @@ class Store:
 
 
 def _foreign(folder: Path) -> bool:
-    """Whether it holds more than a run killed at its start leaves, and no mark of ours."""
-    strange = any(not is_part(path.name) for path in folder.iterdir())
+    """Whether the folder holds files that no exploration wrote."""
+    other_files = any(not is_part(path.name) for path in folder.iterdir())
     mark = folder / MARK
-    return strange and not (mark.is_file() and mark.read_bytes() == MARKED)
+    return other_files and not (mark.is_file() and mark.read_bytes() == MARKED)

@@ -1,4 +1,4 @@
-"""Tasks that a worker can do anywhere: plain data in, plain data out, the same wherever done."""
+"""Tasks for workers on any machine: plain data in and out, with the same result everywhere."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def _designs(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _packed(values: list[Any]) -> Any:
-    """A column that is one value throughout as that value alone."""
+    """A column; where all its values are equal, only that value is kept."""
     alone = all(v == values[0] and type(v) is type(values[0]) for v in values)
     return {"all": values[0]} if alone else {"each": values}
 
 
 def unpacked(packed: dict[str, Any], count: int) -> list[Any]:
-    """The column again."""
+    """The column that `_packed` was given."""
     if "all" in packed:
         return [packed["all"]] * count
     return list(packed["each"])

@@ -54,7 +54,7 @@ class Offer:
 
     @property
     def present_mm(self) -> float:
-        """Its thickness."""
+        """Thickness of the finger in mm."""
         return float(self.present.figures["finger.thickness_mm"] or 0.0)
 
 

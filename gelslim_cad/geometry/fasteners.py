@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SCREW_EDGE_MM = 2.6
-"""From a side wall's inside to the axis of the screws beside it."""
+"""Distance from the inner face of a side wall to the axis of the nearest screws."""
 
 
 @dataclass(frozen=True)

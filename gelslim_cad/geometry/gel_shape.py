@@ -107,15 +107,15 @@ class GelShape:
         )
 
     def _polar_moment_mm4(self) -> float:
-        """∫ x² + y² over the outline: the rectangle less, at each corner, square minus quarter.
+        """Polar moment ∫ x² + y² of the outline: the rectangle without its four cut corners.
 
         With (p, q) the corner arc's centre, ∫ (p + u)² over the square of side r is
         p²r² + p r³ + r⁴/3, over the quarter disc p² π r²/4 + 2 p r³/3 + π r⁴/16.
         """
         length, width, r = self.length_mm, self.width_mm, self.corner_radius_mm
-        whole = length * width * (length**2 + width**2) / 12
+        rectangle = length * width * (length**2 + width**2) / 12
         cut = 0.0
         for p in (length / 2 - r, width / 2 - r):
             cut += p**2 * r**2 * (1 - math.pi / 4)
             cut += p * r**3 / 3 + r**4 * (1 / 3 - math.pi / 16)
-        return whole - 4 * cut
+        return rectangle - 4 * cut

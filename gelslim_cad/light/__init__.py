@@ -1,1 +1,1 @@
-"""How this finger is lit: scenes of its guide and of the older kind, traced and compared."""
+"""The finger's light: its guide and straight guides, traced and compared."""

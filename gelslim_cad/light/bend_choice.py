@@ -1,4 +1,4 @@
-"""Which bend radius brings most light to the gel's coat, by tracing."""
+"""The bend radius that brings most light to the gel's coat, found by ray tracing."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def _brightest(items: tuple[tuple[str, Any], ...]) -> float:
 
 
 def candidates(values: Mapping[str, Any]) -> list[float]:
-    """Ratios to try, rising, up to what the width allows."""
+    """Ratios R/t to try, in ascending order, up to the largest that the width allows."""
     limit, most = values["design.envelope.max_width_mm"], MOST
     if limit is not None:
         t = values["design.light_guide.thickness_mm"]
-        beside = values["design.housing.side_wall_mm"] + values["design.housing.fit_clearance_mm"]
-        radius = limit / 2 - beside - t - values["guide.flat_width_mm"] / 2
+        wall = values["design.housing.side_wall_mm"] + values["design.housing.fit_clearance_mm"]
+        radius = limit / 2 - wall - t - values["guide.flat_width_mm"] / 2
         most = min(MOST, radius / t)
     steps = [float(r) for r in np.arange(LEAST, most, STEP)]
     last = [] if most < LEAST else [int(most * 1000) / 1000]

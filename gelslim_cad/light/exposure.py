@@ -17,7 +17,7 @@ WAVELENGTHS: dict[str, FloatName] = {
     "green": "design.leds.green_wavelength_nm",
 }
 WELL_SHARE = 0.5
-"""Part of the full well that the mean of the picture fills: bright spots keep a stop of room."""
+"""Part of the full well that the mean of the image fills, so that bright spots do not saturate."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Exposure:
     limit: Literal["readout", "exposure"]
 
     def sentence(self) -> str:
-        """In words."""
+        """One sentence for people."""
         what = "the camera's readout" if self.limit == "readout" else "the light"
         return (
             f"{self.colour.capitalize()}: an exposure of {self.exposure_ms:.2f} ms fills half of a "
@@ -72,7 +72,7 @@ def exposure_at(d: Lookup, irradiance_per_w: float, colour: str) -> Exposure:
 
 
 def _to_air(d: Lookup) -> float:
-    """Share of the coat's radiance that gets into the air: Fresnel over n², near the normal."""
+    """Share of the coat's radiance that leaves into air near the normal: transmission over n²."""
     gel, acrylic = d["material.gel.refractive_index"], d["material.acrylic.refractive_index"]
     first = 1 - ((gel - acrylic) / (gel + acrylic)) ** 2
     second = 1 - ((acrylic - 1) / (acrylic + 1)) ** 2

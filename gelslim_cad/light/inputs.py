@@ -1,4 +1,4 @@
-"""What the light depends on: a small mapping that crosses process borders and makes a key."""
+"""The values on which the light depends, as a mapping for worker processes and cache keys."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ NAMES: tuple[Name, ...] = (
     "material.gel.refractive_index",
     "stack.gel_bottom_z_mm",
 )
-"""Names that scene, study, exposure and pictures look up."""
+"""Names that scene, study, exposure and pictures use."""
 
 
 def light_inputs(d: Lookup) -> dict[str, Any]:

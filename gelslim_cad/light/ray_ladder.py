@@ -98,7 +98,7 @@ def measure_times(d: Lookup, progress: Progress | None = None) -> dict[str, floa
 
 
 def _rising(times: Mapping[str, float]) -> dict[str, float]:
-    """Times with fewer rays never slower than with more: there another program was in the way."""
+    """Times made monotonic: a time with fewer rays is at most the time with more rays."""
     least = np.minimum.accumulate(list(times.values())[::-1])[::-1]
     return dict(zip(times, map(float, least), strict=True))
 

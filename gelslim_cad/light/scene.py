@@ -10,7 +10,7 @@ from gelslim_optics.light.scene import PMMA_SELLMEIER, LightScene, Medium, Surfa
 from gelslim_optics.light.source import AngularLaw, Dome, Lambertian, LedRow, MeasuredLaw
 
 MIRROR_REFLECTANCE = 0.9
-"""Aluminium on acrylic, unprotected; silver reaches 0.95."""
+"""Reflectance of unprotected aluminium on acrylic; silver reaches 0.95."""
 PMMA_REFERENCE_UM = 0.590
 OPEN_FACES = ("leg_top", "window_end")
 """Faces of the air-gap guide whose light goes on to its mirror."""

@@ -1,4 +1,4 @@
-"""The guide against the GelSlim 1 type, the same rays in both; every figure with its interval."""
+"""The guide compared with straight guides of the GelSlim 1 type, traced with the same rays."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class Comparison:
 
     @property
     def verdict(self) -> Verdict:
-        """What the 95 % interval allows to say."""
+        """The conclusion that the 95 % interval supports."""
         if self.ratio.low > 1:
             return "brighter"
         return "darker" if self.ratio.high < 1 else "no different"
 
     def sentence(self) -> str:
-        """In words."""
+        """One sentence for people."""
         r = self.ratio
         return (
             f"{self.verdict} than {self.other}: {r.value:.3f} times the "

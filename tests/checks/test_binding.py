@@ -8,7 +8,7 @@ import pytest
 from rule_samples import shipped, varied
 
 from gelslim_cad.checks.binding import binding_sentences
-from gelslim_cad.checks.relaxation import ladders, relaxations
+from gelslim_cad.checks.relaxation import growing_changes, relaxations
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec import Spec
 
@@ -71,7 +71,7 @@ def ways_out(text: str) -> list[tuple[str, float]]:
 
 
 def solved(spec: Spec, words: str) -> tuple[float, bool]:
-    steps = [*relaxations(spec), *(s for ladder in ladders(spec) for s in ladder)]
+    steps = [*relaxations(spec), *(s for changes in growing_changes(spec) for s in changes)]
     chosen = {s.path: s.value for s in steps if s.words in words.split(" and ")}
     assert chosen, words
     d = derive(varied(spec, chosen))
@@ -126,7 +126,7 @@ def test_a_hopeless_design_is_told_so() -> None:
 def test_suggested_steps_are_legal_specs() -> None:
     for name in ("mini20", "gelslim2"):
         spec = shipped(name)
-        steps = [*relaxations(spec), *(s for ladder in ladders(spec) for s in ladder)]
+        steps = [*relaxations(spec), *(s for changes in growing_changes(spec) for s in changes)]
         assert len({s.words for s in steps}) == len(steps)
         for step in steps:
             varied(spec, {step.path: step.value})
