@@ -39,22 +39,22 @@ def test_yes_and_no_vary(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "name"),
     [
-        ("manufacturing.fabric_skin=yes", "must be one of true, false"),
-        ("gel=1,2", "gel is a block; vary one of its fields: design.gel.length_mm"),
-        ("leds.emission_angle_deg=1", "is a list"),
+        ("manufacturing.fabric_skin=yes", r"manufacturing\.fabric_skin"),
+        ("gel=1,2", r"design\.gel\.length_mm"),
+        ("leds.emission_angle_deg=1", r"leds\.emission_angle_deg"),
     ],
 )
-def test_refusals_say_what_to_give_instead(text: str, words: str) -> None:
-    with pytest.raises(ExploreError, match=words):
+def test_refusals_name_the_field(text: str, name: str) -> None:
+    with pytest.raises(ExploreError, match=name):
         parse_axis(text)
 
 
 def test_columns_have_the_short_names_of_axes() -> None:
     asked = Request(space(), also=("gel.width_mm", "led.count"))
     assert asked.also == ("design.gel.width_mm", "led.count")
-    with pytest.raises(ExploreError, match=r"did you mean finger\.thickness_mm"):
+    with pytest.raises(ExploreError, match=r"finger\.thickness_mm"):
         Request(space(), also=("finger.thicknes_mm",))
 
 

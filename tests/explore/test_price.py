@@ -101,9 +101,9 @@ def test_no_field_reaches_beyond_its_rules(offer: Offer) -> None:
 
 
 def test_a_finger_that_is_thin_enough_or_broken_has_no_price() -> None:
-    with pytest.raises(ExploreError, match=r"17\.79 mm thick, no more than 20 mm"):
+    with pytest.raises(ExploreError, match=r"17\.79 mm.* 20 mm"):
         thinner(mini20(), 20.0)
-    with pytest.raises(ExploreError, match=r"breaks .*bezel\.thickness_mm.*mend"):
+    with pytest.raises(ExploreError, match=r"bezel\.thickness_mm"):
         thinner(changed(mini20(), {"design.gel.thickness_mm": 1.0}))
 
 
