@@ -92,7 +92,7 @@ def build_variant(
 
     loaded = read_spec(spec_path)
     target = Path(os.path.abspath(out_dir))
-    tell = progress or (lambda text, done, total: None)
+    notify = progress or (lambda text, done, total: None)
     with locked(target):
         recover(target)
         require_ours(target)
@@ -103,53 +103,28 @@ def build_variant(
             return BuildResult(
                 target, (*previous.files, NAME), (), stages.checks, stages.binding, up_to_date=True
             )
-        failed = tuple(c for c in stages.checks if c.status == "fail")
-        if failed:
-            raise BuildRefusedError(stages.checks, _refusal(loaded.spec.name, failed))
-        return _build(stages, target, previous, key, jobs or min(4, os.cpu_count() or 1), tell)
+        _require_rules(stages.name, stages.checks)
+        return _build(stages, target, previous, key, jobs or min(4, os.cpu_count() or 1), notify)
 
 
 def _build(
-    stages: Stages, target: Path, previous: Manifest | None, key: str, jobs: int, tell: Progress
+    stages: Stages, target: Path, previous: Manifest | None, key: str, jobs: int, notify: Progress
 ) -> BuildResult:
-    tell("solids", 0, 1)
+    notify("solids", 0, 1)
     plan = stages.plan()
-    failed = tuple(c for c in plan.checks if c.status == "fail")
-    if failed:
-        raise BuildRefusedError(plan.checks, _refusal(stages.name, failed))
+    _require_rules(stages.name, plan.checks)
     keys = {unit.name: unit.key() for unit in plan.units}
     reused = _reusable(previous, target, keys)
     todo = [u for u in plan.units if u.name not in reused]
-    written = _run_all(todo, jobs, tell)
-    bad = [p for w in written.values() for p in w.proofs if not p["ok"]]
-    if bad:
-        lines = "; ".join(f"{p['file']}: {p['check']} {p['detail']}" for p in bad)
-        raise BuildRefusedError(
-            plan.checks, f"{stages.name}: a written file fails its proof: {lines}"
-        )
-    note = " ".join(w.note for w in written.values() if w.note)
+    written = _run_all(todo, jobs, notify)
+    _require_proofs(stages.name, plan.checks, written)
     with staged(target, () if previous is None else {*previous.files, NAME}) as folder:
-        files: dict[str, FileEntry] = {}
-        proofs = list(_kept_proofs(previous, reused))
-        contents: dict[str, bytes] = {}
-        for name in keys:
-            if name in reused and previous is not None:
-                for path in reused[name]:
-                    contents[path] = (target / path).read_bytes()
-                    files[path] = previous.files[path]
-                continue
-            for path, data in written[name].files.items():
-                contents[path] = data
-                files[path] = entry(data, written[name].purposes[path], name)
-            proofs += [{**p, "unit": name} for p in written[name].proofs]
+        contents, files = _gathered(list(keys), target, previous, reused, written)
+        note = " ".join(w.note for w in written.values() if w.note)
         for path, (data, purpose) in stages.documents(plan, contents, files, note).items():
             contents[path] = data
             files[path] = entry(data, purpose, "documents")
-        for path, data in contents.items():
-            place = folder / path
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(data)
-        # A unit that could not be done here is tried again by the next build.
+        # A unit that could not be done on this machine is tried again by the next build.
         done = {n: k for n, k in keys.items() if n not in written or not written[n].note}
         manifest = Manifest(
             stages.name,
@@ -158,12 +133,64 @@ def _build(
             dict(versions()),
             done,
             files,
-            tuple(sorted(proofs, key=lambda p: (str(p["unit"]), str(p["file"])))),
+            _all_proofs(previous, reused, written),
         )
-        (folder / NAME).write_bytes(manifest.to_json())
+        for path, data in {**contents, NAME: manifest.to_json()}.items():
+            place = folder / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
     return BuildResult(
         target, (*sorted(files), NAME), tuple(u.name for u in todo), plan.checks, stages.binding
     )
+
+
+def _require_rules(name: str, checks: tuple[Check, ...]) -> None:
+    """Raise BuildRefusedError when a design rule fails."""
+    failed = [c for c in checks if c.status == "fail"]
+    if failed:
+        lines = [f"{name}: {len(failed)} design rule(s) fail; nothing was built"]
+        lines += [f"  {c.id}: {c.reason}. {c.advice} ({c.parameter})" for c in failed]
+        raise BuildRefusedError(checks, "\n".join(lines))
+
+
+def _require_proofs(name: str, checks: tuple[Check, ...], written: dict[str, Written]) -> None:
+    """Raise BuildRefusedError when a written file fails its check."""
+    bad = [p for w in written.values() for p in w.proofs if not p["ok"]]
+    if bad:
+        lines = "; ".join(f"{p['file']}: {p['check']} {p['detail']}" for p in bad)
+        raise BuildRefusedError(checks, f"{name}: a written file fails its proof: {lines}")
+
+
+def _gathered(
+    units: list[str],
+    target: Path,
+    previous: Manifest | None,
+    reused: dict[str, list[str]],
+    written: dict[str, Written],
+) -> tuple[dict[str, bytes], dict[str, FileEntry]]:
+    """Contents and entries by path, of files that were taken over and of new ones."""
+    contents: dict[str, bytes] = {}
+    files: dict[str, FileEntry] = {}
+    for name in units:
+        if previous is not None and name in reused:
+            for path in reused[name]:
+                contents[path] = (target / path).read_bytes()
+                files[path] = previous.files[path]
+            continue
+        for path, data in written[name].files.items():
+            contents[path] = data
+            files[path] = entry(data, written[name].purposes[path], name)
+    return contents, files
+
+
+def _all_proofs(
+    previous: Manifest | None, reused: dict[str, list[str]], written: dict[str, Written]
+) -> tuple[dict[str, object], ...]:
+    """Proofs of all files, sorted by unit and file."""
+    kept = () if previous is None else previous.proofs
+    proofs = [dict(p) for p in kept if p.get("unit") in reused]
+    proofs += [{**p, "unit": name} for name, w in written.items() for p in w.proofs]
+    return tuple(sorted(proofs, key=lambda p: (str(p["unit"]), str(p["file"]))))
 
 
 def _reusable(
@@ -182,21 +209,13 @@ def _reusable(
     }
 
 
-def _kept_proofs(
-    previous: Manifest | None, reused: dict[str, list[str]]
-) -> list[dict[str, object]]:
-    if previous is None:
-        return []
-    return [dict(p) for p in previous.proofs if p.get("unit") in reused]
-
-
-def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
+def _run_all(todo: list[Unit], jobs: int, notify: Progress) -> dict[str, Written]:
     """Run the units in worker processes, those with the highest cost first; results by name."""
     queue = sorted(todo, key=lambda u: -u.cost)
     results: dict[str, Written] = {}
     if jobs <= 1 or len(queue) <= 1:
         for done, unit in enumerate(queue):
-            tell(unit.name, done, len(queue))
+            notify(unit.name, done, len(queue))
             results[unit.name] = run(unit)
         return results
     # A forked worker starts with the CAD kernel loaded; a spawned one must load it first.
@@ -204,16 +223,10 @@ def _run_all(todo: list[Unit], jobs: int, tell: Progress) -> dict[str, Written]:
     with worker_pool(min(jobs, len(queue)), "fork" if _forks() else "spawn") as pool:
         futures = [(unit, pool.submit(run, unit)) for unit in queue]
         for done, (unit, future) in enumerate(futures):
-            tell(unit.name, done, len(queue))
+            notify(unit.name, done, len(queue))
             results[unit.name] = future.result()
     return results
 
 
 def _forks() -> bool:
     return sys.platform.startswith("linux")
-
-
-def _refusal(name: str, failed: tuple[Check, ...]) -> str:
-    lines = [f"{name}: {len(failed)} design rule(s) fail; nothing was built"]
-    lines += [f"  {c.id}: {c.reason}. {c.advice} ({c.parameter})" for c in failed]
-    return "\n".join(lines)
