@@ -39,7 +39,7 @@ def test_the_extras_are_those_of_the_package() -> None:
         wanted = {line.partition(">")[0] for line in listed[extra.name]}
         named = {libraries.DISTRIBUTIONS.get(m, m) for m in extra.modules}
         assert named == wanted, extra.name
-    assert {e.name for e in EXTRAS} == set(listed) - {"dev", "peers", "all"}
+    assert {e.name for e in EXTRAS} == set(listed) - {"dev", "docs", "mutants", "peers", "all"}
 
 
 def test_a_missing_extra_is_named_with_its_command(
