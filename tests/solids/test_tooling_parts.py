@@ -233,7 +233,8 @@ def test_all_tooling_of_the_papers_sensor() -> None:
     d = gelslim2()
     parts = tooling_parts(d, clipped_grid(d))
     names = [p.name for p in parts]
-    assert len(set(names)) == len(names) == 11
+    assert len(set(names)) == len(names) == 12
+    assert "light_guide_blank" in names
     assert not any(p.in_assembly for p in parts)
     for part in parts:
         assert len(part.solid.Solids()) == 1

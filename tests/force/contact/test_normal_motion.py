@@ -246,7 +246,7 @@ def test_what_is_not_known_is_not_invented():
     model = wide_model()
     flat = model.motion(disc(), Flat(radius_mm=2.0))
     assert not flat.known
-    assert "supply" in flat.problem
+    assert flat.problem
     assert np.isnan(flat.w_mm).all()
     assert np.isnan(flat.push_n)
     wide = model.motion(disc(a=3.0), Sphere(2.0))
