@@ -44,4 +44,4 @@ assert all(rule.status != "fail" for rule in checks)
 
 # %% [markdown]
 # `gelslim.build(spec_file)` writes all files of the finger, as `gelslim build` does: parts as STEP and
-# STL, the marker print, the mould, the report. It takes about 20 s and needs the extra `cad`.
+# STL, the marker print, the mould, the report. It takes about 30 s and needs the extra `cad`.
