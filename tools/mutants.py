@@ -6,6 +6,8 @@ to the module run there until one fails. A mutant that no test notices has survi
 
     make mutants                                    # 200 mutants, at least 90 % must be killed
     python tools/mutants.py --count 20 --seed 3     # a smaller sample
+    python tools/mutants.py --module 'ifem_export/*'  # of the sample only one package
+    python tools/mutants.py --again                 # the survivors of the last run once more
 
 The result is out/mutants.json. Survivors that change no result are explained one by one in
 tools/mutants_explained.json and count as killed.
@@ -27,10 +29,12 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from queue import Queue
 
 ROOT = Path(__file__).parents[1]
+RECORD = ROOT / "out" / "mutants.json"
 EXPLAINED = Path(__file__).with_name("mutants_explained.json")
 PACKAGES = (
     "gelslim", "gelslim_cad", "gelslim_core", "gelslim_force", "gelslim_optics", "gelslim_twin",
@@ -154,6 +158,27 @@ def sample(count: int, seed: int) -> list[Mutant]:
     return [mutant_at(key[0], *rng.choice(by_line[key]), key[1]) for key in chosen]
 
 
+def recorded(record: Path) -> list[Verdict]:
+    """The verdicts of an earlier run."""
+    rows = json.loads(record.read_text(encoding="utf-8"))["verdicts"]
+    return [Verdict(**{**row, "mutant": Mutant(**row["mutant"])}) for row in rows]
+
+
+def still_there(mutants: list[Mutant]) -> list[Mutant]:
+    """Those of some earlier mutants that can still be made, wherever their lines are now."""
+    found = []
+    for old in mutants:
+        if not (ROOT / old.module).is_file():
+            continue
+        for name, occurrence, line in places_of(ROOT / old.module):
+            if name == old.operator:
+                new = mutant_at(old.module, name, occurrence, line)
+                if (new.before, new.after) == (old.before, old.after):
+                    found.append(new)
+                    break
+    return found
+
+
 def imports_of(path: Path) -> set[str]:
     """Modules of ours that a file imports, as paths below the root."""
     found = set()
@@ -265,21 +290,29 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=14)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--module", default="*", help="of the sample only modules of this pattern")
+    parser.add_argument("--again", action="store_true", help="only the last survivors")
+    parser.add_argument("--record", type=Path, default=RECORD)
     parser.add_argument("--list", action="store_true", help="print the sample, run nothing")
     chosen = parser.parse_args()
-    mutants = sample(chosen.count, chosen.seed)
+    earlier = recorded(chosen.record) if chosen.again else []
+    killed = [v for v in earlier if v.killed]
+    if chosen.again:
+        mutants = still_there([v.mutant for v in earlier if not v.killed])
+    else:
+        mutants = sample(chosen.count, chosen.seed)
+    mutants = [m for m in mutants if fnmatch(m.module, chosen.module)]
     if chosen.list:
         for m in mutants:
             print(f"{m.module}:{m.line}\n  - {m.before}\n  + {m.after}")
         return 0
-    verdicts = run(mutants, chosen.jobs)
+    verdicts = killed + run(mutants, chosen.jobs)
     explained = json.loads(EXPLAINED.read_text(encoding="utf-8")) if EXPLAINED.is_file() else []
     known = {(e["module"], e["after"]) for e in explained}
     alive = [v for v in verdicts if not v.killed]
     unexplained = [v for v in alive if (v.mutant.module, v.mutant.after) not in known]
     share = 1 - len(unexplained) / max(1, len(verdicts))
-    place = ROOT / "out" / "mutants.json"
-    place.parent.mkdir(exist_ok=True)
+    chosen.record.parent.mkdir(exist_ok=True)
     record = {
         "seed": chosen.seed,
         "count": len(verdicts),
@@ -287,7 +320,7 @@ def main() -> int:
         "explained": len(alive) - len(unexplained),
         "verdicts": [asdict(v) for v in verdicts],
     }
-    place.write_text(json.dumps(record, indent=1), encoding="utf-8")
+    chosen.record.write_text(json.dumps(record, indent=1), encoding="utf-8")
     print(f"{len(alive)} of {len(verdicts)} survived, {len(unexplained)} of them unexplained.")
     return 0 if share >= NEEDED_SHARE else 1
 
