@@ -71,7 +71,7 @@ OPERATORS = (
     "core/ReplaceTrueWithFalse", "core/ReplaceFalseWithTrue", "core/NumberReplacer",
 )  # fmt: skip
 NEEDED_SHARE = 0.9
-LIMIT_S = 600
+LIMIT_S = 300
 MOST_FILES = 8
 
 
