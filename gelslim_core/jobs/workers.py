@@ -116,6 +116,7 @@ def _end_with(sentinel: int) -> None:
 def _stop(pool: ProcessPoolExecutor) -> None:
     # The executor has no public way to end its workers before Python 3.14.
     processes = list((getattr(pool, "_processes", None) or {}).values())
+    manager = getattr(pool, "_executor_manager_thread", None)
     pool.shutdown(wait=False, cancel_futures=True)
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -129,3 +130,6 @@ def _stop(pool: ProcessPoolExecutor) -> None:
     for process in processes:
         with contextlib.suppress(OSError, ValueError, AssertionError):
             process.join()
+    if manager is not None:
+        # It frees the pool's semaphores. A process that ends meanwhile would leave one behind.
+        manager.join(GRACE_S)
