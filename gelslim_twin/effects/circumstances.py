@@ -22,10 +22,10 @@ Use = Literal["auto", "on", "off"]
 
 
 class EffectParameters(Block):
-    """Whether to simulate an effect, beside its own parameters."""
+    """Whether to simulate an effect. Some effects have further parameters."""
 
     use: Use = Field(
-        default="auto", description="Let the planner decide, always simulate, or never"
+        default="auto", description="Simulated as the planner decides, always, or never"
     )
 
 

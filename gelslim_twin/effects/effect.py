@@ -85,33 +85,33 @@ class Effect:
 
     Attributes:
         name: Name in the scene file.
-        title: Name in reports.
+        description: What it is, for the reference of the scene file.
         parameters: Model of its block in the scene file.
         bound: Largest error of leaving it out.
         formula: The bound in words.
         ladder: Rungs with their errors and times.
-        is_null: Whether its parameters make it do nothing.
         implementation: Module that computes it, imported only when a plan includes the effect.
         needs: Data that it takes.
         provides: Data that it computes from these.
         refines: Data of other effects that it changes.
         after: Effects that refine the same data before it.
+        does_nothing: Whether its parameters make it do nothing, where a bound of zero does not
+            tell.
     """
 
     name: str
-    title: str
+    description: str
     parameters: type[EffectParameters]
     bound: Callable[[Circumstances], Bound]
     formula: str
     ladder: Callable[[Circumstances], tuple[Rung, ...]]
-    is_null: Callable[[Circumstances], bool]
     implementation: str
     needs: tuple[str, ...] = ()
     provides: tuple[str, ...] = ()
     refines: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
+    does_nothing: Callable[[Circumstances], bool] | None = None
 
-
-def never_null(_c: Circumstances) -> bool:
-    """For effects that no parameter turns off."""
-    return False
+    def is_null(self, c: Circumstances) -> bool:
+        """Whether its parameters make it do nothing."""
+        return self.bound(c) == Bound() if self.does_nothing is None else self.does_nothing(c)

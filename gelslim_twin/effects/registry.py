@@ -2,46 +2,26 @@
 
 from __future__ import annotations
 
-from gelslim_twin.effects import (
-    compression,
-    defocus,
-    dirt,
-    drawing,
-    exposure,
-    friction,
-    lens_distortion,
-    marker_print,
-    motion_blur,
-    nonlinearity,
-    normal_contact,
-    perspective,
-    refraction,
-    relaxation,
-    sensor_noise,
-    shading,
-    specular,
+from gelslim_twin.effects.contact import FRICTION, NONLINEARITY, NORMAL_CONTACT, RELAXATION
+from gelslim_twin.effects.dot_contrast import DEFOCUS, DRAWING, EXPOSURE
+from gelslim_twin.effects.dot_positions import (
+    LENS_DISTORTION,
+    MARKER_PRINT,
+    PERSPECTIVE,
+    REFRACTION,
 )
 from gelslim_twin.effects.effect import Effect
+from gelslim_twin.effects.grey_values import (
+    COMPRESSION,
+    DIRT,
+    MOTION_BLUR,
+    SENSOR_NOISE,
+    SHADING,
+    SPECULAR,
+)
 
-EFFECTS: tuple[Effect, ...] = tuple(
-    module.EFFECT
-    for module in (
-        normal_contact,
-        friction,
-        nonlinearity,
-        relaxation,
-        perspective,
-        refraction,
-        lens_distortion,
-        marker_print,
-        drawing,
-        shading,
-        dirt,
-        defocus,
-        specular,
-        motion_blur,
-        exposure,
-        sensor_noise,
-        compression,
-    )
+EFFECTS: tuple[Effect, ...] = (
+    *(NORMAL_CONTACT, FRICTION, NONLINEARITY, RELAXATION),
+    *(PERSPECTIVE, REFRACTION, LENS_DISTORTION, MARKER_PRINT, DRAWING),
+    *(SHADING, DIRT, DEFOCUS, SPECULAR, MOTION_BLUR, EXPOSURE, SENSOR_NOISE, COMPRESSION),
 )

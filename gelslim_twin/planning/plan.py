@@ -17,7 +17,6 @@ class Choice:
     """Whether one effect is simulated, how finely, and why."""
 
     effect: str
-    title: str
     included: bool
     why: str
     bound: Bound

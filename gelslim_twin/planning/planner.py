@@ -153,53 +153,48 @@ def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
     return any(r.error.of(observable) > 0 for r in ladder)
 
 
-def _within(error: Bound, shares: dict[str, float]) -> bool:
-    return all(error.of(observable) <= share for observable, share in shares.items())
-
-
 def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str, float]) -> Choice:
     c, use = question.circumstances, question.use(effect)
     _, bound, ladder = question.weighed(effect)
-    if use == "off":
-        cost = "not observed" if not relevant else "switched off"
-        return _out(effect, bound, cost, shares if relevant else {})
     if not relevant:
-        return _out(effect, bound, "not observed", {})
+        return _choice(effect, bound, "not observed", {})
+    if use == "off":
+        return _choice(effect, bound, "switched off", shares)
     if use == "on":
-        return _in(effect, ladder, bound, "switched on", shares)
+        return _choice(effect, bound, "switched on", shares, ladder)
     if effect.provides:
         made = ", ".join(effect.provides)
-        return _in(effect, ladder, bound, f"provides {made}", shares)
+        return _choice(effect, bound, f"provides {made}", shares, ladder)
     if effect.is_null(c):
-        return _out(effect, bound, "parameters nil", shares)
-    if _within(bound, shares):
-        return _out(effect, bound, "below its share", shares)
+        return _choice(effect, bound, "parameters nil", shares)
+    if all(bound.of(observable) <= share for observable, share in shares.items()):
+        return _choice(effect, bound, "below its share", shares)
     worst = max(shares, key=lambda o: _excess(bound.of(o), shares[o]))
-    return _in(effect, ladder, bound, f"matters to {worst}", shares)
+    return _choice(effect, bound, f"matters to {worst}", shares, ladder)
 
 
 def _excess(error: float, share: float) -> float:
     return error / share if share > 0 else (float("inf") if error > 0 else 0.0)
 
 
-def _out(effect: Effect, bound: Bound, why: str, shares: dict[str, float]) -> Choice:
-    return Choice(
-        effect.name, effect.title, False, why, bound, _as_pairs(shares), bound,
-        formula=effect.formula,
-    )  # fmt: skip
-
-
-def _in(
-    effect: Effect, ladder: Sequence[Rung], bound: Bound, why: str, shares: dict[str, float]
+def _choice(
+    effect: Effect,
+    bound: Bound,
+    why: str,
+    shares: dict[str, float],
+    ladder: Sequence[Rung] | None = None,
 ) -> Choice:
+    """Simulate an effect by a rung of `ladder`, or leave it out where there is no ladder."""
+    pairs = tuple(shares.items())
+    if ladder is None:
+        return Choice(effect.name, False, why, bound, pairs, bound, formula=effect.formula)
     rung = _rung(ladder, shares)
     return Choice(
         effect.name,
-        effect.title,
         True,
         why,
         bound,
-        _as_pairs(shares),
+        pairs,
         rung.error,
         formula=effect.formula,
         rung=rung.name,
@@ -225,10 +220,6 @@ def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
         return ladder[int(Ladder(rungs).choose(Budget(error=1.0)).rung.name)]
     totals = [sum(r.error.of(o) for o in shares) for r in ladder]
     return ladder[min(range(len(ladder)), key=lambda k: (errors[k], totals[k]))]
-
-
-def _as_pairs(shares: dict[str, float]) -> tuple[tuple[str, float], ...]:
-    return tuple(shares.items())
 
 
 def _ordered(effects: Sequence[Effect]) -> list[Effect]:

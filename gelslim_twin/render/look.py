@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from gelslim_twin.effects.circumstances import EffectParameters
-from gelslim_twin.effects.drawing import DrawingParameters
+from gelslim_twin.effects.dot_contrast import DrawingParameters
 
 if TYPE_CHECKING:
     from gelslim_twin.planning.plan import Plan

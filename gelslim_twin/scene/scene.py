@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from gelslim_core.yaml.base import Block, require_folder_name
 from gelslim_core.yaml.errors import FieldError
-from gelslim_twin.scene.effects import Effects
+from gelslim_twin.effects.circumstances import EffectParameters, Use
+from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.motion import Motion
 
@@ -117,6 +118,33 @@ class SceneCamera(Block):
     )
 
 
+class EffectsBlock(Block):
+    """`auto`, `on` or `off` for each effect, or a block with `use` and its parameters."""
+
+    def parameters(self) -> dict[str, EffectParameters]:
+        """The parameters of every effect by name; a bare word stands for the defaults with it."""
+        given = {effect: getattr(self, effect.name) for effect in EFFECTS}
+        return {
+            effect.name: effect.parameters(use=block) if isinstance(block, str) else block
+            for effect, block in given.items()
+        }
+
+
+Effects: type[EffectsBlock] = create_model(
+    "Effects",
+    __base__=EffectsBlock,
+    __doc__=EffectsBlock.__doc__,
+    **{  # type: ignore[arg-type]
+        effect.name: (
+            Use | effect.parameters,
+            Field(default="auto", description=effect.description),
+        )
+        for effect in EFFECTS
+    },
+)
+"""The block of the scene file, with one field per effect."""
+
+
 class Scene(Block):
     """A contact scene."""
 
@@ -140,7 +168,7 @@ class Scene(Block):
     )
     tolerance: Tolerance = Field(default=Tolerance(), description="How exactly")
     camera: SceneCamera = Field(default=SceneCamera(), description="How frames are taken")
-    effects: Effects = Field(
+    effects: Effects = Field(  # type: ignore[valid-type]
         default=Effects(), description="Effects forced on or off, and their parameters"
     )
     vary: Variation = Field(

@@ -14,8 +14,7 @@ from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
-from gelslim_twin.effects import friction, nonlinearity, normal_contact
-from gelslim_twin.effects.normal_contact import RUNGS
+from gelslim_twin.effects.contact import FRICTION, NONLINEARITY, NORMAL_CONTACT, RUNGS
 from gelslim_twin.planning.question import question
 from gelslim_twin.planning.sensor_figures import bundle_figures
 from gelslim_twin.scene.reader import read_scene
@@ -71,7 +70,7 @@ def test_no_rung_leaves_more_than_it_says(
 
     with threadpool_limits(1, user_api="blas"):
         true = solved(1e-7)
-        for (name, tolerance), rung in zip(RUNGS, normal_contact.ladder(c), strict=True):
+        for (name, tolerance), rung in zip(RUNGS, NORMAL_CONTACT.ladder(c), strict=True):
             assert (name, {"tolerance": tolerance}) == (rung.name, rung.parameters)
             moved, force = largest(solved(tolerance), true)
             assert moved * c.sensor.px_per_mm <= rung.error.displacement_px, name
@@ -85,7 +84,7 @@ def test_no_rung_errs_by_more_than_the_effect_itself(sensor: Path, tmp_path: Pat
     c = question(read_scene(path), bundle_figures(sensor)).circumstances
     for mu in (1e-6, 1e-3, 1.0):
         slight = replace(c, friction=mu)
-        for module in (friction, nonlinearity):
-            whole = module.bound(slight)
-            for rung in module.ladder(slight):
+        for effect in (FRICTION, NONLINEARITY):
+            whole = effect.bound(slight)
+            for rung in effect.ladder(slight):
                 assert rung.error == rung.error.at_most(whole)

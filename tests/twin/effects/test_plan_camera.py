@@ -12,7 +12,7 @@ from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.sight import camera_record
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.camera.virtual_camera import VirtualCamera
-from gelslim_twin.effects import lens_distortion, refraction
+from gelslim_twin.effects.dot_positions import LENS_DISTORTION, REFRACTION
 from gelslim_twin.planning.question import plan_scene, question
 from gelslim_twin.planning.sensor_figures import figures
 from gelslim_twin.render.look import plan_look
@@ -72,7 +72,7 @@ def test_leaving_refraction_out_errs_by_no_more_than_its_bound(tmp_path, record)
     true = VirtualCamera.from_record(record).project(points)
     straight = plan_camera(plan_of(tmp_path, record, refraction="off"), record).project(points)
     worst = np.linalg.norm(straight - true, axis=1).max()
-    bound = refraction.bound(asked(tmp_path, record)).markers_px
+    bound = REFRACTION.bound(asked(tmp_path, record)).markers_px
     assert 1.0 < worst <= bound
     assert bound < 4 * worst, "a bound so loose decides nothing"
 
@@ -80,26 +80,26 @@ def test_leaving_refraction_out_errs_by_no_more_than_its_bound(tmp_path, record)
 def test_apparent_depths_err_by_no_more_than_their_rung_says(tmp_path, record):
     points = gel_points()
     c = asked(tmp_path, record)
-    rung = next(r for r in refraction.ladder(c) if r.name == "apparent depth")
+    rung = next(r for r in REFRACTION.ladder(c) if r.name == "apparent depth")
     full = plan_camera(plan_of(tmp_path, record), record)
     near = refracting(full, full.layers, **rung.parameters)
     worst = np.linalg.norm(near.project(points) - full.project(points), axis=1).max()
     assert worst <= rung.error.markers_px
-    assert worst < 0.5 * refraction.bound(c).markers_px
+    assert worst < 0.5 * REFRACTION.bound(c).markers_px
 
 
 def test_leaving_the_lens_out_errs_by_no_more_than_its_bound(tmp_path, record):
     points = gel_points()
     ideal = VirtualCamera.from_record(record).project(points)
     record["lens_distortion"] = LENS
-    bound = lens_distortion.bound(asked(tmp_path, record)).markers_px
+    bound = LENS_DISTORTION.bound(asked(tmp_path, record)).markers_px
     worst = np.linalg.norm(VirtualCamera.from_record(record).project(points) - ideal, axis=1).max()
     assert 0 < worst <= bound < 4 * worst
 
 
 def test_layers_of_index_one_are_no_refraction_bit_for_bit(tmp_path, record):
     record["layers"] = [{**layer, "index": 1.0} for layer in record["layers"]]
-    assert refraction.EFFECT.is_null(asked(tmp_path, record))
+    assert REFRACTION.is_null(asked(tmp_path, record))
     points = gel_points()
     off = plan_camera(plan_of(tmp_path, record, refraction="off"), record).project(points)
     on = plan_camera(plan_of(tmp_path, record, refraction="on"), record)

@@ -244,7 +244,7 @@ def _effect(name: str, error: float, rungs: tuple[tuple[float, float], ...], **m
     return Effect(
         name, name, _Quiet, lambda _c: picture(error), "", lambda _c: tuple(
             Rung(f"r{k}", picture(e), ms) for k, (e, ms) in enumerate(rungs)
-        ), lambda _c: error == 0, f"stub_{name}", **more,
+        ), f"stub_{name}", **more,
     )  # fmt: skip
 
 

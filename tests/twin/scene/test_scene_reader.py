@@ -13,8 +13,8 @@ from scene_samples import GALLERY, MINIMAL, ROOT, load, problems, random_scene
 
 from gelslim_core.yaml.errors import InputError, Problem
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.scene.effects import Effects
 from gelslim_twin.scene.reader import read_scene, scene_schema_text
+from gelslim_twin.scene.scene import Effects
 
 
 def only(folder: Path, text: str) -> str:

@@ -16,8 +16,8 @@ from gelslim_twin.planning import planner
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.question import question
 from gelslim_twin.planning.sensor_figures import bundle_figures
-from gelslim_twin.scene.effects import Effects
 from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.scene.scene import Effects
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import TwinSensor

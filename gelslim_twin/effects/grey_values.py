@@ -1,0 +1,279 @@
+"""Effects on the grey values: shading, dirt, reflections, motion blur, noise and compression."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
+from gelslim_twin.effects.dot_contrast import (
+    ExposureParameters,
+    contrast,
+    dot_px,
+    edge_px,
+    grey_shift_px,
+    least_light_dn,
+    shift_px,
+)
+from gelslim_twin.effects.effect import Bound, Effect, Rung, picture
+
+GRAZING_DEG = 18.9
+"""Light enters the gel at this angle above its face or more (total reflection acrylic to gel): a
+slope s changes what falls on the surface by at most s / tan of that, up to 1 / sin for a surface
+that faces the light."""
+
+
+class ShadingParameters(EffectParameters):
+    """The coat of the gel reflects diffusely, and part of its light comes from all directions."""
+
+    ambient_share: float = Field(
+        default=0.3, ge=0, le=1, description="Share of the light that does not depend on the slope"
+    )
+
+
+def grey_share(c: Circumstances) -> float:
+    """Share of the light that the steepest slope adds or takes away.
+
+    The gel is as steep as the tool, but not steeper than the mesh can be: the depth from one node
+    to the next.
+    """
+    p, t = c.given("shading", ShadingParameters), c.contact
+    if t.depth_mm == 0:
+        return 0.0
+    slope = min(t.depth_mm / c.sensor.node_pitch_mm, c.footprint.steepest(t.depth_mm))
+    slope = max(slope, t.depth_mm / c.sensor.thickness_mm)
+    angle = math.radians(GRAZING_DEG)
+    return (1 - p.ambient_share) * min(1 / math.sin(angle) - 1, slope / math.tan(angle))
+
+
+def shading_ladder(c: Circumstances) -> tuple[Rung, ...]:
+    """A value every few pixels; slopes vary over the thickness h: p² / (8 (h f/Z)²) is missed."""
+    size, reach = c.sensor.frame_px / 307200, c.sensor.thickness_mm * c.sensor.px_per_mm
+    return tuple(
+        Rung(
+            f"every {p} px",
+            picture(shift_px(c, grey_share(c) * p * p / (8 * reach * reach))),
+            (0.6 + 40 / p**2) * size,
+            {"pixel_step": p},
+        )
+        for p in (8, 4, 2, 1)
+    )
+
+
+SHADING = Effect(
+    name="shading",
+    description="Shading: the slopes of the deformed gel change its red and green light",
+    parameters=ShadingParameters,
+    bound=lambda c: picture(shift_px(c, grey_share(c))),
+    formula="(1 - ambient) min(2.1, slope/tan 18.9 deg) over the ink's contrast x width of an edge",
+    ladder=shading_ladder,
+    implementation="gelslim_twin.render.shading",
+    needs=("displacement",),
+    refines=("image",),
+)
+
+
+class DirtParameters(EffectParameters):
+    """Without specks and hairs the picture is clean."""
+
+    specks: int = Field(default=0, ge=0, le=10_000, description="Number of dark specks")
+    hairs: int = Field(default=0, ge=0, le=10_000, description="Number of dark hairs")
+    speck_mm: float = Field(default=0.25, gt=0, le=5, description="Largest diameter of a speck")
+    hair_mm: float = Field(default=2.5, gt=0, le=50, description="Length of a hair")
+    opacity: float = Field(default=0.6, ge=0, le=1, description="Share of light that dirt absorbs")
+
+
+def dirt_bound(c: Circumstances) -> Bound:
+    """What a speck hides, its diameter; a hair is at most a fifth of a speck wide.
+
+    It counts by how dark it is against the ink. At most half of a dot and half of the speck, the
+    distance of their middles.
+    """
+    p = c.given("dirt", DirtParameters)
+    wide = p.speck_mm if p.specks else p.speck_mm / 5 if p.hairs else 0.0
+    seen = wide * c.sensor.px_per_mm
+    return picture(min(p.opacity / contrast(c) * seen, (dot_px(c) + seen) / 2) if seen else 0.0)
+
+
+DIRT = Effect(
+    name="dirt",
+    description="Dark specks and hairs between the gel and the camera",
+    parameters=DirtParameters,
+    bound=dirt_bound,
+    formula="opacity over the ink's contrast x diameter of a speck x f/Z",
+    ladder=lambda c: (Rung("drawn once", Bound(), 0.01),),
+    implementation="gelslim_twin.render.dirt",
+    refines=("image",),
+    after=("shading",),
+)
+
+
+class SpecularParameters(EffectParameters):
+    """Without spots there are no reflections."""
+
+    spots: int = Field(default=0, ge=0, le=10_000, description="Number of bright spots")
+    brightness_percent: float = Field(
+        default=80.0, ge=0, le=1000, description="Peak of the brightest spot, relative to white"
+    )
+    radius_px: float = Field(default=2.0, gt=0, le=200, description="Typical radius of a spot")
+
+
+def specular_bound(c: Circumstances) -> Bound:
+    """Brightness over the least contrast of a dot times the width of an edge.
+
+    A spot in a lamp's tint has that brightness in one channel and half in the others, twice in all.
+    At most the largest spot's width.
+    """
+    p = c.given("specular", SpecularParameters)
+    added = 2 * p.brightness_percent / 100 * 255
+    light = contrast(c) * least_light_dn(c)
+    return picture(min(edge_px(c) * added / light, dot_px(c), 3 * p.radius_px))
+
+
+SPECULAR = Effect(
+    name="specular",
+    description="Specular reflections of the lamps in the acrylic window",
+    parameters=SpecularParameters,
+    bound=specular_bound,
+    formula="2 x brightness of a spot over the least contrast x width of an edge, at most the spot",
+    ladder=lambda c: (Rung("drawn once", Bound(), 0.3 * c.sensor.frame_px / 307200),),
+    implementation="gelslim_twin.render.specular",
+    refines=("image",),
+    after=("shading", "dirt", "defocus"),
+)
+
+
+class MotionBlurParameters(EffectParameters):
+    """Blur by the motion during the exposure."""
+
+    shutter_ms: float = Field(
+        default=5.0,
+        ge=0,
+        le=1000,
+        description="Time for which the shutter is open, at most that between two frames",
+    )
+
+
+def smear_px(c: Circumstances) -> float:
+    """How far a dot moves while the shutter is open."""
+    open_s = c.given("motion_blur", MotionBlurParameters).shutter_ms / 1000
+    return c.motion.speed_mm_s * open_s * c.sensor.px_per_mm
+
+
+def motion_blur_bound(c: Circumstances) -> Bound:
+    """Half the smear: how far the middle of the smeared dot lags behind."""
+    return picture(smear_px(c) / 2)
+
+
+def motion_blur_ladder(c: Circumstances) -> tuple[Rung, ...]:
+    """Instants averaged: n of them leave a staircase.
+
+    A step q = smear/n of it shifts the middle of an edge by at most q/4. Where it is narrower than
+    the edge it is not seen: the second moment lacks q²/12, which changes an edge of width w as a
+    shift of q²/(12 w) does, or less.
+    """
+    size, width = c.sensor.frame_px / 307200, edge_px(c)
+    steps = {n: smear_px(c) / n for n in (2, 4, 8, 16, 32)}
+    return tuple(
+        Rung(
+            f"{n} instants",
+            picture(min(q / 4, q * q / (12 * width))),
+            (1.0 + 0.1 * n) * size,
+            {"most_poses": n},
+        )
+        for n, q in steps.items()
+    )
+
+
+MOTION_BLUR = Effect(
+    name="motion_blur",
+    description="Blur of dots that move while the shutter is open",
+    parameters=MotionBlurParameters,
+    bound=motion_blur_bound,
+    formula="v t f/(2 Z)",
+    ladder=motion_blur_ladder,
+    implementation="gelslim_twin.render.motion_blur",
+    refines=("image",),
+    after=("shading", "dirt", "defocus"),
+)
+
+
+class SensorNoiseParameters(EffectParameters):
+    """The default values are those of a small phone camera with pixels of 1.4 µm."""
+
+    full_well_electrons: float = Field(
+        default=5000.0,
+        ge=0,
+        le=1e6,
+        description="Electrons of a white pixel, for the shot noise; 0 switches all noise off",
+    )
+    read_noise_electrons: float = Field(
+        default=5.0, ge=0, le=1000, description="Standard deviation of the read noise"
+    )
+
+
+def sigma_share(c: Circumstances) -> float:
+    """Standard deviation of a pixel in the least light, over that light, channels summed.
+
+    sqrt(n + 3 r²)/n with n electrons in the three channels: the full well's share of the light and
+    of the exposure time. Gain amplifies both alike.
+    """
+    p = c.given("sensor_noise", SensorNoiseParameters)
+    if p.full_well_electrons == 0:
+        return 0.0
+    time = c.given("exposure", ExposureParameters).time
+    electrons = p.full_well_electrons * least_light_dn(c) / 255 * time
+    return math.sqrt(electrons + 3 * p.read_noise_electrons**2) / electrons
+
+
+SENSOR_NOISE = Effect(
+    name="sensor_noise",
+    description="Shot noise and read noise of the image sensor",
+    parameters=SensorNoiseParameters,
+    bound=lambda c: picture(shift_px(c, 3 * sigma_share(c))),
+    formula="3 sqrt(n + 3 r²)/n of the least light over the ink's contrast x width of an edge",
+    ladder=lambda c: (Rung("drawn", Bound(), 1.5 * c.sensor.frame_px / 307200),),
+    implementation="gelslim_twin.render.sensor_noise",
+    refines=("image",),
+    after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure"),
+)
+
+
+RMS_STEP = 67.1
+"""Root mean square of the 64 luminance steps in table K.1 of ITU-T T.81."""
+
+
+class CompressionParameters(EffectParameters):
+    """Without a quality the frames are not compressed."""
+
+    quality: int | None = Field(default=None, ge=1, le=95, description="JPEG quality")
+
+
+def grey_levels(quality: int) -> float:
+    """Standard deviation of the grey error: uniform in a quantisation step q, q/sqrt(12).
+
+    The usual scaling of the tables: 5000/quality per cent below 50, 200 - 2 quality above; steps
+    are at least 1. An orthonormal transform keeps the mean square; rounding adds its own.
+    """
+    percent = 5000 / quality if quality < 50 else 200 - 2 * quality
+    return math.hypot(max(1.0, RMS_STEP * percent / 100), 1.0) / math.sqrt(12)
+
+
+def compression_bound(c: Circumstances) -> Bound:
+    """Three standard deviations, against the dots in the least light."""
+    quality = c.given("compression", CompressionParameters).quality
+    return picture(0.0 if quality is None else grey_shift_px(c, 3 * grey_levels(quality)))
+
+
+COMPRESSION = Effect(
+    name="compression",
+    description="JPEG compression of the frames",
+    parameters=CompressionParameters,
+    bound=compression_bound,
+    formula="3 q_rms/sqrt(12) over the least contrast of a dot x width of an edge",
+    ladder=lambda c: (Rung("jpeg", Bound(), 2.0 * c.sensor.frame_px / 307200),),
+    implementation="gelslim_twin.render.compression",
+    refines=("image",),
+    after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure", "sensor_noise"),
+)
