@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, create_model, model_validator
 
@@ -123,25 +123,25 @@ class EffectsBlock(Block):
 
     def parameters(self) -> dict[str, EffectParameters]:
         """The parameters of every effect by name; a bare word stands for the defaults with it."""
-        given = {effect: getattr(self, effect.name) for effect in EFFECTS}
-        return {
-            effect.name: effect.parameters(use=block) if isinstance(block, str) else block
-            for effect, block in given.items()
-        }
+        found: dict[str, EffectParameters] = {}
+        for effect in EFFECTS:
+            given: Use | EffectParameters = getattr(self, effect.name)
+            found[effect.name] = effect.parameters(use=given) if isinstance(given, str) else given
+        return found
 
 
-Effects: type[EffectsBlock] = create_model(
-    "Effects",
-    __base__=EffectsBlock,
-    __doc__=EffectsBlock.__doc__,
-    **{  # type: ignore[arg-type]
-        effect.name: (
-            Use | effect.parameters,
-            Field(default="auto", description=effect.description),
-        )
-        for effect in EFFECTS
-    },
-)
+if TYPE_CHECKING:
+    Effects = EffectsBlock
+else:
+    Effects = create_model(
+        "Effects",
+        __base__=EffectsBlock,
+        __doc__=EffectsBlock.__doc__,
+        **{
+            e.name: (Use | e.parameters, Field(default="auto", description=e.description))
+            for e in EFFECTS
+        },
+    )
 """The block of the scene file, with one field per effect."""
 
 
@@ -168,7 +168,7 @@ class Scene(Block):
     )
     tolerance: Tolerance = Field(default=Tolerance(), description="How exactly")
     camera: SceneCamera = Field(default=SceneCamera(), description="How frames are taken")
-    effects: Effects = Field(  # type: ignore[valid-type]
+    effects: Effects = Field(
         default=Effects(), description="Effects forced on or off, and their parameters"
     )
     vary: Variation = Field(
