@@ -17,17 +17,17 @@ from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.matching import MatchMode, match
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import RenderedFrame
+from gelslim_twin.render.image_sensor import SensorNoise
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 LOOKS = {
     "clean": Look(shading=Shading()),
-    "noise 8": Look(shading=Shading(), noise=SensorNoise(8.0, seed=SEED)),
+    "noise 8": Look(shading=Shading(), sensor_noise=SensorNoise(8.0, seed=SEED)),
     "blur 1.5 px": Look(
-        shading=Shading(), defocus=Defocus(0.0, 22.0, 1.5), noise=SensorNoise(2.0, seed=SEED)
+        shading=Shading(), defocus=Defocus(0.0, 22.0, 1.5), sensor_noise=SensorNoise(2.0, seed=SEED)
     ),
 }
 NEAR_PX, MISPLACED_PX = 4.0, 1.0

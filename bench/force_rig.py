@@ -18,8 +18,8 @@ from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_p
 from gelslim_optics.light.light_map import red_green_sides
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
+from gelslim_twin.render.image_sensor import SensorNoise
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
@@ -38,7 +38,7 @@ NORMAL_N, SHEAR_N = 1.0, (0.3, -0.2)
 PLACE_MM, RADIUS_MM = (1.0, -1.0), 3.0
 SEED = 20190521
 FRAMES_LOOK = Look(
-    shading=Shading(), defocus=Defocus(0.0, 22.0, 0.5), noise=SensorNoise(2.0, seed=SEED)
+    shading=Shading(), defocus=Defocus(0.0, 22.0, 0.5), sensor_noise=SensorNoise(2.0, seed=SEED)
 )
 
 

@@ -23,14 +23,15 @@ import numpy as np
 from bench_data import DOCS, write_data
 from machine import machine
 from numpy.typing import NDArray
+from sampled_dots import SampledRenderer
 from scipy.spatial import cKDTree
 
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.light.light_map import LED_COLOURS, LightMap, red_green_sides
-from gelslim_twin.render.compression import Compression
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
+from gelslim_twin.render.image_sensor import Compression
 from gelslim_twin.render.look import Look, sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
@@ -42,8 +43,8 @@ EFFECTS = (
     "defocus",
     "motion_blur",
     "exposure",
-    "noise",
-    "print_faults",
+    "sensor_noise",
+    "marker_print",
     "dirt",
     "specular",
     "compression",
@@ -178,18 +179,16 @@ def stage_rows(sensor: Sensor, repeats: int) -> list[dict[str, Any]]:
     look = sensor_look(sensor.aperture_mm, sensor.focus_mm)
     r, now, before = sensor.renderer(look), pressed(0.1), pressed()
     outlines = outlines_px(r.camera, r.dots, now)
-    centres, area = centroids_px(outlines)
-    ink = r._ink(outlines, outlines, r.dots.present, centres, np.abs(area), now, None)
+    _, area = centroids_px(outlines)
+    ink = r._ink(outlines, outlines, r.dots.present, np.abs(area), now)
     values = r.values(ink, now)
     noisy, image = values.copy(), np.empty(values.size, dtype=np.uint8)
     work: dict[str, Callable[[], Any]] = {
         "outlines": lambda: outlines_px(r.camera, r.dots, now),
-        "ink, blurred": lambda: r._ink(
-            outlines, outlines, r.dots.present, centres, np.abs(area), now, None
-        ),
+        "ink, blurred": lambda: r._ink(outlines, outlines, r.dots.present, np.abs(area), now),
         "light and shading": lambda: r.values(ink, now),
         "light, level gel": lambda: r.values(ink),
-        "noise": lambda: look.noise.apply(noisy) if look.noise else None,
+        "noise": lambda: look.sensor_noise.apply(noisy) if look.sensor_noise else None,
         "rounding": lambda: develop(values.reshape(-1), r._curve, image),
         "whole frame": lambda: r.frame(now, before),
         "whole frame, dots alone": sensor.renderer(Look()).frame,
@@ -208,7 +207,10 @@ def sampling_rows(sensor: Sensor, repeats: int) -> list[dict[str, Any]]:
     rungs = [(even, n, "even") for n in (1, 2, 4, 8, 0)] + [(sensor, 0, "traced")]
     rows = []
     for lit, samples, light in rungs:
-        r, now = lit.renderer(Look(samples=samples)), pressed()
+        now = pressed()
+        r = lit.renderer(Look())
+        if samples:
+            r = SampledRenderer(**lit.values, look=Look(), samples=samples)
         frame = r.frame(now)
         rows.append(
             {
@@ -250,7 +252,7 @@ def ink_centres(r: FrameRenderer, state: SurfaceState) -> Array:
 
     outlines = outlines_px(r.camera, r.dots, state)
     centres, area = centroids_px(outlines)
-    ink = r._ink(outlines, outlines, r.dots.present, centres, np.abs(area), state, None)
+    ink = r._ink(outlines, outlines, r.dots.present, np.abs(area), state)
     out = np.full(centres.shape, np.nan)
     for k in np.flatnonzero(r.frame(state).drawn):
         low = np.floor(outlines[k].min(axis=0) - 0.5).astype(int)

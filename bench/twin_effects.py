@@ -86,7 +86,7 @@ class Bench:
 
     def viewer(self, **use: str) -> Viewer:
         """The scene's sensor with every effect on, but for those in `use`."""
-        return Viewer(self.sensor, self.plan(**use), self.loaded.scene, self.step_s)
+        return Viewer(self.sensor, self.plan(**use), self.loaded.scene)
 
 
 def measured(bench: Bench, quick: bool = False) -> list[dict[str, Any]]:
@@ -178,8 +178,10 @@ def _pictures(bench: Bench, states: list[GelState], null: set[str]) -> list[dict
             on_ms, off_ms = (_ms(partial(v.markers_px, state)) for v in (whole, less))
             key = "markers_px"
         else:
-            shift = _seen(whole, less, state, before, by_detector=name not in CENTRES)
-            on_ms, off_ms = (_ms(partial(v.frame, state, before, 1)) for v in (whole, less))
+            shift = _seen(whole, less, state, before, bench.step_s, name not in CENTRES)
+            on_ms, off_ms = (
+                _ms(partial(v.frame, state, before, 1, bench.step_s)) for v in (whole, less)
+            )
             key = "markers_px" if name in CENTRES else "image_px"
         error = {key: float(np.linalg.norm(shift, axis=1).max())}
         rows.append(
@@ -189,9 +191,11 @@ def _pictures(bench: Bench, states: list[GelState], null: set[str]) -> list[dict
     return rows
 
 
-def _seen(on: Viewer, off: Viewer, state: GelState, before: GelState, by_detector: bool) -> Array:
+def _seen(
+    on: Viewer, off: Viewer, state: GelState, before: GelState, step_s: float, by_detector: bool
+) -> Array:
     """How far dots (k, 2) move in the picture when an effect is left out."""
-    pictures = [v.frame(state, before, 1) for v in (on, off)]
+    pictures = [v.frame(state, before, 1, step_s) for v in (on, off)]
     if not by_detector:
         both = pictures[0].drawn & pictures[1].drawn
         return np.asarray((pictures[0].centres_px - pictures[1].centres_px)[both])

@@ -123,7 +123,12 @@ def whole_ms(bench: KeptBench, plans: Sequence[Plan], rounds: int) -> list[tuple
         state, before = bench.peak(bench.states_of(plan)[0])
         viewer = bench.own_viewer(plan)
         if "image" in observe:
-            calls.append(lambda v=viewer, s=state, b=before: (v.markers_px(s), v.frame(s, b, 1)))
+            calls.append(
+                lambda v=viewer, s=state, b=before: (
+                    v.markers_px(s),
+                    v.frame(s, b, 1, bench.step_s),
+                )
+            )
         elif "markers" in observe:
             calls.append(lambda v=viewer, s=state: v.markers_px(s))
         else:
@@ -160,7 +165,9 @@ def picture_shift(
     bench: KeptBench, views: Sequence[Any], found: list[GelState], true: list[GelState]
 ) -> float:
     """Farthest that the detector sees a dot shifted, px."""
-    pictures = [v.frame(*bench.peak(s), 1) for v, s in zip(views, (found, true), strict=True)]
+    pictures = [
+        v.frame(*bench.peak(s), 1, bench.step_s) for v, s in zip(views, (found, true), strict=True)
+    ]
     good, places = pictures[0].drawn & pictures[1].drawn, []
     for p in pictures:
         settings = DetectorSettings.for_diameters(p.diameter_px[good])

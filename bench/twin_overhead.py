@@ -57,7 +57,7 @@ class ByHand:
     def like_plan(cls, loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> ByHand:
         """The values that planning finds, found once and not timed."""
         plan = plan_scene(loaded, bundle_figures(folder / BUNDLE))
-        viewer = Viewer(sensor, plan, loaded.scene, usual_step_s(loaded))
+        viewer = Viewer(sensor, plan, loaded.scene)
         knobs = [
             dict(plan.choice(n).rung_parameters)["tolerance"]
             for n in ("normal_contact", "friction")
@@ -89,9 +89,10 @@ class ByHand:
         rest = np.column_stack([places, to_markers @ points[:, 2]])
         truths, before = [], None
         for k, (pose, state) in enumerate(zip(self.loaded.poses, states, strict=True)):
+            step_s = pose.time_s - self.loaded.poses[k - 1].time_s if k else 0.0
             dots = self.camera.project(rest + to_markers @ state.displacement_mm)
             surface = SurfaceState.from_nodes(points, state.displacement_mm)
-            drawn = renderer.frame(surface, before, number=k)
+            drawn = renderer.frame(surface, before, number=k, step_s=step_s)
             picture = encoded(np.asarray(drawn.image), ".png")
             replace_file(out / "frames" / f"frame_{k:06d}.png", picture)
             truths.append(
@@ -164,11 +165,6 @@ def bookkeeping(loaded: LoadedScene, sensor: TwinSensor, folder: Path, place: Pa
         ledger.add(name, time.perf_counter())
     run.write(LEDGER, json_bytes(ledger.to_record()))
     run.mark("complete", about)
-
-
-def usual_step_s(loaded: LoadedScene) -> float:
-    """Median time from pose to pose."""
-    return float(np.median(np.diff([p.time_s for p in loaded.poses])))
 
 
 def spent(call: Callable[[], Any], fresh: Path | None = None) -> tuple[float, float]:

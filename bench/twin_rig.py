@@ -123,7 +123,7 @@ class KeptBench(Bench):
 
     def own_viewer(self, plan: Plan) -> Viewer:
         """How a plan has the sensor seen."""
-        return Viewer(self.sensor, plan, self.loaded.scene, self.step_s)
+        return Viewer(self.sensor, plan, self.loaded.scene)
 
     def whole_use(self, without: Sequence[str] = ()) -> dict[str, str]:
         """Every effect on that does something, but for `without`."""

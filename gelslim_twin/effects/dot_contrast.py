@@ -115,7 +115,7 @@ EXPOSURE = Effect(
     bound=exposure_bound,
     formula="min(1, |time gain - 1| + largest |v^(1/gamma) - v|) x width of an edge",
     ladder=lambda c: (Rung("per pixel", Bound(), 0.4 * c.sensor.frame_px / 307200),),
-    implementation="gelslim_twin.render.exposure",
+    implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus", "specular", "motion_blur"),
 )

@@ -22,7 +22,7 @@ PERSPECTIVE = Effect(
     bound=perspective_bound,
     formula="width of the gel's image",
     ladder=lambda c: (Rung("pinhole", Bound(), 0.05 * c.sensor.markers / 575),),
-    implementation="gelslim_twin.render.scene_camera",
+    implementation="gelslim_twin.render.look",
     needs=("displacement",),
     provides=("markers",),
 )
@@ -63,7 +63,7 @@ REFRACTION = Effect(
     ladder=refraction_ladder,
     # Rounding may leave a bound above zero where no layer refracts.
     does_nothing=lambda c: all(h == 0 or n == 1 for h, n in c.sensor.layers_mm),
-    implementation="gelslim_twin.render.scene_camera",
+    implementation="gelslim_twin.render.look",
     refines=("markers",),
 )
 
@@ -86,7 +86,7 @@ LENS_DISTORTION = Effect(
     bound=lens_distortion_bound,
     formula="f (|k1| rho³ + |k2| rho⁵ + |k3| rho⁷ + 3 |p| rho²) at the farthest point of the gel",
     ladder=lambda c: (Rung("exact", Bound(), 0.02 * c.sensor.markers / 575),),
-    implementation="gelslim_twin.render.scene_camera",
+    implementation="gelslim_twin.render.look",
     refines=("markers",),
     after=("refraction",),
 )
@@ -129,6 +129,6 @@ MARKER_PRINT = Effect(
     bound=marker_print_bound,
     formula="sigma sqrt(2 ln(n/0.001)) f/Z; a pitch where dots are missing; d/4 for odd ones",
     ladder=lambda c: (Rung("drawn", optics(0.0), 0.05 * c.sensor.markers / 575),),
-    implementation="gelslim_twin.render.print_faults",
+    implementation="gelslim_twin.render.printed_dots",
     refines=("markers",),
 )

@@ -103,7 +103,7 @@ DIRT = Effect(
     bound=dirt_bound,
     formula="opacity over the ink's contrast x diameter of a speck x f/Z",
     ladder=lambda c: (Rung("drawn once", Bound(), 0.01),),
-    implementation="gelslim_twin.render.dirt",
+    implementation="gelslim_twin.render.blemishes",
     refines=("image",),
     after=("shading",),
 )
@@ -126,7 +126,7 @@ def specular_bound(c: Circumstances) -> Bound:
     At most the largest spot's width.
     """
     p = c.given("specular", SpecularParameters)
-    added = 2 * p.brightness_percent / 100 * 255
+    added = 2 * p.brightness_percent / 100 * 255 if p.spots else 0.0
     light = contrast(c) * least_light_dn(c)
     return picture(min(edge_px(c) * added / light, dot_px(c), 3 * p.radius_px))
 
@@ -138,7 +138,7 @@ SPECULAR = Effect(
     bound=specular_bound,
     formula="2 x brightness of a spot over the least contrast x width of an edge, at most the spot",
     ladder=lambda c: (Rung("drawn once", Bound(), 0.3 * c.sensor.frame_px / 307200),),
-    implementation="gelslim_twin.render.specular",
+    implementation="gelslim_twin.render.blemishes",
     refines=("image",),
     after=("shading", "dirt", "defocus"),
 )
@@ -193,7 +193,7 @@ MOTION_BLUR = Effect(
     bound=motion_blur_bound,
     formula="v t f/(2 Z)",
     ladder=motion_blur_ladder,
-    implementation="gelslim_twin.render.motion_blur",
+    implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus"),
 )
@@ -234,7 +234,7 @@ SENSOR_NOISE = Effect(
     bound=lambda c: picture(shift_px(c, 3 * sigma_share(c))),
     formula="3 sqrt(n + 3 r²)/n of the least light over the ink's contrast x width of an edge",
     ladder=lambda c: (Rung("drawn", Bound(), 1.5 * c.sensor.frame_px / 307200),),
-    implementation="gelslim_twin.render.sensor_noise",
+    implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure"),
 )
@@ -273,7 +273,7 @@ COMPRESSION = Effect(
     bound=compression_bound,
     formula="3 q_rms/sqrt(12) over the least contrast of a dot x width of an edge",
     ladder=lambda c: (Rung("jpeg", Bound(), 2.0 * c.sensor.frame_px / 307200),),
-    implementation="gelslim_twin.render.compression",
+    implementation="gelslim_twin.render.image_sensor",
     refines=("image",),
     after=("shading", "dirt", "defocus", "specular", "motion_blur", "exposure", "sensor_noise"),
 )

@@ -19,7 +19,7 @@ from gelslim_optics.camera.view_quality import blur_map
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
-    from gelslim_twin.render.sight import Sight
+    from gelslim_twin.render.surroundings import Sight
 
 Array = NDArray[np.float64]
 _LEFT_OUT = 1e-4
@@ -35,21 +35,12 @@ class Defocus:
     """Defocus of a lens with entrance pupil `aperture_mm`, focused at `focus_mm`.
 
     `still_px` is the standard deviation of the blur in focus (aberrations, diffraction,
-    demosaicing). If both blurs are 0, the picture does not change. Raises ValueError for values
-    out of range.
+    demosaicing). If both blurs are 0, the picture does not change.
     """
 
     aperture_mm: float
     focus_mm: float
     still_px: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.aperture_mm) and self.aperture_mm >= 0):
-            raise ValueError(f"an aperture of {self.aperture_mm} mm: must not be negative")
-        if not (np.isfinite(self.focus_mm) and self.focus_mm > 0):
-            raise ValueError(f"a focus at {self.focus_mm} mm: must be positive")
-        if not 0 <= self.still_px <= _LARGEST_PX:
-            raise ValueError(f"still_px = {self.still_px}: must be in 0 ... {_LARGEST_PX:g} px")
 
     @property
     def is_null(self) -> bool:

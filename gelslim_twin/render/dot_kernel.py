@@ -68,31 +68,6 @@ def _add_polygon(acc: Any, polygon: Any, left: Any, top: Any, share: Any) -> Non
 
 
 @njit(**COMPILED)
-def _sample_polygon(cover: Any, polygon: Any, left: Any, top: Any, share: Any, n: Any) -> None:
-    """Add the share of n x n samples per pixel inside `polygon`, by crossings."""
-    count = polygon.shape[0]
-    part = share / (n * n)
-    for row in range(cover.shape[0]):
-        for i in range(n):
-            y = top + row + (i + 0.5) / n
-            for column in range(cover.shape[1]):
-                for j in range(n):
-                    x = left + column + (j + 0.5) / n
-                    inside = False
-                    for k in range(count):
-                        m = k + 1 if k + 1 < count else 0
-                        ya, yb = polygon[k, 1], polygon[m, 1]
-                        if (ya > y) != (yb > y):
-                            at = polygon[k, 0] + (y - ya) / (yb - ya) * (
-                                polygon[m, 0] - polygon[k, 0]
-                            )
-                            if at > x:
-                                inside = not inside
-                    if inside:
-                        cover[row, column] += part
-
-
-@njit(**COMPILED)
 def _blurred(cover: Any, taps: Any, reach: Any) -> Any:
     """Convolve `cover` along both axes with the even kernel `taps` (reach + 1,).
 
@@ -125,13 +100,13 @@ def _blurred(cover: Any, taps: Any, reach: Any) -> Any:
 
 @njit(**COMPILED)
 def draw_dots(
-    start: Any, end: Any, drawn: Any, poses: Any, samples: Any, taps: Any, reach: Any, ink: Any
+    start: Any, end: Any, drawn: Any, poses: Any, taps: Any, reach: Any, ink: Any
 ) -> None:
     """Add the dots' coverage to `ink` (h, w) float32, at most 1.
 
     Outlines `start`, `end` (m, k, 2) in px, pixel centres at integers, at the exposure's begin
-    and end; `poses` (m,) of the path between are averaged (midpoints). `samples` 0 is exact,
-    n > 0 takes n x n samples. `taps` (m, t) with `reach` (m,): each dot's blur, reach 0 for none.
+    and end; `poses` (m,) of the path between are averaged (midpoints). `taps` (m, t) with `reach`
+    (m,): each dot's blur, reach 0 for none.
     """
     height, width = ink.shape
     polygon = np.empty(start.shape[1:])
@@ -162,16 +137,12 @@ def draw_dots(
             for k in range(polygon.shape[0]):
                 polygon[k, 0] = start[m, k, 0] + t * (end[m, k, 0] - start[m, k, 0]) + 0.5
                 polygon[k, 1] = start[m, k, 1] + t * (end[m, k, 1] - start[m, k, 1]) + 0.5
-            if samples > 0:
-                _sample_polygon(acc[:, :columns], polygon, left, top, 1.0 / poses[m], samples)
-            else:
-                _add_polygon(acc, polygon, left, top, share)
-        if samples == 0:
-            for y in range(rows):
-                running = 0.0
-                for x in range(columns):
-                    running += acc[y, x]
-                    acc[y, x] = running
+            _add_polygon(acc, polygon, left, top, share)
+        for y in range(rows):
+            running = 0.0
+            for x in range(columns):
+                running += acc[y, x]
+                acc[y, x] = running
         patch = acc[:, :columns].astype(np.float32)
         if reach[m] > 0:
             patch = _blurred(patch, taps[m], reach[m])

@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.printed_dots import PrintedDots, centroids_px, outlines_px
-from gelslim_twin.render.sight import Sight
-from gelslim_twin.render.surface_state import SurfaceState
-from gelslim_twin.render.surroundings import Pad, still_irradiance
+from gelslim_twin.render.surface_state import DomedTop, SurfaceState
+from gelslim_twin.render.surroundings import Pad, Sight, still_irradiance
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.defocus import BlurField
-    from gelslim_twin.render.domed_top import DomedTop
     from ifem_export.markers.grid import MarkerGrid
 
 
@@ -76,7 +74,7 @@ class FrameRenderer:
     def dots(self) -> PrintedDots:
         """The dots as printed, with the faults of the print."""
         nominal = PrintedDots.nominal(self.grid)
-        faults = self.look.print_faults
+        faults = self.look.marker_print
         return nominal if faults is None else faults.apply(nominal)
 
     @cached_property
@@ -131,16 +129,17 @@ class FrameRenderer:
         before: SurfaceState | None = None,
         *,
         number: int = 0,
+        step_s: float = 0.0,
     ) -> RenderedFrame:
         """Frame `number` of the gel displaced by `surface` (None: undeformed).
 
-        `before` is the state one frame earlier, for motion blur. Raises ValueError for dots behind
-        the camera.
+        `before` is the state `step_s` seconds earlier, for motion blur; with 0 s the shutter is
+        open from one state to the other. Raises ValueError for dots behind the camera.
         """
         if self.top is not None:
             surface = self.top.carrying(surface)
             before = self.top.carrying(before) if before is not None else None
-        start, now = self._outlines(surface, before)
+        start, now = self._outlines(surface, before, step_s)
         middle = now if start is now else (start + now) / 2
         centres, area = centroids_px(middle)
         drawn = self.dots.present & (area * self._orientation > 0)
@@ -183,7 +182,7 @@ class FrameRenderer:
         from gelslim_twin.render.image_kernel import develop
 
         height, width = ink.shape
-        write, noise = self._composer(ink, surface), self.look.noise
+        write, noise = self._composer(ink, surface), self.look.sensor_noise
         gain = 1.0 if self.look.exposure is None else self.look.exposure.gain
         image = np.empty((height, width, 3), dtype=np.uint8)
         strip = np.empty((_STRIP, width, 3), dtype=np.float32)
@@ -196,14 +195,14 @@ class FrameRenderer:
         return image if self.look.compression is None else self.look.compression.apply(image)
 
     def _outlines(
-        self, surface: SurfaceState | None, before: SurfaceState | None
+        self, surface: SurfaceState | None, before: SurfaceState | None, step_s: float
     ) -> tuple[Array, Array]:
         """Outlines when the shutter opens and closes; the same array without motion blur."""
         now = outlines_px(self.camera, self.dots, surface) if surface else self._rest_outlines
         if self.look.motion_blur is None or before is None:
             return now, now
         then = outlines_px(self.camera, self.dots, before)
-        return self.look.motion_blur.start(then, now), now
+        return self.look.motion_blur.start(then, now, step_s), now
 
     @cached_property
     def _on_pad(self) -> Image:
@@ -257,5 +256,5 @@ class FrameRenderer:
                 points += surface.at(self.dots.centres_mm)
             taps, reach = kernel_taps(self.look.defocus.sigma_px(self._blur_field, points, scale))
         ink = np.zeros((self.camera.image_height_px, self.camera.image_width_px), dtype=np.float32)
-        draw_dots(start, now, drawn, poses, self.look.samples, taps, reach, ink)
+        draw_dots(start, now, drawn, poses, taps, reach, ink)
         return ink

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.render.sight import Sight
+from gelslim_twin.render.surroundings import Sight
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
@@ -34,12 +34,6 @@ class Shading:
     ambient_share: float = 0.3
     pixel_step: int = 4
     rounds: int = 8
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.ambient_share <= 1:
-            raise ValueError(f"ambient_share = {self.ambient_share}: must be in 0 ... 1")
-        if self.pixel_step < 1 or self.rounds < 1:
-            raise ValueError("pixel_step and rounds of the shading must be at least 1")
 
     def sight(self, camera: VirtualCamera) -> Sight:
         """The lattice of pixels on which the shading is computed."""

@@ -1,15 +1,22 @@
-"""Displacement of the gel's outer surface at one instant."""
+"""Displacement of the gel's outer surface at one instant, and its crown at rest."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+if TYPE_CHECKING:
+    from gelslim_twin.render.surroundings import Sight
+
+
 Array = NDArray[np.float64]
 _EVEN = 1e-6
+_ROUNDS = 12
+_NEAR_MM = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,3 +110,50 @@ def _check_even(name: str, axis: Array) -> None:
             f"{name} of a surface must increase in even steps: interpolate the displacement to an "
             "even grid first"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class DomedTop:
+    """A crowned surface at rest: its heights as a displacement `rest` without lateral part.
+
+    The heights are relative to the plane z = 0 at its apex. A displacement of the crowned surface
+    is treated as one of that plane that includes the heights. Dots, intersections of rays and
+    slopes then follow by the same formulas as on a flat gel.
+    """
+
+    rest: SurfaceState
+
+    @classmethod
+    def of_nodes(cls, nodes_mm: ArrayLike) -> DomedTop | None:
+        """The surface through nodes (n, 3) of a regular mesh; None for a flat one at z = 0."""
+        nodes = np.asarray(nodes_mm, dtype=float)
+        if not nodes[:, 2].any():
+            return None
+        raised = np.zeros((len(nodes), 3))
+        raised[:, 2] = nodes[:, 2]
+        return cls(SurfaceState.from_nodes(nodes, raised))
+
+    def height_mm(self, points_mm: Array) -> Array:
+        """Heights (n,) at points (n, 2)."""
+        return np.asarray(self.rest.at(points_mm)[:, 2])
+
+    def carrying(self, motion: SurfaceState | None) -> SurfaceState:
+        """A displacement of the crowned surface (None: at rest) as one of the plane."""
+        if motion is None:
+            return self.rest
+        raised = motion.displacement_mm.copy()
+        grid = np.stack(np.meshgrid(motion.x_mm, motion.y_mm), axis=2)
+        raised[..., 2] += self.height_mm(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+        return replace(motion, displacement_mm=raised)
+
+    def seen_mm(self, sight: Sight) -> Array:
+        """Points (h, w, 2) of the crowned surface at rest where the rays of `sight` meet it."""
+        start = sight.rest_mm.reshape(-1, 2)
+        slope, at = sight.slope.reshape(-1, 2), start
+        for _ in range(_ROUNDS):
+            moved = start + slope * self.height_mm(at)[:, None]
+            left = float(np.abs(moved - at).max())
+            at = moved
+            if left < _NEAR_MM:
+                break
+        return np.asarray(at.reshape(sight.rest_mm.shape))

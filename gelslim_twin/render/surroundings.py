@@ -1,4 +1,4 @@
-"""The constant part of the picture: the illuminated pad at rest and the frame around it."""
+"""The constant part of the picture: the rays of its pixels, the illuminated pad and its frame."""
 
 from __future__ import annotations
 
@@ -13,9 +13,51 @@ from gelslim_twin.render.random_stream import stream
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_optics.light.light_map import LightMap
-    from gelslim_twin.render.sight import Sight
 
 Array = NDArray[np.float64]
+_PROBE_MM = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Rays of a lattice of pixels: x, y = `rest_mm` (h, w, 2) + `slope` (h, w, 2) z.
+
+    Within the gel a ray is straight, so that this form is exact. Column i and row j of the lattice
+    are the pixels i and j times `pixel_step`.
+    """
+
+    rest_mm: Array
+    slope: Array
+    pixel_step: int
+
+    @classmethod
+    def of(cls, camera: VirtualCamera, pixel_step: int = 1) -> Sight:
+        """Rays of every `pixel_step`-th pixel; the last ones lie beyond the picture's edge.
+
+        Raises ValueError for pixels that look away from the window.
+        """
+        columns = -(-(camera.image_width_px - 1) // pixel_step) + 1
+        rows = -(-(camera.image_height_px - 1) // pixel_step) + 1
+        y, x = np.mgrid[:rows, :columns] * pixel_step
+        pixels = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+        rest = camera.backproject(pixels, 0.0)[:, :2]
+        below = camera.backproject(pixels, -_depth(camera))[:, :2]
+        slope = (rest - below) / _depth(camera)
+        return cls(rest.reshape(rows, columns, 2), slope.reshape(rows, columns, 2), pixel_step)
+
+    def pixel_mm(self) -> Array:
+        """Size (h, w) of a pixel on the gel in mm: the square root of its area."""
+        du = np.gradient(self.rest_mm, axis=1) / self.pixel_step
+        dv = np.gradient(self.rest_mm, axis=0) / self.pixel_step
+        area: Array = np.sqrt(np.abs(du[..., 0] * dv[..., 1] - du[..., 1] * dv[..., 0]))
+        return area
+
+
+def _depth(camera: VirtualCamera) -> float:
+    """A depth below the surface, within the gel."""
+    if not camera.layers or camera.layers[-1].thickness_mm <= 0:
+        raise ValueError("the camera has no gel layer: its last layer must be the gel")
+    return min(_PROBE_MM, camera.layers[-1].thickness_mm / 2)
 
 
 @dataclass(frozen=True)
@@ -26,7 +68,6 @@ class Pad:
     its centre; it decays as exp(-distance / frame_decay_mm). `mottle` is the relative standard
     deviation of the coat's brightness, in patches of `mottle_mm`. `vignetting` is the weight of the
     lens's cos⁴ law (0: none, 1: full).
-    Raises ValueError for values out of range.
     """
 
     length_mm: float
@@ -38,18 +79,6 @@ class Pad:
     mottle_mm: float = 1.5
     vignetting: float = 0.0
     seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("length_mm", "width_mm", "frame_decay_mm", "mottle_mm"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"the pad's {name} = {getattr(self, name)} must be positive")
-        if not 0 <= self.corner_radius_mm <= min(self.length_mm, self.width_mm) / 2:
-            raise ValueError(
-                f"a corner radius of {self.corner_radius_mm} mm: must be at most half a side"
-            )
-        for name, most in (("frame_level", 10.0), ("mottle", 0.5), ("vignetting", 1.0)):
-            if not 0 <= getattr(self, name) <= most:
-                raise ValueError(f"the pad's {name} = {getattr(self, name)}: in 0 ... {most:g}")
 
     def beyond_mm(self, x_mm: Array, y_mm: Array) -> Array:
         """Signed distance from the outline, negative on the pad."""

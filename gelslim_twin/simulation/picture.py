@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
-from gelslim_twin.render.scene_camera import plan_camera
+from gelslim_twin.render.look import Look, plan_camera, plan_look
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.markers.interpolation import marker_to_node
@@ -32,8 +32,6 @@ class Viewer:
     sensor: TwinSensor
     plan: Plan
     scene: Scene
-    step_s: float
-    """Time from frame to frame."""
 
     @cached_property
     def camera(self) -> VirtualCamera:
@@ -55,50 +53,11 @@ class Viewer:
         return self.camera.project(self._rest_mm + self._to_markers @ state.displacement_mm)
 
     @cached_property
-    def _shutter_s(self) -> float:
-        # Reading parameters checks all of them: not at every frame.
-        blur = self.scene.effects.parameters()["motion_blur"]
-        return float(getattr(blur, "shutter_ms", 0.0)) / 1000
-
-    def _usual(self, before: GelState, state: GelState, apart_s: float | None) -> GelState:
-        """The state from which the renderer's motion blur gives the true exposure.
-
-        The renderer's share of open shutter refers to the median time step. At another step the
-        earlier state is moved along the path, so that the shutter is open for its own time, or
-        since the frame before if that is less.
-        """
-        shutter_s = self._shutter_s
-        if apart_s is None or apart_s <= 0 or self.step_s <= 0 or shutter_s == 0:
-            return before
-        usual = min(1.0, shutter_s / self.step_s)
-        part = 1 - min(1.0, shutter_s / apart_s) / usual
-        # Equal steps differ by rounding only.
-        return before if abs(part) < 1e-9 else before.blended(state, part)
-
-    @cached_property
     def renderer(self) -> FrameRenderer:
-        """Draws frames. Raises ValueError where the plan draws none."""
-        from gelslim_twin.render.domed_top import DomedTop
-        from gelslim_twin.render.frame_renderer import FrameRenderer
-        from gelslim_twin.render.look import plan_look
-        from gelslim_twin.render.surroundings import Pad
-
-        look = plan_look(
-            self.plan,
-            self.scene.effects.parameters(),
-            self.sensor.camera_record,
-            self.scene.seed,
-            self.step_s,
-        )
-        pad = Pad(
-            *self.sensor.size_mm,
-            self.sensor.corner_radius_mm,
-            mottle=MOTTLE,
-            vignetting=VIGNETTING,
-            seed=self.scene.seed,
-        )
-        top = DomedTop.of_nodes(self.sensor.points_mm)
-        return FrameRenderer(self.camera, self.sensor.grid, self.sensor.light(), pad, look, top)
+        """Draws frames."""
+        scene, record = self.scene, self.sensor.camera_record
+        look = plan_look(self.plan, scene.effects.parameters(), record, scene.seed)
+        return sensor_renderer(self.sensor, self.camera, look, scene.seed)
 
     def surface(self, state: GelState) -> SurfaceState:
         """The state as the renderer takes it. The last two are cached: a frame needs both."""
@@ -116,8 +75,23 @@ class Viewer:
         return []
 
     def frame(
-        self, state: GelState, before: GelState | None, number: int, apart_s: float | None = None
+        self, state: GelState, before: GelState | None, number: int, step_s: float
     ) -> RenderedFrame:
-        """Frame `number`; `before` is the state a frame earlier, by `apart_s` or else `step_s`."""
-        earlier = None if before is None else self.surface(self._usual(before, state, apart_s))
-        return self.renderer.frame(self.surface(state), earlier, number=number)
+        """Frame `number`; `before` is the state of the frame `step_s` seconds earlier."""
+        earlier = None if before is None else self.surface(before)
+        return self.renderer.frame(self.surface(state), earlier, number=number, step_s=step_s)
+
+
+def sensor_renderer(
+    sensor: TwinSensor, camera: VirtualCamera, look: Look, seed: int
+) -> FrameRenderer:
+    """The renderer of a sensor's pad with a mottled coat and the vignetting of a small lens."""
+    from gelslim_twin.render.frame_renderer import FrameRenderer
+    from gelslim_twin.render.surface_state import DomedTop
+    from gelslim_twin.render.surroundings import Pad
+
+    pad = Pad(
+        *sensor.size_mm, sensor.corner_radius_mm, mottle=MOTTLE, vignetting=VIGNETTING, seed=seed
+    )
+    top = DomedTop.of_nodes(sensor.points_mm)
+    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, look, top)

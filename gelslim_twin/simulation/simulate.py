@@ -199,7 +199,7 @@ def _seen(
     if "markers" in observe or "image" in observe:
         from gelslim_twin.simulation.picture import Viewer
 
-        viewer = Viewer(job.sensor, job.plan, job.scene, _step_s(times))
+        viewer = Viewer(job.sensor, job.plan, job.scene)
     before: GelState | None = None
     for number, when in enumerate(times):
         state = _at(states, when)
@@ -209,8 +209,8 @@ def _seen(
             truth = replace(truth, markers_px=viewer.markers_px(state))
             started = ledger.add("markers", started)
         if viewer is not None and "image" in observe:
-            apart = when.time_s - times[number - 1].time_s if number else None
-            drawn = viewer.frame(state, before, number, apart)
+            step_s = when.time_s - times[number - 1].time_s if number else 0.0
+            drawn = viewer.frame(state, before, number, step_s)
             started = ledger.add("image", started)
             path = run.frame_path(number)
             if path.is_file():
@@ -238,8 +238,3 @@ def _pose(poses: tuple[Pose, ...], when: FrameTime) -> Pose:
     blend = {n: (1 - when.part) * getattr(first, n) + when.part * getattr(last, n)
              for n in COORDINATES}  # fmt: skip
     return replace(first, time_s=when.time_s, **blend)
-
-
-def _step_s(times: tuple[FrameTime, ...]) -> float:
-    """Median time between frames."""
-    return float(np.median(np.diff([t.time_s for t in times]))) if len(times) > 1 else 0.0

@@ -16,16 +16,15 @@ from numpy.typing import NDArray
 
 from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.design import bundle_camera
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.indenter_source import IndenterSource
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.render.domed_top import DomedTop
-from gelslim_twin.render.frame_renderer import FrameRenderer
-from gelslim_twin.render.look import sensor_look
+from gelslim_twin.render.look import lens_of, sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
-from gelslim_twin.render.surroundings import Pad
+from gelslim_twin.simulation.picture import sensor_renderer
 from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.validation.chain import Chain, KnownContact, chains_for
 from gelslim_twin.validation.error_budget import error_budget
@@ -48,7 +47,8 @@ class Bench:
 
     def __init__(self, sensor: TwinSensor, seed: int, budget: Budget | None = None) -> None:
         self.sensor = sensor
-        self.renderer = sensor_renderer(sensor, seed)
+        look = sensor_look(**lens_of(sensor.camera_record), seed=seed)
+        self.renderer = sensor_renderer(sensor, bundle_camera(sensor.bundle), look, seed)
         self.reference: Image = self.renderer.frame(number=0).image
         self.calibration: Calibration = calibrate(sensor.bundle, self.reference)
         self.chains = chains_for(sensor.bundle, budget)
@@ -191,19 +191,6 @@ def validate(
         _statement(gel, bundle.mesh.layers), experiment, tuple(scores), chains, spreads, others,
         tuple(samples), sensor.points_mm, bench.calibration,
     )  # fmt: skip
-
-
-def sensor_renderer(sensor: TwinSensor, seed: int) -> FrameRenderer:
-    """A renderer with the effects of a used sensor."""
-    from gelslim_force.calibration.design import bundle_camera
-
-    record = sensor.camera_record
-    aperture = float(record.get("aperture_mm") or 0.0)
-    focus = float(record.get("focus_mm") or 1e6)
-    pad = Pad(*sensor.size_mm, sensor.corner_radius_mm, mottle=0.04, vignetting=0.7, seed=seed)
-    look = sensor_look(aperture, focus, seed)
-    camera, top = bundle_camera(sensor.bundle), DomedTop.of_nodes(sensor.points_mm)
-    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, look, top)
 
 
 def _statement(gel: TruthGel, layers: int) -> str:

@@ -46,9 +46,9 @@ class Outcome:
         """Images (m, 2) of the dots' centres at a pose."""
         return self.viewer.markers_px(self.states[at])
 
-    def apart_s(self, at: int) -> float | None:
-        """Time since the pose before."""
-        return self.times_s[at] - self.times_s[at - 1] if at else None
+    def step_s(self, at: int) -> float:
+        """Time since the pose before; 0 for the first."""
+        return self.times_s[at] - self.times_s[at - 1] if at else 0.0
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,7 @@ class Trial:
         found = states or tuple(
             mechanics_of(self.loaded, plan, self.sensor, self.folder).states(self.poses)
         )
-        steps = np.diff([p.time_s for p in self.poses])
-        step_s = float(np.median(steps)) if len(steps) else 0.0
-        viewer = Viewer(self.sensor, plan, self.loaded.scene, step_s)
+        viewer = Viewer(self.sensor, plan, self.loaded.scene)
         return Outcome(plan, found, viewer, tuple(p.time_s for p in self.poses))
 
     def bound(self, effect: str) -> Bound:
@@ -157,7 +155,7 @@ def seen_apart_px(one: Outcome, other: Outcome, frames: set[int]) -> float:
         good: NDArray[np.bool_] | None = None
         for run in (one, other):
             before = run.states[at - 1] if at else None
-            p = run.viewer.frame(run.states[at], before, at, run.apart_s(at))
+            p = run.viewer.frame(run.states[at], before, at, run.step_s(at))
             drawn = p.drawn if good is None else good & p.drawn
             if not drawn.any():
                 return worst

@@ -14,8 +14,8 @@ from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.light.light_map import red_green_sides
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer
+from gelslim_twin.render.image_sensor import SensorNoise
 from gelslim_twin.render.look import Look as RenderLook
-from gelslim_twin.render.sensor_noise import SensorNoise
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
@@ -249,7 +249,9 @@ def test_the_dark_wedge_at_a_pads_corner_is_no_dot():
     frames with noise of 8 grey levels, 9 had a dot there once."""
     outline = Pad(22.0, 20.5, 1.0)
     look = RenderLook(
-        shading=Shading(), defocus=Defocus(0.0, 22.0, 0.5), noise=SensorNoise(8.0, seed=20190521)
+        shading=Shading(),
+        defocus=Defocus(0.0, 22.0, 0.5),
+        sensor_noise=SensorNoise(8.0, seed=20190521),
     )
     light = red_green_sides(22.0, 20.5, decay_mm=15.0, elevation_deg=25.0)
     grid = build_marker_grid(19, 18, 1.1, 0.45)

@@ -91,7 +91,7 @@ def outcome(folder: Path, effects: dict[str, Any]) -> tuple[tuple[str, ...], byt
     loaded, sensor = read_scene(path), _sensor(folder / "bundle")
     plan = plan_scene(loaded, bundle_figures(folder / "bundle"))
     states = _states(folder, plan, loaded)
-    viewer = Viewer(sensor, plan, loaded.scene, 0.05)
+    viewer = Viewer(sensor, plan, loaded.scene)
     frame = viewer.frame(states[-1], states[-2], 3, 0.3)
     arrays = (*(a for s in states for a in (s.displacement_mm, s.force_n)), frame.image)
     return plan.order, b"".join(

@@ -15,8 +15,7 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.effects.dot_positions import LENS_DISTORTION, REFRACTION
 from gelslim_twin.planning.question import plan_scene, question
 from gelslim_twin.planning.sensor_figures import figures
-from gelslim_twin.render.look import plan_look
-from gelslim_twin.render.scene_camera import plan_camera, refracting
+from gelslim_twin.render.look import plan_camera, plan_look, refracting
 
 LENS = {"k1": -0.12, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.0}
 
@@ -114,15 +113,6 @@ def test_figures_agree_with_the_generators_own(record):
     assert found.far_mm == pytest.approx(d["view.far_distance_mm"], rel=5e-3)
 
 
-def test_a_plan_without_a_picture_has_neither_camera_nor_look(tmp_path, record):
-    loaded = load(tmp_path, MINIMAL)
-    plan = plan_scene(loaded, sensor(record))
-    with pytest.raises(ValueError, match="no camera"):
-        plan_camera(plan, record)
-    with pytest.raises(ValueError, match="draws no picture"):
-        plan_look(plan, loaded.scene.effects.parameters(), record, 0, 0.1)
-
-
 def test_the_look_carries_the_scenes_parameters(tmp_path, record):
     effects = """effects:
   marker_print: {jitter_mm: 0.03, missing_percent: 2}
@@ -135,15 +125,15 @@ def test_the_look_carries_the_scenes_parameters(tmp_path, record):
 """
     loaded = load(tmp_path, TEXT + effects)
     plan = plan_scene(loaded, sensor(record))
-    look = plan_look(plan, loaded.scene.effects.parameters(), record, 5, 0.04)
-    assert (look.print_faults.jitter_mm, look.print_faults.missing_share) == (0.03, 0.02)
-    assert look.print_faults.seed == look.noise.seed == 5
-    assert look.noise.electrons_per_dn == pytest.approx(10)
-    assert look.noise.read_dn == pytest.approx(2)
-    assert look.motion_blur.open_share == pytest.approx(0.25)
-    assert look.specular.level_dn == pytest.approx(127.5)
+    look = plan_look(plan, loaded.scene.effects.parameters(), record, 5)
+    assert (look.marker_print.jitter_mm, look.marker_print.missing_percent) == (0.03, 2)
+    assert look.marker_print.seed == look.sensor_noise.seed == 5
+    assert look.sensor_noise.electrons_per_dn == pytest.approx(10)
+    assert look.sensor_noise.read_dn == pytest.approx(2)
+    assert look.motion_blur.shutter_ms == 10
+    assert look.specular.brightness_percent == 50
     assert look.exposure.gain == 2
     assert look.defocus.aperture_mm == record["aperture_mm"]
-    assert look.compression is None
+    assert look.compression.quality is None
     assert look.dirt is None
     assert look.shading.pixel_step == dict(plan.choice("shading").rung_parameters)["pixel_step"]

@@ -9,11 +9,10 @@ from scipy.spatial import cKDTree
 
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.design import marker_heights_mm
-from gelslim_twin.render.domed_top import DomedTop
 from gelslim_twin.render.look import Look, sensor_look
 from gelslim_twin.render.shading import Shading
-from gelslim_twin.render.sight import Sight
-from gelslim_twin.render.surface_state import SurfaceState
+from gelslim_twin.render.surface_state import DomedTop, SurfaceState
+from gelslim_twin.render.surroundings import Sight
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
 from ifem_export.markers.grid import build_marker_grid
@@ -128,7 +127,7 @@ def test_calibration_finds_the_drawn_dots_where_it_says(look: Look) -> None:
     says = found.camera.project(np.column_stack([found.rest_mm, heights]))
     apart, _ = cKDTree(frame.centres_px[frame.drawn]).query(says)
     # With noise and specks, what is left is the detector's.
-    assert np.median(apart) < (0.05 if look.noise is None else 0.08)
+    assert np.median(apart) < (0.05 if look.sensor_noise is None else 0.08)
     off = found.rest_mm - draws.dots.centres_mm[found.markers]
     assert np.median(np.abs(off)) < 0.003
 

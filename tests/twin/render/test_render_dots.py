@@ -32,11 +32,11 @@ DOTS = PrintedDots.nominal(GRID)
 REST = SurfaceState.at_rest(22, 21)
 
 
-def drawn(polygon: np.ndarray, shape: tuple[int, int], samples: int = 0) -> np.ndarray:
+def drawn(polygon: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     ink = np.zeros(shape, dtype=np.float32)
     one = np.ascontiguousarray(polygon[None], dtype=float)
     none, single = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.int64)
-    draw_dots(one, one, np.ones(1, bool), single, samples, np.ones((1, 1)), none, ink)
+    draw_dots(one, one, np.ones(1, bool), single, np.ones((1, 1)), none, ink)
     return ink
 
 
@@ -83,19 +83,6 @@ def test_a_dot_that_hangs_over_the_edge_loses_only_what_lies_outside():
         assert 1 < whole.sum() < 45
         assert np.abs(drawn(p + corner, (30, 30)) - whole).max() < 1e-6
     assert drawn(p - 20, (30, 30)).max() == 0
-
-
-@pytest.mark.parametrize(("samples", "least"), [(1, 0.02), (4, 0.002)])
-def test_sampled_coverage_tends_to_the_exact_one(samples, least):
-    turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    rng = np.random.default_rng(5)
-    errors = []
-    for _ in range(30):
-        p = np.stack([4 * np.cos(turn), 3 * np.sin(turn)], 1) + 10 + rng.random(2)
-        errors.append(drawn(p, (24, 24), samples).sum() - drawn(p, (24, 24)).sum())
-    spread = float(np.std(errors)) / (12 * np.pi)
-    assert spread < 3 * least
-    assert spread > least / 30
 
 
 @pytest.mark.parametrize("lens", [None, LensDistortion(k1=-0.18, k2=0.05, p1=1e-3)])
@@ -169,7 +156,7 @@ def test_truth_is_the_centroid_of_the_ink_that_is_drawn():
     outlines = outlines_px(CAMERA, r.dots, state)
     count = len(sparse)
     draw_dots(
-        outlines, outlines, frame.drawn, np.ones(count, np.int64), 0,
+        outlines, outlines, frame.drawn, np.ones(count, np.int64),
         np.ones((count, 1)), np.zeros(count, np.int64), ink,
     )  # fmt: skip
     for centre, size in zip(frame.centres_px, frame.diameter_px, strict=True):

@@ -10,9 +10,8 @@ from gelslim_optics.light.light_map import LED_COLOURS, LightMap, red_green_side
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.shading import Shading
-from gelslim_twin.render.sight import Sight
 from gelslim_twin.render.surface_state import SurfaceState
-from gelslim_twin.render.surroundings import Pad, still_irradiance
+from gelslim_twin.render.surroundings import Pad, Sight, still_irradiance
 
 
 def tilted(slope_x: float, slope_y: float) -> SurfaceState:
@@ -198,11 +197,3 @@ def test_invalid_light_is_refused_with_the_field(change):
     }  # fmt: skip
     with pytest.raises(ValueError, match=next(iter(change))):
         LightMap(**(values | change))
-
-
-@pytest.mark.parametrize(
-    "values", [{"length_mm": 0.0}, {"corner_radius_mm": 12.0}, {"vignetting": 2.0}]
-)
-def test_pads_that_cannot_be_are_refused(values):
-    with pytest.raises(ValueError, match=r"pad|corner"):
-        Pad(**({"length_mm": 22.0, "width_mm": 21.0} | values))

@@ -1,4 +1,4 @@
-"""Dirt: dark specks and hairs between gel and camera."""
+"""What disturbs the light of the pad: dark dirt, and bright reflections of the lamps."""
 
 from __future__ import annotations
 
@@ -22,8 +22,7 @@ class Dirt:
     """Numbers of specks and hairs on a pad; each absorbs the share `opacity` of the light.
 
     Specks are ellipses with axes between a third of `speck_mm` and `speck_mm`. Hairs are arcs of
-    length `hair_mm` and a width of a tenth to a fifth of a speck. Raises ValueError for values
-    out of range.
+    length `hair_mm` and a width of a tenth to a fifth of a speck.
     """
 
     specks: int = 0
@@ -33,24 +32,11 @@ class Dirt:
     opacity: float = 0.6
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        if min(self.specks, self.hairs) < 0 or max(self.specks, self.hairs) > 10_000:
-            raise ValueError("specks and hairs must be counts from 0 to 10000")
-        if not (self.speck_mm > 0 and self.hair_mm > 0):
-            raise ValueError("speck_mm and hair_mm must be positive")
-        if not 0 <= self.opacity <= 1:
-            raise ValueError(f"the dirt's opacity = {self.opacity}: must be in 0 ... 1")
-
-    @property
-    def is_null(self) -> bool:
-        """Whether the picture stays clean."""
-        return self.specks + self.hairs == 0 or self.opacity == 0
-
     def apply(
         self, camera: VirtualCamera, pad_mm: tuple[float, float], light: NDArray[np.float32]
     ) -> NDArray[np.float32]:
         """The light (h, w, k) that the dirt transmits."""
-        if self.is_null:
+        if self.specks + self.hairs == 0 or self.opacity == 0:
             return light
         from gelslim_twin.render.dot_kernel import draw_dots
 
@@ -61,7 +47,7 @@ class Dirt:
         count = len(seen)
         ink = np.zeros(light.shape[:2], dtype=np.float32)
         draw_dots(
-            seen, seen, np.ones(count, dtype=bool), np.ones(count, dtype=np.int64), 0,
+            seen, seen, np.ones(count, dtype=bool), np.ones(count, dtype=np.int64),
             np.ones((count, 1)), np.zeros(count, dtype=np.int64), ink,
         )  # fmt: skip
         return light * (1 - np.float32(self.opacity) * ink)[..., None]
@@ -92,3 +78,33 @@ def _placed(shape: Array, at: Array, turn: Array, pad_mm: tuple[float, float]) -
     )
     placed: Array = turned + ((at - 0.5) * np.array(pad_mm))[:, None, :]
     return placed
+
+
+@dataclass(frozen=True)
+class Specular:
+    """Bright spots that do not move, in the colours of the lamps.
+
+    The brightest spot reaches `brightness_percent` of white; the radii are about `radius_px`.
+    """
+
+    spots: int = 0
+    brightness_percent: float = 80.0
+    radius_px: float = 2.0
+    seed: int = 0
+
+    def glare(self, shape: tuple[int, int], colour: NDArray[np.float64]) -> NDArray[np.float32]:
+        """What the spots add (h, w, 3), lamps of `colour` (k, 3); empty if nothing."""
+        level_dn = self.brightness_percent / 100 * 255
+        if self.spots == 0 or level_dn == 0:
+            return np.zeros((0, 0, 3), dtype=np.float32)
+        random = stream(self.seed, "specular spots").random((self.spots, 5))
+        y, x = np.arange(shape[0])[:, None], np.arange(shape[1])[None, :]
+        out = np.zeros((*shape, 3), dtype=np.float32)
+        for u, v, size, strength, lamp in random:
+            radius = self.radius_px * (0.5 + size)
+            away = ((x - u * shape[1]) / radius) ** 2 + ((y - v * shape[0]) / radius) ** 2
+            spot = (0.3 + 0.7 * strength) * level_dn * np.exp(-(away**2))
+            tint = colour[int(lamp * len(colour))]
+            tint = 0.5 + 0.5 * tint / max(tint.max(), 1e-12)
+            out += (spot[..., None] * tint).astype(np.float32)
+        return out

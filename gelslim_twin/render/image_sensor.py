@@ -1,0 +1,151 @@
+"""What shutter, image sensor and transmission do to a frame.
+
+These are motion blur, exposure with the response curve, noise, and JPEG compression.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.render.random_stream import stream_key
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MotionBlur:
+    """Blur of dots that move while the shutter is open, the last `shutter_ms` before a frame.
+
+    Dots move uniformly on straight lines. The blur is the mean of at most `most_poses` poses, no
+    farther apart than `px_per_pose`.
+    """
+
+    shutter_ms: float = 5.0
+    px_per_pose: float = 0.5
+    most_poses: int = 16
+
+    def start(self, before: Array, now: Array, step_s: float) -> Array:
+        """Outlines (m, k, 2) when the shutter opens, from those `step_s` before `now`.
+
+        The shutter is open for the whole step where it would be open for longer.
+        """
+        if self.shutter_ms == 0:
+            return now
+        open_share = 1.0 if step_s <= 0 else min(1.0, self.shutter_ms / 1000 / step_s)
+        opened: Array = now + open_share * (before - now)
+        return opened
+
+    def poses(self, start: Array, now: Array) -> NDArray[np.int64]:
+        """How many poses (m,) to draw of each dot; 1 for a dot that stands still."""
+        from gelslim_twin.render.dot_kernel import farthest
+
+        path = np.empty(len(now))
+        farthest(start, now, path)
+        wanted = np.ceil(path / self.px_per_pose)
+        return np.clip(wanted, 1, self.most_poses).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Time and gain relative to the defaults, and the exponent 1/gamma of the response curve.
+
+    A gamma above 1 brightens the grey values between black and white.
+    """
+
+    time: float = 1.0
+    gain: float = 1.0
+    gamma: float = 1.0
+
+    @property
+    def scale(self) -> float:
+        """Factor on the light."""
+        return self.time * self.gain
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Read noise `read_dn` in grey values and `electrons_per_dn`, both at gain 1.
+
+    The variance of a value v is (gain · read)² + gain · v / electrons_per_dn; infinitely many
+    electrons have no shot noise.
+    """
+
+    read_dn: float = 0.0
+    electrons_per_dn: float = float("inf")
+    seed: int = 0
+
+    def apply(
+        self, image: NDArray[np.float32], gain: float = 1.0, frame: int = 0, first: int = 0
+    ) -> None:
+        """Add the noise of frame number `frame` to `image` (h, w, 3), in place.
+
+        A strip of a picture has the picture's noise if `first` is the number of its first pixel.
+        """
+        shot = gain / self.electrons_per_dn
+        if self.read_dn == 0 and shot == 0:
+            return
+        from gelslim_twin.render.image_kernel import add_noise
+
+        add_noise(
+            image.reshape(-1, 3),
+            first,
+            stream_key(self.seed, "sensor noise", frame),
+            normal_table(),
+            np.float32((gain * self.read_dn) ** 2),
+            np.float32(shot),
+        )
+
+
+def noise_of_electrons(
+    full_well_electrons: float, read_noise_electrons: float, seed: int
+) -> SensorNoise:
+    """Noise of a sensor whose white pixel holds `full_well_electrons`; none without electrons."""
+    if full_well_electrons == 0:
+        return SensorNoise()
+    per_dn = full_well_electrons / 255
+    return SensorNoise(read_noise_electrons / per_dn, per_dn, seed)
+
+
+@cache
+def normal_table() -> NDArray[np.float32]:
+    """Means of the normal distribution over 2¹⁴ equal shares, scaled to unit variance."""
+    from scipy.special import ndtri
+
+    from gelslim_twin.render.image_kernel import BITS
+
+    edges = ndtri(np.arange(1, 2**BITS) / 2**BITS)
+    density = np.concatenate([[0.0], np.exp(-(edges**2) / 2) / np.sqrt(2 * np.pi), [0.0]])
+    means = (density[:-1] - density[1:]) * 2**BITS
+    table = (means / means.std()).astype(np.float32)
+    table.setflags(write=False)
+    return table
+
+
+@dataclass(frozen=True)
+class Compression:
+    """JPEG `quality` (1 ... 95), colour at half resolution as cameras send it; None for none."""
+
+    quality: int | None = None
+
+    def apply(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The picture (h, w, 3) after coding and decoding.
+
+        Raises ValueError where the library for it is not installed.
+        """
+        if self.quality is None:
+            return image
+        import io
+
+        try:
+            from PIL import Image
+        except ImportError as error:
+            raise ValueError(
+                "compression needs Pillow: install gelslim-cad[vision], or switch it off"
+            ) from error
+        store = io.BytesIO()
+        Image.fromarray(image).save(store, "JPEG", quality=self.quality, subsampling=2)
+        return np.array(Image.open(io.BytesIO(store.getvalue())).convert("RGB"))
