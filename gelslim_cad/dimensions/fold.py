@@ -106,7 +106,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         air_height_mm=s.air_height_mm,
         virtual_x_mm=s.virtual_x_mm,
         virtual_z_mm=s.virtual_z_mm,
-        mirror_rad=mirror_rad + 0 * s.air_height_mm,
+        mirror_rad=mirror_rad,
         pitch_rad=pitch,
         mirror_upper_x_mm=m.upper_x_mm,
         mirror_upper_z_mm=m.upper_z_mm,

@@ -1,0 +1,149 @@
+"""Every length and limit of random folds against plane geometry, and the grids of the search."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from plane_geometry import Layout, Problem
+
+from gelslim_cad.dimensions.fold import Fold, fold
+from gelslim_cad.dimensions.fold_grids import COARSE, LOWER, SHRINK, UPPER, Best, best_candidates
+from gelslim_cad.dimensions.fold_problem import FoldProblem
+
+COUNT = 400
+SPANS = {
+    "gel_length_mm": (8.0, 40.0),
+    "gel_width_mm": (8.0, 35.0),
+    "gel_total_mm": (0.5, 6.0),
+    "gel_index": (1.35, 1.6),
+    "guide_thickness_mm": (1.0, 6.0),
+    "guide_index": (1.4, 1.7),
+    "half_horizontal_tan": (0.3, 1.2),
+    "half_vertical_tan": (0.25, 0.9),
+    "focal_length_mm": (1.5, 4.0),
+    "focal_px": (400.0, 1500.0),
+    "aperture_mm": (0.3, 2.0),
+    "lens_travel_mm": (0.0, 0.6),
+    "focus_nearest_mm": (5.0, 80.0),
+    "module_height_mm": (4.0, 9.0),
+    "module_depth_mm": (1.0, 6.0),
+    "lens_diameter_mm": (3.0, 7.0),
+    "lens_height_mm": (0.5, 4.0),
+    "mirror_thickness_mm": (0.5, 3.0),
+    "mirror_border_mm": (0.2, 2.0),
+    "clearance_mm": (0.1, 1.0),
+    "ledge_depth_mm": (0.5, 4.0),
+    "ledge_reach_mm": (0.5, 5.0),
+    "guide_stack_mm": (5.0, 40.0),
+    "marker_diameter_mm": (0.3, 1.2),
+    "blur_limit_mm": (0.1, 1.0),
+    "min_px_per_marker": (4.0, 20.0),
+    "max_keystone": (1.1, 2.0),
+}
+
+
+@pytest.fixture(scope="module")
+def candidates() -> tuple[Fold, list[Layout]]:
+    """Random candidates of random designs: our layouts, and the same by plane geometry."""
+    rng = np.random.default_rng(31)
+    columns = {name: rng.uniform(*span, (COUNT, 1, 1)) for name, span in SPANS.items()}
+    assert set(columns) == {f.name for f in fields(FoldProblem)}
+    problem = FoldProblem(**columns)
+    axes = rng.uniform(LOWER, UPPER, (COUNT, 3))
+    ours = fold(problem, *(axis[:, None, None] for axis in axes.T))
+    return ours, [Layout(Problem(problem, i), *axes[i]) for i in range(COUNT)]
+
+
+LENGTHS = {
+    "near_ray_rad": lambda v: v.near_rad,
+    "far_ray_rad": lambda v: v.far_rad,
+    "tilt_rad": lambda v: v.tilt,
+    "air_height_mm": lambda v: v.air,
+    "virtual_x_mm": lambda v: v.virtual.real,
+    "virtual_z_mm": lambda v: v.virtual.imag,
+    "mirror_rad": lambda v: v.mirror_rad,
+    "pitch_rad": lambda v: -np.angle(v.ahead),
+    "mirror_upper_x_mm": lambda v: v.upper.real,
+    "mirror_upper_z_mm": lambda v: v.upper.imag,
+    "mirror_lower_x_mm": lambda v: v.lower.real,
+    "mirror_lower_z_mm": lambda v: v.lower.imag,
+    "mirror_half_width_mm": lambda v: max(
+        v.near_across * (v.lower - v.virtual).imag, v.far_across * (v.upper - v.virtual).imag
+    ),
+    "camera_x_mm": lambda v: v.pinhole.real,
+    "camera_z_mm": lambda v: v.pinhole.imag,
+    "camera_top_z_mm": lambda v: max(c.imag for c in v.corners),
+    "camera_bottom_z_mm": lambda v: v.bottom,
+    "camera_front_x_mm": lambda v: max(c.real for c in v.corners),
+    "camera_rear_x_mm": lambda v: min(c.real for c in v.corners),
+    "ledge_edge_x_mm": lambda v: v.ledge_x,
+    "near_distance_mm": lambda v: v.apparent_mm[0],
+    "far_distance_mm": lambda v: v.apparent_mm[1],
+    "corner_horizontal_tan": lambda v: v.horizontal_tan,
+    "corner_vertical_tan": lambda v: v.vertical_tan,
+    "mirror_depth_mm": lambda v: v.mirror_depth,
+    "camera_depth_mm": lambda v: v.camera_depth,
+    "depth_mm": lambda v: v.depth,
+    "keystone": lambda v: v.keystone,
+}
+
+
+def test_all_lengths_are_those_of_plane_geometry(candidates: tuple[Fold, list[Layout]]) -> None:
+    ours, layouts = candidates
+    assert {f.name for f in fields(Fold)} == {*LENGTHS, "violations"}
+    for name, read in LENGTHS.items():
+        expected = [read(layout) for layout in layouts]
+        np.testing.assert_allclose(
+            np.ravel(getattr(ours, name)), expected, rtol=1e-9, atol=1e-9, err_msg=name
+        )
+
+
+def test_all_limits_are_those_of_plane_geometry(candidates: tuple[Fold, list[Layout]]) -> None:
+    ours, layouts = candidates
+    missed = [layout.missed() for layout in layouts]
+    assert set(ours.violations) == set(missed[0])
+    for name, values in ours.violations.items():
+        expected = np.array([m[name] for m in missed])
+        np.testing.assert_allclose(np.ravel(values), expected, rtol=1e-8, atol=1e-8, err_msg=name)
+        assert 0 < np.mean(expected > 0) < 1, name
+
+
+def test_the_objective_is_that_of_plane_geometry(candidates: tuple[Fold, list[Layout]]) -> None:
+    ours, layouts = candidates
+    np.testing.assert_allclose(np.ravel(ours.worst()), [v.worst() for v in layouts], rtol=1e-8)
+    np.testing.assert_allclose(
+        np.ravel(ours.objective()), [v.objective() for v in layouts], rtol=1e-8
+    )
+
+
+def test_grids_shrink_around_the_best_of_each_band() -> None:
+    """Designs whose best candidate is known: the search ends there, whichever band holds it."""
+    targets = np.radians([[-11.0, 0.0, 13.0], [20.0, 0.0, 49.0], [57.5, 0.0, 30.0]])
+    targets[:, 1] = 0.26, 0.6, 0.99
+    asked: list[np.ndarray] = []
+
+    def nearest(mid: np.ndarray, spread: np.ndarray, mirror: np.ndarray, _: np.ndarray) -> Best:
+        asked.append(np.array([np.ptp(axis, axis=1).max() for axis in (mid, spread, mirror)]))
+        found = []
+        for grid in range(len(mid)):
+            target = targets[grid % len(targets)]
+            chosen, missed = [], 0.0
+            for axis, wanted, size in zip(
+                (mid, spread, mirror), target, UPPER - LOWER, strict=True
+            ):
+                best = axis[grid][np.argmin(np.abs(axis[grid] - wanted))]
+                chosen.append(best)
+                missed += abs(best - wanted) / size
+            found.append((*chosen, missed))
+        return Best(*np.array(found).T)
+
+    best = best_candidates(len(targets), nearest)
+    np.testing.assert_allclose(np.column_stack(best[:3]), targets, atol=1e-4)
+    assert np.all(best.score < 3e-4)
+    assert len(asked) == 27
+    step = (UPPER - LOWER) / (np.array(COARSE) - 1)
+    np.testing.assert_allclose(asked[0], [2 * step[0], *(UPPER - LOWER)[1:]])
+    for level, widest in enumerate(asked[1:]):
+        np.testing.assert_allclose(widest, 2 * step * SHRINK**level, rtol=1e-6)
