@@ -47,26 +47,4 @@ __all__ = [
     "write_bundle",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "Budget": "gelslim_core.budget.budget",
-        "ForcePipeline": "gelslim_force.pipeline",
-        "GelslimError": "gelslim_core.errors",
-        "build": "gelslim.design",
-        "calibrate": "gelslim_force.calibration.calibration",
-        "check": "gelslim.design",
-        "derive": "gelslim.design",
-        "examples": "gelslim.examples",
-        "load_bundle": "ifem_export.bundle.files",
-        "make_bundle": "gelslim.design",
-        "open_frames": "gelslim_force.frames.source",
-        "open_sensor": "gelslim_force.sensor",
-        "plan": "gelslim.contacts",
-        "read_scene": "gelslim_twin.scene.reader",
-        "read_spec": "gelslim_cad.spec.reader",
-        "simulate": "gelslim.contacts",
-        "validate": "gelslim.contacts",
-        "write_bundle": "ifem_export.bundle.files",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

@@ -51,29 +51,4 @@ __all__ = [
     "virtual_camera",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "BuildRefusedError": "gelslim_cad.build.variant",
-        "BuildResult": "gelslim_cad.build.variant",
-        "Check": "gelslim_cad.checks.rule",
-        "Dimensions": "gelslim_cad.dimensions.dimensions",
-        "LoadedSpec": "gelslim_cad.spec.reader",
-        "Part": "gelslim_cad.geometry.part",
-        "SolidError": "gelslim_cad.solids.shapes",
-        "Spec": "gelslim_cad.spec.spec",
-        "build_variant": "gelslim_cad.build.variant",
-        "check": "gelslim_cad.checks.apply",
-        "derive": "gelslim_cad.dimensions.dimensions",
-        "finger_parts": "gelslim_cad.solids.finger",
-        "glb_bytes": "gelslim_cad.export.glb",
-        "guide_profile": "gelslim_cad.geometry.guide_section",
-        "make_bundle": "gelslim_cad.sensor.pad",
-        "marker_grid": "gelslim_cad.sensor.pad",
-        "pad_mesh": "gelslim_cad.sensor.pad",
-        "read_spec": "gelslim_cad.spec.reader",
-        "step_bytes": "gelslim_cad.export.step",
-        "tooling_parts": "gelslim_cad.solids.finger",
-        "virtual_camera": "gelslim_cad.geometry.sight",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

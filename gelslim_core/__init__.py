@@ -42,25 +42,4 @@ __all__ = [
     "schema_text",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "Block": "gelslim_core.yaml.base",
-        "Budget": "gelslim_core.budget.budget",
-        "BudgetError": "gelslim_core.budget.budget",
-        "Choice": "gelslim_core.budget.ladder",
-        "Engine": "gelslim_core.jobs.engine",
-        "EngineError": "gelslim_core.jobs.engine",
-        "FieldError": "gelslim_core.yaml.errors",
-        "GelslimError": "gelslim_core.errors",
-        "InputError": "gelslim_core.yaml.errors",
-        "Ladder": "gelslim_core.budget.ladder",
-        "Loaded": "gelslim_core.yaml.reader",
-        "Problem": "gelslim_core.yaml.errors",
-        "Rung": "gelslim_core.budget.ladder",
-        "Wording": "gelslim_core.budget.ladder",
-        "read_model": "gelslim_core.yaml.reader",
-        "reference_markdown": "gelslim_core.yaml.schema",
-        "schema_text": "gelslim_core.yaml.schema",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

@@ -62,34 +62,4 @@ __all__ = [
     "write_calibration",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "Calibration": "gelslim_force.calibration.sensor_calibration",
-        "CalibrationError": "gelslim_force.calibration.error",
-        "DepthMapSource": "gelslim_force.contact.depth_map_source",
-        "ForceField": "gelslim_force.forces.frame_result",
-        "ForcePipeline": "gelslim_force.pipeline",
-        "ForceSettings": "gelslim_force.forces.estimator",
-        "Frame": "gelslim_force.frames.frame",
-        "FrameResult": "gelslim_force.forces.frame_result",
-        "NormalReading": "gelslim_force.contact.normal_source",
-        "NormalSource": "gelslim_force.contact.normal_source",
-        "Overlay": "gelslim_force.outputs.overlay",
-        "PictureSink": "gelslim_force.outputs.sinks",
-        "PipelineSettings": "gelslim_force.settings",
-        "RecorderSink": "gelslim_force.outputs.sinks",
-        "RunRecorder": "gelslim_force.outputs.run_recorder",
-        "Wrench": "gelslim_force.forces.wrench",
-        "calibrate": "gelslim_force.calibration.calibration",
-        "indenter_source": "gelslim_force.sensor",
-        "open_frames": "gelslim_force.frames.source",
-        "open_sensor": "gelslim_force.sensor",
-        "read_calibration": "gelslim_force.calibration.file",
-        "read_depth_maps": "gelslim_force.contact.depth_map_source",
-        "read_reference": "gelslim_force.calibration.reference_picture",
-        "read_run": "gelslim_force.outputs.recorded_run",
-        "run_frames": "gelslim_force.run",
-        "write_calibration": "gelslim_force.calibration.file",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

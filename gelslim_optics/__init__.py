@@ -56,32 +56,4 @@ __all__ = [
     "trace_light",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "CurvedGuide": "gelslim_optics.guide.shapes",
-        "GelSection": "gelslim_optics.guide.shapes",
-        "GuideProfile": "gelslim_optics.guide.profile",
-        "HeightGrid": "gelslim_optics.camera.back_projection",
-        "Layer": "gelslim_optics.camera.refraction",
-        "LedRow": "gelslim_optics.light.source",
-        "LensDistortion": "gelslim_optics.camera.lens_distortion",
-        "LightMap": "gelslim_optics.light.light_map",
-        "LightResult": "gelslim_optics.light.result",
-        "LightScene": "gelslim_optics.light.scene",
-        "Medium": "gelslim_optics.light.scene",
-        "MirrorGuide": "gelslim_optics.guide.shapes",
-        "Surface": "gelslim_optics.light.scene",
-        "TirCertificate": "gelslim_optics.guide.tir_certificate",
-        "VirtualCamera": "gelslim_optics.camera.virtual_camera",
-        "blur_map": "gelslim_optics.camera.view_quality",
-        "certify_tir": "gelslim_optics.guide.tir_certificate",
-        "curved_profile": "gelslim_optics.guide.shapes",
-        "fit_homography": "gelslim_optics.camera.view_quality",
-        "lateral_reach": "gelslim_optics.camera.refraction",
-        "mirror_profile": "gelslim_optics.guide.shapes",
-        "projection_error_mm": "gelslim_optics.camera.projection_error",
-        "ray_slope": "gelslim_optics.camera.rays",
-        "trace_light": "gelslim_optics.light.trace",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

@@ -55,30 +55,4 @@ __all__ = [
     "validate",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "EFFECTS": "gelslim_twin.effects.registry",
-        "ContactError": "gelslim_twin.contact.contact_error",
-        "Effect": "gelslim_twin.effects.effect",
-        "FrameRenderer": "gelslim_twin.render.frame_renderer",
-        "GelState": "gelslim_twin.contact.gel_state",
-        "LoadedScene": "gelslim_twin.scene.reader",
-        "Plan": "gelslim_twin.planning.plan",
-        "PlanError": "gelslim_twin.planning.planner",
-        "RenderedFrame": "gelslim_twin.render.frame_renderer",
-        "SensorFigures": "gelslim_twin.effects.circumstances",
-        "SimulationError": "gelslim_twin.simulation.run_folder",
-        "SimulationJob": "gelslim_twin.simulation.simulate",
-        "TwinSensor": "gelslim_twin.simulation.sensor",
-        "Validation": "gelslim_twin.validation.validation",
-        "bundle_figures": "gelslim_twin.planning.sensor_figures",
-        "job_of": "gelslim_twin.simulation.scene_task",
-        "plan_scene": "gelslim_twin.planning.question",
-        "read_scene": "gelslim_twin.scene.reader",
-        "simulate": "gelslim_twin.simulation.simulate",
-        "store_sensor": "gelslim_twin.simulation.sensor",
-        "stored_sensor": "gelslim_twin.simulation.sensor",
-        "validate": "gelslim_twin.validation.validate",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

@@ -57,33 +57,4 @@ __all__ = [
     "write_vtu",
 ]
 
-__getattr__, __dir__ = lazy_exports(
-    __name__,
-    {
-        "Bundle": "ifem_export.bundle.bundle",
-        "BundleError": "ifem_export.errors",
-        "IfemError": "ifem_export.errors",
-        "MarkerGrid": "ifem_export.markers.grid",
-        "Material": "ifem_export.elements.material",
-        "NeoHookeanPad": "ifem_export.finite_strain.neo_hookean",
-        "OperatorLadder": "ifem_export.operators.operator_ladder",
-        "PadMesh": "ifem_export.mesh.pad_mesh",
-        "Paraboloid": "ifem_export.mesh.crown",
-        "RoundedRectangle": "ifem_export.mesh.outline",
-        "SurfaceOperator": "ifem_export.operators.surface_operator",
-        "build_bundle": "ifem_export.bundle.bundle",
-        "build_marker_grid": "ifem_export.markers.grid",
-        "build_pad_mesh": "ifem_export.mesh.pad_mesh",
-        "export_matrix": "ifem_export.bundle.export_matrix",
-        "hex8_stiffness": "ifem_export.elements.hex8",
-        "load_bundle": "ifem_export.bundle.files",
-        "marker_to_node": "ifem_export.markers.interpolation",
-        "masked_force": "ifem_export.inverse.contact_inverse",
-        "measure_ladder": "ifem_export.operators.ladder",
-        "mesh_stiffness": "ifem_export.assembly.assembly",
-        "summarise_bundle": "ifem_export.bundle.files",
-        "surface_operator": "ifem_export.operators.surface_operator",
-        "write_bundle": "ifem_export.bundle.files",
-        "write_vtu": "ifem_export.mesh.vtu",
-    },
-)
+__getattr__, __dir__ = lazy_exports(__name__)

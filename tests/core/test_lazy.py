@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import types
+from pathlib import Path
 
 import pytest
 
+SAMPLE = """
+from typing import TYPE_CHECKING
+
 from gelslim_core.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+    from math import cos, sqrt
+
+__getattr__, __dir__ = lazy_exports(__name__)
+"""
 
 
 @pytest.fixture
-def package(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
-    module = types.ModuleType("lazy_sample")
-    get, names = lazy_exports("lazy_sample", {"sqrt": "math", "Fraction": "fractions"})
-    module.__getattr__, module.__dir__ = get, names  # type: ignore[method-assign]
-    monkeypatch.setitem(sys.modules, "lazy_sample", module)
+def package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> types.ModuleType:
+    (tmp_path / f"lazy_{tmp_path.name}.py").write_text(SAMPLE, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    module = importlib.import_module(f"lazy_{tmp_path.name}")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
     return module
 
 
@@ -26,9 +38,10 @@ def test_a_name_is_loaded_when_it_is_used_and_then_kept(package: types.ModuleTyp
 
 
 def test_all_names_are_listed_before_they_are_loaded(package: types.ModuleType) -> None:
-    assert {"Fraction", "sqrt"} <= set(dir(package))
+    assert {"Fraction", "cos", "sqrt"} <= set(dir(package))
 
 
-def test_an_unknown_name_is_no_attribute(package: types.ModuleType) -> None:
+@pytest.mark.parametrize("name", ["cbrt", "math"])
+def test_an_unknown_name_is_no_attribute(package: types.ModuleType, name: str) -> None:
     with pytest.raises(AttributeError):
-        _ = package.cbrt
+        getattr(package, name)

@@ -85,7 +85,7 @@ FACES = sorted(
 
 @pytest.mark.parametrize("package", FACES)
 def test_a_package_lists_the_same_names_for_all_readers(package: str) -> None:
-    """`__all__`, the lazy table and the imports for type checkers agree."""
+    """`__all__` agrees with the imports that type checkers and the loader read."""
     module = importlib.import_module(package)
     tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
     typed = {
