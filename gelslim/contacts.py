@@ -236,7 +236,7 @@ def _data_set(
     overwrite: bool,
     progress: Progress | None,
 ) -> dict[str, Any]:
-    from gelslim_core.jobs.engine import Engine
+    from gelslim_core.jobs import Engine
     from gelslim_twin.simulation.scene_task import SceneTask, perform
 
     for number in range(count):

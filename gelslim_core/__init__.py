@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from gelslim_core.budget.budget import Budget, BudgetError
     from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
     from gelslim_core.errors import GelslimError
-    from gelslim_core.jobs.engine import Engine, EngineError
+    from gelslim_core.jobs import Engine, EngineError
     from gelslim_core.yaml.base import Block
     from gelslim_core.yaml.errors import FieldError, InputError, Problem
     from gelslim_core.yaml.reader import Loaded, read_model

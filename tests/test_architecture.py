@@ -36,8 +36,8 @@ BELOW: dict[str, tuple[str, ...]] = {
 
 ROOMS: dict[str, tuple[str, ...]] = {
     "gelslim_core": (
-        "errors", "lazy", "extras", "optional_library", "figure", "html_table", "kernel_cache",
-        "budget", "files", "jobs", "yaml",
+        "errors", "lazy", "optional_library", "figure", "html_table", "kernel_cache", "files",
+        "budget", "jobs", "yaml",
     ),
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (

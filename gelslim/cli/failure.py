@@ -15,7 +15,7 @@ import typer
 from gelslim.cli.answer import BAD_INPUT, FAULT, RULE_FAILED
 from gelslim.ending import SAID, asked_to_end
 from gelslim_core.errors import GelslimError
-from gelslim_core.extras import extra_of, install_command
+from gelslim_core.optional_library import extra_of, install_command
 
 # typer brings its own click from 0.20 on and uses the installed one before: ask typer for it.
 _USAGE_ERROR = typer.BadParameter.__mro__[1]

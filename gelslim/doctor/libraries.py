@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 
-from gelslim_core.extras import EXTRAS, installed
+from gelslim_core.optional_library import EXTRAS, installed
 
 REQUIRED = (
     *("numpy", "scipy", "numba", "pydantic", "ruamel.yaml", "typer", "rich", "threadpoolctl"),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gelslim_cad.build.fingerprint import PACKAGES
 from gelslim_cad.explore.engine import processors
-from gelslim_core.extras import install_command, installed
+from gelslim_core.optional_library import install_command, installed
 
 GL_LIBRARIES = {
     "libGL.so.1": "libgl1",

@@ -13,9 +13,9 @@ import sys
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from gelslim_core.files.beside import beside
+from gelslim_core.errors import OutputError
+from gelslim_core.files.file_lock import beside
 from gelslim_core.files.file_lock import locked as lock_file
-from gelslim_core.files.output_error import OutputError
 from gelslim_core.files.replaced_folder import FolderError, replaced_folder
 
 MANIFEST = "manifest.json"

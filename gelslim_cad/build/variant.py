@@ -16,7 +16,7 @@ from gelslim_cad.build.work import Unit, Written, run
 from gelslim_cad.checks import Check
 from gelslim_core.errors import GelslimError
 from gelslim_core.files.replaced_folder import recover
-from gelslim_core.jobs.workers import worker_pool
+from gelslim_core.jobs import worker_pool
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Stages

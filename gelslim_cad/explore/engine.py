@@ -9,8 +9,8 @@ from typing import Any
 from gelslim_cad.build.fingerprint import code_hash
 from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.task import Task, perform
-from gelslim_core.jobs.engine import Engine as WorkEngine
-from gelslim_core.jobs.engine import EngineError, processors
+from gelslim_core.jobs import Engine as WorkEngine
+from gelslim_core.jobs import EngineError, processors
 
 __all__ = ["Engine", "processors"]
 

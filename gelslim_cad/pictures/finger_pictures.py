@@ -15,7 +15,7 @@ import numpy as np
 
 from gelslim_cad.pictures.mesh_scene import MeshScene, View
 from gelslim_core.errors import GelslimError
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 Mesh = tuple[
     str,

@@ -18,7 +18,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+
+from gelslim_core.files.replaced_file import json_bytes, replace_file
 
 FORMAT = "gelslim-machine-times/1"
 FOLDER_VARIABLE = "GELSLIM_CACHE_DIR"
@@ -104,22 +105,13 @@ def read_times(ladder_key: str) -> dict[str, float]:
 def write_times(ladder_key: str, times_ms: Mapping[str, float]) -> Path:
     """Store the times in ms of a ladder atomically; returns the file. Raises OSError."""
     path = times_path(ladder_key)
-    record: dict[str, Any] = {
+    record = {
         "format": FORMAT,
         "ladder": ladder_key,
         "machine": asdict(this_machine()),
         "times_ms": dict(times_ms),
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, part = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write((json.dumps(record, indent=1) + "\n").encode())
-        os.replace(part, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(part).unlink()
-        raise
+    replace_file(path, json_bytes(record), parents=True)
     return path
 
 

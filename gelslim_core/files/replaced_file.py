@@ -1,21 +1,23 @@
-"""A file that is there whole or not at all.
+"""Files that are written completely or not at all.
 
-It is written beside its place as `.0123456789abcdef.part`, forced to the disk and moved there. The
-part is locked by its writer, so that what a killed process left can be told from what another one
-is writing: the first write of a process into a folder removes such leftovers.
+A file is written next to its target as `.0123456789abcdef.part`, forced to the disk and moved into
+place. Its writer locks the part, so that the part of a killed process can be distinguished from one
+that is being written. The first write of a process into a folder removes the parts that killed
+processes left there.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import re
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from filelock import lock_descriptor
 
@@ -27,20 +29,27 @@ _swept: set[tuple[int, str]] = set()
 
 
 def replace_file(path: str | os.PathLike[str], data: bytes, parents: bool = False) -> None:
-    """Write `data` to `path` in one step; `parents` makes the folders above.
+    """Write `data` to `path` in one step; `parents` makes the folders above it.
 
-    A link is followed; a device or pipe is written to as it is. Raises OSError that names `path`;
-    the old file, if any, is then as it was.
+    A link is followed, and a device or pipe is written to directly. Raises an OSError that names
+    `path`; an old file is then unchanged.
     """
     with replacement(path, parents) as stream:
         stream.write(data)
 
 
+def json_bytes(record: Mapping[str, Any]) -> bytes:
+    """Return indented UTF-8 JSON with a final newline; NaN is not allowed in it."""
+    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
+    # A lone surrogate, as in a file name of another encoding, becomes its JSON escape.
+    return (text + "\n").encode("utf-8", "backslashreplace")
+
+
 @contextlib.contextmanager
 def replacement(path: str | os.PathLike[str], parents: bool = False) -> Iterator[IO[bytes]]:
-    """A stream whose content takes the place of `path` when the block ends without an error.
+    """A stream whose content replaces `path` when the block ends without an error.
 
-    As `replace_file`.
+    Arguments and errors are those of `replace_file`.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -63,12 +72,12 @@ def replacement(path: str | os.PathLike[str], parents: bool = False) -> Iterator
 
 
 def is_part(name: str) -> bool:
-    """Whether a file of this name is, or was, a part of `replace_file`."""
+    """Whether a name is that of an unfinished file of `replace_file`."""
     return bool(PART.fullmatch(name))
 
 
 def sweep(folder: Path, again: bool = False) -> None:
-    """Remove parts in `folder` whose writers are no more; once per process unless `again`."""
+    """Remove the parts in `folder` whose writers have ended; once per process unless `again`."""
     key = (os.getpid(), os.fspath(folder))
     if key in _swept and not again:
         return
@@ -84,12 +93,12 @@ def _part_beside(target: Path) -> Iterator[IO[bytes]]:
     with interrupts_held() as let_through:
         part, descriptor = _new_part(target.parent)
         try:
-            # closefd=False: the lock goes with the descriptor, which outlives the stream.
+            # closefd=False: the lock ends with the descriptor, which must outlive the stream.
             with let_through(), open(descriptor, "wb", closefd=False) as stream:
                 yield stream
                 stream.flush()
                 os.fsync(descriptor)
-            if sys.platform == "win32":  # which moves no open file
+            if sys.platform == "win32":  # Windows moves no open file.
                 os.close(descriptor)
                 descriptor = -1
             os.replace(part, target)
@@ -106,7 +115,7 @@ def _new_part(folder: Path) -> tuple[Path, int]:
     while True:
         part = folder / f".{os.urandom(8).hex()}.part"
         descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | _BINARY, 0o666)
-        # A sweeper that found it before it was locked removes it.
+        # Another process may have found and removed it before it was locked.
         if _locked(descriptor) is not False and os.fstat(descriptor).st_nlink:
             return part, descriptor
         os.close(descriptor)
@@ -130,7 +139,7 @@ def _locked(descriptor: int) -> bool | None:
 
 
 def _kind(target: Path) -> int:
-    """Kind of what is at `target`; 0 for nothing."""
+    """Type of the file at `target`; 0 if there is none."""
     try:
         return stat.S_IFMT(os.stat(target).st_mode)
     except FileNotFoundError:

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from gelslim_core.files.beside import beside
+from gelslim_core.files.file_lock import beside
 from gelslim_core.files.held_interrupt import interrupts_held
 
 _AT_FDCWD = -100

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.atomic_file import json_bytes, replace_file
+from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.error import CalibrationError

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core import optional_library
-from gelslim_core.files.atomic_file import replace_file
-from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.errors import OutputError, disk_error
+from gelslim_core.files.replaced_file import replace_file
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.packed_frame import PER_MARKER, PER_NODE, PackedFrame, unpack
 

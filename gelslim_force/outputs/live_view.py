@@ -15,7 +15,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from typing import Any
 
-from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.packed_frame import plain
 from gelslim_force.outputs.picture_file import Image, encoded

@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from gelslim_core import optional_library
-from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.ros_messages import (
     FORCE_FIELD,

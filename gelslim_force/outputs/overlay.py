@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.atomic_file import replace_file
-from gelslim_core.files.output_error import disk_error
+from gelslim_core.errors import disk_error
+from gelslim_core.files.replaced_file import replace_file
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale
 from gelslim_force.outputs.canvas import Canvas, Image, arrow

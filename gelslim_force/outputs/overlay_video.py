@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from gelslim_core import optional_library
-from gelslim_core.files.beside import beside
-from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.errors import OutputError, disk_error
+from gelslim_core.files.file_lock import beside
 from gelslim_force.outputs.picture_file import Image
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG"}

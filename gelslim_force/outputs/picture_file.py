@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core import optional_library
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 
 Image = NDArray[np.uint8]
 _PURPOSE = "writing pictures"

@@ -12,7 +12,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.field_chunk import FieldChunk, Format, read_chunk, stack
 from gelslim_force.outputs.frame_journal import read_journal

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core import optional_library
+from gelslim_core.errors import OutputError, disk_error
 from gelslim_core.files.file_lock import locked
 from gelslim_core.files.held_interrupt import interrupts_held
-from gelslim_core.files.output_error import OutputError, disk_error
 from gelslim_core.files.replaced_file import sweep
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs import wrench_csv

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.output_error import disk_error
+from gelslim_core.errors import disk_error
 from gelslim_core.files.replaced_file import replacement
 from gelslim_force.dot_tracking import DotsAtRest
 from gelslim_force.forces.frame_result import FrameResult

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.output_error import OutputError, disk_error
+from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.tracking.tracks import MarkerStatus
 

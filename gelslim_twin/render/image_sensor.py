@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.optional_library import load
 from gelslim_twin.render.random_stream import stream_key
 
 Array = NDArray[np.float64]
@@ -134,18 +135,13 @@ class Compression:
     def apply(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The picture (h, w, 3) after coding and decoding.
 
-        Raises ValueError where the library for it is not installed.
+        Raises MissingLibraryError if Pillow is not installed.
         """
         if self.quality is None:
             return image
         import io
 
-        try:
-            from PIL import Image
-        except ImportError as error:
-            raise ValueError(
-                "compression needs Pillow: install gelslim-cad[vision], or switch it off"
-            ) from error
+        pillow = load("PIL.Image", "the effect compression")
         store = io.BytesIO()
-        Image.fromarray(image).save(store, "JPEG", quality=self.quality, subsampling=2)
-        return np.array(Image.open(io.BytesIO(store.getvalue())).convert("RGB"))
+        pillow.fromarray(image).save(store, "JPEG", quality=self.quality, subsampling=2)
+        return np.array(pillow.open(io.BytesIO(store.getvalue())).convert("RGB"))

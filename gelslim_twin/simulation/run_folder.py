@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_core.errors import GelslimError
-from gelslim_core.files.atomic_file import json_bytes, replace_file
-from gelslim_core.files.replaced_file import is_part, sweep
+from gelslim_core.files.replaced_file import is_part, json_bytes, replace_file, sweep
 
 FORMAT = "gelslim-simulation/1"
 RUN, PLAN, LEDGER = "run.json", "plan.json", "ledger.json"

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.atomic_file import json_bytes, replace_file
-from gelslim_core.files.file_lock import locked
-from gelslim_core.files.replaced_file import sweep
-from gelslim_core.files.shared_use import use, used_elsewhere
+from gelslim_core.files.file_lock import locked, use, used_elsewhere
+from gelslim_core.files.replaced_file import json_bytes, replace_file, sweep
 from gelslim_twin.simulation.run_folder import SimulationError
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle, write_bundle

@@ -15,9 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gelslim_core.files.atomic_file import json_bytes, replace_file
-from gelslim_core.files.beside import beside
-from gelslim_core.files.file_lock import locked
+from gelslim_core.files.file_lock import beside, locked
+from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.outputs.picture_file import encoded
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan

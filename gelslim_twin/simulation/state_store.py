@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gelslim_core.files.atomic_file import replace_file
+from gelslim_core.files.replaced_file import replace_file
 from gelslim_twin.contact.gel_state import GelState
 
 CHUNK = 32

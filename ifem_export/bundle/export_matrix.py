@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.extras import install_command
 from gelslim_core.files.replaced_file import replace_file
+from gelslim_core.optional_library import load
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.errors import IfemError
 
@@ -34,7 +34,8 @@ def export_matrix(bundle: Bundle, path: str | os.PathLike[str]) -> None:
             ".safetensors" (CSR arrays and the mesh, which C++ and Rust read without copies).
 
     Raises:
-        IfemError: The ending is unknown, or the package safetensors is not installed.
+        IfemError: The ending is unknown.
+        MissingLibraryError: The package safetensors is not installed.
         OSError: The file cannot be written.
     """
     target = Path(path)
@@ -69,13 +70,7 @@ def _mat(bundle: Bundle) -> bytes:
 
 
 def _safetensors(bundle: Bundle) -> bytes:
-    try:
-        from safetensors.numpy import save
-    except ImportError as error:
-        raise IfemError(
-            f"writing safetensors needs the package safetensors: {install_command('export')}",
-            field="path",
-        ) from error
+    save = load("safetensors.numpy", "writing safetensors").save
     matrix = bundle.stiffness_matrix
     arrays = {
         "stiffness_data": np.asarray(matrix.data),

@@ -15,8 +15,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.beside import beside
-from gelslim_core.files.file_lock import locked
+from gelslim_core.files.file_lock import beside, locked
 from gelslim_core.files.replaced_folder import FolderError, recover, replaced_folder
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.check import check_bundle

@@ -27,7 +27,7 @@ pytest.importorskip("cadquery", reason="building needs the [cad] extra")
 
 from gelslim_cad.build import BuildRefusedError, build_variant
 from gelslim_cad.build import variant as variant_module
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 
 Digests = Callable[[Path], dict[str, str]]
 SPEC = Path(__file__).parents[2] / "designs" / "mini20.yaml"

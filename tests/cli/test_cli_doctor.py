@@ -15,7 +15,7 @@ from gelslim.cli import main
 from gelslim.doctor import libraries
 from gelslim.doctor.realtime import RealTime, Timed
 from gelslim_core import extras as extras_module
-from gelslim_core.extras import EXTRAS, extra_of, install_command, installed
+from gelslim_core.optional_library import EXTRAS, extra_of, install_command, installed
 
 
 def answered(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:

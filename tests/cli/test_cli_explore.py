@@ -13,7 +13,7 @@ import pytest
 from cli_samples import MINI20, ROOT, fresh
 
 from gelslim.cli import main
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 VARY = ["--vary", "gel.length_mm=16:24:4", "--vary", "camera.f_number=2,4"]
 
@@ -68,7 +68,7 @@ def test_bad_requests(
 def test_without_parquet_and_pictures_the_table_is_still_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim_core.extras.installed", lambda module: False)
+    monkeypatch.setattr("gelslim_core.optional_library.installed", lambda module: False)
     command = ["explore", str(MINI20), "--vary", "gel.length_mm=16", "-o", str(tmp_path / "x")]
     assert main(command) == 0
     captured = capsys.readouterr()

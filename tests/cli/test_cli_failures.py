@@ -12,7 +12,7 @@ from cli_samples import MINI20, altered, fresh, too_long
 
 from gelslim.cli import main
 from gelslim_cad.spec import reader
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 TAKES_SPEC = ("check", "derive", "build", "bundle", "markers", "light")
 

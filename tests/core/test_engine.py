@@ -10,7 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_tasks
 
-from gelslim_core.jobs.engine import Engine, EngineError
+from gelslim_core.jobs import Engine, EngineError
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +45,7 @@ def test_what_a_task_raises_comes_through(jobs: int) -> None:
 
 def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("gelslim_core.jobs.engine.CONNECT_S", 1)
+    monkeypatch.setattr("gelslim_core.jobs.CONNECT_S", 1)
     with pytest.raises(EngineError, match=r"tcp://127\.0\.0\.1:1"):
         list(Engine(scheduler="tcp://127.0.0.1:1").run(pool_tasks.square, [1]))
 

@@ -16,7 +16,7 @@ from gelslim_cad.family import picture
 from gelslim_cad.family.member import Member, Mesh, dots
 from gelslim_cad.family.picture import EDGE, FRONT, _middles, _row, _upright, family_png
 from gelslim_cad.spec.reader import read_spec
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 DESIGNS = Path(__file__).parents[2] / "designs"
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
@@ -112,7 +112,9 @@ def test_two_specs_of_one_name_are_refused(
 def test_without_the_cad_extra_nothing_is_left_behind(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim_core.extras.installed", lambda module: module != "cadquery")
+    monkeypatch.setattr(
+        "gelslim_core.optional_library.installed", lambda module: module != "cadquery"
+    )
     assert main(["family", str(DESIGNS / "mini20.yaml"), "-o", str(tmp_path / "f")]) == 2
     assert install_command("cad") in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import report_sample
 
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 pytest.importorskip("vtkmodules", reason="VTK is not installed: no still pictures")
 from PIL import Image

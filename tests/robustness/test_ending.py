@@ -281,7 +281,7 @@ def test_the_signal_behind_an_error_is_found() -> None:
 
 POOL = """
 from pool_task import task
-from gelslim_core.jobs.workers import worker_pool
+from gelslim_core.jobs import worker_pool
 with worker_pool(2, "{method}") as pool:
     futures = [pool.submit(task, k) for k in range(6)]
     futures[0].result()

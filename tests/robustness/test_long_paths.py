@@ -10,7 +10,7 @@ import pytest
 from sweep_commands import COMMANDS, MINI20, Command, finished
 
 from gelslim.cli import main
-from gelslim_core.files.beside import MOST_BYTES, beside
+from gelslim_core.files.file_lock import MOST_BYTES, beside
 from gelslim_core.files.replaced_file import replace_file
 from gelslim_core.files.replaced_folder import replaced_folder
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sweep_commands import MINI20, finished, prepare
 
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 BLOCKER = """
 import sys

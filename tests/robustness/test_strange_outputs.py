@@ -12,7 +12,7 @@ from gelslim.cli import main
 from gelslim.cli.commands.validate import PLOTS, picture_name, picture_names
 from gelslim.scene_sensor import spec_bundle
 from gelslim_cad.build.folder import require_ours
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_force.outputs.run_recorder import RunRecorder
 from gelslim_twin.simulation.run_folder import RunFolder, SimulationError
 from gelslim_twin.simulation.sensor import TwinSensor, store_sensor

@@ -45,7 +45,7 @@ def calibrate(
     """
     from gelslim.cli.answer import print_json
     from gelslim.cli.output import replace_file, spare_strangers
-    from gelslim_core.files.atomic_file import json_bytes
+    from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate as calibrated
     from gelslim_force.calibration.file import calibration_record
     from gelslim_force.calibration.reference_picture import read_reference

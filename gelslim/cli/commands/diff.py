@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gelslim.cli.options import AsJson, SpecFile
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,7 +85,7 @@ def _report_price(first: str, second: str, costs: Sequence[Measured]) -> None:
 
 def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
     """Return the changed parts, or why they could not be compared."""
-    from gelslim_core.extras import installed
+    from gelslim_core.optional_library import installed
 
     if not installed("cadquery"):
         return None, f"not compared: cadquery is missing; run: {install_command('cad')}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gelslim.cli.options import AsJson, DrawPictures, SpecFile
-from gelslim_core.extras import install_command
+from gelslim_core.optional_library import install_command
 
 if TYPE_CHECKING:
     from gelslim_cad.explore.study import Exploration
@@ -100,7 +100,7 @@ def write_exploration(folder: Path, found: Exploration, *, pictures: bool) -> li
 
     from gelslim.cli.output import replace_file
     from gelslim_cad.explore.table import csv_bytes, parquet_bytes
-    from gelslim_core.extras import installed
+    from gelslim_core.optional_library import installed
 
     made = {"designs.csv": csv_bytes(found.columns)}
     notes = []

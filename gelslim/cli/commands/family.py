@@ -36,7 +36,7 @@ def family(
     """
     from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim_cad.spec.reader import read_spec
-    from gelslim_core.extras import require
+    from gelslim_core.optional_library import require
 
     started = time.monotonic()
     require("cadquery", "trimesh")

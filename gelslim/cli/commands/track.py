@@ -95,7 +95,7 @@ def track(
 
 def _write(folder: Path, record: TrackRecord, summary: dict[str, Any]) -> None:
     from gelslim.cli.output import replace_file
-    from gelslim_core.files.atomic_file import json_bytes
+    from gelslim_core.files.replaced_file import json_bytes
 
     tracks, table, told = FILES
     record.write(folder / tracks)

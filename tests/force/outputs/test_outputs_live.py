@@ -15,7 +15,7 @@ import numpy as np
 import output_samples as samples
 import pytest
 
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_force.outputs.live_view import LiveView, live_state
 
 Image = pytest.importorskip("PIL.Image")

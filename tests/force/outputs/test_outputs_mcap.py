@@ -12,7 +12,7 @@ import numpy as np
 import output_samples as samples
 import pytest
 
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import Wrench

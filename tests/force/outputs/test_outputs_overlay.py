@@ -13,7 +13,7 @@ import pytest
 from camera_rig import finger_view
 from scipy.interpolate import LinearNDInterpolator
 
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import (

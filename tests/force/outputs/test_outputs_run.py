@@ -14,7 +14,7 @@ import numpy as np
 import output_samples as samples
 import pytest
 
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.recorded_run import read_run
@@ -184,7 +184,7 @@ import resource, signal, sys
 sys.path[:0] = [{str(SAMPLES)!r}]
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 import output_samples as samples
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
 frames = [samples.frame(k) for k in range(11)]
 resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000))

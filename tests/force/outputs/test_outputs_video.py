@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.outputs.overlay_video import OverlayVideo
 
@@ -77,7 +77,7 @@ def test_a_full_disk_is_noticed(tmp_path: Path) -> None:
 import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 import numpy as np
-from gelslim_core.files.output_error import OutputError
+from gelslim_core.errors import OutputError
 from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.outputs.overlay_video import OverlayVideo
 resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))

@@ -1,20 +1,27 @@
-"""Run independent tasks in this process, in other processes, or on a Dask cluster."""
+"""Run independent tasks in this process, in other processes, or on a Dask cluster.
+
+Worker processes end with their parent, and at once when the parent is interrupted.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import multiprocessing
 import os
+import signal
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import (
-    Executor,
-    Future,
-    as_completed,
-)
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import TypeVar
+from multiprocessing.connection import wait
+from types import FrameType
+from typing import Any, Literal, TypeVar
 
 from gelslim_core.errors import GelslimError
-from gelslim_core.jobs.workers import worker_pool
+from gelslim_core.files.held_interrupt import interrupts_held
+from gelslim_core.optional_library import load
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -57,6 +64,7 @@ class Engine:
         Raises:
             EngineError: No cluster answers, or a task has crashed its worker three times.
                 Exceptions that a task raises are raised as they are.
+            MissingLibraryError: There is a scheduler, but the extra `cluster` is not installed.
         """
         if self.scheduler:
             yield from _on_cluster(perform, tasks, self.scheduler)
@@ -129,16 +137,9 @@ def _in_pool(
 def _on_cluster(
     perform: Callable[[Task], Result], tasks: Sequence[Task], address: str
 ) -> Iterator[tuple[int, Result]]:
+    distributed = load("distributed", "--scheduler")
     try:
-        from distributed import Client
-        from distributed import as_completed as as_finished
-    except ImportError as error:
-        raise EngineError(
-            "--scheduler needs distributed, which is not installed; "
-            "run: pip install 'gelslim-cad[cluster]'"
-        ) from error
-    try:
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise EngineError(
             f"--scheduler {address}: no Dask scheduler answers within {CONNECT_S} s ({error}); "
@@ -154,5 +155,124 @@ def _on_cluster(
             client.submit(perform, task, pure=False, retries=MAX_CRASHES): number
             for number, task in enumerate(tasks)
         }
-        for future in as_finished(list(futures)):
+        for future in distributed.as_completed(list(futures)):
             yield futures[future], future.result()
+
+
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+GRACE_S = 2
+"""Time for workers to end after SIGTERM, before they are killed."""
+TERMINATED = 128 + signal.SIGTERM
+"""Exit status of a worker that SIGTERM ended."""
+_is_busy = False
+"""Whether this worker is running a task."""
+
+
+class _Terminated(BaseException):
+    """Unwinds a task so that its files are closed; no `except Exception` catches it."""
+
+
+@contextlib.contextmanager
+def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[ProcessPoolExecutor]:
+    """A pool of processes whose workers are ended when an exception leaves the block.
+
+    Ctrl-C is such an exception. Without an exception the end of the block waits for the tasks
+    that are left. Workers also end when their parent is killed.
+    """
+    context = multiprocessing.get_context(method)
+    with interrupts_held() as let_through:
+        pool = _Pool(workers, mp_context=context, initializer=begin_worker)
+        try:
+            with let_through():
+                yield pool
+                pool.shutdown()
+        except BaseException:
+            _stop(pool)
+            raise
+
+
+class _Pool(ProcessPoolExecutor):
+    """Starts its workers with SIGINT and SIGTERM blocked until `begin_worker` handles them.
+
+    Before that a new interpreter would print a traceback, and a fork would run the handler of
+    its parent.
+    """
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submit a task; no interrupt reaches a worker while it starts."""
+        with interrupts_held(), _blocked():
+            return super().submit(_perform, fn, *args, **kwargs)
+
+
+@contextlib.contextmanager
+def _blocked() -> Iterator[None]:
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _perform(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
+    """Run a task in a worker, which ends on SIGTERM after the task has closed its files."""
+    global _is_busy
+    try:
+        _is_busy = True
+        return fn(*args, **kwargs)
+    except _Terminated:
+        os._exit(TERMINATED)
+    finally:
+        _is_busy = False
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    if not _is_busy:
+        os._exit(TERMINATED)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise _Terminated
+
+
+def begin_worker() -> None:
+    """Make this process end with its parent, and ignore Ctrl-C.
+
+    On Ctrl-C the parent ends its workers. Without this the workers of a killed parent would wait
+    for ever, as each of them holds the queue open.
+    """
+    with contextlib.suppress(ValueError):  # raised outside the main thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, _terminate)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
+
+
+def _stop(pool: ProcessPoolExecutor) -> None:
+    # The executor has no public way to end its workers before Python 3.14.
+    processes = list((getattr(pool, "_processes", None) or {}).values())
+    manager = getattr(pool, "_executor_manager_thread", None)
+    pool.shutdown(wait=False, cancel_futures=True)
+    for process in processes:
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            process.terminate()
+    deadline = time.monotonic() + GRACE_S
+    for process in processes:
+        with contextlib.suppress(OSError, ValueError, AssertionError):
+            process.join(max(0.0, deadline - time.monotonic()))
+            # A worker in compiled code handles no signal until that code returns.
+            process.kill()
+    for process in processes:
+        with contextlib.suppress(OSError, ValueError, AssertionError):
+            process.join()
+    if manager is not None:
+        # It frees the pool's semaphores. A process that ends meanwhile would leave one behind.
+        manager.join(GRACE_S)

@@ -1,1 +1,0 @@
-"""Independent tasks on the processors of this machine or on a cluster."""
