@@ -23,19 +23,17 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
-from gelslim_twin.planning.question import plan_scene
-from gelslim_twin.planning.sensor_figures import bundle_figures
+from gelslim_twin.planning.question import bundle_figures, plan_scene
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.render.surroundings import Pad
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import MOTTLE, VIGNETTING, Viewer
+from gelslim_twin.simulation.records import FrameTruth, StateStore, fields_npz, wrench_csv
 from gelslim_twin.simulation.run_folder import LEDGER, PLAN, RunFolder
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import BUNDLE
 from gelslim_twin.simulation.simulate import Ledger, simulate
-from gelslim_twin.simulation.state_store import StateStore
-from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
 from ifem_export.markers.interpolation import marker_to_node
 
 SCENE = "shear_sphere"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from gelslim_twin.effects.circumstances import SensorFigures
     from gelslim_twin.planning.plan import Plan
     from gelslim_twin.scene.reader import LoadedScene
-    from gelslim_twin.validation.validation import Validation
+    from gelslim_twin.validation.score import Validation
 
     SceneLike = LoadedScene | str | os.PathLike[str]
 

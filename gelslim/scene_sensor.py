@@ -22,7 +22,7 @@ def sensor_figures(loaded: LoadedScene) -> SensorFigures:
     Raises InputError if the sensor is missing or its spec has faults, IfemError if the folder is
     not a bundle.
     """
-    from gelslim_twin.planning.sensor_figures import bundle_figures
+    from gelslim_twin.planning.question import bundle_figures
 
     _require_present(loaded)
     if loaded.scene.sensor.bundle is not None:
@@ -100,7 +100,7 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     from gelslim_cad.geometry.sight import camera_record
     from gelslim_cad.sensor.pad import marker_grid, pad_mesh
     from gelslim_cad.spec.reader import read_spec
-    from gelslim_twin.planning.sensor_figures import figures
+    from gelslim_twin.planning.question import figures
 
     spec = read_spec(loaded.sensor_path).spec
     d = derive(spec)

@@ -12,23 +12,21 @@ from typing import TYPE_CHECKING
 from gelslim_core.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from gelslim_twin.contact.contact_error import ContactError
-    from gelslim_twin.contact.gel_state import GelState
+    from gelslim_twin.contact.gel_state import ContactError, GelState
     from gelslim_twin.effects.circumstances import SensorFigures
     from gelslim_twin.effects.effect import Effect
     from gelslim_twin.effects.registry import EFFECTS
     from gelslim_twin.planning.plan import Plan
     from gelslim_twin.planning.planner import PlanError
-    from gelslim_twin.planning.question import plan_scene
-    from gelslim_twin.planning.sensor_figures import bundle_figures
+    from gelslim_twin.planning.question import bundle_figures, plan_scene
     from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
     from gelslim_twin.scene.reader import LoadedScene, read_scene
     from gelslim_twin.simulation.run_folder import SimulationError
     from gelslim_twin.simulation.scene_task import job_of
     from gelslim_twin.simulation.sensor import TwinSensor, store_sensor, stored_sensor
     from gelslim_twin.simulation.simulate import SimulationJob, simulate
+    from gelslim_twin.validation.score import Validation
     from gelslim_twin.validation.validate import validate
-    from gelslim_twin.validation.validation import Validation
 
 __all__ = [
     "EFFECTS",

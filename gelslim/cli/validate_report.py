@@ -13,8 +13,7 @@ from gelslim_core.figure import as_png, new_figure
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from gelslim_twin.validation.score import Score, Spread
-    from gelslim_twin.validation.validation import Sample, Validation
+    from gelslim_twin.validation.score import Sample, Score, Spread, Validation
 
 
 NONE = "-"
@@ -65,7 +64,7 @@ def _table(*heads: str) -> Table:
 
 
 def _resultants(title: str, rows: Sequence[Spread]) -> Table:
-    from gelslim_twin.validation.validation import PAPER_N, PAPER_RELATIVE
+    from gelslim_twin.validation.score import PAPER_N, PAPER_RELATIVE
 
     table = _table(title, "deviation", "mean", "error", "good")
     for row in rows:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.files.replaced_file import replacement
-from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.row_factor import RowFactor
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.mesh.pad_mesh import PadMesh

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
 
-from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_state import ContactError
 
 Array = NDArray[np.float64]
 Touches = NDArray[np.int8]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.elements.material import Material

@@ -1,4 +1,4 @@
-"""State of the gel at one pose: displacement, nodal forces and contact status."""
+"""State of the gel at one pose, and the error of a contact that has none."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ifem_export.errors import IfemError
 
 Array = NDArray[np.float64]
 
@@ -66,3 +68,19 @@ def anchor_mm(state: GelState) -> NDArray[np.float64]:
     """Displacement (c, 3) at which nodes stick; of a plain state its own displacement."""
     held = state.anchor_mm if isinstance(state, AnchoredState) else None
     return state.displacement_mm if held is None else held
+
+
+class ContactError(IfemError):
+    """A contact did not converge to the tolerance, or its input is invalid.
+
+    Attributes:
+        residual: Smallest residual reached, relative to the forces; NaN where there is none.
+    """
+
+    def __init__(self, message: str, residual: float = float("nan")) -> None:
+        super().__init__(message)
+        self.residual = residual
+
+    def __reduce__(self) -> tuple[type[ContactError], tuple[str, float]]:
+        """Parts for pickling, so that worker processes can raise it."""
+        return (type(self), (str(self), self.residual))

@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.contact.anderson import Anderson
-from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_contact import FREE, STICK, ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_body import GelBody, Tangent
-from gelslim_twin.contact.gel_state import AnchoredState, GelState
+from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState
 from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm
 from gelslim_twin.contact.solver import CANDIDATE_SHARE, ContactSolver
-from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
+from gelslim_twin.contact.tool import ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 

@@ -12,10 +12,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_contact import ContactForces, solve_contact_forces
-from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.tool_surface import ToolSurface, tool_surface
+from gelslim_twin.contact.gel_state import ContactError
+from gelslim_twin.contact.tool import Tool, ToolSurface, tool_surface
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]

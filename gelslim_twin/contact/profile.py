@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.scene.footprint import stl_corners
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -20,7 +21,6 @@ from gelslim_twin.scene.indenter import (
     TexturedPlane,
     Wedge,
 )
-from gelslim_twin.scene.stl_extent import stl_corners
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]

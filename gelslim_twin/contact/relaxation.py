@@ -15,39 +15,25 @@ once, although the real surface would follow for a moment; tensile forces are se
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class PronySeries:
-    """g(t) = 1 - sum of fractions (1 - exp(-t / times)); no terms: an elastic gel.
-
-    Raises ValueError for fractions outside 0 ... 1 or with a sum of 1 or more, for times that are
-    not positive, or for lists of different lengths.
-    """
+    """g(t) = 1 - sum of fractions (1 - exp(-t / times)); no terms: an elastic gel."""
 
     fractions: tuple[float, ...] = ()
     times_s: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        if len(self.fractions) != len(self.times_s):
-            raise ValueError(
-                f"{len(self.fractions)} fractions for {len(self.times_s)} times: give one of each"
-            )
-        if not all(math.isfinite(g) and g >= 0 for g in self.fractions) or self.lost >= 1:
-            raise ValueError(f"fractions {self.fractions}: none below 0, their sum below 1")
-        if not all(math.isfinite(t) and t > 0 for t in self.times_s):
-            raise ValueError(f"times {self.times_s} s: must be positive")
-
-    @property
-    def lost(self) -> float:
-        """Share of the force that decays in the end."""
-        return math.fsum(self.fractions)
 
     @property
     def is_null(self) -> bool:
@@ -75,15 +61,8 @@ def relax(
 
     A step of 0 s is a jump. Returns the force on the gel and the state for the next step; without
     relaxation the force is the elastic one bit for bit.
-
-    Raises:
-        ValueError: another shape than the state's, or a negative step.
     """
     new = np.asarray(elastic_n, dtype=float)
-    if new.shape != state.elastic_n.shape:
-        raise ValueError(f"forces of shape {new.shape}: must be {state.elastic_n.shape}")
-    if not (math.isfinite(step_s) and step_s >= 0):
-        raise ValueError(f"a step of {step_s} s: must not be negative")
     change = new - state.elastic_n
     internal = np.empty_like(state.internal_n)
     force = new.copy()
@@ -105,3 +84,23 @@ def _held(force: Array, elastic: Array) -> Array:
     free = ~elastic.any(axis=1)
     force[pulled | free] = 0.0
     return force
+
+
+@dataclass(frozen=True)
+class RelaxingContact:
+    """Contacts of an elastic gel whose forces relax."""
+
+    elastic: Any
+    """Solver of the elastic contact, with the method `states`."""
+    series: PronySeries
+
+    def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+        """The elastic states with relaxed forces."""
+        memory: RelaxationState | None = None
+        before = poses[0]
+        for pose, state in zip(poses, self.elastic.states(poses), strict=True):
+            memory = memory or at_rest(self.series, len(state.force_n))
+            step_s = pose.time_s - before.time_s
+            force, memory = relax(self.series, memory, state.force_n, step_s)
+            before = pose
+            yield replace(state, force_n=force)

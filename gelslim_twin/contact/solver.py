@@ -15,30 +15,34 @@ converge, it is halved.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
-from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_contact import STICK
-from gelslim_twin.contact.gel_state import AnchoredState, GelState, anchor_mm
-from gelslim_twin.contact.load_steps import even_steps, is_stationary, with_halved_steps
+from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState, anchor_mm
 from gelslim_twin.contact.plane_iteration import (
     PlaneIteration,
     PlaneSolution,
     allowed_motion_mm,
     gap_tolerance_mm,
 )
-from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.tool_surface import ToolSurface, clearance_mm, tool_surface
+from gelslim_twin.contact.tool import Tool, ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
 
+Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
+State = TypeVar("State")
 SPARE = 1.5
 """Size of a stored block over the size needed above which a smaller one is gathered."""
+CANDIDATE_SHARE = 0.2
+"""Gap over depth up to which a node is a candidate, because the gel bulges at the contact."""
+GROWTH_STEPS = 12
+MOST_SUBSTEPS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +70,6 @@ def candidates_of(wanted: NDArray[np.bool_], compliance: SurfaceCompliance) -> C
     """The `wanted` (c,) nodes as candidates."""
     nodes = np.flatnonzero(wanted)
     return Candidates(nodes, compliance.block(nodes))
-
-
-__all__ = ["ContactError", "ContactSettings", "ContactSolver"]
-
-Array = NDArray[np.float64]
-CANDIDATE_SHARE = 0.2
-"""Gap over depth up to which a node is a candidate, because the gel bulges at the contact."""
-GROWTH_STEPS = 12
-MOST_SUBSTEPS = 200
 
 
 @dataclass(frozen=True)
@@ -244,3 +239,39 @@ class ContactSolver:
         if self._reach is None:
             return candidates_of(wanted, self.compliance)
         return self._reach.including(wanted, self.compliance)
+
+
+def even_steps(before: Pose, after: Pose, count: int) -> Iterator[Pose]:
+    """`count` equal steps from `before` to `after`; the last pose is `after` itself."""
+    yield from (before.blended(after, number / count) for number in range(1, count))
+    yield after
+
+
+def is_stationary(before: Pose, pose: Pose) -> bool:
+    """Whether the tool does not move between two poses."""
+    return replace(before, time_s=pose.time_s) == pose
+
+
+def with_halved_steps(
+    step: Callable[[State, Pose, Pose], State],
+    state: State,
+    before: Pose,
+    pose: Pose,
+    halvings: int,
+) -> State:
+    """State at `pose` by one step or, where that fails, by two halves of it, recursively.
+
+    Raises ContactError with the reason of the smallest step after `halvings` halvings.
+    """
+    try:
+        return step(state, before, pose)
+    except ContactError as error:
+        if halvings == 0:
+            raise ContactError(
+                f"no convergence at t = {pose.time_s:g} s, depth {pose.depth_mm:g} mm, in the "
+                f"smallest step tried: {error}",
+                error.residual,
+            ) from error
+    middle, _ = even_steps(before, pose, 2)
+    state = with_halved_steps(step, state, before, middle, halvings - 1)
+    return with_halved_steps(step, state, middle, pose, halvings - 1)

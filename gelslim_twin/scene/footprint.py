@@ -1,10 +1,17 @@
-"""Footprint of a tool below the gel's undeformed surface, in closed form by depth."""
+"""Footprint of a tool below the gel's undeformed surface, in closed form by depth.
+
+A shape from an STL file counts with its extents, which are read without a mesh library.
+"""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.scene.indenter import (
@@ -18,10 +25,11 @@ from gelslim_twin.scene.indenter import (
     TexturedPlane,
     Wedge,
 )
-from gelslim_twin.scene.stl_extent import footprint_mm
 
 Pair = Callable[[float], tuple[float, float]]
 """Area in mm² and volume in mm³ at a depth above 0."""
+MAX_BYTES = 500_000_000
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def tool_footprint(
@@ -45,11 +53,17 @@ def tool_footprint(
         held = min(1.0, pad_mm2 / area) if area > 0 else 0.0
         return held * area, held * sum(v for _, v, _ in found)
 
+    def largest(value: Callable[[Indenter, float], float], depth: float) -> float:
+        below = [one for one in indenters if depth > one.raised_mm]
+        return max((value(one, depth - one.raised_mm) for one in below), default=0.0)
+
     return Footprint(
         lambda d: total(d)[0],
         lambda d: total(d)[1],
-        lambda d: tool_reach_mm(indenters, folder, d),
-        lambda d: tool_steepness(indenters, d),
+        lambda d: largest(
+            lambda one, own: math.hypot(one.x_mm, one.y_mm) + _reach_mm(one, folder, own), d
+        ),
+        lambda d: largest(_steepest, d),
         lambda d: min((w for _, _, w in parts(d)), default=0.0),
     )
 
@@ -62,7 +76,7 @@ def _on_nodes(
 
     def resolved(d: float) -> tuple[float, float, float]:
         area, volume = pair(d)
-        length, most = 2 * shape_reach_mm(indenter, folder, d), math.inf
+        length, most = 2 * _reach_mm(indenter, folder, d), math.inf
         width = area / length
         if isinstance(indenter, Ring):
             most = math.pi * indenter.outer_radius_mm**2
@@ -92,11 +106,11 @@ def _pair(indenter: Indenter, folder: Path) -> Pair:
             r, a, b = indenter.radius_mm, indenter.length_mm, indenter.width_mm
             return _prism(math.pi * r * r if r is not None else (a or 0.0) * (b or 0.0))
         case Wedge():
-            tip, half = indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
-            return lambda d: _along(_wedge_section(tip, half, d), indenter.length_mm)
+            tip = _tip(indenter)
+            return lambda d: _along(_wedge_section(*tip, d), indenter.length_mm)
         case Cone():
-            tip, half = indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
-            return lambda d: _cone(tip, half, d)
+            tip = _tip(indenter)
+            return lambda d: _cone(*tip, d)
         case TexturedPlane():
             plane = indenter.length_mm * indenter.width_mm
             return lambda d: _waves(plane, indenter.relief_mm, d)
@@ -123,8 +137,13 @@ def _round_cap(r: float, d: float) -> tuple[float, float]:
 def _round_section(r: float, d: float) -> tuple[float, float]:
     if d >= r:
         return r, math.pi * r * r / 2 + 2 * r * (d - r)
-    w = math.sqrt(2 * r * d - d * d)
+    w = _circle(r, d)
     return w, r * r * math.acos((r - d) / r) - (r - d) * w
+
+
+def _tip(indenter: Wedge | Cone) -> tuple[float, float]:
+    """Radius of the tip, and half of the angle between the flanks in rad."""
+    return indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
 
 
 def _tangent(tip: float, half: float) -> tuple[float, float]:
@@ -132,20 +151,24 @@ def _tangent(tip: float, half: float) -> tuple[float, float]:
     return tip * (1 - math.sin(half)), tip * math.cos(half)
 
 
-def _wedge_section(tip: float, half: float, d: float) -> tuple[float, float]:
+def _flank(tip: float, half: float, d: float) -> float:
+    """Half width of a rounded tip and its flanks."""
     d0, w0 = _tangent(tip, half)
+    return _circle(tip, d) if d <= d0 else w0 + (d - d0) * math.tan(half)
+
+
+def _wedge_section(tip: float, half: float, d: float) -> tuple[float, float]:
+    (d0, w0), w = _tangent(tip, half), _flank(tip, half, d)
     if d <= d0:
         return _round_section(tip, d)
-    w = w0 + (d - d0) * math.tan(half)
     round_part = _round_section(tip, d0)[1] if d0 > 0 else 0.0
     return w, round_part + (w0 + w) * (d - d0)
 
 
 def _cone(tip: float, half: float, d: float) -> tuple[float, float]:
-    d0, w0 = _tangent(tip, half)
+    (d0, w0), w = _tangent(tip, half), _flank(tip, half, d)
     if d <= d0:
         return _round_cap(tip, d)
-    w = w0 + (d - d0) * math.tan(half)
     frustum = math.pi / 3 * (d - d0) * (w0 * w0 + w0 * w + w * w)
     return math.pi * w * w, (_round_cap(tip, d0)[1] if d0 > 0 else 0.0) + frustum
 
@@ -158,35 +181,8 @@ def _waves(plane: float, relief: float, d: float) -> tuple[float, float]:
     return plane * t / math.pi, plane / math.pi * ((d - relief / 2) * t + relief / 2 * math.sin(t))
 
 
-def tool_reach_mm(indenters: Sequence[Indenter], folder: Path, depth_mm: float) -> float:
-    """Largest distance from the tool's axis of its part below the gel's undeformed surface.
-
-    It is 0 where no part is below. Raises ValueError or OSError for an STL file (in `folder`)
-    that cannot be read.
-    """
-    return max(
-        (
-            math.hypot(one.x_mm, one.y_mm) + shape_reach_mm(one, folder, depth_mm - one.raised_mm)
-            for one in indenters
-            if depth_mm > one.raised_mm
-        ),
-        default=0.0,
-    )
-
-
-def tool_steepness(indenters: Sequence[Indenter], depth_mm: float) -> float:
-    """Largest slope below the surface, infinite for shapes with walls; 0 where nothing is below."""
-    return max(
-        (_steepest(one, depth_mm - one.raised_mm) for one in indenters if depth_mm > one.raised_mm),
-        default=0.0,
-    )
-
-
-def shape_reach_mm(indenter: Indenter, folder: Path, d: float) -> float:
-    """Largest distance from the axis of a shape, at a depth `d` above 0.
-
-    Raises as `tool_reach_mm`.
-    """
+def _reach_mm(indenter: Indenter, folder: Path, d: float) -> float:
+    """Largest distance from the axis of a shape, at a depth `d` above 0."""
     match indenter:
         case Sphere():
             return _circle(indenter.radius_mm, d)
@@ -199,9 +195,9 @@ def shape_reach_mm(indenter: Indenter, folder: Path, d: float) -> float:
                 return indenter.radius_mm
             return math.hypot(indenter.length_mm or 0.0, indenter.width_mm or 0.0) / 2
         case Wedge():
-            return math.hypot(_flank(indenter, d), indenter.length_mm / 2)
+            return math.hypot(_flank(*_tip(indenter), d), indenter.length_mm / 2)
         case Cone():
-            return _flank(indenter, d)
+            return _flank(*_tip(indenter), d)
         case TexturedPlane():
             return math.hypot(indenter.length_mm, indenter.width_mm) / 2
         case Stl():
@@ -210,6 +206,7 @@ def shape_reach_mm(indenter: Indenter, folder: Path, d: float) -> float:
 
 
 def _steepest(indenter: Indenter, d: float) -> float:
+    """Largest slope, infinite for shapes with walls."""
     if isinstance(indenter, Sphere):
         r = indenter.radius_mm
         return _circle(r, d) / (r - d) if d < r else math.inf
@@ -222,8 +219,42 @@ def _circle(r: float, d: float) -> float:
     return r if d >= r else math.sqrt(2 * r * d - d * d)
 
 
-def _flank(indenter: Wedge | Cone, d: float) -> float:
-    """Half width of the section, rounded at its tip."""
-    tip, half = indenter.tip_radius_mm, math.radians(indenter.included_angle_deg / 2)
-    d0, w0 = tip * (1 - math.sin(half)), tip * math.cos(half)
-    return _circle(tip, d) if d <= d0 else w0 + (d - d0) * math.tan(half)
+def stl_corners(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """Corners of the facets, (n, 3, 3) in the file's unit, from binary or ASCII STL.
+
+    Raises ValueError for a file that is no STL or holds no facets, OSError where unreadable.
+    """
+    size = os.path.getsize(path)
+    if size > MAX_BYTES:
+        raise ValueError(f"is larger than {MAX_BYTES / 1e6:.0f} MB")
+    data = Path(path).read_bytes()
+    count = int.from_bytes(data[80:84], "little") if size >= 84 else -1
+    if size == 84 + 50 * count:
+        corners = np.frombuffer(data, _FACET, count, 84)["corners"].astype(float)
+    else:
+        corners = _ascii_corners(data)
+    if len(corners) == 0:
+        raise ValueError("holds no facets")
+    if not np.isfinite(corners).all():
+        raise ValueError("holds a corner that is not finite")
+    return corners
+
+
+def _ascii_corners(data: bytes) -> NDArray[np.float64]:
+    lines = data.split(b"\n")
+    if not lines[0].lstrip().lower().startswith(b"solid"):
+        raise ValueError("is no STL file: neither its size nor its first word fits")
+    words = [line.split() for line in lines if line.lstrip().lower().startswith(b"vertex")]
+    try:
+        values = np.array([[float(w) for w in row[1:4]] for row in words])
+        return values.reshape(-1, 3, 3)
+    except ValueError:
+        raise ValueError("is no STL file: its vertices are not threes of three numbers") from None
+
+
+def footprint_mm(path: str | os.PathLike[str], down: str, scale: float) -> tuple[float, float]:
+    """Extents in mm across the direction `down` ("z", "-x", ...). Raises as `stl_corners`."""
+    corners = stl_corners(path).reshape(-1, 3) * scale
+    extents = np.ptp(corners, axis=0)
+    a, b = (extents[i] for i in range(3) if i != "xyz".index(down[-1]))
+    return float(a), float(b)

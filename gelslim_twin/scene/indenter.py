@@ -1,4 +1,4 @@
-"""What presses on the gel: rigid shapes, each pointing down with its lowest point at its origin."""
+"""Indenters: rigid shapes that point down, each with its lowest point at its origin."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ from gelslim_core.yaml.errors import FieldError
 
 Size = Annotated[float, Field(gt=0, le=200)]
 Offset = Annotated[float, Field(ge=-100, le=100)]
+Axis = Annotated[float, Field(ge=-180, le=180)]
+TipAngle = Annotated[float, Field(ge=10, le=175)]
+TipRadius = Annotated[float, Field(ge=0, le=50)]
 
 
 class Placed(Block):
-    """Where a shape sits on the tool that carries it."""
+    """Position of a shape on the tool that carries it."""
 
-    x_mm: Offset = Field(default=0.0, description="Place on the tool, along the finger")
-    y_mm: Offset = Field(default=0.0, description="Place on the tool, across the finger")
+    x_mm: Offset = Field(default=0.0, description="Position on the tool, along the finger")
+    y_mm: Offset = Field(default=0.0, description="Position on the tool, across the finger")
     raised_mm: float = Field(
-        default=0.0, ge=0, le=50, description="How far its lowest point lies above the tool's"
+        default=0.0, ge=0, le=50, description="Height of its lowest point above that of the tool"
     )
 
 
@@ -31,22 +34,20 @@ class Sphere(Placed):
 
 
 class Cylinder(Placed):
-    """A rod lying on its side, cut off square."""
+    """A cylindrical rod that lies on its side, with flat ends."""
 
     shape: Literal["cylinder"] = Field(description="Kind of indenter")
     radius_mm: Size = Field(description="Radius of the rod")
     length_mm: Size = Field(description="Length of the rod")
-    axis_deg: float = Field(
-        default=0.0, ge=-180, le=180, description="Direction of the axis, 0 along the finger"
-    )
+    axis_deg: Axis = Field(default=0.0, description="Direction of the axis; 0 is along the finger")
 
 
 class Ring(Placed):
-    """A flat ring standing on its end: a tube."""
+    """A tube that stands on its flat end."""
 
     shape: Literal["ring"] = Field(description="Kind of indenter")
-    outer_radius_mm: Size = Field(description="Outer radius")
-    inner_radius_mm: Size = Field(description="Radius of the hole")
+    outer_radius_mm: Size = Field(description="Outer radius of the ring")
+    inner_radius_mm: Size = Field(description="Radius of its hole")
 
     @model_validator(mode="after")
     def _hole(self) -> Ring:
@@ -60,12 +61,12 @@ class Ring(Placed):
 
 
 class FlatPunch(Placed):
-    """A flat-ended prism: round, or a rectangle with rounded corners."""
+    """A punch with a flat end, which is a disc or a rectangle."""
 
     shape: Literal["flat_punch"] = Field(description="Kind of indenter")
     radius_mm: Size | None = Field(default=None, description="Radius of a round punch")
-    length_mm: Size | None = Field(default=None, description="Length of a rectangular punch, x")
-    width_mm: Size | None = Field(default=None, description="Width of a rectangular punch, y")
+    length_mm: Size | None = Field(default=None, description="Length of a rectangular punch (x)")
+    width_mm: Size | None = Field(default=None, description="Width of a rectangular punch (y)")
 
     @model_validator(mode="after")
     def _one_outline(self) -> FlatPunch:
@@ -82,45 +83,47 @@ class FlatPunch(Placed):
 
 
 class Wedge(Placed):
-    """A straight edge with a rounded tip: a knife, the corner of a box."""
+    """A straight edge with a rounded tip, such as a knife or the edge of a box."""
 
     shape: Literal["wedge"] = Field(description="Kind of indenter")
-    included_angle_deg: float = Field(ge=10, le=175, description="Angle between the two flanks")
+    included_angle_deg: TipAngle = Field(description="Angle between the two flanks")
     length_mm: Size = Field(description="Length of the edge")
-    tip_radius_mm: float = Field(default=0.2, ge=0, le=50, description="Radius of the edge")
-    axis_deg: float = Field(
-        default=0.0, ge=-180, le=180, description="Direction of the edge, 0 along the finger"
-    )
+    tip_radius_mm: TipRadius = Field(default=0.2, description="Radius of the edge")
+    axis_deg: Axis = Field(default=0.0, description="Direction of the edge; 0 is along the finger")
 
 
 class Cone(Placed):
-    """A cone pointing down with a rounded tip."""
+    """A cone that points down and has a rounded tip."""
 
     shape: Literal["cone"] = Field(description="Kind of indenter")
-    included_angle_deg: float = Field(ge=10, le=175, description="Full angle of the cone")
-    tip_radius_mm: float = Field(default=0.2, ge=0, le=50, description="Radius of the tip")
+    included_angle_deg: TipAngle = Field(description="Full angle of the cone")
+    tip_radius_mm: TipRadius = Field(default=0.2, description="Radius of the tip")
 
 
 class TexturedPlane(Placed):
-    """A flat rectangle with a relief: cloth, knurling, coarse paper."""
+    """A flat rectangle with a relief, such as cloth, knurling or coarse paper."""
 
     shape: Literal["textured_plane"] = Field(description="Kind of indenter")
     length_mm: Size = Field(description="Length along the finger")
     width_mm: Size = Field(description="Width across the finger")
     texture: Literal["ridges", "bumps", "rough"] = Field(
-        default="ridges", description="Waves one way, waves both ways, or random heights"
+        default="ridges",
+        description="Waves in one direction, in two directions, or random heights",
     )
     pitch_mm: float = Field(
-        default=2.0, gt=0, le=100, description="Wavelength; of rough ones the correlation length"
+        default=2.0,
+        gt=0,
+        le=100,
+        description="Wavelength, or correlation length of random heights",
     )
-    relief_mm: float = Field(default=0.2, ge=0, le=10, description="Height from valley to crest")
-    axis_deg: float = Field(
-        default=0.0, ge=-180, le=180, description="Direction of the ridges, 0 along the finger"
+    relief_mm: float = Field(default=0.2, ge=0, le=10, description="Height from valleys to crests")
+    axis_deg: Axis = Field(
+        default=0.0, description="Direction of the ridges; 0 is along the finger"
     )
 
 
 class Stl(Placed):
-    """A mesh from an STL file, used through its height map seen from below."""
+    """A mesh from an STL file, used as a height map of its lower side."""
 
     shape: Literal["stl"] = Field(description="Kind of indenter")
     file: str = Field(min_length=1, max_length=400, description="STL file, relative to the scene")

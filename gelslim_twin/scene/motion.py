@@ -1,4 +1,4 @@
-"""How the tool moves: waypoints that each add one movement, or a table of poses."""
+"""Motion of the tool: waypoints that each add one movement, or a table of poses."""
 
 from __future__ import annotations
 
@@ -12,64 +12,65 @@ from gelslim_core.yaml.errors import FieldError
 MAX_POSES = 20_000
 
 Lateral = Annotated[float, Field(ge=-100, le=100)]
+Shearing = Annotated[float, Field(ge=-5, le=5)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 
 
 class Timed(Block):
-    """How finely and how long."""
+    """Number of poses and duration of a movement."""
 
-    steps: int = Field(default=10, ge=1, le=5000, description="Poses this movement is cut into")
-    duration_s: float = Field(default=0.5, gt=0, le=3600, description="Time it takes")
+    steps: int = Field(default=10, ge=1, le=5000, description="Number of poses of this movement")
+    duration_s: float = Field(default=0.5, gt=0, le=3600, description="Duration of this movement")
 
 
 class Press(Timed):
-    """Straight down or up to a depth below the undeformed gel surface."""
+    """The tool moves straight down or up to a depth below the undeformed surface of the gel."""
 
     move: Literal["press"] = Field(description="Kind of movement")
     depth_mm: float = Field(
-        ge=-50, le=20, description="Depth at the end; negative is above the gel"
+        ge=-50, le=20, description="Depth at the end; negative values are above the gel"
     )
 
 
 class Shear(Timed):
-    """Sideways by so little that the contact mostly sticks."""
+    """The tool moves sideways by so little that most of the contact sticks."""
 
     move: Literal["shear"] = Field(description="Kind of movement")
-    x_mm: Annotated[float, Field(ge=-5, le=5)] = Field(default=0.0, description="Along the finger")
-    y_mm: Annotated[float, Field(ge=-5, le=5)] = Field(default=0.0, description="Across the finger")
+    x_mm: Shearing = Field(default=0.0, description="Distance along the finger")
+    y_mm: Shearing = Field(default=0.0, description="Distance across the finger")
 
 
 class Slide(Timed):
-    """Sideways over a distance; the contact slips once the friction limit is reached."""
+    """The tool moves sideways, and the contact slips once the limit of friction is reached."""
 
     move: Literal["slide"] = Field(description="Kind of movement")
-    x_mm: Lateral = Field(default=0.0, description="Along the finger")
-    y_mm: Lateral = Field(default=0.0, description="Across the finger")
+    x_mm: Lateral = Field(default=0.0, description="Distance along the finger")
+    y_mm: Lateral = Field(default=0.0, description="Distance across the finger")
 
 
 class Twist(Timed):
-    """Turned about the gel's normal through the tool's lowest point."""
+    """The tool turns about the normal of the gel through its lowest point."""
 
     move: Literal["twist"] = Field(description="Kind of movement")
-    angle_deg: Angle = Field(description="Anticlockwise seen from outside")
+    angle_deg: Angle = Field(description="Angle, anticlockwise as seen from outside the finger")
 
 
 class Tilt(Timed):
-    """Tipped about an axis in the gel's surface through the tool's lowest point."""
+    """The tool tilts about an axis in the surface of the gel through its lowest point."""
 
     move: Literal["tilt"] = Field(description="Kind of movement")
-    about: Literal["x", "y"] = Field(description="Axis")
-    angle_deg: Annotated[float, Field(ge=-45, le=45)] = Field(description="Right-handed")
+    about: Literal["x", "y"] = Field(description="Axis of the tilt")
+    angle_deg: float = Field(ge=-45, le=45, description="Right-handed angle of the tilt")
 
 
 class Hold(Timed):
-    """Stay: the gel relaxes."""
+    """The tool stays where it is while the gel relaxes."""
 
     move: Literal["hold"] = Field(description="Kind of movement")
 
 
 class Release(Timed):
-    """Straight up until the tool is clear of the gel."""
+    """The tool moves straight up until it is clear of the gel."""
 
     move: Literal["release"] = Field(description="Kind of movement")
     clearance_mm: float = Field(
@@ -83,10 +84,10 @@ Waypoint = Annotated[
 
 
 class Motion(Block):
-    """Where the tool starts, just touching, and what it does; or a table that says it all."""
+    """Motion of the tool by waypoints, from a start where it just touches, or by a table."""
 
-    start_x_mm: Lateral = Field(default=0.0, description="Start, along the finger")
-    start_y_mm: Lateral = Field(default=0.0, description="Start, across the finger")
+    start_x_mm: Lateral = Field(default=0.0, description="Position of the start, along the finger")
+    start_y_mm: Lateral = Field(default=0.0, description="Position of the start, across the finger")
     waypoints: tuple[Waypoint, ...] | None = Field(
         default=None, min_length=1, max_length=500, description="Movements, one after the other"
     )
@@ -94,7 +95,7 @@ class Motion(Block):
         default=None,
         min_length=1,
         max_length=400,
-        description="Table of poses instead, relative to the scene",
+        description="Path of a table of poses instead, relative to the scene",
     )
 
     @model_validator(mode="after")

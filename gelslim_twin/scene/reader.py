@@ -1,4 +1,4 @@
-"""Read a scene: its YAML file, and the files that it names."""
+"""Read a scene with the files that it names; schema and reference page of scenes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from pydantic import ValidationError
 
 from gelslim_core.yaml.errors import InputError, Problem, shown
 from gelslim_core.yaml.reader import Loaded, read_model
-from gelslim_core.yaml.schema import schema_text
-from gelslim_twin.scene.motion_csv import read_motion_csv
-from gelslim_twin.scene.pose import Pose, poses
+from gelslim_core.yaml.schema import reference_markdown, schema_text
+from gelslim_twin.scene.footprint import footprint_mm
+from gelslim_twin.scene.pose import Pose, poses, read_motion_csv
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
-from gelslim_twin.scene.stl_extent import footprint_mm
-from gelslim_twin.scene.varied import varied
+from gelslim_twin.scene.variation import varied
 
 
 @dataclass(frozen=True)
@@ -95,15 +94,7 @@ def read_scene(path: str | os.PathLike[str]) -> LoadedScene:
     loaded = read_model(path, Scene)
     motion, folder = loaded.model.motion, Path(loaded.path).parent
     found = poses(motion) if motion.csv is None else read_motion_csv(folder / motion.csv)
-    scene = LoadedScene(
-        loaded.model,
-        loaded.source_map,
-        loaded.sha256,
-        loaded.text,
-        loaded.path,
-        loaded.defaulted,
-        found,
-    )
+    scene = LoadedScene(**vars(loaded), poses=found)
     _check_meshes(scene)
     return scene
 
@@ -129,3 +120,41 @@ def _check_meshes(loaded: LoadedScene) -> None:
 def scene_schema_text() -> str:
     """The JSON Schema (draft 2020-12) of scenes as text."""
     return schema_text(Scene, FORMAT)
+
+
+RULES = (
+    ("sensor", "names `spec` or `bundle`, not both"),
+    ("indenters[]: ring", "`inner_radius_mm` is below `outer_radius_mm`"),
+    ("indenters[]: flat_punch", "`radius_mm`, or `length_mm` and `width_mm`, not both kinds"),
+    ("motion", "`waypoints` or `csv`, not both; a table gives the place, so no start beside it"),
+    ("motion", "at most 20 000 poses"),
+    ("observe", "nothing is listed twice"),
+    (
+        "vary",
+        "the first value of a range is at most the second; factors of depth and size are above 0",
+    ),
+)
+"""What no single field can tell: block, rule. The reader enforces each."""
+
+_HEAD = """\
+# Scene reference
+
+<!-- Made by `make docs` from the schema; do not edit by hand. -->
+
+Every field of a contact scene (`format: gelslim-scene/1`), block by block in the order of the file.
+What scenes are for, and how effects are chosen, is in the [digital twin's guide](digital_twin.md).
+`gelslim schema --scene` prints the JSON Schema, which is also in
+[gelslim-scene-1.schema.json](gelslim-scene-1.schema.json).
+"""
+_BETWEEN = """
+## Rules between fields
+
+Checked when the file is read.
+
+"""
+
+
+def reference_text() -> str:
+    """The whole page in Markdown, the same for the same program."""
+    rules = "".join(f"- `{block}`: {rule}.\n" for block, rule in RULES)
+    return f"{_HEAD}\n{reference_markdown(Scene)}{_BETWEEN}{rules}"

@@ -1,9 +1,8 @@
-"""The whole scene: what touches the sensor, how, and what is to be known of it."""
+"""A contact scene: what touches the sensor, how it moves, and what is observed of it."""
 
 from __future__ import annotations
 
-import hashlib
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field, create_model, model_validator
 
@@ -13,65 +12,20 @@ from gelslim_twin.effects.circumstances import EffectParameters, Use
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.motion import Motion
-
-Range = Annotated[tuple[float, float], Field(description="Lowest and highest value")]
-_TWO_53 = 2.0**53
-
-
-class Variation(Block):
-    """Ranges, drawn evenly; what is left out stays as the scene says."""
-
-    x_mm: Range | None = Field(default=None, description="Added to the start, along the finger")
-    y_mm: Range | None = Field(default=None, description="Added to the start, across the finger")
-    depth_factor: Range | None = Field(default=None, description="Times every depth of a press")
-    lateral_factor: Range | None = Field(default=None, description="Times every shear and slide")
-    direction_deg: Range | None = Field(
-        default=None, description="Turns every shear and slide about the gel's normal"
-    )
-    twist_factor: Range | None = Field(default=None, description="Times every twist")
-    size_factor: Range | None = Field(
-        default=None, description="Times every length of the indenters"
-    )
-    friction: Range | None = Field(default=None, description="Coefficient of friction")
-
-    @model_validator(mode="after")
-    def _ranges(self) -> Variation:
-        for name in type(self).model_fields:
-            pair = getattr(self, name)
-            if pair is not None and pair[0] > pair[1]:
-                raise FieldError(name, f"{pair[0]:g} is above {pair[1]:g}", "swap the two")
-        for name in ("depth_factor", "size_factor"):
-            pair = getattr(self, name)
-            if pair is not None and pair[0] <= 0:
-                raise FieldError(name, "must be above 0", "raise the lower end")
-        if self.friction is not None and not 0 <= self.friction[0] <= self.friction[1] <= 10:
-            raise FieldError("friction", "must lie in 0 to 10", "correct the range")
-        return self
-
-    def drawn(self, seed: int, number: int) -> dict[str, float]:
-        """The values of scene `number`; every name has a stream of its own."""
-        given: dict[str, Any] = {name: getattr(self, name) for name in type(self).model_fields}
-        return {
-            name: pair[0] + _unit(seed, number, name) * (pair[1] - pair[0])
-            for name, pair in given.items()
-            if pair is not None
-        }
-
-
-def _unit(seed: int, number: int, name: str) -> float:
-    """An even number in 0 ... 1 from the hash of what it is for: the same on every machine."""
-    digest = hashlib.sha256(f"{seed}/{number}/{name}".encode()).digest()
-    return (int.from_bytes(digest[:8], "big") >> 11) / _TWO_53
+from gelslim_twin.scene.variation import Variation
 
 
 class Sensor(Block):
-    """A spec or a bundle; paths are relative to the scene's file."""
+    """The sensor, by its spec or by its bundle. Paths are relative to the scene file."""
 
     spec: str | None = Field(
         default=None, min_length=1, max_length=400, description="Spec of the finger, a YAML file"
     )
     bundle: str | None = Field(
-        default=None, min_length=1, max_length=400, description="Stiffness bundle, a folder"
+        default=None,
+        min_length=1,
+        max_length=400,
+        description="Stiffness bundle, a folder",
     )
 
     @model_validator(mode="after")
@@ -91,30 +45,33 @@ Observable = Literal["displacement", "force", "markers", "image"]
 
 
 class Contact(Block):
-    """What happens between tool and gel."""
+    """The contact between the tool and the gel."""
 
     friction: float = Field(
-        default=0.0, ge=0, le=10, description="Coulomb's coefficient; 0 is frictionless"
+        default=0.0, ge=0, le=10, description="Coefficient of Coulomb friction; 0 means no friction"
     )
 
 
 class Tolerance(Block):
-    """How exact the simulation must be: effects below their share of it are left out."""
+    """Errors allowed in the simulation. Effects that change less than their share are left out."""
 
-    force_n: float = Field(default=0.02, ge=0, le=1000, description="Error of forces")
+    force_n: float = Field(default=0.02, ge=0, le=1000, description="Allowed error of forces")
     image_px: float = Field(
         default=0.1,
         ge=0,
         le=1000,
-        description="Error in the picture; displacements as the camera sees them",
+        description="Allowed error of displacements, markers and pictures, as seen by the camera",
     )
 
 
 class SceneCamera(Block):
-    """How frames are taken; the optics belong to the sensor."""
+    """When frames are taken. The optics of the camera belong to the sensor."""
 
     frame_rate_hz: float | None = Field(
-        default=None, gt=0, le=10_000, description="Frames per second; one per pose if left out"
+        default=None,
+        gt=0,
+        le=10_000,
+        description="Frames per second; without it, one per pose",
     )
 
 
@@ -155,26 +112,29 @@ class Scene(Block):
         min_length=1,
         max_length=60,
         pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$",
-        description="Name of the scene; becomes the output folder",
+        description="Name of the scene, which is also that of the output folder",
     )
-    sensor: Sensor = Field(description="The finger")
+    sensor: Sensor = Field(description="The sensor that is touched")
     indenters: tuple[Indenter, ...] = Field(
-        min_length=1, max_length=16, description="Rigid shapes on one tool, moved together"
+        min_length=1, max_length=16, description="Rigid shapes that form one tool and move together"
     )
-    motion: Motion = Field(description="How the tool moves")
-    contact: Contact = Field(default=Contact(), description="Contact; left out: no friction")
+    motion: Motion = Field(description="Motion of the tool")
+    contact: Contact = Field(default=Contact(), description="Contact, by default without friction")
     observe: tuple[Observable, ...] = Field(
-        min_length=1, max_length=4, description="What is to be known"
+        min_length=1, max_length=4, description="Quantities that the simulation provides"
     )
-    tolerance: Tolerance = Field(default=Tolerance(), description="How exactly")
-    camera: SceneCamera = Field(default=SceneCamera(), description="How frames are taken")
+    tolerance: Tolerance = Field(
+        default=Tolerance(), description="Allowed errors of the simulation"
+    )
+    camera: SceneCamera = Field(default=SceneCamera(), description="When frames are taken")
     effects: Effects = Field(
-        default=Effects(), description="Effects forced on or off, and their parameters"
+        default=Effects(),
+        description="Physical effects: whether to simulate them, and how",
     )
     vary: Variation = Field(
-        default=Variation(), description="Ranges that `simulate --count` draws scenes from"
+        default=Variation(), description="Ranges from which `gelslim simulate --count` draws scenes"
     )
-    seed: int = Field(default=0, ge=0, le=2**53, description="Of everything random")
+    seed: int = Field(default=0, ge=0, le=2**53, description="Seed of all random numbers")
 
     @model_validator(mode="after")
     def _once(self) -> Scene:

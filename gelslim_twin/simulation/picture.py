@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,20 +60,15 @@ class Viewer:
         look = plan_look(self.plan, scene.effects.parameters(), record, scene.seed)
         return sensor_renderer(self.sensor, self.camera, look, scene.seed)
 
-    def surface(self, state: GelState) -> SurfaceState:
-        """The state as the renderer takes it. The last two are cached: a frame needs both."""
+    @cached_property
+    def surface(self) -> Callable[[GelState], SurfaceState]:
+        """A state as the renderer takes it. The last two are kept, because a frame needs both."""
         from gelslim_twin.render.surface_state import SurfaceState
 
-        for known, surface in self._surfaces:
-            if known is state:
-                return surface
-        made = SurfaceState.from_nodes(self.sensor.points_mm, state.displacement_mm)
-        self._surfaces[:] = [*self._surfaces[-1:], (state, made)]
-        return made
-
-    @cached_property
-    def _surfaces(self) -> list[tuple[GelState, SurfaceState]]:
-        return []
+        points_mm = self.sensor.points_mm
+        return lru_cache(maxsize=2)(
+            lambda state: SurfaceState.from_nodes(points_mm, state.displacement_mm)
+        )
 
     def frame(
         self, state: GelState, before: GelState | None, number: int, step_s: float

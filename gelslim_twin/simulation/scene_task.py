@@ -1,4 +1,4 @@
-"""One scene of a data set as a task for a worker process."""
+"""A planned scene as a job, its mechanical model, and one scene of a data set as a task."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from gelslim_twin.planning.question import plan_scene
-from gelslim_twin.planning.sensor_figures import bundle_figures
+from gelslim_twin.planning.plan import Choice, Plan
+from gelslim_twin.planning.question import bundle_figures, plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
-from gelslim_twin.simulation.mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
-from gelslim_twin.simulation.simulate import Progress, SimulationJob, simulate
+from gelslim_twin.simulation.simulate import Mechanics, SimulationJob, simulate
 
 
 @dataclass(frozen=True)
@@ -76,4 +75,38 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
     )
 
 
-__all__ = ["Progress", "SceneTask", "job_of", "perform"]
+def mechanics_of(
+    loaded: LoadedScene, plan: Plan, sensor: TwinSensor, folder: Path | None = None
+) -> Mechanics:
+    """The mechanical model of a planned scene; the pad's compliance is stored in `folder`.
+
+    Only modules of effects in the plan are imported. Raises ValueError or OSError for an STL file
+    that cannot be read.
+    """
+    chosen = {choice.effect: choice for choice in plan.included}
+    solver = import_module(chosen["normal_contact"].implementation)
+    from gelslim_twin.contact.compliance import SurfaceCompliance
+    from gelslim_twin.contact.tool import Tool
+
+    tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
+    if "friction" in chosen:
+        tolerance = min(tolerance, _tolerance(chosen["friction"]))
+        friction = loaded.scene.contact.friction
+    settings = solver.ContactSettings(tolerance, friction)
+    tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
+    contact: Any = solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder), tool, settings)
+    if "nonlinearity" in chosen:
+        nonlinear = import_module(chosen["nonlinearity"].implementation)
+        contact = nonlinear.NonlinearContact(
+            contact, **dict(chosen["nonlinearity"].rung_parameters)
+        )
+    if "relaxation" in chosen:
+        given = loaded.scene.effects.parameters()["relaxation"].model_dump()["terms"]
+        relaxation = import_module(chosen["relaxation"].implementation)
+        fractions, times_s = (tuple(t[n] for t in given) for n in ("fraction", "time_s"))
+        contact = relaxation.RelaxingContact(contact, relaxation.PronySeries(fractions, times_s))
+    return contact
+
+
+def _tolerance(choice: Choice) -> float:
+    return float(dict(choice.rung_parameters)["tolerance"])

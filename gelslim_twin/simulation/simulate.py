@@ -22,6 +22,7 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.scene.pose import FrameTime, Pose, frame_times
 from gelslim_twin.scene.scene import Scene
+from gelslim_twin.simulation.records import FrameTruth, StateStore, fields_npz, wrench_csv
 from gelslim_twin.simulation.run_folder import (
     FIELDS,
     LEDGER,
@@ -33,12 +34,9 @@ from gelslim_twin.simulation.run_folder import (
     simulation_key,
 )
 from gelslim_twin.simulation.sensor import TwinSensor
-from gelslim_twin.simulation.state_store import StateStore
-from gelslim_twin.simulation.truth import FrameTruth, fields_npz, wrench_csv
 from ifem_export.operators.single_thread import single_threaded
 
 Progress = Callable[[str, int, int], None]
-COORDINATES = ("x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")
 
 
 class Mechanics(Protocol):
@@ -233,7 +231,5 @@ def _pose(poses: tuple[Pose, ...], when: FrameTime) -> Pose:
     first = poses[when.before]
     if when.part == 0:
         return first
-    last = poses[when.before + 1]
-    blend = {n: (1 - when.part) * getattr(first, n) + when.part * getattr(last, n)
-             for n in COORDINATES}  # fmt: skip
-    return replace(first, time_s=when.time_s, **blend)
+    later = poses[when.before + 1]
+    return replace(first.blended(later, when.part), time_s=when.time_s)

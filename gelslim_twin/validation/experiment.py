@@ -1,14 +1,28 @@
-"""Contacts of a validation: the paper's ball that presses and slides, two rods and a punch."""
+"""Contacts of a validation, and the gel on which they are solved.
+
+The contacts are the paper's ball that presses and slides, two rods and a punch. The gel is finer
+than that of the pipeline, of other elements, and neo-Hookean where its pad allows it.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
+from gelslim_twin.contact.compliance import SurfaceCompliance
+from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.nonlinear import NonlinearContact, unfit
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
+from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.mesh.pad_mesh import PadMesh
 
 FRICTION = 0.8
 DIRECTIONS = 8
@@ -23,6 +37,11 @@ PLACE_SHARE = 0.12
 """Farthest start from the middle over the pad's shorter side."""
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 _STRIDE = 3
+STEPS, DEPTH_SHARE = 3, 0.15
+"""Of the other contacts: steps of a movement, and depth over the gel's thickness."""
+LAYERS = 8
+"""Layers of cells of the gel behind the frames."""
+Law = Literal["neo_hookean", "linear"]
 
 
 @dataclass(frozen=True)
@@ -39,21 +58,15 @@ class SlideTest:
     def poses(self) -> tuple[Pose, ...]:
         """Poses from first contact: pressed in equal steps, then slid in equal steps."""
         turn = math.radians(self.direction_deg)
-        pressed = [
-            Pose(float(k), self.x_mm, self.y_mm, self.depth_mm * k / PRESS_STEPS)
-            for k in range(PRESS_STEPS + 1)
-        ]
-        ways = [self.distance_mm * k / SLIDE_STEPS for k in range(1, SLIDE_STEPS + 1)]
-        slid = [
-            Pose(
-                PRESS_STEPS + k,
-                self.x_mm + way * math.cos(turn),
-                self.y_mm + way * math.sin(turn),
-                self.depth_mm,
-            )
-            for k, way in enumerate(ways, 1)
-        ]
-        return (*pressed, *slid)
+        touch = Pose(0.0, self.x_mm, self.y_mm, 0.0)
+        down = replace(touch, time_s=PRESS_STEPS, depth_mm=self.depth_mm)
+        end = replace(
+            down,
+            time_s=PRESS_STEPS + SLIDE_STEPS,
+            x_mm=self.x_mm + self.distance_mm * math.cos(turn),
+            y_mm=self.y_mm + self.distance_mm * math.sin(turn),
+        )
+        return (touch, *even_steps(touch, down, PRESS_STEPS), *even_steps(down, end, SLIDE_STEPS))
 
 
 @dataclass(frozen=True)
@@ -94,10 +107,6 @@ def sphere_experiment(thickness_mm: float, length_mm: float, width_mm: float) ->
     return Experiment(Sphere(shape="sphere", radius_mm=radius), tuple(tests))
 
 
-STEPS = 3
-DEPTH_SHARE = 0.15
-
-
 @dataclass(frozen=True)
 class Case:
     """A tool with its poses; `known` is its shape as an argument of `gelslim force`."""
@@ -129,12 +138,59 @@ def other_contacts(thickness_mm: float, length_mm: float, width_mm: float) -> tu
 
 def path(*ends: Pose) -> tuple[Pose, ...]:
     """Poses from first contact above the first end through all ends, three steps each."""
-    first = ends[0]
-    poses = [Pose(0.0, first.x_mm, first.y_mm, 0.0)]
+    poses = [Pose(0.0, ends[0].x_mm, ends[0].y_mm, 0.0)]
     for end in ends:
-        start = poses[-1]
-        names = ("time_s", "x_mm", "y_mm", "depth_mm", "twist_deg")
-        for part in np.linspace(0, 1, STEPS + 1)[1:]:
-            blend = {n: (1 - part) * getattr(start, n) + part * getattr(end, n) for n in names}
-            poses.append(Pose(**{n: float(v) for n, v in blend.items()}))
+        poses += even_steps(poses[-1], end, STEPS)
     return tuple(poses)
+
+
+@dataclass(frozen=True, eq=False)
+class TruthGel:
+    """Solves contacts with friction on the finer pad; its compliance is stored in `folder`."""
+
+    sensor: Bundle
+    friction: float
+    folder: Path | None = None
+    _solvers: dict[Indenter, ContactSolver] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def compliance(self) -> SurfaceCompliance:
+        """Surface compliance of the finer pad."""
+        return SurfaceCompliance(truth_pad(self.sensor), self.folder)
+
+    @property
+    def law(self) -> Law:
+        """Neo-Hookean for flat pads of whole cells, linear for the others."""
+        return "neo_hookean" if unfit(self.sensor) is None else "linear"
+
+    @property
+    def layers(self) -> int:
+        """Layers of the finer pad."""
+        return self.compliance.bundle.mesh.layers
+
+    def states(self, tool: Indenter, poses: tuple[Pose, ...], law: Law) -> list[GelState]:
+        """A state per pose. Raises ContactError."""
+        if tool not in self._solvers:
+            settings = ContactSettings(friction=self.friction)
+            body = Tool.of((tool,), Path())
+            self._solvers[tool] = ContactSolver(self.compliance, body, settings)
+        contact: Any = self._solvers[tool]
+        if law == "neo_hookean":
+            contact = NonlinearContact(contact)
+        return list(contact.states(poses))
+
+
+def truth_pad(bundle: Bundle) -> Bundle:
+    """The bundle's pad in eight layers of B-bar cells on the same surface nodes.
+
+    Crowned or weighted pads come back as they are: their layers are not free to choose.
+    """
+    mesh = bundle.mesh
+    if unfit(bundle) is not None or mesh.layers >= LAYERS:
+        return bundle
+    hx, hy, hz = mesh.cell_size_mm
+    plan = np.asarray(mesh.occupancy)[:, :, :1]
+    cells = np.ascontiguousarray(np.repeat(plan, LAYERS, axis=2))
+    finer = PadMesh.from_occupancy(cells, (hx, hy, hz * mesh.layers / LAYERS), mesh.origin_mm)
+    made = build_bundle(finer, bundle.material, "bbar", with_stiffness=False)
+    return replace(made, camera=bundle.camera, spec_hash=bundle.spec_hash)

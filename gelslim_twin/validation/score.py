@@ -1,21 +1,33 @@
-"""Errors of one estimate: resultant, field, centre of pressure and direction."""
+"""Errors of estimates: of one frame, of many, and of a whole validation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.validation.experiment import FRICTION, Experiment
 
 Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
 NEAR = 0.15
 """Relative error within which the paper counts a frame as right."""
 SHEARED = 0.2
 """Smallest ratio of shear to normal force for which directions are compared."""
+PAPER_N = (0.244, 0.201, 0.322)
+"""Standard deviations in x, y and z that Ma, Donlon, Dong and Rodriguez (ICRA 2019) measured."""
+PAPER_RELATIVE = 0.15
+"""Of the true force, as they state it."""
+MEDIANS = (
+    "field_error", "outside_share", "centre_error_mm", "direction_error_deg", "milliseconds",
+)  # fmt: skip
+"""Errors of single frames of which a summary gives the median."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +61,7 @@ class Spread:
 
     name: str
     frames: int
-    without: tuple[int, int, int]
+    without: tuple[int, ...]
     """Number of frames without a force along x, y, z."""
     deviation_n: tuple[float, float, float]
     """Standard deviation of found minus true, about its mean."""
@@ -75,7 +87,7 @@ def spread(name: str, true_n: Array, found_n: Array) -> Spread:
     return Spread(
         name,
         len(found_n),
-        _counts(~known),
+        tuple(int(n) for n in (~known).sum(axis=0)),
         _three([e.std() if len(e) else np.nan for e in kept]),
         _three([e.mean() if len(e) else np.nan for e in kept]),
         float(np.sqrt((off[known] ** 2).sum()) / size) if size > 0 else float("nan"),
@@ -92,21 +104,12 @@ def _within(true_n: Array, off_n: Array, known: NDArray[np.bool_]) -> float:
 def summary(name: str, scores: Sequence[Score]) -> Spread:
     """Statistics of one chain; errors of the field are medians over the frames."""
     true, found = (np.array([getattr(s, a) for s in scores]) for a in ("true_n", "found_n"))
-    base = spread(name, true, found)
-
-    def middle(attribute: str) -> float:
-        values = np.array([getattr(s, attribute) for s in scores])
-        values = values[np.isfinite(values)]
-        return float(np.median(values)) if len(values) else float("nan")
-
-    return replace(
-        base,
-        field_error=middle("field_error"),
-        outside_share=middle("outside_share"),
-        centre_error_mm=middle("centre_error_mm"),
-        direction_error_deg=middle("direction_error_deg"),
-        milliseconds=middle("milliseconds"),
-    )
+    table = np.array([[getattr(s, n) for n in MEDIANS] for s in scores])
+    medians: dict[str, Any] = {
+        n: float(np.median(values[np.isfinite(values)])) if np.isfinite(values).any() else np.nan
+        for n, values in zip(MEDIANS, table.T, strict=True)
+    }
+    return replace(spread(name, true, found), **medians)
 
 
 def field_errors(
@@ -175,11 +178,65 @@ def _turn(true_n: Array, found_n: Array) -> float:
     return float(abs(np.degrees((b - a + np.pi) % (2 * np.pi) - np.pi)))
 
 
-def _counts(missing: NDArray[np.bool_]) -> tuple[int, int, int]:
-    x, y, z = (int(v) for v in missing.sum(axis=0))
-    return x, y, z
-
-
 def _three(values: ArrayLike) -> tuple[float, float, float]:
     x, y, z = (float(v) for v in np.asarray(values))
     return x, y, z
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One frame with its true state and the results of the chains, for figures."""
+
+    name: str
+    image: Image
+    truth: GelState
+    results: Mapping[str, FrameResult]
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """The result of a validation.
+
+    Attributes:
+        truth: Which model made the frames, and how it differs from that of the pipeline.
+        experiment: The ball and its slides.
+        scores: Every chain on every frame of the slides.
+        chains: Statistics of each chain over the slides.
+        budget: Errors of the resultant by source.
+        others: Scores of the last frame of the other contacts.
+        samples: Last frame of each contact.
+        points_mm: Surface nodes (c, 3) in mm.
+        calibration: Calibration of the rendered reference frame.
+    """
+
+    truth: str
+    experiment: Experiment
+    scores: tuple[Score, ...]
+    chains: tuple[Spread, ...]
+    budget: tuple[Spread, ...]
+    others: Mapping[str, tuple[Score, ...]]
+    samples: tuple[Sample, ...]
+    points_mm: NDArray[np.float64]
+    calibration: Calibration
+    operator: str = ""
+    """Label of the force operator that a budget chose; empty without a budget."""
+    remarks: tuple[str, ...] = ()
+    """What lies outside the calibrated range of that choice."""
+
+    def to_record(self) -> dict[str, Any]:
+        """The values as they are written to JSON."""
+        return {
+            "format": "gelslim-validation/1",
+            "truth": self.truth,
+            "paper": {"deviation_n": PAPER_N, "relative": PAPER_RELATIVE},
+            "experiment": {
+                "ball_radius_mm": self.experiment.ball.radius_mm,
+                "friction": FRICTION,
+                "slides": [asdict(test) for test in self.experiment.tests],
+            },
+            "chains": [asdict(s) for s in self.chains],
+            "budget": [asdict(s) for s in self.budget],
+            "frames": [asdict(s) for s in self.scores],
+            "other_contacts": {n: [asdict(s) for s in v] for n, v in self.others.items()},
+            **({"operator": self.operator} if self.operator else {}),
+        }

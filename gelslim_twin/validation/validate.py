@@ -1,15 +1,18 @@
 """Validation of a sensor on rendered frames with known forces.
 
 The contacts are the paper's experiment and some others. Frames show everything that a real sensor
-shows. The pipeline is given the sensor's bundle and a reference frame, nothing else.
+shows. The pipeline is given the sensor's bundle and a reference frame, nothing else. Several
+variants of the pipeline, called chains, are compared. The paper's chains use one layer of fully
+integrated cells, the projection compensation as printed, forces as stiffness times displacement,
+and for a known shape the cap of the indenter below the rim of the contact patch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,19 +22,27 @@ from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.design import bundle_camera
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.indenter_source import IndenterSource
+from gelslim_force.contact.normal_source import NormalReading
+from gelslim_force.forces.estimator import ForceSettings
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.settings import PipelineSettings
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.nonlinear import unfit
 from gelslim_twin.render.look import lens_of, sensor_look
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.simulation.picture import sensor_renderer
 from gelslim_twin.simulation.sensor import TwinSensor
-from gelslim_twin.validation.chain import Chain, KnownContact, chains_for
 from gelslim_twin.validation.error_budget import error_budget
-from gelslim_twin.validation.experiment import FRICTION, other_contacts, sphere_experiment
-from gelslim_twin.validation.score import Score, score, summary
-from gelslim_twin.validation.truth_gel import TruthGel
-from gelslim_twin.validation.validation import Sample, Validation
+from gelslim_twin.validation.experiment import (
+    FRICTION,
+    Case,
+    TruthGel,
+    other_contacts,
+    sphere_experiment,
+)
+from gelslim_twin.validation.score import Sample, Score, Validation, score, summary
+from ifem_export.bundle.bundle import Bundle
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.operators.single_thread import single_threaded
 
@@ -40,6 +51,67 @@ Image = NDArray[np.uint8]
 Progress = Callable[[str, int, int], None]
 FRAMES_APART = 100
 """Distance of the frame numbers of two contacts, so that each has its own noise."""
+
+
+Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
+"""What the chain is given: the true heights (`depth`), with the true contact region (`contact`), or
+the shape of the indenter (`shape`; `cap` with the paper's model of it)."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """One variant of the pipeline."""
+
+    name: str
+    settings: PipelineSettings
+    knows: Knows
+    needs_even_layers: bool = False
+    """It does not take crowned pads and cut cells."""
+
+
+_PAPER = PipelineSettings(
+    rung="paper", compensation="printed", force=ForceSettings(method="direct")
+)
+CHAINS: tuple[Chain, ...] = (
+    Chain("ours, contact known", PipelineSettings(), "contact"),
+    Chain("ours, depth known", PipelineSettings(), "depth"),
+    Chain("ours, depth, neo-Hookean", PipelineSettings(gel="neo_hookean"), "depth", True),
+    Chain("ours, shape known", PipelineSettings(), "shape"),
+    Chain("ours, shape, neo-Hookean", PipelineSettings(gel="neo_hookean"), "shape", True),
+    Chain("ours, tangential", PipelineSettings(), "nothing"),
+    Chain("paper, depth known", _PAPER, "depth", True),
+    Chain("paper, shape known", _PAPER, "cap", True),
+)
+
+
+def chains_for(bundle: Bundle, budget: Budget | None = None) -> tuple[Chain, ...]:
+    """The chains for a bundle's pad; those that name no operator get the budget."""
+    fit = unfit(bundle) is None
+    return tuple(
+        chain
+        if chain.settings.rung is not None
+        else replace(chain, settings=replace(chain.settings, budget=budget))
+        for chain in CHAINS
+        if fit or not chain.needs_even_layers
+    )
+
+
+class KnownContact:
+    """The true normal motion and contact region as a normal source, one state per frame."""
+
+    def __init__(self, states: Iterable[GelState]) -> None:
+        self._left: Iterator[GelState] = iter(states)
+
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> GelState:
+        """The frame's state. Raises StopIteration beyond the last."""
+        return next(self._left)
+
+    def motion(
+        self, seen: GelState, lateral_mm: NDArray[np.float64] | None = None
+    ) -> NormalReading:
+        """True heights, without doubt, and the nodes truly touched."""
+        w = seen.displacement_mm[:, 2]
+        return NormalReading(w, np.zeros(len(w)), seen.touch > 0)
 
 
 class Bench:
@@ -154,33 +226,28 @@ def validate(
     strained: list[GelState] = []
     linear: list[GelState] = []
     samples: list[Sample] = []
-    for number, test in enumerate(experiment.tests):
-        tell(f"slide {number + 1}", number, steps)
-        states = gel.states(experiment.ball, test.poses, gel.law)[1:]
-        linear += gel.states(experiment.ball, test.poses, "linear")[1:]
-        strained += states
+    others: dict[str, tuple[Score, ...]] = {}
+    slides = [
+        Case(f"slide {k}", experiment.ball, test.poses, experiment.known)
+        for k, test in enumerate(experiment.tests, 1)
+    ]
+    for number, case in enumerate((*slides, *cases)):
+        tell(case.name, number, steps)
+        states = gel.states(case.indenter, case.poses, gel.law)[1:]
         images = bench.images(states, FRAMES_APART * (number + 1))
-        last = {}
-        for chain, results in bench.results(states, images, experiment.known):
-            scores += [
+        rows, last = list[Score](), dict[str, FrameResult]()
+        for chain, results in bench.results(states, images, case.known):
+            rows += [
                 bench.score(number, k, chain, s, r)
                 for k, (s, r) in enumerate(zip(states, results, strict=True))
             ]
             last[chain.name] = results[-1]
-        samples.append(Sample(f"slide {number + 1}", images[-1], states[-1], last))
-    others: dict[str, tuple[Score, ...]] = {}
-    for number, case in enumerate(cases, len(experiment.tests)):
-        tell(case.name, number, steps)
-        states = gel.states(case.indenter, case.poses, gel.law)[1:]
-        images = bench.images(states, FRAMES_APART * (number + 1))
-        last = {}
-        for chain, results in bench.results(states, images, case.known):
-            last[chain.name] = results[-1]
-        others[case.name] = tuple(
-            bench.score(number, len(states) - 1, chain, states[-1], last[chain.name])
-            for chain in bench.chains
-            if chain.name in last
-        )
+        if number < len(slides):
+            scores += rows
+            strained += states
+            linear += gel.states(case.indenter, case.poses, "linear")[1:]
+        else:
+            others[case.name] = tuple(row for row in rows if row.frame == len(states) - 1)
         samples.append(Sample(case.name, images[-1], states[-1], last))
     tell("error budget", steps - 1, steps)
     spreads = error_budget(bundle, strained, linear) if gel.law == "neo_hookean" else ()

@@ -18,7 +18,7 @@ from gelslim_core.budget.budget import Budget
 from gelslim_force.settings import PipelineSettings
 from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.validation import validate as validation
-from gelslim_twin.validation.chain import chains_for
+from gelslim_twin.validation.validate import chains_for
 
 SPEC = str(ROOT / "designs" / "mini20.yaml")
 

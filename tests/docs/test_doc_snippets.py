@@ -22,7 +22,7 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.simulation.truth import COLUMNS, FrameTruth, fields_npz, wrench_csv
+from gelslim_twin.simulation.records import COLUMNS, FrameTruth, fields_npz, wrench_csv
 
 FORCE, TWIN = DOCS / "force_pipeline.md", DOCS / "digital_twin.md"
 """Their blocks need frames and simulated data, and run in tests of their own."""

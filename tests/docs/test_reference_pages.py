@@ -11,7 +11,7 @@ from gelslim.cli import main
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reference import reference_text as spec_page
 from gelslim_core.yaml.fields import Field, field_table
-from gelslim_twin.scene.reference import reference_text as scene_page
+from gelslim_twin.scene.reader import reference_text as scene_page
 from gelslim_twin.scene.scene import Scene
 
 DOCS = Path(__file__).parents[2] / "docs"

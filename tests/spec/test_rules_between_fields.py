@@ -11,7 +11,7 @@ from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reference import RULES as SPEC_RULES
 from gelslim_core.yaml.errors import InputError
 from gelslim_core.yaml.reader import load_bytes
-from gelslim_twin.scene.reference import RULES as SCENE_RULES
+from gelslim_twin.scene.reader import RULES as SCENE_RULES
 from gelslim_twin.scene.scene import Scene
 
 SPEC = """\

@@ -50,7 +50,7 @@ def _schema(scene: bool) -> str:
 
 def _page(scene: bool) -> str:
     if scene:
-        from gelslim_twin.scene.reference import reference_text as scene_reference_text
+        from gelslim_twin.scene.reader import reference_text as scene_reference_text
 
         return scene_reference_text()
     from gelslim_cad.spec.reference import reference_text

@@ -14,7 +14,7 @@ from gelslim.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
     from gelslim_twin.simulation.sensor import TwinSensor
-    from gelslim_twin.validation.validation import Validation
+    from gelslim_twin.validation.score import Validation
 
 RECORD = "validation.json"
 PLOTS = ("resultants.png", "fields.png", "error_budget.png")
@@ -81,7 +81,7 @@ def _draw(found: Validation, folder: Path) -> list[str]:
     from gelslim.cli.validate_report import budget_png, fields_png, resultants_png
     from gelslim_force.outputs.arrow_scale import scale_of_run
     from gelslim_force.outputs.overlay import Overlay, write_overlay
-    from gelslim_twin.validation.validation import PAPER_N, PAPER_RELATIVE
+    from gelslim_twin.validation.score import PAPER_N, PAPER_RELATIVE
 
     slides = len(found.experiment.tests)
     deepest, others = found.samples[slides - 1], found.samples[slides:]

@@ -12,9 +12,9 @@ from contact_pads import dense_compliance, small_pad, violations
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from gelslim_twin.contact.contact_error import ContactError
 from gelslim_twin.contact.coulomb_contact import FREE, SLIP, STICK, solve_contact_forces
 from gelslim_twin.contact.coulomb_kernel import node_force
+from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from gelslim_twin.contact import compliance as module
 from gelslim_twin.contact.compliance import SurfaceCompliance, symmetries
-from gelslim_twin.contact.contact_error import ContactError
+from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material

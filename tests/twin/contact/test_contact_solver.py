@@ -11,10 +11,13 @@ from contact_pads import dense_compliance, small_pad
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
-from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.gel_state import ContactStatus, GelState
-from gelslim_twin.contact.load_steps import even_steps, with_halved_steps
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver
+from gelslim_twin.contact.gel_state import ContactError, ContactStatus, GelState
+from gelslim_twin.contact.solver import (
+    ContactSettings,
+    ContactSolver,
+    even_steps,
+    with_halved_steps,
+)
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, FlatPunch, Indenter, Ring, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose

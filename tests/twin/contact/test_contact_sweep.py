@@ -9,8 +9,7 @@ import pytest
 from contact_pads import small_pad
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
-from gelslim_twin.contact.load_steps import even_steps
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import (
     Cone,

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.tool import Tool, rotation
-from gelslim_twin.contact.tool_surface import clearance_mm, tool_surface
+from gelslim_twin.contact.tool import Tool, clearance_mm, rotation, tool_surface
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,

@@ -13,8 +13,7 @@ from random_contact_scenes import random_contact
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.tool_surface import clearance_mm, tool_surface
+from gelslim_twin.contact.tool import Tool, clearance_mm, tool_surface
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring
 from gelslim_twin.scene.pose import Pose
 

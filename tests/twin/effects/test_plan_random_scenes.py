@@ -10,8 +10,7 @@ import pytest
 from agreement import Outcome, Trial
 from random_contact_scenes import Values, random_contact
 
-from gelslim_twin.contact.contact_error import ContactError
-from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.effects.effect import OBSERVABLES
 
 SLACK = 1e-9

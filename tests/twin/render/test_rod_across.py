@@ -13,7 +13,7 @@ from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState
 from gelslim_twin.scene.indenter import Cylinder
 from gelslim_twin.scene.pose import Pose
-from gelslim_twin.validation.truth_gel import TruthGel
+from gelslim_twin.validation.experiment import TruthGel
 from ifem_export.bundle.files import load_bundle
 
 

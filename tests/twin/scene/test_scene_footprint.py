@@ -14,9 +14,12 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from gelslim_twin.effects.contact_estimate import Footprint, contact_estimate, nonlinear_excess
-from gelslim_twin.scene.footprint import shape_reach_mm, tool_footprint, tool_reach_mm
+from gelslim_twin.scene.footprint import (
+    footprint_mm,
+    stl_corners,
+    tool_footprint,
+)
 from gelslim_twin.scene.indenter import Indenter
-from gelslim_twin.scene.stl_extent import footprint_mm, stl_corners
 from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import build_pad_mesh
@@ -91,10 +94,12 @@ def test_area_and_volume_are_those_of_the_shape(indenter, height, depth):
 @pytest.mark.parametrize("depth", [0.05, 0.3, 1.0])
 def test_reach_is_the_farthest_place_below_the_surface(indenter, height, depth):
     farthest = R[height < depth].max()
-    assert shape_reach_mm(indenter, HERE, depth) == pytest.approx(farthest, abs=3 * STEP)
+    reach = tool_footprint([indenter], HERE, 1e6).reach_mm
+    assert reach(depth) == pytest.approx(farthest, abs=3 * STEP)
     high = indenter.model_copy(update={"raised_mm": 0.2, "x_mm": 3.0, "y_mm": 4.0})
-    assert tool_reach_mm([high], HERE, 0.2) == 0.0
-    assert tool_reach_mm([high], HERE, depth + 0.2) == pytest.approx(5.0 + farthest, abs=3 * STEP)
+    reach = tool_footprint([high], HERE, 1e6).reach_mm
+    assert reach(0.2) == 0.0
+    assert reach(depth + 0.2) == pytest.approx(5.0 + farthest, abs=3 * STEP)
 
 
 @pytest.mark.parametrize(("indenter", "height"), CASES, ids=lambda v: getattr(v, "shape", ""))

@@ -8,8 +8,7 @@ from pydantic import TypeAdapter
 
 from gelslim_core.yaml.errors import InputError
 from gelslim_twin.scene.motion import Motion
-from gelslim_twin.scene.motion_csv import read_motion_csv
-from gelslim_twin.scene.pose import Pose, poses
+from gelslim_twin.scene.pose import Pose, poses, read_motion_csv
 
 
 def motion(*waypoints: dict, **more: float) -> Motion:

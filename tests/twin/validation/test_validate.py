@@ -13,11 +13,15 @@ from gelslim_twin.scene.indenter import Cylinder
 from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.validation import experiment as experiments
 from gelslim_twin.validation.error_budget import SOURCES, BudgetRig, Source, error_budget
-from gelslim_twin.validation.experiment import FRICTION, other_contacts, sphere_experiment
-from gelslim_twin.validation.score import field_errors, spread
-from gelslim_twin.validation.truth_gel import TruthGel, truth_pad
+from gelslim_twin.validation.experiment import (
+    FRICTION,
+    TruthGel,
+    other_contacts,
+    sphere_experiment,
+    truth_pad,
+)
+from gelslim_twin.validation.score import PAPER_N, Validation, field_errors, spread
 from gelslim_twin.validation.validate import validate
-from gelslim_twin.validation.validation import PAPER_N, Validation
 from ifem_export.bundle.files import load_bundle
 
 

@@ -1,19 +1,33 @@
-"""Gel states on disk, in chunks that are written atomically, so that a simulation can resume."""
+"""What a simulation records: the gel states of its poses and the true values of its frames.
+
+States are written in chunks, each of them completely or not at all, so that a simulation can
+resume.
+"""
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import zipfile
 from collections.abc import Iterator, Sequence
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelslim_core.files.replaced_file import replace_file
-from gelslim_twin.contact.gel_state import GelState
+from gelslim_force.forces.wrench import resultant
+from gelslim_twin.contact.gel_state import ContactStatus, GelState
+from gelslim_twin.scene.pose import Pose
 
+Array = NDArray[np.float64]
 CHUNK = 32
+COLUMNS = (
+    "frame", "time_s", "x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg",
+    "fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm", "sticking_nodes", "slipping_nodes",
+)  # fmt: skip
 
 
 class StateStore:
@@ -96,3 +110,58 @@ def _unpacked(path: Path) -> list[GelState]:
         u, f, touch = held["displacement_mm"], held["force_n"], held["touch"]
         solver = [json.loads(str(text)) for text in held["solver"]]
     return [GelState(*fields) for fields in zip(u, f, touch, solver, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTruth:
+    """One frame."""
+
+    number: int
+    time_s: float
+    pose: Pose
+    """Tool at that time."""
+    state: GelState
+    markers_px: Array | None
+    """(m, 2) images of the dots' centres, where markers are observed."""
+    centroids_px: Array | None
+    """(m, 2) centroids of the dots drawn, where a picture was."""
+    drawn: NDArray[np.bool_] | None
+
+
+def wrench_csv(frames: Sequence[FrameTruth], points_mm: Array) -> bytes:
+    """A line per frame: tool pose, true wrench on the gel about the sensor origin, contact."""
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for frame in frames:
+        force, torque = resultant(points_mm, frame.state.force_n)
+        _, *place = astuple(frame.pose)
+        numbers = [repr(float(v)) for v in (frame.time_s, *place, *force, *torque)]
+        held = frame.state.touch
+        nodes = [int((held == kind).sum()) for kind in (ContactStatus.STICK, ContactStatus.SLIP)]
+        table.writerow([frame.number, *numbers, *nodes])
+    return out.getvalue().encode()
+
+
+def fields_npz(frames: Sequence[FrameTruth], points_mm: Array, observe: Sequence[str]) -> bytes:
+    """Arrays over the frames: only what the scene observes.
+
+    points_mm (c, 3), time_s (n,), displacement_mm (n, c, 3), force_n (n, c, 3), touch (n, c),
+    markers_px (n, m, 2), centroids_px (n, m, 2), drawn (n, m).
+    """
+    held: dict[str, Array] = {
+        "points_mm": points_mm,
+        "time_s": np.array([f.time_s for f in frames]),
+    }
+    if "displacement" in observe:
+        held["displacement_mm"] = np.stack([f.state.displacement_mm for f in frames])
+    if "force" in observe:
+        held["force_n"] = np.stack([f.state.force_n for f in frames])
+        held["touch"] = np.stack([f.state.touch for f in frames])
+    for name in ("markers_px", "centroids_px", "drawn"):
+        values = [getattr(f, name) for f in frames]
+        if all(v is not None for v in values):
+            held[name] = np.stack(values)
+    stream = io.BytesIO()
+    np.savez(stream, **held)  # type: ignore[arg-type]
+    return stream.getvalue()
