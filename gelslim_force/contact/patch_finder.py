@@ -42,6 +42,8 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _MOST_PASSES = 3
+_EDGE_MARGIN = 1.5
+"""Distance from the pad's edge, over its size, below which a patch may be cut by the edge."""
 _HIDDEN_RIM_ERROR = 0.05
 """Relative error of the size of a patch whose rim is hidden completely."""
 
@@ -205,14 +207,15 @@ class PatchFinder:
         """The patch of the outline with its rim moved to where the shading has it, if possible."""
         patch, found = start, None
         starts = first_starts(start)
-        for _ in range(_MOST_PASSES):
+        for number in range(_MOST_PASSES):
             found = self._shading(patch, starts, light)
             if found is None:
                 return None
             before, patch = patch, found[0]
-            if settled(before, patch):
+            # A patch that the edge cuts may look too small with a steep decay around it: larger
+            # ones are tried too.
+            if settled(before, patch) and (number > 0 or self._well_inside(patch, _EDGE_MARGIN)):
                 break
-            # A patch that the edge cuts looks too small at first: larger ones are tried too.
             larger = [start_values(patch, scale, 1.5) for scale in (1.0, 1.3)]
             starts = [found[1].values, *larger]
         if found is None or found[1].explained < self.settings.least_explained:
@@ -311,10 +314,10 @@ class PatchFinder:
     def _strip(self) -> bool:
         return self.indenter is not None and self.indenter.patch_kind == "strip"
 
-    def _well_inside(self, patch: ContactPatch) -> bool:
-        """Whether the whole rim of a disc is on the pad, without a test of its points."""
+    def _well_inside(self, patch: ContactPatch, scale: float = 1.0) -> bool:
+        """Whether a disc, with its size times `scale`, is on the pad as a whole."""
         return patch.kind == "disc" and bool(
-            self._inside_mm[self._nearest(patch.centre_mm)] > patch.size_mm
+            self._inside_mm[self._nearest(patch.centre_mm)] > scale * patch.size_mm
         )
 
     @cached_property

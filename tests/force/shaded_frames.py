@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from synthetic import Frame, Look, grid_of_dots, render
 
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+
 Vector = NDArray[np.float64]
 ELEVATION, AMBIENT = np.deg2rad(40.0), 0.33
 GRID = grid_of_dots()
@@ -33,11 +35,16 @@ def contact(radius_mm: float, ball_mm: float, nu: float = 0.48) -> LayerContact:
 
 @cache
 def sight() -> tuple[Vector, Vector]:
+    """Lines of sight of the camera, see `lines_of_sight`."""
+    return lines_of_sight(CAMERA)
+
+
+def lines_of_sight(camera: VirtualCamera) -> tuple[Vector, Vector]:
     """Where pixels meet the rest surface (n, 2), and the motion (n, 2) per mm of height."""
     y, x = np.mgrid[:480, :640]
     pixels = np.column_stack([x.ravel(), y.ravel()]).astype(float)
-    rest = CAMERA.backproject(pixels, 0.0)[:, :2]
-    below = CAMERA.backproject(pixels, -0.3)[:, :2]
+    rest = camera.backproject(pixels, 0.0)[:, :2]
+    below = camera.backproject(pixels, -0.3)[:, :2]
     return rest, (rest - below) / 0.3
 
 
@@ -55,10 +62,14 @@ def _profile(radius_mm: float, ball_mm: float, nu: float) -> tuple[Vector, Vecto
 
 
 def pressed_heights(
-    centre_mm, radius_mm: float, ball_mm: float, nu: float = 0.48
+    centre_mm,
+    radius_mm: float,
+    ball_mm: float,
+    nu: float = 0.48,
+    camera: VirtualCamera | None = None,
 ) -> tuple[Vector, Vector, Vector]:
     """Slopes (n,) along x and y, and height, of the surface that each pixel sees."""
-    rest, lean = sight()
+    rest, lean = sight() if camera is None else lines_of_sight(camera)
     r, z, slope = _profile(radius_mm, ball_mm, nu)
     height = np.zeros(len(rest))
     for _ in range(6):
@@ -88,13 +99,14 @@ def shaded(
     moved_mm: Vector | None = None,
     brightness: float = 1.0,
     dark_sides: float = 0.0,
+    camera: VirtualCamera = CAMERA,
 ) -> Frame:
     """A 480 x 640 frame; without slopes, of a level surface.
 
     With `dark_sides` each colour falls off as exp(-dark_sides · share of the way) across the gel,
     and blue is all but missing.
     """
-    frame = render(GRID, CAMERA, Look(blur=0.0, noise=0.0, seed=7), moved_mm)
+    frame = render(GRID, camera, Look(blur=0.0, noise=0.0, seed=7), moved_mm)
     image = frame.image.astype(float) * brightness
     if slopes is not None:
         image *= lit(*slopes).reshape(480, 640, 3)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from camera_rig import finger_view
 from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded, sight
 
 from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
@@ -115,6 +116,34 @@ def test_patch_cut_by_the_pads_edge(centre):
     assert (np.abs(patch.centre_mm - centre) < 3.5 * sigma[:2]).all()
     assert abs(patch.size_mm - radius) < 3.5 * sigma[2]
     assert sigma[2] > whole.sigma_mm
+
+
+@pytest.mark.parametrize(
+    ("aside_mm", "lens_offset_px", "centre", "radius"),
+    [
+        (0.0, (0.0, 0.0), (-5.0, -9.3), 1.8),
+        (0.6, (-3.0, 2.0), (9.8, 1.0), 2.4),
+        (0.3, (6.0, -4.0), (9.8, -1.0), 2.4),
+    ],
+)
+def test_patch_cut_by_the_edge_has_no_second_solution(aside_mm, lens_offset_px, centre, radius):
+    """A rim a quarter too small with a steep decay around it also explains what the edge leaves."""
+    camera = finger_view(aside_mm=aside_mm, lens_offset_px=lens_offset_px)
+    rest = shaded(seed=0, camera=camera)
+    sx, sy, _ = pressed_heights(centre, radius, BALL_MM, camera=camera)
+    patch = PatchFinder(
+        camera,
+        rest.image,
+        rest.centres_px,
+        marker_radius_px=rest.diameter_px / 2,
+        surface_mm=pad_nodes(),
+        indenter=Sphere(BALL_MM),
+    ).find(shaded((sx, sy), seed=9, camera=camera).image)
+    patch = patch.at_height(rim_height(radius))
+    sigma = np.sqrt(np.diag(patch.covariance))
+    assert patch.size_mm == pytest.approx(radius, abs=0.05)
+    assert abs(patch.size_mm - radius) < 3.5 * sigma[2]
+    assert (np.abs(patch.centre_mm - centre) < 3.5 * sigma[:2]).all()
 
 
 @pytest.mark.parametrize(("dark_sides", "noise"), [(1.0, 4.0), (2.0, 2.0)])
