@@ -18,7 +18,7 @@ import numpy as np
 from twin_rig import SCENES, TwinSensor
 
 from gelslim_core.files.replaced_file import json_bytes, replace_file
-from gelslim_force.outputs.picture_file import encoded
+from gelslim_force.outputs.canvas import encoded
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver

@@ -15,8 +15,7 @@ from gelslim_force.calibration.file import read_calibration
 from gelslim_force.calibration.reference_picture import read_reference
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.indenter import Indenter, parse_indenter
-from gelslim_force.contact.indenter_source import IndenterSource
-from gelslim_force.contact.normal_motion import NormalModel
+from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings

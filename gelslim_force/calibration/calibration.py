@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gelslim_force.calibration import checks
 from gelslim_force.calibration.built_deviation import built_deviation
 from gelslim_force.calibration.camera_deviation import CameraTolerance
-from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
+from gelslim_force.calibration.design import bundle_camera, bundle_grid, marker_heights_mm
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.calibration.fit import CameraFit, fit_camera
 from gelslim_force.calibration.report import diagnosis_lines, warning_lines
@@ -19,7 +19,6 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import BORDER, Detections
 from gelslim_force.detection.settings import DetectorSettings
-from gelslim_force.lattice.bundle_grid import bundle_grid
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.registration import Registration, register
 from ifem_export.operators.single_thread import single_threaded

@@ -1,4 +1,4 @@
-"""Normal displacement of the whole surface from the contact patch of a known indenter."""
+"""Normal motion of the whole surface from the contact patch of a known indenter."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
+from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch, rotated
+from gelslim_force.contact.patch_finder import PatchFinder
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,35 +25,6 @@ _MOST_STEPS = 40
 _DISCRETE = 0.2
 """Relative error of the depth for a patch as large as the node spacing; it falls with the square
 of the size."""
-
-
-@dataclass(frozen=True, eq=False)
-class NormalMotion:
-    """Normal displacement at the c surface nodes; all values are NaN if it is unknown."""
-
-    w_mm: Array
-    """(c,) negative where the gel is pressed in."""
-    sigma_mm: Array
-    """(c,) standard deviation."""
-    patch: Mask
-    """(c,) nodes that the indenter touches."""
-    depth_mm: float
-    """Of the indenter's lowest point below the rest surface; NaN where unknown."""
-    depth_sigma_mm: float
-    force_n: Array
-    """(c,) normal force on the nodes, positive into the gel, of this contact without friction."""
-    problem: str = ""
-    """Why it is unknown; empty otherwise."""
-
-    @property
-    def known(self) -> bool:
-        """Whether there is a displacement."""
-        return not self.problem
-
-    @property
-    def push_n(self) -> float:
-        """Total normal force without friction."""
-        return float(self.force_n.sum())
 
 
 class NormalModel:
@@ -85,8 +58,7 @@ class NormalModel:
         patch: ContactPatch,
         indenter: Indenter,
         depth_mm: float | None = None,
-        depth_sigma_mm: float = 0.0,
-    ) -> NormalMotion:
+    ) -> NormalReading:
         """Motion under `indenter` for the patch seen.
 
         `depth_mm` is given where the depth is known from elsewhere. The depth of a flat punch does
@@ -95,23 +67,23 @@ class NormalModel:
         """
         if depth_mm is None:
             if isinstance(indenter, Flat):
-                return self.unknown(
+                return self._unknown(
                     "the depth of a flat punch does not follow from its patch: give the depth"
                 )
             patch, depth, spread = self._settled(patch, indenter)
             if not np.isfinite(depth):
-                return self.unknown(_why_no_depth(patch, indenter))
+                return self._unknown(_why_no_depth(patch, indenter))
             # To first order the depth is proportional to the square of the patch's size.
             growth = 2 * depth / patch.size_mm
         else:
             if not (np.isfinite(depth_mm) and depth_mm > 0):
                 raise ValueError(f"depth_mm = {depth_mm:g}: must be finite and above 0")
-            depth, spread, growth = depth_mm, depth_sigma_mm, 0.0
+            depth, spread, growth = depth_mm, 0.0, 0.0
             patch = patch.at_height(self._rim_height(patch, indenter, depth))
         gap = depth - self._profile(patch, indenter)
         touched, push, factor = self._contact(gap, patch)
         if not len(touched):
-            return self.unknown("the patch contains no surface node of the pad")
+            return self._unknown("the patch contains no surface node of the pad")
         sensitivity = self._sensitivity(patch, indenter, touched)
         moved = self.compliance.apply(
             touched, np.column_stack([push, cho_solve(factor, sensitivity)])
@@ -122,31 +94,23 @@ class NormalModel:
         w[touched] = -gap[touched]
         mask = np.zeros(len(w), dtype=bool)
         mask[touched] = True
-        force = np.zeros(len(w))
-        force[touched] = push
-        total = float(np.hypot(growth * patch.sigma_mm, spread))
-        return NormalMotion(w, np.sqrt(np.maximum(variance, 0)), mask, depth, total, force)
+        return NormalReading(w, np.sqrt(np.maximum(variance, 0)), mask, depth_mm=depth)
 
-    def cap_only(self, patch: ContactPatch, indenter: Indenter) -> NormalMotion:
+    def cap_only(self, patch: ContactPatch, indenter: Indenter) -> NormalReading:
         """The paper's model: the indenter's cap below the rim of the patch, and no motion outside.
 
         The depth is the height of the cap, profile(size): the rim is assumed to be at rest.
         """
         if isinstance(indenter, Flat):
-            return self.unknown("a flat punch has no cap")
+            return self._unknown("a flat punch has no cap")
         depth = self._rim_profile(patch, indenter)
         if not np.isfinite(depth):
-            return self.unknown(_why_no_depth(patch, indenter))
+            return self._unknown(_why_no_depth(patch, indenter))
         gap = depth - self._profile(patch, indenter)
         inside = gap > 0
         spread = 2 * depth / patch.size_mm * patch.sigma_mm
-        w, zero = np.where(inside, -gap, 0.0), np.zeros(len(gap))
-        return NormalMotion(w, np.where(inside, spread, 0.0), inside, depth, spread, zero)
-
-    def unknown(self, problem: str) -> NormalMotion:
-        """A motion that is not known, with the reason."""
-        nan, none = np.full(len(self.points_mm), np.nan), np.zeros(len(self.points_mm), bool)
-        return NormalMotion(nan, nan, none, np.nan, np.nan, nan, problem)
+        w, sigma = np.where(inside, -gap, 0.0), np.where(inside, spread, 0.0)
+        return NormalReading(w, sigma, inside, depth_mm=depth)
 
     def depth_mm(self, patch: ContactPatch, indenter: Indenter) -> float:
         """Depth at which the pressure falls to zero at the patch's rim; NaN where there is none.
@@ -175,6 +139,9 @@ class NormalModel:
         punches(block, own, shares_of, np.array(profiles), _LEAST_SHARE, found)
         stiffness, reduction = found[0::2].sum(axis=0) - found[1::2].sum(axis=0)
         return float(reduction / stiffness) if stiffness > 0 else np.nan
+
+    def _unknown(self, problem: str) -> NormalReading:
+        return NormalReading.unknown(len(self.points_mm), problem)
 
     def _settled(
         self, patch: ContactPatch, indenter: Indenter
@@ -251,6 +218,50 @@ class NormalModel:
                 change = (profile(*back) - profile(*move)) / (2 * small)
             columns.append(np.where(np.isfinite(change), change, 0.0))
         return np.column_stack(columns)
+
+
+@dataclass(frozen=True, eq=False)
+class IndenterSource:
+    """Patch finder and contact model of one indenter.
+
+    The patch is found where the gel is now, but the model needs its nodes at rest. `motion`
+    therefore moves the patch back by the lateral motion of the gel in it.
+
+    Attributes:
+        finder: Finds the patch in a picture.
+        model: Contact of a rigid indenter on the pad.
+        indenter: The shape that touches the gel.
+        depth_mm: Known depth, which a flat punch needs; otherwise the patch determines it.
+        cap_only: Use the paper's model: the indenter's cap below the rim, and no motion outside.
+    """
+
+    finder: PatchFinder
+    model: NormalModel
+    indenter: Indenter
+    depth_mm: float | None = None
+    cap_only: bool = False
+
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | None:
+        """Return the patch of a frame whose markers are at (n, 2)."""
+        return self.finder.find(image, markers_px)
+
+    def motion(self, seen: ContactPatch | None, lateral_mm: Array | None = None) -> NormalReading:
+        """Normal motion for a patch; zero without one.
+
+        `lateral_mm` (2,) is the mean lateral motion of the gel in the patch, where it is known.
+        """
+        count = len(self.model.points_mm)
+        if seen is None:
+            zero = np.zeros(count)
+            return NormalReading(zero, zero, np.zeros(count, dtype=bool))
+        at_rest = seen
+        if lateral_mm is not None:
+            at_rest = replace(seen, centre_mm=seen.centre_mm - lateral_mm)
+        if self.cap_only:
+            found = self.model.cap_only(at_rest, self.indenter)
+        else:
+            found = self.model.motion(at_rest, self.indenter, self.depth_mm)
+        return replace(found, patch=seen)
 
 
 def _pitch(points_mm: Array) -> float:

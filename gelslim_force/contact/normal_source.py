@@ -37,7 +37,7 @@ class NormalReading:
     def unknown(cls, count: int, problem: str) -> NormalReading:
         """Reading of `count` nodes whose motion is not known, with the reason."""
         nan = np.full(count, np.nan)
-        return cls(nan, nan, None, problem=problem)
+        return cls(nan, nan, None, depth_mm=np.nan, problem=problem)
 
     @property
     def known(self) -> bool:

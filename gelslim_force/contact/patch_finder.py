@@ -11,8 +11,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from gelslim_force.contact.indenter import Flat, Indenter
-from gelslim_force.contact.patch import ContactPatch
-from gelslim_force.contact.patch_place import rim_share, strip_covariance, strip_patch
+from gelslim_force.contact.patch import ContactPatch, rim_share, strip_covariance, strip_patch
 from gelslim_force.contact.patch_region import PatchSettings, changed_region
 from gelslim_force.contact.patch_shading import (
     REFRESH_FRAMES,

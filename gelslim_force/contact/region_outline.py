@@ -10,8 +10,7 @@ from scipy import ndimage
 from scipy.optimize import least_squares
 
 from gelslim_force.contact.indenter import Flat, Indenter
-from gelslim_force.contact.patch import ContactPatch
-from gelslim_force.contact.patch_place import flat_patch, strip_covariance, strip_patch
+from gelslim_force.contact.patch import ContactPatch, flat_patch, strip_covariance, strip_patch
 from gelslim_force.contact.patch_region import PatchSettings
 
 Array = NDArray[np.float64]

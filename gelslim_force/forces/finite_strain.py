@@ -18,7 +18,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_force.contact.anderson import Anderson
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.operators.pad_system import PadSystem, checked_field
@@ -89,3 +88,23 @@ class FiniteStrainForce:
             f"steps (residuals {shown} N): the strain is too large for steps with the linear "
             "stiffness"
         )
+
+
+class Anderson:
+    """Anderson acceleration of x <- x + step(x) (Walker and Ni 2011, type II)."""
+
+    def __init__(self, depth: int = 4) -> None:
+        self.depth = depth
+        self.iterates: list[Array] = []
+        self.steps: list[Array] = []
+
+    def next(self, x: Array, step: Array) -> Array:
+        """The next x, from this one and its step without acceleration."""
+        self.iterates = [*self.iterates[-self.depth :], x.copy()]
+        self.steps = [*self.steps[-self.depth :], step]
+        if len(self.steps) == 1:
+            return np.asarray(x + step)
+        step_changes = np.diff(np.array(self.steps), axis=0).T
+        x_changes = np.diff(np.array(self.iterates), axis=0).T
+        weights = np.linalg.lstsq(step_changes, step, rcond=None)[0]
+        return np.asarray(x + step - (x_changes + step_changes) @ weights)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections import deque
+from collections.abc import Iterator
 from pathlib import Path
+from threading import Condition, Thread
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +14,11 @@ from numpy.typing import NDArray
 from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError
 from gelslim_force.frames.frame_array import FrameArray, read_frame_array
 from gelslim_force.frames.opencv_frames import VIDEO_ENDINGS, LiveCamera, VideoFile
-from gelslim_force.frames.picture import PICTURE_ENDINGS
-from gelslim_force.frames.picture_folder import PictureFolder
-from gelslim_force.frames.threaded_reader import ThreadedReader
-
-__all__ = ["Frame", "FrameSource", "FrameSourceError", "open_frames"]
+from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureFolder
 
 _CAMERA = "camera:"
 _STREAMS = ("rtsp://", "rtmp://", "http://", "https://", "udp://", "tcp://")
+_JOIN_S = 5.0
 
 
 def open_frames(
@@ -75,3 +75,78 @@ def _source(
         f"{path}: the ending {ending or 'none'} is neither a picture's "
         f"({', '.join(PICTURE_ENDINGS)}) nor a video's ({', '.join(VIDEO_ENDINGS)}) nor .npz"
     )
+
+
+class ThreadedReader(FrameSource):
+    """Reads a source in a thread of its own, so that decoding and computing overlap.
+
+    The latest frame of a live source replaces one that has not been taken yet; a recorded source
+    waits while `ahead` frames are in the buffer. It can be iterated once.
+    """
+
+    def __init__(self, source: FrameSource, ahead: int = 4) -> None:
+        """Reading starts with the first `next`. Raises ValueError for `ahead` < 1."""
+        if ahead < 1:
+            raise ValueError(f"ahead = {ahead}: must be at least 1")
+        self.source, self.live = source, source.live
+        self.count, self.frames_per_s = source.count, source.frames_per_s
+        self._ahead = 1 if source.live else ahead
+        self._buffer: deque[Frame] = deque()
+        self._changed = Condition()
+        self._error: BaseException | None = None
+        self._ended = self._stopped = False
+        self._thread: Thread | None = None
+        self.dropped = 0
+        """Number of frames that were dropped."""
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield frames; an error of the source is raised after the frames before it."""
+        if self._thread is None:
+            self._thread = Thread(target=self._read, name="frames", daemon=True)
+            self._thread.start()
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._buffer or self._ended or self._stopped)
+                if self._stopped:
+                    return
+                if not self._buffer:
+                    if self._error is not None:
+                        raise self._error
+                    return
+                frame = self._buffer.popleft()
+                self._changed.notify_all()
+            yield frame
+
+    def close(self) -> None:
+        """Stop the thread and close the source."""
+        with self._changed:
+            self._stopped = True
+            self._changed.notify_all()
+        self.source.close()
+        if self._thread is not None:
+            self._thread.join(_JOIN_S)
+
+    def _read(self) -> None:
+        try:
+            for frame in self.source:
+                if not self._put(frame):
+                    break
+        except BaseException as error:
+            self._error = error
+        finally:
+            with self._changed:
+                self._ended = True
+                self._changed.notify_all()
+
+    def _put(self, frame: Frame) -> bool:
+        with self._changed:
+            if not self.live:
+                self._changed.wait_for(lambda: self._stopped or len(self._buffer) < self._ahead)
+            elif self._buffer:
+                self._buffer.popleft()
+                self.dropped += 1
+            if self._stopped:
+                return False
+            self._buffer.append(frame)
+            self._changed.notify_all()
+            return True

@@ -13,7 +13,7 @@ import numpy as np
 from gelslim_core import optional_library
 from gelslim_core.errors import OutputError, disk_error
 from gelslim_core.files.file_lock import beside
-from gelslim_force.outputs.picture_file import Image
+from gelslim_force.outputs.canvas import Image
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.contact.anderson import Anderson
+from gelslim_force.forces.finite_strain import Anderson
 from gelslim_twin.contact.coulomb_contact import FREE, STICK, ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_body import GelBody, Tangent
 from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState

@@ -18,8 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.contact.anderson import Anderson
-from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.forces.finite_strain import Anderson, FiniteStrainForce
 from gelslim_twin.contact.gel_body import GelBody
 from gelslim_twin.contact.gel_state import ContactError, GelState, anchor_mm
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState

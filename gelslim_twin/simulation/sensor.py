@@ -48,7 +48,7 @@ class TwinSensor:
     @cached_property
     def grid(self) -> MarkerGrid:
         """The marker grid. Raises IfemError for a bundle without markers."""
-        from gelslim_force.lattice.bundle_grid import bundle_grid
+        from gelslim_force.calibration.design import bundle_grid
 
         return bundle_grid(self.bundle)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from gelslim_core.files.file_lock import beside, locked
 from gelslim_core.files.replaced_file import json_bytes, replace_file
-from gelslim_force.outputs.picture_file import encoded
+from gelslim_force.outputs.canvas import encoded
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.scene.pose import FrameTime, Pose, frame_times

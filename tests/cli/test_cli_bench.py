@@ -16,7 +16,7 @@ from sensor_samples import frame, sensor_bundle, stream
 from gelslim.cli.main import main
 from gelslim_core.budget.budget import Budget
 from gelslim_core.budget.machine_times import read_times, times_path, write_times
-from gelslim_force.outputs.picture_file import encoded
+from gelslim_force.outputs.canvas import encoded
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle, write_bundle
 from ifem_export.operators.ladder import operator_choices

@@ -11,9 +11,8 @@ from scipy.ndimage import gaussian_filter
 
 from gelslim.cli import main
 from gelslim_force.calibration.camera_deviation import PARAMETERS, deviated_camera
-from gelslim_force.calibration.design import bundle_camera
+from gelslim_force.calibration.design import bundle_camera, bundle_grid
 from gelslim_force.calibration.file import read_calibration
-from gelslim_force.lattice.bundle_grid import bundle_grid
 from ifem_export.bundle.files import load_bundle
 
 SPEC = str(Path(__file__).parents[2] / "designs" / "mini20.yaml")

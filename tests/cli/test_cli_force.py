@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, stream
 
 from gelslim.cli.main import main
-from gelslim_force.outputs.picture_file import encoded
+from gelslim_force.outputs.canvas import encoded
 from gelslim_force.outputs.recorded_run import read_run
 from ifem_export.bundle.files import write_bundle
 

@@ -108,7 +108,7 @@ def test_the_guide_of_the_force_pipeline_runs(
     pytest.importorskip("PIL")
     from sensor_samples import frame, press, sensor_bundle, stream
 
-    from gelslim_force.outputs.picture_file import encoded
+    from gelslim_force.outputs.canvas import encoded
     from ifem_export.bundle.files import write_bundle
 
     write_bundle(tmp_path / "out" / "gelslim2-bundle", sensor_bundle())

@@ -5,7 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from gelslim_force.contact.normal_motion import NormalModel
+from gelslim_force.contact.normal_source import NormalReading
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
 from ifem_export.markers.grid import build_marker_grid
@@ -26,6 +29,19 @@ def small_bundle(layers: int = 4, poissons_ratio: float = 0.3223) -> Bundle:
         marker_positions_mm=grid.positions_mm,
         with_stiffness=False,
     )
+
+
+def node_forces_n(model: NormalModel, found: NormalReading) -> np.ndarray:
+    """(c,) normal forces, positive into the gel, under which the touched nodes move as found."""
+    force = np.zeros(len(found.w_mm))
+    nodes = np.flatnonzero(found.touched)
+    force[nodes] = np.linalg.solve(model.compliance.block(nodes), -found.w_mm[nodes])
+    return force
+
+
+def depth_sigma_mm(model: NormalModel, found: NormalReading, centre_mm: ArrayLike) -> float:
+    """Standard deviation of the depth: that of the node nearest to the lowest point."""
+    return float(found.sigma_mm[np.argmin(np.hypot(*(model.points_mm - centre_mm).T))])
 
 
 def hertz_like(points_mm: np.ndarray, normal_n: float, shear_n: tuple[float, float]) -> np.ndarray:

@@ -98,7 +98,7 @@ def prepare(place: Path) -> Path:
     from render_rig import finger_camera  # noqa: F401  (found by sim_rig)
     from sim_rig import small_sensor, written_scene
 
-    from gelslim_force.outputs.picture_file import encoded
+    from gelslim_force.outputs.canvas import encoded
 
     prepare_specs(place)
     small_sensor(place)

@@ -113,7 +113,7 @@ class _Frames:
 
     def first_picture(self) -> NDArray[np.uint8]:
         """Return the first frame that can be read; the iteration still yields it."""
-        from gelslim_force.frames.source import FrameSourceError
+        from gelslim_force.frames.frame import FrameSourceError
 
         for frame in self._frames:
             self._ahead.append(frame)

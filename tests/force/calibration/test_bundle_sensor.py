@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from calibration_samples import small_bundle
 
-from gelslim_force.calibration.design import bundle_camera
-from gelslim_force.lattice.bundle_grid import bundle_grid
+from gelslim_force.calibration.design import bundle_camera, bundle_grid
 from ifem_export.errors import IfemError
 from ifem_export.markers.grid import build_marker_grid
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from gelslim_core.optional_library import MissingLibraryError
+from gelslim_force.frames.frame import FrameSourceError
 from gelslim_force.frames.frame_array import FrameArray
 from gelslim_force.frames.opencv_frames import VideoFile
-from gelslim_force.frames.picture import PictureError, read_picture
-from gelslim_force.frames.picture_folder import PictureFolder, natural_key
-from gelslim_force.frames.source import FrameSourceError, open_frames
+from gelslim_force.frames.picture import PictureError, PictureFolder, natural_key, read_picture
+from gelslim_force.frames.source import open_frames
 
 cv2 = pytest.importorskip("cv2")
 Image = pytest.importorskip("PIL.Image")

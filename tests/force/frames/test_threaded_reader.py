@@ -7,7 +7,7 @@ import pytest
 
 from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError
 from gelslim_force.frames.opencv_frames import LiveCamera
-from gelslim_force.frames.threaded_reader import ThreadedReader
+from gelslim_force.frames.source import ThreadedReader
 
 
 class Scripted(FrameSource):

@@ -16,8 +16,7 @@ from gelslim_core.errors import OutputError
 from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import Wrench
-from gelslim_force.outputs.mcap_recording import McapRecording
-from gelslim_force.outputs.ros_messages import nanoseconds
+from gelslim_force.outputs.mcap_recording import McapRecording, nanoseconds
 from gelslim_force.tracking.tracks import Tracks
 
 pytest.importorskip("mcap_ros2")

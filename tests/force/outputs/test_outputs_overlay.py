@@ -26,8 +26,7 @@ from gelslim_force.outputs.arrow_scale import (
     scale_of_run,
 )
 from gelslim_force.outputs.legend import LEAST_HEIGHT_PX, ORANGE, RED, WIDTH_PX, YELLOW, value_text
-from gelslim_force.outputs.overlay import Overlay, OverlaySettings, write_overlay
-from gelslim_force.outputs.surface_view import SurfaceView
+from gelslim_force.outputs.overlay import Overlay, OverlaySettings, SurfaceView, write_overlay
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 BLACK = np.zeros((480, 640, 3), dtype=np.uint8)
