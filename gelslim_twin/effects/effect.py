@@ -112,6 +112,8 @@ class Effect:
     after: tuple[str, ...] = ()
     does_nothing: Callable[[Circumstances], bool] | None = None
 
-    def is_null(self, c: Circumstances) -> bool:
-        """Whether its parameters make it do nothing."""
-        return self.bound(c) == Bound() if self.does_nothing is None else self.does_nothing(c)
+    def is_null(self, c: Circumstances, bound: Bound | None = None) -> bool:
+        """Whether its parameters make it do nothing; `bound` is its bound, where it is known."""
+        if self.does_nothing is not None:
+            return self.does_nothing(c)
+        return (self.bound(c) if bound is None else bound) == Bound()

@@ -50,7 +50,8 @@ class Question:
         found = self._kept.get(id(effect))
         if found is None:
             c = self.circumstances
-            bound = Bound() if effect.is_null(c) else effect.bound(c)
+            bound = effect.bound(c)
+            bound = Bound() if effect.is_null(c, bound) else bound
             # The effect is stored too, so that its id is not given to another object.
             found = self._kept[id(effect)] = effect, bound, tuple(effect.ladder(c))
         return found
@@ -165,7 +166,7 @@ def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str
     if effect.provides:
         made = ", ".join(effect.provides)
         return _choice(effect, bound, f"provides {made}", shares, ladder)
-    if effect.is_null(c):
+    if effect.is_null(c, bound):
         return _choice(effect, bound, "parameters nil", shares)
     if all(bound.of(observable) <= share for observable, share in shares.items()):
         return _choice(effect, bound, "below its share", shares)

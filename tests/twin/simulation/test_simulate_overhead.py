@@ -48,7 +48,7 @@ def simulated(folder: Path, out: Path, steps: int, monkeypatch: pytest.MonkeyPat
     calls: Counter[str] = Counter()
     with monkeypatch.context() as patch:
         for owner, name in (
-            (Effects, "parameters"), (Plan, "to_record"), (Viewer, "_usual"),
+            (Effects, "parameters"), (Plan, "to_record"), (Viewer, "frame"),
         ):  # fmt: skip
             patch.setattr(owner, name, counted(calls, name, getattr(owner, name)))
         loaded, sensor = read_scene(path), TwinSensor(load_bundle(folder / "bundle"))
@@ -61,7 +61,7 @@ def test_parameters_and_plans_json_are_not_made_again_per_frame(
 ) -> None:
     few = simulated(folder, tmp_path / "few", 2, monkeypatch)
     many = simulated(folder, tmp_path / "many", 9, monkeypatch)
-    assert many.pop("_usual") == few.pop("_usual") + 7  # frames with one before them
+    assert many.pop("frame") == few.pop("frame") + 7
     assert many == few
     assert few["to_record"] == 1
     assert few["parameters"] <= 4
