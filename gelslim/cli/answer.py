@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
-
+    from rich.padding import Padding
+    from rich.table import Table
+    from rich.text import Text
 
 WIDEST = 110
 
@@ -85,9 +87,26 @@ def console() -> Console:
     return screen
 
 
+def table(*texts: str, figures: Sequence[str] = (), **style: Any) -> Table:
+    """Return a table without lines: columns of text, then right-aligned columns of figures."""
+    from rich.table import Table
+
+    made = Table(*texts, **{"box": None, "pad_edge": False, **style})
+    for head in figures:
+        made.add_column(head, justify="right", no_wrap=True)
+    return made
+
+
 def say(text: str, style: str = "") -> None:
     """Print text, wrapped at the width of the console."""
     console().print(text, style=style or None)
+
+
+def indented(text: str | Text, by: int) -> Padding:
+    """Return text that the console prints with an indentation of `by` characters."""
+    from rich.padding import Padding
+
+    return Padding(text, (0, 0, 0, by), expand=False)
 
 
 OK = 0

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gelslim.cli.failure import CommandError
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -33,7 +35,6 @@ FrameTime = Annotated[
 
 def budget_of(error: str | None, time: str | None) -> Budget:
     """Return the budget of both options. Raises CommandError if one of them cannot be read."""
-    from gelslim.cli.failure import CommandError
     from gelslim_core.budget.budget import Budget, BudgetError
 
     try:
@@ -100,7 +101,6 @@ def budgeted_scene(loaded: LoadedScene, error: str | None, time: str | None) -> 
 
     Raises CommandError if an option cannot be read, BudgetError if no plan keeps the budget.
     """
-    from gelslim.cli.budget import budget_of, note_choice
     from gelslim.contacts import with_budget
 
     budget = budget_of(error, time)

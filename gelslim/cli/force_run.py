@@ -9,6 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import print_json, say
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import out_folder
+from gelslim.cli.output import spare_strangers
+
 if TYPE_CHECKING:
     from gelslim_force.outputs.overlay import Overlay
     from gelslim_force.outputs.sinks import PictureSink
@@ -71,7 +76,6 @@ def result_sinks(
 
 
 def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -> Any:
-    from gelslim.cli.output import spare_strangers
     from gelslim_force.outputs.mcap_recording import McapRecording
     from gelslim_force.outputs.sinks import RecorderSink
 
@@ -84,7 +88,6 @@ def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -
 def _video(
     stack: ExitStack, target: Path, overlay: Overlay, frames_per_s: float, overwrite: bool
 ) -> Any:
-    from gelslim.cli.failure import CommandError
     from gelslim_force.outputs.arrow_scale import Extent, LiveScale
     from gelslim_force.outputs.overlay_video import OverlayVideo
     from gelslim_force.outputs.sinks import VideoSink
@@ -132,9 +135,7 @@ Calibration = Annotated[
         "-c", "--calibration", help="File of `gelslim calibrate`, in place of the picture."
     ),
 ]
-RunFolder = Annotated[
-    Path | None, typer.Option("-o", "--out", help="Run folder to write; by default out/NAME-force.")
-]
+RunFolder = Annotated[Path | None, out_folder("out/NAME-force", "Run folder to write")]
 KnownIndenter = Annotated[
     str | None,
     typer.Option(help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm)."),
@@ -168,7 +169,6 @@ def answer_json(
     folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]
 ) -> None:
     """Print the run's folder, counts, last wrench (N, N mm) and median times (ms) as JSON."""
-    from gelslim.cli.answer import print_json
     from gelslim_force.outputs.packed_frame import plain
 
     wrench = summary.last.wrench if summary.last is not None else None
@@ -190,8 +190,6 @@ def answer_json(
 
 def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]) -> None:
     """Print the number of frames with forces, the last wrench, problems, times and folder."""
-    from gelslim.cli.answer import say
-
     say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")
     wrench = summary.last.wrench if summary.last is not None else None
     if wrench is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -22,3 +22,8 @@ MostFrames = Annotated[
 SensorBundle = Annotated[
     Path, typer.Argument(metavar="BUNDLE", help="Folder of the sensor's bundle.")
 ]
+
+
+def out_folder(default: str, what: str = "Folder to write") -> Any:
+    """Return the option `--out` of a command that writes to the folder `default` without it."""
+    return typer.Option("-o", "--out", help=f"{what}; by default {default}.")

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gelslim.cli.answer import RULE_FAILED
+from gelslim.cli.failure import CommandError
 from gelslim_core.files.replaced_file import replace_file as whole_file
 
 if TYPE_CHECKING:
@@ -27,8 +29,6 @@ def spare_strangers(target: Path, mark: bytes, what: str) -> None:
 
     A file of an earlier run may be replaced, a file of the user must not.
     """
-    from gelslim.cli.failure import CommandError
-
     if not target.is_file():
         return
     with open(target, "rb") as stream:
@@ -42,8 +42,6 @@ def spare_strangers_in(folder: Path, names: Iterable[str], first: str, mark: byt
 
     A run writes the file `first` before all others, with `mark` near its beginning.
     """
-    from gelslim.cli.failure import CommandError
-
     there = [name for name in names if (folder / name).exists()]
     if not there:
         return
@@ -66,8 +64,6 @@ def written(folder: Path, files: Sized) -> str:
 
 def require_pad_rules(d: Dimensions, command: str, force: bool) -> None:
     """Raise CommandError (status 1) if a rule on gel, mesh or markers fails."""
-    from gelslim.cli.answer import RULE_FAILED
-    from gelslim.cli.failure import CommandError
     from gelslim_cad.checks import check
 
     failed = [c for c in check(d) if c.status == "fail" and c.id.startswith(PAD_RULES)]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from gelslim.cli.answer import console, number, say, table
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -32,16 +34,12 @@ def price_record(prices: Sequence[Price]) -> list[dict[str, Any]]:
 
 def print_prices(title: str, prices: Sequence[Price], before: str, after: str) -> None:
     """Print a table of all figures with both values and the change in per cent."""
-    from rich.table import Table
     from rich.text import Text
 
-    from gelslim.cli.answer import console
-
-    table = Table(title, box=None, pad_edge=False)
-    for column in (before, after, "change", ""):
-        table.add_column(column, justify="right" if column else "left", no_wrap=True)
+    rows = table(title, figures=(before, after, "change"))
+    rows.add_column("", no_wrap=True)
     for p in prices:
-        table.add_row(
+        rows.add_row(
             p.figure.words,
             figure_text(p.figure, p.before),
             figure_text(p.figure, p.after),
@@ -49,21 +47,17 @@ def print_prices(title: str, prices: Sequence[Price], before: str, after: str) -
             Text(p.verdict, style=STYLE[p.verdict]),
         )
     print()
-    console().print(table)
+    console().print(rows)
 
 
 def print_broken(name: str, found: Measured) -> None:
     """Print which rules fail, so that light and force error were not computed."""
-    from gelslim.cli.answer import say
-
     if found.failed:
         say(f"{name} breaks {', '.join(found.failed)}, so light and force error were not computed.")
 
 
 def figure_text(figure: Figure, value: float | None) -> str:
     """Return a figure as text."""
-    from gelslim.cli.answer import number
-
     if value is None:
         return "–"
     if figure.name in SHARES:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gelslim.cli.answer import console, say
 from gelslim_core.figure import as_png, new_figure
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ NONE = "-"
 
 def print_validation(found: Validation) -> None:
     """Print the experiment, the chains and the paper, the error budget, the other contacts."""
-    from gelslim.cli.answer import console, say
-
     screen = console()
     tests = found.experiment.tests
     depths = [t.depth_mm for t in tests]

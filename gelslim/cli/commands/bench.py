@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import console, number, print_json, progress_bar, table
 from gelslim.cli.options import AsJson
 
 if TYPE_CHECKING:
@@ -67,7 +68,6 @@ def bench(
     then on; no bundle and no result changes. Let no other program run meanwhile, because it would
     slow down the measurement.
     """
-    from gelslim.cli.answer import print_json, progress_bar
     from gelslim_core.budget.machine_times import cache_folder, require_keeping, this_machine
 
     require_keeping()
@@ -103,17 +103,13 @@ def _parts(sensor: Path, simulation: bool, tell: Progress | None) -> Iterator[Pa
 
 
 def _table(part: Part) -> None:
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, number
-
     before = f"{part.source}'s" if part.source == "bundle" else "before"
-    table = Table(part.name, before, "now", part.unit, box=None, padding=(0, 2, 0, 0))
+    rows = table(part.name, before, "now", part.unit, padding=(0, 2, 0, 0))
     for rung, value in part.now.items():
         old = part.before.get(rung)
         change = "" if old is None else f"{value / old:.2f} x"
-        table.add_row(rung, "" if old is None else number(old), number(value), change)
-    console().print(table)
+        rows.add_row(rung, "" if old is None else number(old), number(value), change)
+    console().print(rows)
     print()
 
 

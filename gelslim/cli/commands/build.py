@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gelslim.cli.options import AsJson, SpecFile
+from gelslim.cli.answer import RULE_FAILED, print_json, progress_bar, say
+from gelslim.cli.commands.check import print_checks
+from gelslim.cli.options import AsJson, SpecFile, out_folder
 
 if TYPE_CHECKING:
     from gelslim_cad.build import BuildResult
@@ -18,9 +20,7 @@ if TYPE_CHECKING:
 
 def build(
     spec: SpecFile,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder to write; by default out/NAME.")
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME")] = None,
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -39,8 +39,6 @@ def build(
     instructions and a report. Only what changed is made again. If a design rule fails, nothing is
     written and the exit status is 1.
     """
-    from gelslim.cli.answer import RULE_FAILED, print_json, progress_bar
-    from gelslim.cli.commands.check import print_checks
     from gelslim_cad.build import BuildRefusedError, build_variant
     from gelslim_cad.spec.reader import read_spec
 
@@ -80,9 +78,6 @@ def _record(result: BuildResult) -> dict[str, Any]:
 
 
 def _report(result: BuildResult, seconds: float) -> None:
-    from gelslim.cli.answer import say
-    from gelslim.cli.commands.check import print_checks
-
     warnings = [c for c in result.checks if c.status == "warn"]
     here = Path.cwd()
     folder = result.folder

@@ -1,4 +1,4 @@
-"""`gelslim bundle`: the bundle of a sensor alone, with its measured ladder of operators."""
+"""`gelslim bundle`, `bundle-info` and `bundle-export`: make, describe and export a bundle."""
 
 from __future__ import annotations
 
@@ -8,20 +8,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gelslim.cli.budget import FieldError, FrameTime
-from gelslim.cli.options import AsJson, Force, SpecFile
+from gelslim.cli.answer import BAD_INPUT, console, print_json, progress_bar, say, shown_ms, table
+from gelslim.cli.budget import FieldError, FrameTime, budget_of
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import AsJson, Force, SpecFile, out_folder
+from gelslim.cli.output import require_pad_rules, spare_strangers, written
 
 if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
     from ifem_export.operators.operator_ladder import OperatorLadder
 
 
+BundleFolder = Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder of the bundle.")]
+MARKS = {
+    ".mtx": b"K in N/mm of geometry",
+    ".mat": b"gelslim-bundle",
+    ".safetensors": b"gelslim-bundle/",
+}
+"""Text near the beginning of each kind of export, by which an export is recognised."""
+
+
 def bundle(
     spec: SpecFile,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-bundle."),
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME-bundle")] = None,
     error: FieldError = None,
     within: FrameTime = None,
     ladder: Annotated[
@@ -45,10 +54,6 @@ def bundle(
     of force operators with error and time measured for this sensor. A budget (--error, --time)
     chooses the operator that the force pipeline starts with.
     """
-    from gelslim.cli.answer import print_json, progress_bar
-    from gelslim.cli.budget import budget_of
-    from gelslim.cli.failure import CommandError
-    from gelslim.cli.output import require_pad_rules, written
     from gelslim.design import derive, make_bundle
     from gelslim_cad.spec.reader import read_spec
     from ifem_export.bundle.files import write_bundle
@@ -93,14 +98,10 @@ def _record(made: Bundle, markers: int) -> dict[str, Any]:
 
 def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
     """Print a table of the rungs with a mark at the chosen one."""
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, shown_ms
-
     columns = ("operator", "field error", "at the edge", "resultant", "per frame", "memory", "")
-    table = Table(*columns, box=None)
+    rows = table(*columns, pad_edge=True)
     for rung in ladder.rungs:
-        table.add_row(
+        rows.add_row(
             rung.label,
             f"{rung.error_field:.2%}",
             "" if rung.error_edge is None else f"{rung.error_edge:.2%}",
@@ -109,5 +110,81 @@ def print_ladder(ladder: OperatorLadder, chosen: str) -> None:
             f"{rung.n_bytes / 1e6:.1f} MB",
             "chosen" if rung.label == chosen else "",
         )
-    console().print(table)
+    console().print(rows)
     print(f"The errors are against {ladder.reference}; nu = {ladder.poissons_ratio:g}.")
+
+
+def bundle_info(
+    path: BundleFolder,
+    as_json: AsJson = False,
+) -> int:
+    """Describe a bundle and verify it.
+
+    Prints mesh, material, markers and operators. Checks the hash of every file, all values, and
+    the stored pair of displacement and force. The exit status is 2 if something is wrong.
+    """
+    from ifem_export.bundle.files import summarise_bundle
+
+    found = summarise_bundle(path)
+    if as_json:
+        print_json(found)
+    else:
+        _describe(path, found)
+    return 0 if found["verification"]["ok"] else BAD_INPUT
+
+
+def _describe(path: Path, found: dict[str, Any]) -> None:
+    mesh, material = found["mesh"], found["material"]
+    cells = " x ".join(str(c) for c in mesh["cells"])
+    size = " x ".join(f"{h:.4g}" for h in mesh["cell_size_mm"])
+    stored = f"stored, {found['stiffness']['nonzeros']} entries"
+    print(f"{path}: {found['format']}, {found['total_bytes'] / 1e6:.2f} MB")
+    print(f"  sensor     spec {found['spec_hash'][:12]}, geometry {found['geometry_hash'][:12]}")
+    print(f"  mesh       {cells} cells of {size} mm: {mesh['elements']} elements, "
+          f"{mesh['nodes']} nodes, {mesh['surface_nodes']} on the surface")  # fmt: skip
+    print(f"  element    {found['element']['type']} {found['element']['formulation']}")
+    print(f"  gel        E = {material['youngs_modulus_mpa']:g} MPa, "
+          f"nu = {material['poissons_ratio']:g}")  # fmt: skip
+    print(f"  stiffness  {stored if found['stiffness']['stored'] else 'assembled when needed'}")
+    markers = found["markers"]
+    print(f"  markers    {markers['count'] if markers else 'none'}")
+    ladder = found.get("ladder") or {}
+    for rung in ladder.get("rungs", ()):
+        inside = ", ".join(f"{k} {v:g}" for k, v in rung["parameters"].items())
+        label = f"{rung['rung']} ({inside})" if inside else rung["rung"]
+        mark = ", chosen" if label == ladder.get("operator") else ""
+        print(f"  operator   {label}: field error {rung['error_field']:.2%}, "
+              f"{shown_ms(rung['milliseconds'])}{mark}")  # fmt: skip
+    verdict = found["verification"]
+    if verdict["ok"]:
+        print("  verified   all hashes, values and the self-test pair")
+    else:
+        say(f"  NOT VALID  {verdict['file']}: {verdict['reason']}; {verdict['remedy']}")
+
+
+def bundle_export(
+    path: BundleFolder,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="File to write: NAME.mtx, NAME.mat or NAME.safetensors."
+        ),
+    ],
+) -> int:
+    """Write the stiffness matrix of a bundle for other programs.
+
+    The ending of the file chooses the format: Matrix Market (.mtx), MATLAB (.mat, indices from 1)
+    or safetensors. The bundle is verified first.
+    """
+    from ifem_export.bundle.export_matrix import EXPORTS, export_matrix
+    from ifem_export.bundle.files import load_bundle
+
+    if file.suffix not in EXPORTS:
+        raise CommandError(
+            f"{file}: the ending {file.suffix!r} names no format; use {', '.join(EXPORTS)}",
+            BAD_INPUT,
+        )
+    spare_strangers(file, MARKS[file.suffix], "export of a bundle")
+    export_matrix(load_bundle(path), file)
+    print(f"Wrote {file} ({file.stat().st_size / 1e6:.2f} MB)")
+    return 0

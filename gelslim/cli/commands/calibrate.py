@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gelslim.cli.answer import print_json, say
 from gelslim.cli.options import AsJson, SensorBundle
+from gelslim.cli.output import replace_file, spare_strangers
 
 if TYPE_CHECKING:
     from gelslim_force.calibration.sensor_calibration import Calibration
@@ -43,8 +45,6 @@ def calibrate(
     design. With -o it writes the calibration. It refuses pictures of another sensor, rotated
     pictures, and pictures with contact (exit status 2).
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.output import replace_file, spare_strangers
     from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate as calibrated
     from gelslim_force.calibration.file import calibration_record
@@ -67,8 +67,6 @@ def calibrate(
 
 
 def _describe(found: Calibration) -> None:
-    from gelslim.cli.answer import say
-
     for line in found.diagnosis:
         say(line)
     for line in found.warnings:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gelslim.cli.answer import OK, RULE_FAILED, console, indented, number, print_json, say
 from gelslim.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ def check(
     each concession would save. Makes no CAD and takes about a second. The exit status is 1 if a
     rule fails.
     """
-    from gelslim.cli.answer import OK, RULE_FAILED, print_json, say
     from gelslim_cad.checks import check as apply_rules
     from gelslim_cad.checks.binding import binding_sentences
     from gelslim_cad.dimensions import derive
@@ -78,16 +78,14 @@ def print_checks(checks: Sequence[Check], *, brief: bool) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from gelslim.cli.answer import console, number
-
     screen = console()
     ordered = sorted(checks, key=lambda c: ORDER[c.status])
     for c in (c for c in ordered if c.status != "pass"):
         head = Text(f"{MARK[c.status]:<5}", style=STYLE[c.status])
         head.append(f"{c.title} ({c.id})", style="bold")
         screen.print(head)
-        screen.print(_indented(f"{c.reason}."))
-        screen.print(_indented(f"To do: {c.advice}. Change {c.parameter}."))
+        screen.print(indented(f"{c.reason}.", 5))
+        screen.print(indented(f"To do: {c.advice}. Change {c.parameter}.", 5))
     passed = [c for c in ordered if c.status == "pass"]
     if brief or not passed:
         return
@@ -109,9 +107,3 @@ def print_checks(checks: Sequence[Check], *, brief: bool) -> None:
                 "" if free else number(c.margin, c.unit),
             )
     screen.print(table)
-
-
-def _indented(text: str) -> object:
-    from rich.padding import Padding
-
-    return Padding(text, (0, 0, 0, 5))

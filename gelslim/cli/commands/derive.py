@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from gelslim.cli.answer import console, number, print_json, say
 from gelslim.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
@@ -30,7 +31,6 @@ def derive(spec: SpecFile, as_json: AsJson = False) -> int:
 
     `gelslim explain` shows where one of them comes from.
     """
-    from gelslim.cli.answer import print_json, say
     from gelslim_cad.dimensions import derive as derive_dimensions
     from gelslim_cad.spec.reader import read_spec
 
@@ -76,7 +76,6 @@ def _record(d: Dimensions, name: str) -> dict[str, Any]:
 def _print_table(d: Dimensions) -> None:
     from rich.table import Table
 
-    from gelslim.cli.answer import console, number
     from gelslim_cad.dimensions import definition
 
     screen = console()

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import console, given, number, print_json, say, table
 from gelslim.cli.options import AsJson, SpecFile
+from gelslim.cli.price_table import price_record, print_broken, print_prices
 from gelslim_core.optional_library import install_command
 
 if TYPE_CHECKING:
@@ -15,8 +17,6 @@ if TYPE_CHECKING:
 
     from gelslim_cad.compare.comparison import Change, Comparison, RuleChange
     from gelslim_cad.compare.part_change import PartChanges
-    from gelslim_cad.explore.price import Measured
-    from gelslim_cad.spec import Spec
 
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
 FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
@@ -41,46 +41,25 @@ def diff(
     second finger costs against the first. Nothing is built. The exit status is 0 whether or not
     they differ.
     """
-    from gelslim.cli.answer import print_json
     from gelslim_cad.compare.comparison import compare
+    from gelslim_cad.explore.price import measured, prices
     from gelslim_cad.spec.reader import read_spec
 
     one, two = read_spec(first), read_spec(second)
     found = compare(one.spec, two.spec)
     made, note = _parts(one, two) if parts and not found.same else (None, "")
-    costs = _measured(one.spec, two.spec) if price and not found.same else ()
+    costs = () if found.same or not price else (measured(one.spec), measured(two.spec))
     if as_json:
         record = _record(str(first), str(second), found, made, note)
-        print_json({**record, "price": _price_record(costs)})
+        print_json({**record, "price": price_record(prices(*costs)) if costs else None})
         return 0
     _report(str(first), str(second), found)
     _report_parts(made, note)
-    _report_price(str(first), str(second), costs)
+    if costs:
+        print_prices("what it costs", prices(*costs), "before", "after")
+        print_broken(str(first), costs[0])
+        print_broken(str(second), costs[1])
     return 0
-
-
-def _measured(one: Spec, two: Spec) -> tuple[Measured, ...]:
-    from gelslim_cad.explore.price import measured
-
-    return measured(one), measured(two)
-
-
-def _price_record(costs: Sequence[Measured]) -> list[dict[str, Any]] | None:
-    from gelslim.cli.price_table import price_record
-    from gelslim_cad.explore.price import prices
-
-    return price_record(prices(*costs)) if costs else None
-
-
-def _report_price(first: str, second: str, costs: Sequence[Measured]) -> None:
-    from gelslim.cli.price_table import print_broken, print_prices
-    from gelslim_cad.explore.price import prices
-
-    if not costs:
-        return
-    print_prices("what it costs", prices(*costs), "before", "after")
-    for name, found in zip((first, second), costs, strict=True):
-        print_broken(name, found)
 
 
 def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
@@ -119,10 +98,7 @@ def _record(
 
 
 def _report(first: str, second: str, found: Comparison) -> None:
-    from rich.table import Table
     from rich.text import Text
-
-    from gelslim.cli.answer import console, number, say
 
     if found.same:
         say(f"{first} and {second} give the same finger.")
@@ -130,14 +106,13 @@ def _report(first: str, second: str, found: Comparison) -> None:
     _changes("fields of the spec", found.fields, every=True)
     _changes("dimensions that follow", found.dimensions)
     if found.rules:
-        table = Table("design rules", box=None, pad_edge=False)
-        for column in ("before", "after", "limit", "margin", ""):
-            table.add_column(column, justify="right" if column else "left", no_wrap=True)
+        rows = table("design rules", figures=("before", "after", "limit", "margin"))
+        rows.add_column("", no_wrap=True)
         order = list(STYLE)
         shown = [c for c in found.rules if _shows(c)]
         for c in sorted(shown, key=lambda c: order.index(c.verdict)):
             b, a = c.before, c.after
-            table.add_row(
+            rows.add_row(
                 c.id,
                 number(b.value, b.unit),
                 number(a.value, a.unit),
@@ -147,7 +122,7 @@ def _report(first: str, second: str, found: Comparison) -> None:
                 if not STYLE[c.verdict]
                 else Text(f"{b.status} → {a.status}, {c.verdict}", style=STYLE[c.verdict]),
             )
-        console().print(table)
+        console().print(rows)
         _note_unshown(len(found.rules) - len(shown))
         print()
     for block in found.bundle:
@@ -157,8 +132,6 @@ def _report(first: str, second: str, found: Comparison) -> None:
 
 def _shows(change: RuleChange) -> bool:
     """Return whether the printed digits show the change."""
-    from gelslim.cli.answer import number
-
     b, a = change.before, change.after
     pairs = ((b.value, a.value), (b.limit, a.limit))
     return b.status != a.status or any(number(x) != number(y) for x, y in pairs)
@@ -170,7 +143,6 @@ def _note_unshown(count: int) -> None:
 
 
 def _limit(before: float | None, after: float | None) -> str:
-    from gelslim.cli.answer import number
     from gelslim_cad.compare.comparison import differ
 
     if differ(before, after):
@@ -180,21 +152,17 @@ def _limit(before: float | None, after: float | None) -> str:
 
 def _changes(title: str, changes: Sequence[Change], every: bool = False) -> None:
     """Print a table of the changes: of `every` one, or of those that the digits show."""
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, given, number
-
     spelt = given if every else number
     if not changes:
         return
     screen = console()
-    table = Table(box=None, pad_edge=False)
-    table.add_column(title, no_wrap=True)
+    rows = table()
+    rows.add_column(title, no_wrap=True)
     for column in ("before", "after", "difference"):
-        table.add_column(column, justify="right", overflow="fold")
+        rows.add_column(column, justify="right", overflow="fold")
     told = screen.width >= WIDE
     if told:
-        table.add_column("", style="dim", overflow="fold")
+        rows.add_column("", style="dim", overflow="fold")
     shown = [c for c in changes if every or number(c.before) != number(c.after)]
     for c in sorted(shown, key=lambda c: c.name not in FIRST):
         step = c.difference
@@ -205,26 +173,20 @@ def _changes(title: str, changes: Sequence[Change], every: bool = False) -> None
             "" if step is None else f"{'+' if step > 0 else ''}{number(step, c.unit)}",
             c.meaning,
         )
-        table.add_row(*cells[: 5 if told else 4])
-    screen.print(table)
+        rows.add_row(*cells[: 5 if told else 4])
+    screen.print(rows)
     _note_unshown(len(changes) - len(shown))
     print()
 
 
 def _report_parts(made: PartChanges | None, note: str) -> None:
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, number, say
-
     if note:
         say(f"parts: {note}")
     if made is None:
         return
-    table = Table("parts", "", box=None, pad_edge=False)
-    for column in ("volume before", "after", "size after"):
-        table.add_column(column, justify="right", no_wrap=True)
+    rows = table("parts", "", figures=("volume before", "after", "size after"))
     for c in (c for c in made.changed if c.how != "moved"):
-        table.add_row(
+        rows.add_row(
             c.name,
             c.how,
             "" if c.volume_before_mm3 is None else number(c.volume_before_mm3, "mm³"),
@@ -232,7 +194,7 @@ def _report_parts(made: PartChanges | None, note: str) -> None:
             _size(c.size_after_mm),
         )
     print()
-    console().print(table)
+    console().print(rows)
     moved = [c.name for c in made.changed if c.how == "moved"]
     if moved:
         say(f"Only moved: {', '.join(moved)}.")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import console, print_json, progress_bar, say, table
 from gelslim.cli.options import AsJson
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ def doctor(
     measures small force operators, which takes about ten seconds. The exit status is 0 even if
     something is missing.
     """
-    from gelslim.cli.answer import print_json, progress_bar
     from gelslim.doctor.libraries import extras, required
     from gelslim.doctor.machine import drawing, kernels, missing_graphics, system, threads
     from gelslim_core import __version__
@@ -83,29 +83,24 @@ def _speed_record(speed: RealTime) -> dict[str, Any]:
 
 
 def _print_extras(optional: tuple[ExtraState, ...]) -> None:
-    from rich.table import Table
     from rich.text import Text
 
-    from gelslim.cli.answer import console
-
-    table = Table("extra", "", "enables", box=None, pad_edge=False)
+    rows = table("extra", "", "enables")
     for extra in optional:
         state = Text("ready", style="green") if extra.ready else Text("missing", style="yellow")
-        table.add_row(extra.name, state, extra.enables)
+        rows.add_row(extra.name, state, extra.enables)
         lacking = [lib.module for lib in extra.libraries if not lib.version]
         if lacking:
-            table.add_row("", "", f"lacks {', '.join(lacking)}; {extra.command}")
+            rows.add_row("", "", f"lacks {', '.join(lacking)}; {extra.command}")
         for lib in extra.libraries:
             if lib.problem:
-                table.add_row("", "", f"{lib.module} does not load: {lib.problem}")
+                rows.add_row("", "", f"{lib.module} does not load: {lib.problem}")
     print()
-    console().print(table)
+    console().print(rows)
     print()
 
 
 def _print_rendering(graphics: tuple[tuple[str, str], ...], picture: str) -> None:
-    from gelslim.cli.answer import say
-
     if graphics:
         packages = " ".join(package for _, package in graphics)
         names = ", ".join(lib for lib, _ in graphics)
@@ -114,8 +109,6 @@ def _print_rendering(graphics: tuple[tuple[str, str], ...], picture: str) -> Non
 
 
 def _print_machine(cores: Threads, cache: Kernels) -> None:
-    from gelslim.cli.answer import say
-
     limits = "".join(f", {name}={value}" for name, value in cores.limits.items())
     counts = dict.fromkeys(f"{name} {count}" for name, count in cores.pools)
     pools = ", ".join(counts) or "none found"
@@ -132,7 +125,6 @@ def _print_machine(cores: Threads, cache: Kernels) -> None:
 
 
 def _print_speed(speed: RealTime | None, problem: str) -> None:
-    from gelslim.cli.answer import say
     from gelslim.doctor.realtime import CELLS, FRAME_RATE_HZ, LAYERS, PASSES
 
     if speed is None:

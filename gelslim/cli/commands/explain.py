@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import console, given, number, print_json
+from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, SpecFile
 
 if TYPE_CHECKING:
@@ -31,8 +33,6 @@ def explain(
 
     Shows the formulas with their numbers, back to the lines of the spec.
     """
-    from gelslim.cli.answer import console, print_json
-    from gelslim.cli.failure import CommandError
     from gelslim_cad.checks.explain import UnknownNameError
     from gelslim_cad.checks.explain import explain as trace
     from gelslim_cad.dimensions import derive
@@ -75,8 +75,6 @@ def _grow(tree: Tree, node: Node) -> None:
 
 def _label(node: Node) -> Text:
     from rich.text import Text
-
-    from gelslim.cli.answer import given, number
 
     shown = given if node.kind == "field" else number
     text = Text(node.name, style="bold")

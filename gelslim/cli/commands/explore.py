@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim.cli.options import AsJson, DrawPictures, SpecFile
+from gelslim.cli.answer import console, number, print_json, progress_bar, say, table
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import AsJson, DrawPictures, SpecFile, out_folder
+from gelslim.cli.output import replace_file
 from gelslim_core.optional_library import install_command
 
 if TYPE_CHECKING:
@@ -41,10 +44,7 @@ Rays = Annotated[int, typer.Option(min=1024, max=1 << 24, help="Rays per guide, 
 def explore(
     spec: SpecFile,
     vary: Vary,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-explore."),
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME-explore")] = None,
     light: Annotated[bool, typer.Option("--light", help="Trace the light of each design.")] = False,
     force_error: Annotated[
         bool, typer.Option("--force-error", help="Compute the expected force error of each design.")
@@ -66,8 +66,6 @@ def explore(
     of what is feasible and what limits the other designs. After an interrupt, run it again: it
     continues where it stopped.
     """
-    from gelslim.cli.answer import print_json, progress_bar
-    from gelslim.cli.failure import CommandError
     from gelslim_cad.explore.axis import ExploreError, parse_axis
     from gelslim_cad.explore.engine import Engine, processors
     from gelslim_cad.explore.space import Space
@@ -98,7 +96,6 @@ def write_exploration(folder: Path, found: Exploration, *, pictures: bool) -> li
     """Write table and pictures and return their names; leave out what needs a missing library."""
     import sys
 
-    from gelslim.cli.output import replace_file
     from gelslim_cad.explore.table import csv_bytes, parquet_bytes
     from gelslim_core.optional_library import installed
 
@@ -157,9 +154,6 @@ def refusals(found: Exploration) -> dict[str, int]:
 
 
 def _report(found: Exploration) -> None:
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, number, say
     from gelslim_cad.explore.axis import shown
     from gelslim_cad.explore.judge import REFUSED
     from gelslim_cad.explore.pareto import THICKNESS, TRADES, front
@@ -176,10 +170,8 @@ def _report(found: Exploration) -> None:
             say(f"  {count:>6} stopped by {name}")
     if not rows:
         return
-    table = Table("best feasible design", box=None, pad_edge=False)
-    table.add_column("", justify="right")
-    table.add_column("thickness", justify="right")
-    table.add_column("with")
+    best_designs = table("best feasible design", figures=("", "thickness"))
+    best_designs.add_column("with")
     for goal in (THICKNESS, *(g for g in TRADES if g.column in found.columns)):
         x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
         best = rows[front(goal.costs(y), x)[0]]
@@ -187,10 +179,10 @@ def _report(found: Exploration) -> None:
             f"{a.path.removeprefix('design.')} {shown(found.columns[a.path][best])}"
             for a in found.space.axes
         )
-        table.add_row(
+        best_designs.add_row(
             f"{'most' if goal.larger else 'least'} {goal.words}",
             number(found.columns[goal.column][best], goal.unit),
             number(found.columns[THICKNESS.column][best], "mm"),
             ", ".join(chosen),
         )
-    console().print(table)
+    console().print(best_designs)

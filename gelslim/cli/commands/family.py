@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import (
+    OK,
+    RULE_FAILED,
+    console,
+    number,
+    print_json,
+    progress_bar,
+    say,
+    table,
+)
+from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson
+from gelslim.cli.output import replace_file
 
 if TYPE_CHECKING:
     from gelslim_cad.family.member import Member
@@ -34,7 +46,6 @@ def family(
     and family.csv with their sizes. The exit status is 1 if a finger breaks a design rule; the
     others are still built and drawn.
     """
-    from gelslim.cli.answer import OK, RULE_FAILED, print_json
     from gelslim_cad.spec.reader import read_spec
     from gelslim_core.optional_library import require
 
@@ -78,7 +89,6 @@ class _Built:
 
 def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: bool) -> _Built:
     """Build every finger into a folder of its own; list those that break a design rule."""
-    from gelslim.cli.answer import progress_bar
     from gelslim_cad.build import build_variant
     from gelslim_cad.build.variant import BuildRefusedError
     from gelslim_cad.dimensions import derive
@@ -99,8 +109,6 @@ def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: b
 
 
 def _distinct(names: list[str]) -> None:
-    from gelslim.cli.failure import CommandError
-
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
         raise CommandError(
@@ -117,7 +125,6 @@ def _named(tell: Any, name: str) -> Any:
 
 def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
     """Write table and picture; return their names and why there is no picture, if so."""
-    from gelslim.cli.output import replace_file
     from gelslim_cad.explore.table import csv_bytes
     from gelslim_cad.family.picture import family_png
     from gelslim_cad.pictures.finger_pictures import PictureError
@@ -149,22 +156,16 @@ def _record(m: Member, rebuilt: int) -> dict[str, Any]:
 
 
 def _report(built: _Built) -> None:
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, number, say
-
-    table = Table("finger", box=None, pad_edge=False)
-    for column in ("gel", "thickness", "width", "length", "units built"):
-        table.add_column(column, justify="right")
+    rows = table("finger", figures=("gel", "thickness", "width", "length", "units built"))
     for m in built.members:
         length, width, thickness = m.size_mm
-        table.add_row(
+        rows.add_row(
             m.name,
             f"{m.gel_mm[0]:g} × {m.gel_mm[1]:g} × {m.gel_mm[2]:g} mm",
             *(number(v, "mm") for v in (thickness, width, length)),
             str(built.units[m.name]) if built.units[m.name] else "up to date",
         )
     if built.members:
-        console().print(table)
+        console().print(rows)
     for name, message in built.refused.items():
         say(f"{name} is not built: {message}", style="bold red")

@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gelslim.cli import force_run as option
-from gelslim.cli.budget import FieldError, FrameTime
+from gelslim.cli.answer import BAD_INPUT, progress_bar
+from gelslim.cli.budget import FieldError, FrameTime, budget_of, note_choice, on_this_machine
+from gelslim.cli.failure import CommandError
+from gelslim.cli.force_run import RunOutputs, answer_json, report, result_sinks
 from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, SensorBundle
 
 if TYPE_CHECKING:
@@ -59,9 +62,6 @@ def force(
     (wrenches.csv), the force at every node (fields), and overlay pictures. Without an indenter or
     depth maps the normal force stays unknown.
     """
-    from gelslim.cli.answer import BAD_INPUT
-    from gelslim.cli.budget import budget_of
-    from gelslim.cli.force_run import RunOutputs, answer_json, report
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
     from ifem_export.bundle.files import load_bundle
@@ -95,8 +95,6 @@ def force(
 
 
 def _require_consistent(fields: str, indenter: str | None, depth_maps: Path | None) -> None:
-    from gelslim.cli.failure import CommandError
-
     if fields not in ("npz", "parquet", "none"):
         raise CommandError(f"--fields {fields}: give npz, parquet or none")
     if indenter and depth_maps:
@@ -105,7 +103,6 @@ def _require_consistent(fields: str, indenter: str | None, depth_maps: Path | No
 
 def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
     """Return the settings of the pipeline for these options. Raises CommandError."""
-    from gelslim.cli.failure import CommandError
     from gelslim_force.forces.estimator import ForceSettings
     from gelslim_force.settings import PipelineSettings
 
@@ -132,8 +129,6 @@ def _run(
     """Process the frames; return the summary and the paths of the pictures."""
     from itertools import islice
 
-    from gelslim.cli.answer import progress_bar
-    from gelslim.cli.force_run import result_sinks
     from gelslim_force.run import run_frames
 
     frames_per_s = source.frames_per_s or 30.0
@@ -146,7 +141,6 @@ def _run(
 
 def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
     """Return the sensor with the times of this machine, and print the remarks on the budget."""
-    from gelslim.cli.budget import note_choice, on_this_machine
     from gelslim_core.budget.machine_times import read_times
 
     timed = on_this_machine(sensor)
@@ -165,7 +159,6 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
 def _calibrated(
     sensor: Bundle, reference: Path | None, file: Path | None, needs_picture: bool
 ) -> tuple[Calibration, NDArray[np.uint8] | None]:
-    from gelslim.cli.failure import CommandError
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.calibration.reference_picture import read_reference

@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim.cli.options import AsJson, DrawPictures, SpecFile
+from gelslim.cli.answer import console, print_json, progress_bar, say, table
+from gelslim.cli.budget import budget_of, keep_times, note_choice
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import AsJson, DrawPictures, SpecFile, out_folder
+from gelslim.cli.output import replace_file, spare_strangers_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,10 +55,7 @@ TraceTime = Annotated[
 
 def light(
     spec: SpecFile,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Folder of the pictures; by default out/NAME-light."),
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME-light", "Folder of the pictures")] = None,
     rays: RaysPerGuide = None,
     error: LightError = None,
     within: TraceTime = None,
@@ -67,10 +68,6 @@ def light(
     Prints the certificate of total internal reflection, where the light goes, the brightness
     against straight guides with 45° mirrors, exposure and frame rate. Writes pictures.
     """
-    from gelslim.cli.answer import print_json, progress_bar
-    from gelslim.cli.budget import budget_of
-    from gelslim.cli.failure import CommandError
-    from gelslim.cli.output import spare_strangers_in
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.record import study_record
     from gelslim_cad.light.study import RAYS, study_light
@@ -102,7 +99,6 @@ def light(
 
 
 def _draw(folder: Path, d: Dimensions, study: LightStudy) -> None:
-    from gelslim.cli.output import replace_file
     from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
 
     made = (paths_png(d, MARK), irradiance_png(d, study), ratio_png(study))
@@ -114,7 +110,6 @@ def _budgeted(
     spec: Spec, d: Dimensions, budget: Budget, seed: int, path: Path, tell: Progress | None
 ) -> int:
     """Return the rays per guide for a budget; a budget of time measures missing times first."""
-    from gelslim.cli.budget import keep_times, note_choice
     from gelslim_cad.light.ray_ladder import (
         TRACED,
         measure_errors,
@@ -153,8 +148,6 @@ def _note_missed(study: LightStudy, budget: Budget) -> None:
 
 
 def _report(name: str, study: LightStudy) -> None:
-    from gelslim.cli.answer import say
-
     for sentence in study.certificate.sentences():
         say(sentence)
     print()
@@ -170,37 +163,28 @@ def _report(name: str, study: LightStudy) -> None:
 
 def _comparisons(name: str, found: Sequence[Comparison]) -> None:
     """Print the ratio to the light of each other guide, with interval and verdict."""
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, say
     from gelslim_cad.light.study import QUANTITIES
 
-    table = Table(
-        "straight guide with", "light", "times", "95 % interval", "", box=None, pad_edge=False
-    )
+    rows = table("straight guide with", "light", "times", "95 % interval", "")
     alike = ""
     for c in found:
         other, _, alike = c.other.partition(" (")
         interval = f"{c.ratio.low:.3f} to {c.ratio.high:.3f}"
         kind = other.removeprefix("a straight guide with ")
         place = QUANTITIES[c.quantity].removeprefix("light ")
-        table.add_row(kind, place, f"{c.ratio.value:.3f}", interval, c.verdict)
+        rows.add_row(kind, place, f"{c.ratio.value:.3f}", interval, c.verdict)
     say(f"Light of {name} over that of others ({alike}:" if alike else f"Light of {name}:")
-    console().print(table)
+    console().print(rows)
 
 
 def _ledger(result: LightResult) -> None:
     """Print the ledger; light that leaves the guide of a finger ends in its black housing."""
-    from rich.table import Table
-
-    from gelslim.cli.answer import console
-
     title = f"where the light goes ({result.rays} rays)"
-    table = Table(title, "share", "95 % interval", box=None, pad_edge=False)
+    rows = table(title, "share", "95 % interval")
     for name, found in sorted(result.ledger().items(), key=lambda e: (e[0] != FIRST, -e[1].value)):
         if found.value >= LEAST_SHARE:
-            table.add_row(_named(name), f"{found.value:.2%}", _interval(found))
-    console().print(table)
+            rows.add_row(_named(name), f"{found.value:.2%}", _interval(found))
+    console().print(rows)
 
 
 def _named(entry: str) -> str:

@@ -5,17 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from gelslim.cli.options import AsJson, Force, SpecFile
+from gelslim.cli.answer import print_json
+from gelslim.cli.options import AsJson, Force, SpecFile, out_folder
+from gelslim.cli.output import require_pad_rules, spare_strangers_in, written
 
 
 def markers(
     spec: SpecFile,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-markers."),
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME-markers")] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> int:
@@ -23,8 +20,6 @@ def markers(
 
     Writes the same SVG, DXF, PDF, Gerber, CSV and stencil files as `gelslim build`.
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.output import require_pad_rules, spare_strangers_in, written
     from gelslim_cad.dimensions import derive
     from gelslim_cad.markers.process import MARKING_PROCESSES
     from gelslim_cad.markers.write import FIRST_FILE, render_marker_files, write_marker_files

@@ -1,4 +1,4 @@
-"""`gelslim new`: a commented spec to start from."""
+"""`gelslim new` and `gelslim examples`: a spec or a scene to start from."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from gelslim.cli.answer import console, print_json, table
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import AsJson
+from gelslim.cli.output import replace_file
 
 
 def new(
@@ -27,9 +32,6 @@ def new(
     default. With --from, a design or a scene that comes with the program is copied under the new
     name.
     """
-    from gelslim.cli.failure import CommandError
-    from gelslim.cli.output import replace_file
-
     target = out or Path(f"{name}.yaml")
     if target.is_dir():
         target = target / f"{name}.yaml"
@@ -61,3 +63,26 @@ def _texts(name: str, source: str, length: float, width: float) -> tuple[dict[st
     require_name(name)
     found = example(source)
     return found.files(name), "check" if found.kind == "design" else "plan"
+
+
+def examples(as_json: AsJson = False) -> int:
+    """List the designs and scenes that come with the program.
+
+    `gelslim new --from NAME MINE` copies one of them.
+    """
+    from gelslim.examples import examples as listed
+
+    found = listed()
+    if as_json:
+        print_json(
+            [
+                {"name": e.name, "kind": e.kind, "path": str(e.path), "summary": e.summary}
+                for e in found
+            ]
+        )
+        return 0
+    rows = table("name", "kind", "summary", padding=(0, 2, 0, 0))
+    for entry in found:
+        rows.add_row(entry.name, entry.kind, entry.summary)
+    console().print(rows)
+    return 0

@@ -9,12 +9,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import (
+    BAD_INPUT,
+    RULE_FAILED,
+    console,
+    number,
+    print_json,
+    progress_bar,
+    say,
+    table,
+)
 from gelslim.cli.commands.explore import Jobs, NoisePx, Rays, Scheduler, Vary
-from gelslim.cli.options import AsJson, SpecFile
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import AsJson, SpecFile, out_folder
+from gelslim.cli.output import replace_file, spare_strangers
+from gelslim.cli.price_table import price_record, print_broken, print_prices
 
 if TYPE_CHECKING:
     from gelslim_cad.explore.optimum import Neighbour, Optimum
-    from gelslim_cad.explore.price import Measured
     from gelslim_cad.spec import Spec
 
 
@@ -33,10 +45,7 @@ def optimise(
         Aim,
         typer.Option("--for", help="Least thickness, exposure or force error."),
     ] = Aim.thin,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Folder to write; by default out/NAME-optimise."),
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME-optimise")] = None,
     save: Annotated[
         Path | None, typer.Option(help="Write the best design as a spec to this file.")
     ] = None,
@@ -55,8 +64,9 @@ def optimise(
     design, what a further step would do, and its price against the spec as it is. With --save it
     writes the design as a spec. The exit status is 1 if no design is feasible.
     """
-    from gelslim.cli.answer import print_json
-    from gelslim.cli.output import replace_file, spare_strangers
+    from gelslim_cad.checks.binding import binding_sentences
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.explore.price import measured, prices
     from gelslim_cad.explore.space import changed
     from gelslim_cad.spec.reader import read_spec
     from gelslim_cad.spec.starter import spec_text
@@ -68,14 +78,17 @@ def optimise(
     effort = _Effort(jobs, scheduler, rays, marker_noise_px, rounds)
     best = _best(loaded.spec, vary, aim, folder, effort, quiet=as_json)
     chosen = changed(loaded.spec, best.values)
-    words, price = _binding(chosen), _Price.of(loaded.spec, chosen, effort)
+    words = binding_sentences(chosen, derive(chosen))
+    before, after = (measured(s, rays, marker_noise_px) for s in (loaded.spec, chosen))
+    price = prices(before, after)
     if save is not None:
         replace_file(save, spec_text(loaded.text, best.values).encode())
     if as_json:
-        print_json({**_record(best, words), "price": price.record()})
+        print_json({**_record(best, words), "price": price_record(price)})
         return 0
     _report(loaded.spec.name, best, words)
-    price.print()
+    print_prices("what it costs", price, "as it is", "best")
+    print_broken("The spec as it is", before)
     if save is not None:
         print(f"Wrote {save}. Next: gelslim check {save}")
     return 0
@@ -92,40 +105,10 @@ class _Effort:
     rounds: int
 
 
-@dataclass(frozen=True)
-class _Price:
-    """Figures of the spec as it is and of the best design."""
-
-    before: Measured
-    after: Measured
-
-    @classmethod
-    def of(cls, spec: Spec, chosen: Spec, effort: _Effort) -> _Price:
-        from gelslim_cad.explore.price import measured
-
-        before, after = (measured(s, effort.rays, effort.noise_px) for s in (spec, chosen))
-        return cls(before, after)
-
-    def record(self) -> list[dict[str, Any]]:
-        from gelslim.cli.price_table import price_record
-        from gelslim_cad.explore.price import prices
-
-        return price_record(prices(self.before, self.after))
-
-    def print(self) -> None:
-        from gelslim.cli.price_table import print_broken, print_prices
-        from gelslim_cad.explore.price import prices
-
-        print_prices("what it costs", prices(self.before, self.after), "as it is", "best")
-        print_broken("The spec as it is", self.before)
-
-
 def _best(
     spec: Spec, vary: list[str], aim: Aim, folder: Path, effort: _Effort, *, quiet: bool
 ) -> Optimum:
     """Return the best feasible design. Raises CommandError for bad axes or if there is none."""
-    from gelslim.cli.answer import progress_bar
-    from gelslim.cli.failure import CommandError
     from gelslim_cad.explore.axis import ExploreError, parse_axis
     from gelslim_cad.explore.engine import Engine, processors
     from gelslim_cad.explore.optimum import optimise as run
@@ -139,20 +122,8 @@ def _best(
         with progress_bar(quiet=quiet) as tell:
             return run(request, aim.value, folder, engine, rounds=effort.rounds, progress=tell)
     except ExploreError as error:
-        raise CommandError(f"gelslim optimise: {error}", _status(error)) from error
-
-
-def _status(error: Exception) -> int:
-    from gelslim.cli.answer import BAD_INPUT, RULE_FAILED
-
-    return RULE_FAILED if "is feasible" in str(error) else BAD_INPUT
-
-
-def _binding(chosen: Any) -> tuple[str, ...]:
-    from gelslim_cad.checks.binding import binding_sentences
-    from gelslim_cad.dimensions import derive
-
-    return binding_sentences(chosen, derive(chosen))
+        status = RULE_FAILED if "is feasible" in str(error) else BAD_INPUT
+        raise CommandError(f"gelslim optimise: {error}", status) from error
 
 
 def _record(best: Optimum, words: tuple[str, ...]) -> dict[str, Any]:
@@ -170,9 +141,6 @@ def _record(best: Optimum, words: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, number, say
     from gelslim_cad.explore.axis import shown
 
     value = best.row[best.goal.column]
@@ -186,19 +154,17 @@ def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
         say(f"  {path}: {shown(chosen)}{end}")
     for sentence in words:
         say(sentence)
-    table = Table("a step further", box=None, pad_edge=False)
-    table.add_column(best.goal.words, justify="right")
-    table.add_column("difference", justify="right")
-    table.add_column("what stops it")
+    steps = table("a step further", figures=(best.goal.words, "difference"))
+    steps.add_column("what stops it")
     for n in best.neighbours:
         here = n.goal if n.status == "feasible" else None
-        table.add_row(
+        steps.add_row(
             f"{n.path.removeprefix('design.')} {shown(n.value)}",
             "" if here is None else number(here, best.goal.unit),
             "" if here is None else f"{'+' if here > value else ''}{number(here - value)}",
             _stop(n),
         )
-    console().print(table)
+    console().print(steps)
 
 
 def _stop(n: Neighbour) -> str:

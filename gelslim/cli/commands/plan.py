@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim.cli.budget import PoseTime, SceneError
+from gelslim.cli.answer import console, say, table
+from gelslim.cli.budget import PoseTime, SceneError, budgeted_scene
 from gelslim.cli.options import AsJson
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ def plan(
     For each effect it says whether it is included and why, the largest error of leaving it out,
     the chosen rung and the predicted time. Nothing is simulated or written.
     """
-    from gelslim.cli.budget import budgeted_scene
     from gelslim.contacts import plan as planned
     from gelslim_twin.scene.reader import read_scene
 
@@ -41,18 +41,15 @@ def plan(
 
 def print_plan(made: Plan) -> None:
     """Print a table of the effects, and which of them exceed the tolerance."""
-    from rich.table import Table
-
-    from gelslim.cli.answer import console, say
     from gelslim_twin.effects.effect import unit_of
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
+    rows = table(padding=(0, 2, 0, 0))
     for title in ("effect", "", "if left out", "rung", "ms"):
-        table.add_column(title, no_wrap=True)
-    table.add_column("why")
+        rows.add_column(title, no_wrap=True)
+    rows.add_column("why")
     for choice in made.choices:
-        table.add_row(*_row(choice), style=None if choice.included else "dim")
-    console().print(table)
+        rows.add_row(*_row(choice), style=None if choice.included else "dim")
+    console().print(rows)
     print(
         f"{made.scene}: {made.predicted_ms:.3g} ms per pose predicted, {made.poses} poses, "
         f"{made.predicted_ms * made.poses / 1000:.3g} s."

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from gelslim.cli.output import replace_file, spare_strangers
+
 
 def schema(
     out: Annotated[
@@ -29,7 +31,6 @@ def schema(
     if out is None:
         print(text, end="")
         return 0
-    from gelslim.cli.output import replace_file, spare_strangers
 
     spare_strangers(out, b"gelslim-", "schema of gelslim")
     replace_file(out, text.encode())

@@ -8,16 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
-from gelslim.cli.budget import PoseTime, SceneError
+from gelslim.cli.answer import print_json, progress_bar, say
+from gelslim.cli.budget import PoseTime, SceneError, budgeted_scene
 from gelslim.cli.commands.plan import SceneFile
-from gelslim.cli.options import AsJson
+from gelslim.cli.options import AsJson, out_folder
 
 
 def simulate(
     scene: SceneFile,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Folder to write; by default out/NAME.")
-    ] = None,
+    out: Annotated[Path | None, out_folder("out/NAME")] = None,
     count: Annotated[
         int | None,
         typer.Option(
@@ -42,8 +41,6 @@ def simulate(
     interrupted run continues where it stopped. With --count, the command makes a data set: each
     scene is drawn from the `vary` block, with the tolerance that a budget gives the scene itself.
     """
-    from gelslim.cli.answer import print_json, progress_bar
-    from gelslim.cli.budget import budgeted_scene
     from gelslim.contacts import simulate as simulated
     from gelslim_twin.scene.reader import read_scene
 
@@ -69,8 +66,6 @@ def simulate(
 
 
 def _report(folder: Path, answer: dict[str, Any]) -> None:
-    from gelslim.cli.answer import say
-
     many = answer["scenes"]
     what = "scene" if many == 1 else f"{many} scenes"
     say(

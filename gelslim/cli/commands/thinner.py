@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gelslim.cli.answer import OK, RULE_FAILED, console, indented, number, print_json, say
 from gelslim.cli.commands.explore import NoisePx, Rays
+from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, SpecFile
+from gelslim.cli.price_table import figure_text, per_cent, price_record
 
 if TYPE_CHECKING:
     from gelslim_cad.explore.price import Price
@@ -34,8 +37,6 @@ def thinner(
     of keystone, blur, brightness, exposure, force error and stiffness in per cent. Nothing is
     written. The exit status is 1 if no single field reaches the thickness.
     """
-    from gelslim.cli.answer import OK, RULE_FAILED, print_json
-    from gelslim.cli.failure import CommandError
     from gelslim_cad.explore.axis import ExploreError
     from gelslim_cad.explore.thinner import thinner as run
     from gelslim_cad.spec.reader import read_spec
@@ -53,8 +54,6 @@ def thinner(
 
 
 def _record(name: str, offer: Offer) -> dict[str, Any]:
-    from gelslim.cli.price_table import price_record
-
     return {
         "format": "gelslim-thinner/1",
         "name": name,
@@ -76,8 +75,6 @@ def _record(name: str, offer: Offer) -> dict[str, Any]:
 
 
 def _report(name: str, path: str, offer: Offer) -> None:
-    from gelslim.cli.answer import say
-    from gelslim.cli.price_table import figure_text
     from gelslim_cad.explore.price import FIGURES
 
     aim = "" if offer.to_mm is None else f", {offer.to_mm:g} mm asked for"
@@ -99,7 +96,8 @@ def _report(name: str, path: str, offer: Offer) -> None:
 
 def _print_concession(c: Concession, offer: Offer) -> None:
     """Print the thickness that one field gives, and what it costs, gains and changes."""
-    from gelslim.cli.answer import number, say
+    from rich.text import Text
+
     from gelslim_cad.explore.price import SAME
 
     short = "" if c.reaches or c.breaks or offer.to_mm is None else ", the thinnest by this field"
@@ -110,25 +108,14 @@ def _print_concession(c: Concession, offer: Offer) -> None:
         style="bold" if c.reaches else "",
     )
     if c.breaks:
-        _indented(f"forbidden: breaks {', '.join(c.breaks)}", style="red")
+        console().print(indented(Text(f"forbidden: breaks {', '.join(c.breaks)}", style="red"), 2))
         return
     changes = [p for p in c.prices[1:] if p.change is None or abs(p.change) >= SAME]
     for word, verdict in (("costs", "worse"), ("gains", "better"), ("changes", "")):
         listed = ", ".join(_change(p) for p in changes if p.verdict == verdict)
         if listed or word == "costs":
-            _indented(f"{word} {listed or 'nothing among these figures'}")
-
-
-def _indented(text: str, style: str = "") -> None:
-    from rich.padding import Padding
-    from rich.text import Text
-
-    from gelslim.cli.answer import console
-
-    console().print(Padding(Text(text, style=style), (0, 0, 0, 2), expand=False))
+            console().print(indented(f"{word} {listed or 'nothing among these figures'}", 2))
 
 
 def _change(p: Price) -> str:
-    from gelslim.cli.price_table import figure_text, per_cent
-
     return f"{p.figure.words} {per_cent(p.change)} ({figure_text(p.figure, p.after)})"

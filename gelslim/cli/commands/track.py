@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gelslim.cli.options import AsJson, MostFrames, OverlayPictures
+from gelslim.cli.answer import print_json, progress_bar, say
+from gelslim.cli.failure import CommandError
+from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, out_folder
+from gelslim.cli.output import replace_file, spare_strangers_in
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,9 +37,7 @@ Reference = Annotated[
     Path | None,
     typer.Option("-r", "--reference", help="Picture without contact; by default the first frame."),
 ]
-TrackFolder = Annotated[
-    Path | None, typer.Option("-o", "--out", help="Folder to write; by default out/NAME-track.")
-]
+TrackFolder = Annotated[Path | None, out_folder("out/NAME-track")]
 Diameters = Annotated[
     str | None,
     typer.Option(
@@ -66,14 +67,15 @@ def track(
     the coverage of each frame, summary.json, and overlay pictures. Ctrl-C ends a run with a camera
     and keeps its files.
     """
-    from gelslim.cli.answer import print_json, progress_bar
-    from gelslim.cli.output import spare_strangers_in
+    from gelslim_force.calibration.reference_picture import read_reference
     from gelslim_force.frames.source import open_frames
     from gelslim_force.outputs.track_record import TrackRecord
 
     settings = _settings(diameters_px)
     # A bad reference must be refused before the source opens and frames are lost.
-    rest = None if reference is None else _at_rest(_picture(reference), settings, str(reference))
+    rest = (
+        None if reference is None else _at_rest(read_reference(reference), settings, str(reference))
+    )
     folder = out or Path("out") / f"{_name(frames)}-track"
     spare_strangers_in(folder, FILES, FILES[0], b"places_px")
     with open_frames(frames, frames_per_s) as source, progress_bar(quiet=as_json) as tell:
@@ -94,7 +96,6 @@ def track(
 
 
 def _write(folder: Path, record: TrackRecord, summary: dict[str, Any]) -> None:
-    from gelslim.cli.output import replace_file
     from gelslim_core.files.replaced_file import json_bytes
 
     tracks, table, told = FILES
@@ -156,8 +157,6 @@ def _follow(
 
 
 def _settings(diameters: str | None) -> Any:
-    from gelslim.cli.failure import CommandError
-
     if diameters is None:
         return None
     import numpy as np
@@ -173,14 +172,7 @@ def _settings(diameters: str | None) -> Any:
         ) from error
 
 
-def _picture(reference: Path) -> NDArray[np.uint8]:
-    from gelslim_force.calibration.reference_picture import read_reference
-
-    return read_reference(reference)
-
-
 def _at_rest(image: NDArray[np.uint8], settings: Any, name: str) -> DotsAtRest:
-    from gelslim.cli.failure import CommandError
     from gelslim_force.dot_tracking import dots_at_rest
 
     try:
@@ -206,8 +198,6 @@ def _picture_sink(rest: DotsAtRest, folder: Path, most: int) -> PictureSink | No
 
 
 def _report(folder: Path, summary: dict[str, Any], rest: DotsAtRest, pictures: int) -> None:
-    from gelslim.cli.answer import say
-
     rows, columns = rest.lattice_shape
     say(
         f"{summary['markers']} dots on a lattice of {rows} x {columns}, "
