@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from cli_samples import ROOT, fresh
 
+from gelslim import doctor
 from gelslim.cli import main
-from gelslim.doctor import libraries
-from gelslim.doctor.realtime import RealTime, Timed
+from gelslim.doctor import RealTime, Timed
 from gelslim_core import extras as extras_module
 from gelslim_core.optional_library import EXTRAS, extra_of, install_command, installed
 
@@ -37,7 +37,7 @@ def test_the_extras_are_those_of_the_package() -> None:
         listed = tomllib.load(stream)["project"]["optional-dependencies"]
     for extra in EXTRAS:
         wanted = {line.partition(">")[0] for line in listed[extra.name]}
-        named = {libraries.DISTRIBUTIONS.get(m, m) for m in extra.modules}
+        named = {doctor.DISTRIBUTIONS.get(m, m) for m in extra.modules}
         assert named == wanted, extra.name
     assert {e.name for e in EXTRAS} == set(listed) - {"dev", "docs", "mutants", "peers", "all"}
 
@@ -51,7 +51,7 @@ def test_a_missing_extra_is_named_with_its_command(
         return module not in lacking and installed(module)
 
     monkeypatch.setattr(extras_module, "installed", without)
-    monkeypatch.setattr(libraries, "installed", without)
+    monkeypatch.setattr(doctor, "installed", without)
     states = {e["name"]: e for e in answered(capsys, "--quick")["extras"]}
     assert states["cad"]["ready"] is False
     assert states["cluster"]["ready"] is False
@@ -68,7 +68,7 @@ def test_a_library_that_does_not_load_or_ends_its_process_is_told(
     (tmp_path / "deadly_one.py").write_text("import os; os._exit(7)")
     (tmp_path / "sound_one.py").write_text("")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    found = libraries.loading(["broken_one", "deadly_one", "sound_one"])
+    found = doctor.loading(["broken_one", "deadly_one", "sound_one"])
     assert "libGL.so.1" in found["broken_one"]
     assert "7" in found["deadly_one"]
     assert found["sound_one"] == ""

@@ -11,9 +11,7 @@ from gelslim.cli.answer import console, print_json, progress_bar, say, table
 from gelslim.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from gelslim.doctor.libraries import ExtraState
-    from gelslim.doctor.machine import Kernels, Threads
-    from gelslim.doctor.realtime import RealTime
+    from gelslim.doctor import ExtraState, Kernels, RealTime, Threads
 
 
 def doctor(
@@ -29,8 +27,7 @@ def doctor(
     measures small force operators, which takes about ten seconds. The exit status is 0 even if
     something is missing.
     """
-    from gelslim.doctor.libraries import extras, required
-    from gelslim.doctor.machine import drawing, kernels, missing_graphics, system, threads
+    from gelslim.doctor import drawing, extras, kernels, missing_graphics, required, system, threads
     from gelslim_core import __version__
 
     with progress_bar(quiet=as_json) as tell:
@@ -70,7 +67,7 @@ def doctor(
 
 def _speed() -> tuple[RealTime | None, str]:
     """Return the times, or why there are none. An error here must not hide the other answers."""
-    from gelslim.doctor.realtime import time_operators
+    from gelslim.doctor import time_operators
 
     try:
         return time_operators(), ""
@@ -125,7 +122,7 @@ def _print_machine(cores: Threads, cache: Kernels) -> None:
 
 
 def _print_speed(speed: RealTime | None, problem: str) -> None:
-    from gelslim.doctor.realtime import CELLS, FRAME_RATE_HZ, LAYERS, PASSES
+    from gelslim.doctor import CELLS, FRAME_RATE_HZ, LAYERS, PASSES
 
     if speed is None:
         say(f"real time: {problem}")

@@ -13,7 +13,6 @@ from gelslim.cli.answer import print_json, progress_bar
 from gelslim.cli.budget import FieldError, FrameTime, budget_of
 from gelslim.cli.options import AsJson, SpecFile, out_folder
 from gelslim.cli.output import replace_file, spare_strangers_in
-from gelslim.cli.validate_report import budget_png, fields_png, print_validation, resultants_png
 
 if TYPE_CHECKING:
     from gelslim_twin.simulation.sensor import TwinSensor
@@ -40,6 +39,7 @@ def validate(
     error budget, rods and a punch follow. Writes validation.json and pictures. --error and --time
     choose the operator of the pipeline from a ladder that is measured first.
     """
+    from gelslim.cli.validate_report import print_validation
     from gelslim.contacts import validate as validated
     from gelslim.scene_sensor import spec_bundle
     from gelslim_cad.spec.reader import read_spec
@@ -73,6 +73,7 @@ def validate(
 
 def _draw(found: Validation, folder: Path) -> list[str]:
     """Write plots, and the last frame of some contacts with the result of the pipeline."""
+    from gelslim.cli.validate_report import budget_png, fields_png, resultants_png
     from gelslim_force.outputs.arrow_scale import scale_of_run
     from gelslim_force.outputs.overlay import Overlay, write_overlay
     from gelslim_twin.validation.score import PAPER_N, PAPER_RELATIVE

@@ -1,1 +1,0 @@
-"""What this machine offers: libraries, processors, rendering and speed of the force operators."""
