@@ -122,7 +122,7 @@ class WrenchNoise:
                 correlated too: the apparent motion of an unknown depth.
         """
         count = len(marker_covariance_mm2)
-        spread = (gains[:, :, None, :] @ marker_covariance_mm2)[:, :, 0, :]
+        spread = np.einsum("aki,kij->akj", gains, marker_covariance_mm2)
         total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
         if normal_sigma_mm is not None:
             sensitivity = self.response[:, :, 2] @ normal_sigma_mm

@@ -108,9 +108,9 @@ class SlowTracer:
             if ray.weight < self.cut:
                 self.book["truncated"] += ray.weight
                 continue
-            waiting.extend(self._one_step(ray))
+            waiting.extend(self.step(ray))
 
-    def _one_step(self, ray: Ray) -> list[Ray]:
+    def step(self, ray: Ray) -> list[Ray]:
         self.book["crossings"] += 1
         hit = min(self._hits(ray), key=lambda h: h.distance_mm, default=None)
         if hit is None:

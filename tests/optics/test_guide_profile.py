@@ -9,7 +9,7 @@ import pytest
 from light_cases import transformed
 from matplotlib.path import Path
 
-from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment, facetted_profile
 from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
@@ -192,3 +192,143 @@ def test_edges_need_two_media_and_a_length() -> None:
         Arc((0, 0), 0.0, 0.0, 1.0)
     with pytest.raises(ValueError, match="sweep_rad"):
         Arc((0, 0), 1.0, 0.0, 0.0)
+
+
+TOP_MM = 1.7
+
+
+@pytest.mark.parametrize("bend_deg", [60.0, 90.0, 130.0])
+def test_corners_of_a_curved_guide_are_those_of_its_drawing(bend_deg: float) -> None:
+    """Window 20 x 2 at z = 1.7, bends of inner radius 3, legs of 5 that end 3 wide."""
+    guide = CurvedGuide(20, 2, 3, 5, math.radians(bend_deg), 3.0, TOP_MM)
+    profile = curved_profile(guide, GelSection(14, 1.5, 0.6))
+    # Complex numbers y + iz about the centre of the right bend; the bend turns clockwise.
+    centre, turned = complex(10, TOP_MM - 2 - 3), np.exp(-1j * math.radians(bend_deg))
+    along = turned
+    across = 1j * turned
+    expected = {
+        "window_bottom": (complex(-10, TOP_MM - 2), complex(10, TOP_MM - 2)),
+        "inner_bend_right": (centre + 3j, centre + 3 * across),
+        "inner_leg_right": (centre + 3 * across, centre + 2.5 * across + 5 * along),
+        "foot_right": (centre + 2.5 * across + 5 * along, centre + 5.5 * across + 5 * along),
+        "outer_leg_right": (centre + 5.5 * across + 5 * along, centre + 5 * across),
+        "outer_bend_right": (centre + 5 * across, centre + 5j),
+        "window_top_right": (complex(10, TOP_MM), complex(7, TOP_MM)),
+        "gel_window": (complex(7, TOP_MM), complex(-7, TOP_MM)),
+        "window_top_left": (complex(-7, TOP_MM), complex(-10, TOP_MM)),
+        "gel_side_right": (complex(7, TOP_MM), complex(7, TOP_MM + 1.5)),
+        "gel_face": (complex(7, TOP_MM + 1.5), complex(-7, TOP_MM + 1.5)),
+        "gel_side_left": (complex(-7, TOP_MM + 1.5), complex(-7, TOP_MM)),
+    }
+    for name, ends in list(expected.items()):
+        if name.endswith("_right") and "window" not in name and "gel" not in name:
+            # The left side is the mirror image, run from the other end.
+            left = tuple(complex(-p.real, p.imag) for p in reversed(ends))
+            expected[name.replace("_right", "_left")] = left
+    assert {edge.name for edge in profile.edges} == set(expected)
+    for edge in profile.edges:
+        found = [complex(*edge.curve.start), complex(*edge.curve.end)]
+        np.testing.assert_allclose(found, expected[edge.name], atol=1e-12)
+    assert profile.edge("gel_face").curve.at(0.5) == pytest.approx((0.0, TOP_MM + 2.1))
+    for name in ("inner_bend_right", "outer_bend_left"):
+        curve = profile.edge(name).curve
+        assert abs(curve.sweep_rad) == pytest.approx(math.radians(bend_deg))
+        assert curve.length_mm == pytest.approx(curve.radius_mm * math.radians(bend_deg))
+
+
+@pytest.mark.parametrize("fit", ["glued", "air_gap"])
+def test_corners_of_a_mirror_guide_are_those_of_its_drawing(fit: str) -> None:
+    guide = MirrorGuide(20, 2, 5, fit, TOP_MM)  # type: ignore[arg-type]
+    profile = mirror_profile(guide, GelSection(20, 1.5))
+    low, foot = TOP_MM - 2, TOP_MM - 7
+    expected = {
+        "gel_window": ((10, TOP_MM), (-10, TOP_MM)),
+        "window_bottom": ((-10, low), (10, low)),
+        "inner_leg_right": ((10, low), (10, foot)),
+        "foot_right": ((10, foot), (12, foot)),
+        "outer_leg_right": ((12, foot), (12, low)),
+        "mirror_right": ((12, low), (10, TOP_MM)),
+        "gel_face": ((10, TOP_MM + 1.5), (-10, TOP_MM + 1.5)),
+    }
+    if fit == "air_gap":
+        expected["window_end_right"] = ((10, low), (10, TOP_MM))
+        expected["leg_top_right"] = ((12, low), (10, low))
+    for name, (start, end) in expected.items():
+        curve = profile.edge(name).curve
+        assert curve.start == pytest.approx(start)
+        assert curve.end == pytest.approx(end)
+        if name.endswith("_right"):
+            mirrored = profile.edge(name.replace("_right", "_left")).curve
+            assert mirrored.start == pytest.approx((-end[0], end[1]))
+            assert mirrored.end == pytest.approx((-start[0], start[1]))
+
+
+def test_limits_of_shapes_are_allowed_themselves() -> None:
+    widest = CurvedGuide(20, 2, 3, 5, math.radians(150))
+    assert len(curved_profile(widest, GelSection(20, 1.5)).bends()) == 2
+    flush = [e.name for e in curved_profile(widest, GelSection(20, 1.5)).edges]
+    assert "window_top_right" not in flush
+    half_round = curved_profile(widest, GelSection(20, 1.5, 10.0)).edge("gel_face").curve
+    assert half_round.sweep_rad == pytest.approx(math.pi)
+    assert half_round.radius_mm == pytest.approx(10.0)
+    assert curved_profile(CurvedGuide(20, 2, 1, 3, foot_thickness_mm=3.99)).edge("foot_left")
+    with pytest.raises(ValueError, match="foot reaches"):
+        curved_profile(CurvedGuide(20, 2, 1, 3, foot_thickness_mm=4.0))
+
+
+def bent(inner: Arc, outer: Arc) -> GuideProfile:
+    """A ring sector between two arcs, closed by straight ends."""
+    return GuideProfile(
+        (
+            Edge("outer", outer, "acrylic", "air"),
+            Edge("far", Segment(outer.end, inner.start), "acrylic", "air"),
+            Edge("inner", inner, "acrylic", "air"),
+            Edge("near", Segment(inner.end, outer.start), "acrylic", "air"),
+        )
+    )
+
+
+def test_only_concentric_arcs_of_equal_sweep_are_a_bend() -> None:
+    outer, sweep = Arc((2.0, 1.0), 5.0, 0.2, 1.1), -1.1
+    (bend,) = bent(Arc((2.0, 1.0), 3.5, 1.3, sweep), outer).bends()
+    assert (bend.centre, bend.inner_radius_mm, bend.outer_radius_mm) == ((2.0, 1.0), 3.5, 5.0)
+    assert bend.sweep_rad == pytest.approx(1.1)
+    assert bend.thickness_mm == pytest.approx(1.5)
+    assert bend.ratio == pytest.approx(3.5 / 1.5)
+    for inner, found in (
+        (Arc((2.0, 1.0 + 4e-6), 3.5, 1.3, sweep), 1),
+        (Arc((2.0, 1.0 + 6e-6), 3.5, 1.3, sweep), 0),
+        (Arc((2.0, 1.0), 3.5, 1.3, sweep + 0.9e-6), 1),
+        (Arc((2.0, 1.0), 3.5, 1.3, sweep + 1.2e-6), 0),
+        (Arc((2.0, 1.0), 5.5, 1.3, sweep), 0),
+        (Arc((2.0, 1.0), 3.5, 0.2, 1.1), 0),
+    ):
+        edges = [Edge("outer", outer, "acrylic", "air"), Edge("inner", inner, "acrylic", "air")]
+        assert len(GuideProfile(tuple(edges)).bends()) == found
+    backwards = GuideProfile(tuple(e.reversed() for e in bent(
+        Arc((2.0, 1.0), 3.5, 1.3, sweep), outer
+    ).edges))  # fmt: skip
+    assert backwards.bends() == (bend,)
+
+
+def test_chords_are_equal_and_end_on_the_arc() -> None:
+    profile = SHAPES["crowned"]
+    rough = facetted_profile(profile, 7.0, 3.5)
+    for name in ("inner_bend_left", "outer_bend_right"):
+        arc = profile.edge(name).curve
+        chords = [e.curve for e in rough.edges if e.name == name]
+        # 90° in steps of at most 7°.
+        assert len(chords) == 13
+        assert chords[0].start == pytest.approx(arc.start)
+        assert chords[-1].end == pytest.approx(arc.end)
+        for chord in chords:
+            assert math.dist(chord.start, arc.centre) == pytest.approx(arc.radius_mm)
+            half = math.radians(90 / 13 / 2)
+            assert chord.length_mm == pytest.approx(2 * arc.radius_mm * math.sin(half))
+    # The face of the gel is no wall of the guide.
+    assert rough.edge("gel_face").curve == profile.edge("gel_face").curve
+    for facet, margin in ((90.1, 99.0), (-1.0, 9.0), (7.0, 3.4)):
+        with pytest.raises(ValueError, match="facet"):
+            facetted_profile(profile, facet, margin)
+    assert facetted_profile(profile, 7.0, 0.0, allow=True).edges == rough.edges
+    assert len(facetted_profile(profile, 90.0, 45.0).edges) == len(profile.edges)

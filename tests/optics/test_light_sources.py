@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from light_cases import N_ACRYLIC, finger, transformed
 
+from gelslim_optics.guide.shapes import CurvedGuide, GelSection, curved_profile
 from gelslim_optics.light.launch import launch, launch_medium, point_batches
 from gelslim_optics.light.scene import LightScene, default_media
 from gelslim_optics.light.source import Dome, EdgeLaunch, Lambertian, LedRow, MeasuredLaw
@@ -124,6 +125,14 @@ def test_a_batch_that_does_not_divide_the_count_ends_with_the_rest() -> None:
         assert not np.array_equal(other, whole)
 
 
+def test_sobol_points_fill_every_stratum_once_and_random_ones_do_not() -> None:
+    for sampling, once in (("sobol", True), ("random", False)):
+        (points,) = point_batches(512, 512, seed=1, replicate=0, source=0, sampling=sampling)
+        strata = np.sort((512 * points).astype(int), axis=0)
+        assert np.all(strata == np.arange(512)[:, None]) == once
+        assert 0 <= points.min() <= points.max() < 1
+
+
 def frame(scene: LightScene, edge: str, medium: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middle of an edge, its direction, and its normal into a medium; (y, z) each."""
     found = scene.profile.edge(edge)
@@ -133,15 +142,15 @@ def frame(scene: LightScene, edge: str, medium: str) -> tuple[np.ndarray, np.nda
     return (start + end) / 2, along, left if found.left == medium else -left
 
 
-def turned(scene: LightScene) -> LightScene:
-    """Mirrored: the edges run the other way round, with the acrylic on their right."""
-    return replace(scene, profile=transformed(scene.profile, 0.4, 1.1, mirrored=True))
+def slanted(*, mirrored: bool) -> LightScene:
+    """Feet that lean; mirrored, the edges have the acrylic on their right."""
+    guide = CurvedGuide(20.0, 2.0, 6.0, 5.0, math.radians(65))
+    profile = curved_profile(guide, GelSection(12.0, 2.0))
+    moved = transformed(profile, 0.4, 1.1, mirrored=mirrored)
+    return replace(finger(3.0, gel_part=0.6), profile=moved)
 
 
-SCENES = {
-    "plain": finger(3.0, gel_part=0.6),
-    "turned": turned(finger(3.0, gel_part=0.6)),
-}
+SCENES = {"plain": slanted(mirrored=False), "turned": slanted(mirrored=True)}
 
 
 @pytest.mark.parametrize("name", SCENES)

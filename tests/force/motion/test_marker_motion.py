@@ -8,6 +8,7 @@ from camera_rig import off_centre_view
 from synthetic import grid_of_dots
 
 from gelslim_force.motion.marker_motion import COMPENSATIONS, MarkerView
+from gelslim_optics.camera.projection_error import projection_error_mm
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +81,39 @@ def test_bad_arguments_are_named(pressed) -> None:
         view.lateral_motion(now, 0.0, "linear")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="finite"):
         MarkerView(view.camera, np.full((3, 2), np.nan))
+
+
+def test_motion_is_in_the_plane_unless_a_depth_is_given(pressed) -> None:
+    view, now, _ = pressed
+    there = view.camera.backproject(now, 0.0)[:, :2]
+    np.testing.assert_allclose(view.lateral_motion(now), there - view.rest_mm[:, :2], atol=1e-12)
+    for model in COMPENSATIONS:
+        np.testing.assert_array_equal(
+            view.lateral_motion(now, compensation=model), view.lateral_motion(now, 0.0, model)
+        )
+
+
+def test_the_papers_models_subtract_their_error_from_the_motion_in_the_plane(pressed) -> None:
+    view, now, motion = pressed
+    for model in ("printed", "arctan"):
+        error = projection_error_mm(view.camera, view.rest_mm, motion[:, 2], model)
+        expected = view.lateral_motion(now) - error
+        np.testing.assert_allclose(view.lateral_motion(now, motion[:, 2], model), expected)
+    np.testing.assert_array_equal(
+        view.lateral_motion(now, motion[:, 2], "none"), view.lateral_motion(now)
+    )
+
+
+def test_a_crowned_pad_is_seen_at_its_height() -> None:
+    camera = off_centre_view()
+    rest = np.array([[1.0, 2.0, 0.3], [-3.0, 0.5, -0.2]])
+    view = MarkerView(camera, camera.project(rest), rest[:, 2])
+    np.testing.assert_allclose(view.rest_mm, rest, atol=1e-11)
+    moved = rest + np.array([[0.1, -0.2, -0.4], [0.0, 0.3, 0.1]])
+    found = view.lateral_motion(camera.project(moved), [-0.4, 0.1])
+    np.testing.assert_allclose(found, [[0.1, -0.2], [0.0, 0.3]], atol=1e-11)
+    scale = np.linalg.inv(camera.jacobian(rest))
+    np.testing.assert_allclose(view.mm_per_px, scale)
+    for bad in (np.zeros(4), np.zeros((4, 3)), np.array([[np.inf, 0.0]])):
+        with pytest.raises(ValueError, match="reference positions"):
+            MarkerView(camera, bad)

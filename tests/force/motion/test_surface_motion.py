@@ -94,3 +94,77 @@ def test_apparent_over_seen_of_a_true_and_of_a_false_contact(surface) -> None:
     nothing = NormalReading(w, 0 * w, None)
     assert surface.in_contact(true, nothing) is None
     assert surface.apparent_over_seen(false, nothing) == 0.0
+
+
+def test_ratio_of_apparent_and_seen_motion_by_its_formula(surface) -> None:
+    away = np.hypot(surface.points_mm[:, 0] - 2.0, surface.points_mm[:, 1] + 1.0)
+    w = -0.3 * np.exp(-((away / 3.0) ** 2))
+    reading = NormalReading(w, 0 * w, away < 2.5)
+    rng = np.random.default_rng(4)
+    motion = rng.normal(0, 0.1, (len(surface.markers), 3))
+    motion[7, 0] = np.nan
+    share = surface.nodes_to_markers @ (away < 2.5).astype(float)
+    inside = (share > 0.5) & np.isfinite(motion[:, 0])
+    assert 3 < inside.sum() < len(inside) / 2
+    depth = surface.nodes_to_markers @ w
+    apparent = surface.apparent_per_mm[surface.markers] * depth[:, None]
+    seen = motion[:, :2] + apparent
+    rms = [np.sqrt(np.mean(v[inside] ** 2)) for v in (apparent, seen)]
+    assert surface.apparent_over_seen(motion, reading) == pytest.approx(rms[0] / (rms[1] + 0.01))
+    found = surface.in_contact(motion, reading)
+    assert found == pytest.approx(motion[inside, :2].mean(axis=0))
+
+
+def test_motion_is_told_from_noise_by_the_fourth_largest(surface) -> None:
+    motion = np.zeros((len(surface.markers), 3))
+    motion[:3, :2] = [0.3, 0.4]
+    assert not surface.moved(motion)
+    motion[3, :2] = [0.0, 0.029]
+    assert not surface.moved(motion)
+    motion[3, :2] = [0.0248, 0.0186]
+    assert surface.moved(motion)
+    motion[3, 0] = np.nan
+    assert not surface.moved(motion)
+    # Of four markers or fewer the one that moves most decides.
+    few = np.full_like(motion, np.nan)
+    assert not surface.moved(few)
+    few[:4] = 0.0
+    few[2, :2] = [0.031, 0.0]
+    assert surface.moved(few)
+    few[2, :2] = [0.029, 0.0]
+    assert not surface.moved(few)
+
+
+def test_noise_of_positions_moves_the_nodes_by_the_scale_of_the_picture(surface) -> None:
+    noise = np.random.default_rng(5).normal(0, 1, (len(surface.markers), 2))
+    found = surface.of_noise(noise)
+    of_all = np.zeros((surface.interpolation.n_markers, 2))
+    for k, marker in enumerate(surface.markers):
+        scale = np.linalg.inv(CAMERA.jacobian(surface.view.rest_mm[k : k + 1])[0])
+        of_all[marker] = scale @ noise[k]
+    np.testing.assert_allclose(found[:, :2], surface.interpolation(of_all), atol=1e-12)
+    assert not found[:, 2].any()
+
+
+def test_nodes_follow_the_markers_that_are_left(surface) -> None:
+    motion = np.random.default_rng(6).normal(0, 0.1, (len(surface.markers), 3))
+    motion[[4, 20]] = np.nan
+    w = np.linspace(-0.2, 0.0, len(surface.points_mm))
+    operator, u = surface.of_nodes(motion, NormalReading(w, 0 * w, None))
+    of_all = np.full((surface.interpolation.n_markers, 2), np.nan)
+    of_all[surface.markers] = motion[:, :2]
+    lost = np.isnan(of_all).any(axis=1)
+    assert np.flatnonzero(lost).tolist() == sorted(
+        [NOT_FOLLOWED, surface.markers[4], surface.markers[20]]
+    )
+    left = surface.interpolation.with_missing(lost)
+    np.testing.assert_allclose(u[:, :2], left(of_all), atol=1e-12)
+    np.testing.assert_allclose(operator(of_all), left(of_all), atol=1e-12)
+    np.testing.assert_array_equal(u[:, 2], w)
+    _, blind = surface.of_nodes(motion, None)
+    assert np.isnan(blind[:, 2]).all()
+    lateral = surface.of_markers(surface.view.reference_px + 1.0, None)
+    np.testing.assert_allclose(
+        lateral[:, :2], surface.view.lateral_motion(surface.view.reference_px + 1.0)
+    )
+    assert np.isnan(lateral[:, 2]).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from gelslim_force.forces.estimator import curvature_operator, neighbour_matrix
 from gelslim_force.forces.low_pass import normal_noise_mm
@@ -57,3 +58,23 @@ def test_normal_noise_is_the_one_that_was_added() -> None:
     assert normal_noise_mm(bend, dent + rng.normal(0, 0.01, len(nodes))) == pytest.approx(
         0.01, rel=0.1
     )
+
+
+def test_sigma_is_the_lower_quartile_over_that_of_a_normal_variable() -> None:
+    values = np.random.default_rng(7).normal(0, 1, (9, 2))
+    quartile = np.quantile(np.abs(values), 0.25)
+    # A normal variable is within 0.31864 sigma in a quarter of the cases.
+    assert robust_sigma(values) == pytest.approx(quartile / norm.ppf(0.625), rel=1e-4)
+    assert robust_sigma(values[:8]) > 0
+    assert robust_sigma(values[:7]) == 0
+
+
+def test_noise_is_that_of_markers_whose_four_neighbours_are_seen() -> None:
+    moved = np.random.default_rng(8).normal(0, 0.3, (len(SITES), 2))
+    moved[[3, 400, 777]] = np.nan
+    grid = moved.reshape(ROWS, COLUMNS, 2)
+    around = (grid[:-2, 1:-1] + grid[2:, 1:-1] + grid[1:-1, :-2] + grid[1:-1, 2:]) / 4
+    off = (grid[1:-1, 1:-1] - around).reshape(-1, 2)
+    off = off[np.isfinite(off).all(axis=1)]
+    expected = np.quantile(np.abs(off), 0.25) / norm.ppf(0.625) / np.sqrt(1.25)
+    assert noise_px(LATTICE, moved) == pytest.approx(expected, rel=1e-4)
