@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 from bench_data import write_data
+from facets import facetted_profile
 from light_ratios import changes, earlier, ratios
 from light_rays_figure import draw
 from machine import machine
 
 from gelslim_cad.light.study import RAYS
-from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment, facetted_profile
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
 from gelslim_optics.guide.shapes import CurvedGuide, GelSection, curved_profile
 from gelslim_optics.guide.tir_certificate import certify_tir
 from gelslim_optics.light.launch import Sampling
@@ -117,7 +118,7 @@ def facets() -> dict[str, Any]:
     margin = certify_tir(exact, GUIDED_NA, guide_index=N_ACRYLIC).bends[0].margin_deg
     rows = []
     for facet in (0.0, *FACETS_DEG):
-        profile = facetted_profile(exact, facet, margin, allow=True) if facet else exact
+        profile = facetted_profile(exact, facet) if facet else exact
         lamp = EdgeLaunch("foot_right", na=GUIDED_NA)
         scene = LightScene(profile, (-10, 10), (-10, 10), (lamp,))
         result, seconds = timed(scene, FACET_RAYS)

@@ -11,13 +11,14 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.linalg import SuperLU
 
 from ifem_export.operators.condensed_operators import (
     CondensedOperator,
     DenseOperator,
     PaperOperator,
 )
-from ifem_export.operators.solver import Factor, factored
+from ifem_export.operators.solver import factored
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -45,7 +46,7 @@ class NormalCompliance:
         self._columns = columns
         self._values = np.zeros((columns, columns), dtype=np.float32)
         self._known = np.zeros(columns, dtype=bool)
-        self._factor: Factor | None = None
+        self._factor: SuperLU | None = None
         self._permutations = _symmetries(operator, columns)
         """(g, c) permutations of the nodes that leave the pad unchanged, the identity first."""
         self._original: Nodes = self._permutations.min(axis=0)

@@ -13,23 +13,6 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 Array = NDArray[np.float64]
 
 
-def pad_axes(length_mm: float, width_mm: float, pitch_mm: float = 0.5) -> tuple[Array, Array]:
-    """Coordinates x and y of a centred grid that reaches the edges of a pad.
-
-    The pitch is reduced to fit. Raises ValueError for sizes that are not positive.
-    """
-    if not (length_mm > 0 and width_mm > 0 and pitch_mm > 0):
-        raise ValueError(
-            f"a pad of {length_mm} x {width_mm} mm with a grid pitch of {pitch_mm} mm: "
-            "all three must be positive"
-        )
-    x, y = (
-        np.linspace(-size / 2, size / 2, max(1, int(np.ceil(size / pitch_mm - 1e-9))) + 1)
-        for size in (length_mm, width_mm)
-    )
-    return x, y
-
-
 def grid_points(x_mm: ArrayLike, y_mm: ArrayLike, z_mm: float = 0.0) -> tuple[Array, Array, Array]:
     """The axes x (nx,) and y (ny,) and the points (ny nx, 3) of their grid, x varying fastest.
 

@@ -8,8 +8,7 @@ medium, never two coincident edges.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 Point = tuple[float, float]
 CLOSED_MM = 1e-9
@@ -191,47 +190,3 @@ def _swept(curve: Segment | Arc) -> float:
         return (a * d - b * c) / 2
     (y, z), r = curve.centre, curve.radius_mm
     return (y * (d - b) - z * (c - a) + r * r * curve.sweep_rad) / 2
-
-
-def facetted_profile(
-    profile: GuideProfile, facet_deg: float, margin_deg: float, *, allow: bool = False
-) -> GuideProfile:
-    """The profile with each arc of acrylic replaced by equal chords, as in a mesh.
-
-    The normal of a facet differs from that of the arc by up to half the angle of the facet.
-    Light that the arc guides with a smaller margin θ - θc than this may leak, however small the
-    distance between chord and arc is.
-
-    Args:
-        profile: The profile with arcs.
-        facet_deg: Largest angle of one chord, above 0 and at most 90.
-        margin_deg: Margin of total reflection of the light that the arcs guide.
-        allow: Whether facets above twice the margin are allowed.
-
-    Returns:
-        The profile; the chords of an arc keep its name.
-
-    Raises:
-        ValueError: `facet_deg` is out of range, or above twice the margin without `allow`.
-    """
-    if not 0 < facet_deg <= 90:
-        raise ValueError(f"facet_deg = {facet_deg!r}: must be over 0 and at most 90")
-    if facet_deg / 2 > margin_deg and not allow:
-        raise ValueError(
-            f"facets of {facet_deg:g}° turn the normal by up to {facet_deg / 2:g}°, more than the "
-            f"margin of total reflection of {margin_deg:g}°, and would leak light that the arc "
-            "guides; trace the exact arcs, or use smaller facets"
-        )
-    edges: list[Edge] = []
-    for edge in profile.edges:
-        edges.extend(_chords(edge, facet_deg))
-    return GuideProfile(tuple(edges))
-
-
-def _chords(edge: Edge, facet_deg: float) -> list[Edge]:
-    arc = edge.curve
-    if not isinstance(arc, Arc) or not touches(edge, "acrylic"):
-        return [edge]
-    count = max(1, math.ceil(math.degrees(abs(arc.sweep_rad)) / facet_deg - 1e-9))
-    corners: list[Point] = [arc.at(i / count) for i in range(count + 1)]
-    return [replace(edge, curve=Segment(a, b)) for a, b in pairwise(corners)]

@@ -135,8 +135,3 @@ class LightScene:
                     raise ValueError(f"edge {edge.name} meets {medium!r}, which has no properties")
         if not self.sources:
             raise ValueError("the scene has no light source")
-
-    @property
-    def colours(self) -> tuple[str, ...]:
-        """The colours of the sources, in the order of the sources."""
-        return tuple(dict.fromkeys(source.colour for source in self.sources))

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import SuperLU
 
 from gelslim_core.files.replaced_file import replacement
 from gelslim_twin.contact.gel_state import ContactError
@@ -22,7 +23,7 @@ from gelslim_twin.contact.row_factor import RowFactor
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.solver import Factor, factored
+from ifem_export.operators.solver import factored
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ class SurfaceCompliance:
         return self.bundle.surface_operator("factor")
 
     @cached_property
-    def _factor(self) -> Factor | RowFactor | None:
+    def _factor(self) -> SuperLU | RowFactor | None:
         system = getattr(self._operator, "system", None)
         if system is None or system.columns != self.nodes:
             return None

@@ -9,7 +9,6 @@ summed, K = Σ φ_e K_e.
 from __future__ import annotations
 
 import itertools
-import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from gelslim_core.jobs import processors
 from ifem_export.assembly.occupancy_table import (
     neighbour_pattern,
     occupancy_table,
@@ -136,16 +136,10 @@ def _slot_strides(nodes: Numbering) -> NDArray[np.int64]:
 
 def _worker_count(threads: int | None, n_bytes: int) -> int:
     if threads is None:
-        return 1 if n_bytes < _SERIAL_BELOW_BYTES else _available_processors()
+        return 1 if n_bytes < _SERIAL_BELOW_BYTES else processors()
     if threads < 1:
         raise MeshError(f"threads = {threads}: must be >= 1", field="threads", value=threads)
     return threads
-
-
-def _available_processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def corner_fill(occupancy: NDArray[np.bool_], fill: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from ifem_export.errors import IfemError
 from ifem_export.operators.layered_operator import Preconditioner
@@ -65,25 +65,14 @@ class Solution:
     iterations: int
 
 
-class Factor(Protocol):
-    """A factored matrix."""
-
-    @property
-    def nnz(self) -> int:
-        """Entries that a back-substitution reads."""
-
-    def solve(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A⁻¹ b for b (n,) or (n, k)."""
-
-
-def factored(matrix: sparse.csr_array) -> Factor:
+def factored(matrix: sparse.csr_array) -> SuperLU:
     """Factor a symmetric positive definite matrix by SuperLU.
 
     Raises:
         IfemError: The matrix is singular, or there is not enough memory.
     """
     try:
-        factor: Factor = splu(
+        factor = splu(
             sparse.csc_array(matrix),
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
@@ -157,7 +146,7 @@ class SparseFactor:
     matrix: sparse.csr_array
 
     @cached_property
-    def factor(self) -> Factor:
+    def factor(self) -> SuperLU:
         """The factor. Raises IfemError for a matrix that cannot be factored."""
         return factored(self.matrix)
 

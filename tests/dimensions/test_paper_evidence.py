@@ -12,7 +12,6 @@ from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.sight import virtual_camera
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.camera.projection_error import ErrorModel, error_map
-from gelslim_optics.camera.view_quality import pad_axes
 from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
@@ -80,7 +79,7 @@ def test_errors_of_the_projection_formulas() -> None:
     """The table's figures, for a press of 0.5 mm anywhere on the gel of gelslim2."""
     camera = virtual_camera(derive(read_spec(ROOT / "designs" / "gelslim2.yaml").spec))
     height, foot = -camera.position_mm[2], camera.position_mm[0]
-    seen = error_map(camera, *pad_axes(28.0, 28.0), -0.5)
+    seen = error_map(camera, np.linspace(-14, 14, 57), np.linspace(-14, 14, 57), -0.5)
 
     def between(model: ErrorModel) -> tuple[float, float]:
         off = 100 * seen.relative(model)

@@ -14,10 +14,9 @@ from gelslim_optics.camera.projection_error import (
     error_map,
     projection_error_mm,
 )
-from gelslim_optics.camera.view_quality import pad_axes
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
-X, Y = pad_axes(28, 24)
+X, Y = np.linspace(-14, 14, 57), np.linspace(-12, 12, 49)
 PRESS = -0.5
 
 

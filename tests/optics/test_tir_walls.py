@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tir_march
+from facets import facetted_profile
 from tir_march import ARRIVED, LEAKED, LOST
 
-from gelslim_optics.guide.profile import Edge, GuideProfile, Segment, facetted_profile
+from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
 from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
@@ -208,7 +209,7 @@ def swapped(profile: GuideProfile, which: str, /, **changes: Any) -> GuideProfil
 
 
 def test_profiles_beyond_the_closed_forms_are_refused_with_the_reason() -> None:
-    facets = facetted_profile(curved(9.6), 5.0, 0.0, allow=True)
+    facets = facetted_profile(curved(9.6), 5.0)
     assert "2.5° (76 " in refused(facets)
     corner = mirror_profile(MirrorGuide(20, 2, 3))
     sharp = GuideProfile(

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from facets import facetted_profile
 from light_cases import COATS, N_ACRYLIC, bend_scene, lone_bend, loop, media, slab
 
-from gelslim_optics.guide.profile import facetted_profile
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.scene import LightScene, Surface
 from gelslim_optics.light.source import EdgeLaunch
@@ -81,7 +81,7 @@ def test_facets_leak_where_the_arc_does_not() -> None:
     exact = trace_light(bend_scene(ratio, na, planar=False), 1 << 14)
     leaks = []
     for facet in (2.5, 5.0, 15.0):
-        rough = facetted_profile(lone_bend(ratio), facet, margin_deg=0.0, allow=True)
+        rough = facetted_profile(lone_bend(ratio), facet)
         scene = bend_scene(ratio, na, planar=False, profile=rough)
         result = trace_light(scene, 1 << 14)
         assert result.value("lost") == 0
@@ -96,18 +96,10 @@ def test_facets_within_the_margin_leak_nothing() -> None:
     margin = math.degrees(math.asin(ratio / (ratio + 1)) - math.asin(1 / N_ACRYLIC))
     facet = 2 * margin * 0.6
     assert facet > 5
-    fine = facetted_profile(lone_bend(ratio), margin, margin)
+    fine = facetted_profile(lone_bend(ratio), margin)
     result = trace_light(bend_scene(ratio, 0.0, planar=True, profile=fine), 1 << 12)
     assert len(fine.edges) > 6
     assert result.value("lost") == 0
-
-
-def test_facets_beyond_the_margin_are_refused() -> None:
-    with pytest.raises(ValueError, match="facets of 5"):
-        facetted_profile(lone_bend(3.0), 5.0, margin_deg=2.0)
-    assert len(facetted_profile(lone_bend(3.0), 5.0, margin_deg=2.5).edges) == 5 + 2 * 18
-    with pytest.raises(ValueError, match="over 0"):
-        facetted_profile(lone_bend(3.0), 0.0, margin_deg=2.0)
 
 
 def test_a_whole_circle_guides_for_ever() -> None:

@@ -14,11 +14,10 @@ from gelslim_optics.camera.view_quality import (
     blur_map,
     fit_homography,
     grid_points,
-    pad_axes,
 )
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
-X, Y = pad_axes(28, 24)
+X, Y = np.linspace(-14, 14, 57), np.linspace(-12, 12, 49)
 AIR = (Layer(2.5, 1.0), Layer(2.0, 1.0))
 
 
@@ -130,16 +129,6 @@ def test_two_by_two_points_fix_a_homography() -> None:
     camera = finger_camera()
     fitted = fit_homography(camera, [-9, 9], [-9, 9])
     assert fitted.max_px < 1e-9
-
-
-def test_pad_axes_reach_the_edges_at_the_pitch_or_finer() -> None:
-    x, y = pad_axes(20, 15.2, 0.5)
-    assert (x[0], x[-1], y[0], y[-1]) == (-10, 10, -7.6, 7.6)
-    assert len(x) == 41
-    np.testing.assert_allclose(np.diff(x), 0.5)
-    assert 0.45 < np.diff(y).max() <= 0.5
-    with pytest.raises(ValueError, match="positive"):
-        pad_axes(20, 0)
 
 
 @pytest.mark.parametrize(
