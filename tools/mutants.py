@@ -210,7 +210,7 @@ class ClosestTests:
         self.tests = {p.relative_to(ROOT).as_posix(): imports_of(p) for p in tests}
 
     def of(self, module: str) -> list[str]:
-        """The closest test files first; among equals those that import least."""
+        """The closest test files first; among equals those of the module's own package."""
         distance, queue = {module: 0}, deque([module])
         while queue:
             here = queue.popleft()
@@ -222,8 +222,9 @@ class ClosestTests:
         for test, used in self.tests.items():
             near = [distance[m] for m in used if m in distance]
             if near and "/robustness/" not in test and "/docs/" not in test:
-                ranked.append((min(near), len(used), test))
-        return [test for _, _, test in sorted(ranked)[:MOST_FILES]]
+                of_others = sum(m.partition("/")[0] != module.partition("/")[0] for m in used)
+                ranked.append((min(near), of_others, len(used), test))
+        return [test for _, _, _, test in sorted(ranked)[:MOST_FILES]]
 
 
 def judged(mutant: Mutant, tests: list[str], copy: Path) -> Verdict:
@@ -234,21 +235,30 @@ def judged(mutant: Mutant, tests: list[str], copy: Path) -> Verdict:
     changed = mutated(source, mutant.operator, mutant.occurrence)
     target.write_text(changed, encoding="utf-8")
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    environment = {**os.environ, "PYTHONPATH": str(copy), "OMP_NUM_THREADS": "1"}
     try:
-        done = subprocess.run(
-            command, cwd=copy, env=environment, capture_output=True, text=True, timeout=LIMIT_S,
-            check=False,
-        )  # fmt: skip
-        failed = [w for w in done.stdout.splitlines() if w.startswith(("FAILED", "ERROR"))]
-        by = failed[0].split(" ")[1] if failed else ""
-        killed = done.returncode != 0
-    except subprocess.TimeoutExpired:
-        killed, by = True, "time limit"
+        done = finished(command, copy)
     finally:
         target.write_text(source, encoding="utf-8")
         os.utime(target, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
-    return Verdict(mutant, killed, by, time.monotonic() - started)
+    if done is None:
+        # The mutant is slow only if the same tests end in time without it.
+        killed = finished(command, copy) is not None
+        return Verdict(mutant, killed, "time limit", time.monotonic() - started)
+    failed = [w for w in done.stdout.splitlines() if w.startswith(("FAILED", "ERROR"))]
+    by = failed[0].split(" ")[1] if failed else ""
+    return Verdict(mutant, done.returncode != 0, by, time.monotonic() - started)
+
+
+def finished(command: list[str], copy: Path) -> subprocess.CompletedProcess[str] | None:
+    """The run of a command in a copy of the tree; None if it takes more than the time limit."""
+    environment = {**os.environ, "PYTHONPATH": str(copy), "OMP_NUM_THREADS": "1"}
+    try:
+        return subprocess.run(
+            command, cwd=copy, env=environment, capture_output=True, text=True, timeout=LIMIT_S,
+            check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return None
 
 
 def copy_tree(place: Path) -> Path:
