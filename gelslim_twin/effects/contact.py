@@ -35,7 +35,7 @@ def solver_error(c: Circumstances, tolerance: float) -> Bound:
     if c.contact.area_mm2 == 0:
         return Bound()
     across = c.footprint.width_mm(c.contact.depth_mm) / c.sensor.node_pitch_mm
-    tip = min(1.0, (NARROW / max(1.0, across)) ** 2) * min(1.0, FEW / max(1.0, c.contact_nodes))
+    tip = (NARROW / max(NARROW, across)) ** 2 * FEW / max(FEW, c.contact_nodes)
     root = math.sqrt(tolerance)
     places = root * max(PLACES, MOST_PLACES * tip) * c.contact.depth_mm * c.sensor.px_per_mm
     return geometry(places, root * max(FORCE, MOST_FORCE * tip) * c.contact.normal_n)
@@ -88,27 +88,26 @@ def dragged_mm(c: Circumstances) -> float:
     return c.motion.lateral_mm + turn + tilt + math.hypot(c.contact.depth_mm, c.contact.sideways_mm)
 
 
+def tangential_n(c: Circumstances) -> float:
+    """Tangential force at the friction limit or at full stick, whichever is smaller."""
+    t = c.contact
+    return min(c.friction * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
+
+
 def moved_mm(c: Circumstances) -> float:
     """Sideways displacement by friction, limited by the tool's path and by the tangential force."""
     t = c.contact
-    if c.friction == 0 or t.normal_n == 0:
+    if t.shear_n_per_mm == 0:
         return 0.0
-    tangential = min(c.friction * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
-    return min(dragged_mm(c), LOCAL * tangential / t.shear_n_per_mm)
+    return min(dragged_mm(c), LOCAL * tangential_n(c) / t.shear_n_per_mm)
 
 
 def friction_bound(c: Circumstances) -> Bound:
-    """Tangential force at the friction limit or at full stick, and the stiffer layer.
-
-    The smaller of the two limits counts. On a gel at large strain all forces are larger.
-    """
-    t, mu = c.contact, c.friction
-    if mu == 0 or t.normal_n == 0:
-        return Bound()
-    tangential = min(mu * RIDGES * t.stick_n, t.shear_n_per_mm * dragged_mm(c))
-    stiffer = RIDGES * min(mu, 1.0) * (t.stick_n - t.normal_n)
-    larger = 1 + t.nonlinear_excess
-    return geometry(moved_mm(c) * c.sensor.px_per_mm, larger * math.hypot(tangential, stiffer))
+    """Tangential force and the stiffer layer. On a gel at large strain all forces are larger."""
+    t = c.contact
+    stiffer = RIDGES * min(c.friction, 1.0) * (t.stick_n - t.normal_n)
+    force_n = (1 + t.nonlinear_excess) * math.hypot(tangential_n(c), stiffer)
+    return geometry(moved_mm(c) * c.sensor.px_per_mm, force_n)
 
 
 def friction_ladder(c: Circumstances) -> tuple[Rung, ...]:
@@ -149,7 +148,7 @@ def nonlinearity_bound(c: Circumstances) -> Bound:
     """
     excess = c.contact.nonlinear_excess
     sideways = excess * (c.contact.depth_mm / 2 + moved_mm(c)) * c.sensor.px_per_mm
-    px = c.contact.depth_mm * c.sensor.px_per_mm if excess > 0 else 0.0
+    px = c.contact.depth_mm * c.sensor.px_per_mm
     seen = SIDEWAYS * sideways
     return Bound((excess + _one_node(c)) * c.force_n, px + seen, seen, seen)
 
@@ -157,7 +156,7 @@ def nonlinearity_bound(c: Circumstances) -> Bound:
 def _one_node(c: Circumstances) -> float:
     """Share of the force on one node for a tool with walls that moves sideways, otherwise 0."""
     t = c.contact
-    if t.area_mm2 == 0 or c.motion.lateral_mm + c.motion.twist_deg + c.motion.tilt_deg == 0:
+    if t.area_mm2 == 0 or not (c.motion.lateral_mm or c.motion.twist_deg or c.motion.tilt_deg):
         return 0.0
     walls = math.isinf(c.footprint.steepest(t.depth_mm))
     return min(1.0, c.sensor.node_pitch_mm**2 / t.area_mm2) if walls else 0.0

@@ -39,8 +39,6 @@ def grey_share(c: Circumstances) -> float:
     to the next.
     """
     p, t = c.given("shading", ShadingParameters), c.contact
-    if t.depth_mm == 0:
-        return 0.0
     slope = min(t.depth_mm / c.sensor.node_pitch_mm, c.footprint.steepest(t.depth_mm))
     slope = max(slope, t.depth_mm / c.sensor.thickness_mm)
     angle = math.radians(GRAZING_DEG)
@@ -253,11 +251,11 @@ class CompressionParameters(EffectParameters):
 def grey_levels(quality: int) -> float:
     """Standard deviation of the grey error: uniform in a quantisation step q, q/sqrt(12).
 
-    The usual scaling of the tables: 5000/quality per cent below 50, 200 - 2 quality above; steps
-    are at least 1. An orthonormal transform keeps the mean square; rounding adds its own.
+    The usual scaling of the tables: 5000/quality per cent below 50, 200 - 2 quality above. An
+    orthonormal transform keeps the mean square; rounding adds its own.
     """
     percent = 5000 / quality if quality < 50 else 200 - 2 * quality
-    return math.hypot(max(1.0, RMS_STEP * percent / 100), 1.0) / math.sqrt(12)
+    return math.hypot(RMS_STEP * percent / 100, 1.0) / math.sqrt(12)
 
 
 def compression_bound(c: Circumstances) -> Bound:

@@ -1,0 +1,217 @@
+"""Rungs of the effects: predicted times at a reference size, how they grow, and their errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_samples import BOUND, FIGURES, LADDER, MOTION, ball, circumstances, values
+
+from gelslim_twin.effects.circumstances import SensorFigures
+from gelslim_twin.effects.effect import Bound, Rung, geometry, optics, picture
+from gelslim_twin.effects.grey_values import MotionBlurParameters, ShadingParameters, grey_share
+
+REFERENCE = replace(
+    FIGURES,
+    length_mm=28.0,
+    width_mm=28.0,
+    surface_nodes=43 * 43,
+    layers=4,
+    markers=575,
+    image_width_px=640,
+    image_height_px=480,
+)
+"""Size of pad, grid and frame for which the times of all rungs stand in the declarations."""
+APART = circumstances(sensor=REFERENCE, motion=replace(MOTION, depth_mm=0.0))
+"""No contact, so that no time depends on it."""
+TIMES_MS = {
+    "normal_contact": (1.2, 1.3, 1.5, 1.8, 2.1),
+    "friction": (0.4,),
+    "nonlinearity": (250.0, 350.0, 450.0),
+    "relaxation": (0.01 + 8e-5 * 1849,),
+    "perspective": (0.05,),
+    "refraction": (0.02, 0.1),
+    "lens_distortion": (0.02,),
+    "marker_print": (0.05,),
+    "drawing": (5.0,),
+    "shading": (0.6 + 40 / 64, 0.6 + 40 / 16, 0.6 + 10, 0.6 + 40),
+    "dirt": (0.01,),
+    "defocus": (1.5,),
+    "specular": (0.3,),
+    "motion_blur": (1.2, 1.4, 1.8, 2.6, 4.2),
+    "exposure": (0.4,),
+    "sensor_noise": (1.5,),
+    "compression": (2.0,),
+}
+GROWS_WITH = {
+    "nodes": ("normal_contact", "friction", "nonlinearity"),
+    "dots": ("perspective", "refraction", "lens_distortion", "marker_print"),
+    "pixels": ("drawing", "shading", "specular", "motion_blur", "exposure", "sensor_noise",
+               "compression"),
+}  # fmt: skip
+LARGER: dict[str, SensorFigures] = {
+    "nodes": replace(REFERENCE, surface_nodes=2 * 43 * 43, layers=12),
+    "dots": replace(REFERENCE, markers=6 * 575),
+    "pixels": replace(REFERENCE, image_width_px=2 * 640, image_height_px=3 * 480),
+}
+"""Six times as many."""
+
+
+def test_times_are_those_of_the_reference_size() -> None:
+    for name, expected in TIMES_MS.items():
+        times = [rung.milliseconds for rung in LADDER[name](APART)]
+        assert times == pytest.approx(expected), name
+    assert set(TIMES_MS) == set(LADDER)
+
+
+@pytest.mark.parametrize("what", GROWS_WITH)
+def test_times_grow_with_the_size(what: str) -> None:
+    larger = replace(APART, sensor=LARGER[what])
+    for name, ladder in LADDER.items():
+        factor = 6 if name in GROWS_WITH[what] else 1
+        expected = [factor * t for t in TIMES_MS[name]]
+        if (what, name) == ("nodes", "relaxation"):
+            expected = [0.01 + 16e-5 * 1849]
+        if (what, name) == ("pixels", "defocus"):
+            expected = [0.5 + 6 * 1.0]
+        assert [rung.milliseconds for rung in ladder(larger)] == pytest.approx(expected), name
+
+
+def test_a_dense_contact_costs_the_square_of_its_nodes() -> None:
+    c = circumstances()
+    nodes = 1300 * 3 / (43 * 43 * 4)
+    for rung, single in zip(LADDER["normal_contact"](c), TIMES_MS["normal_contact"], strict=True):
+        assert rung.milliseconds == pytest.approx(single * nodes + (c.contact_nodes / 100) ** 2)
+
+
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("radius_mm", "width_mm", "tip"),
+    [
+        # Wide: neither few nodes across nor few in all.
+        (14.0, 12.0, 0.0),
+        # As narrow as the mesh and as small: the full error of a tip.
+        (0.2, 0.5, 1.0),
+        # Fewer nodes across than 3.5, many in all: a ridge.
+        (40.0, 0.5, None),
+        # Twice as many across as 3.5: a quarter of a tip's error.
+        (0.2, 7 * FIGURES.node_pitch_mm, 0.25),
+    ],
+)
+def test_error_of_a_tolerance_is_that_of_its_tool(
+    radius_mm: float, width_mm: float, tip: float | None
+) -> None:
+    """Root of the tolerance, times 0.14 and 0.07 on wide tools, 1.1 and 0.15 on tips."""
+    c = circumstances(footprint=replace(ball(radius_mm), width_mm=lambda _d: width_mm))
+    if tip is None:
+        tip = 50 / c.contact_nodes
+        assert 0.14 / 1.1 < tip < 0.9
+    for tolerance, rung in zip(TOLERANCES, LADDER["normal_contact"](c), strict=True):
+        px = math.sqrt(tolerance) * max(0.14, 1.1 * tip) * 0.35 * FIGURES.px_per_mm
+        force = math.sqrt(tolerance) * max(0.07, 0.15 * tip) * c.contact.normal_n
+        assert rung.parameters == {"tolerance": tolerance}
+        assert values(rung.error) == pytest.approx(values(geometry(px, force)))
+
+
+def test_without_contact_no_tolerance_leaves_an_error() -> None:
+    assert all(rung.error == Bound() for rung in LADDER["normal_contact"](APART))
+
+
+def test_friction_leaves_its_error_to_the_contact() -> None:
+    [rung] = LADDER["friction"](circumstances())
+    assert (rung.error, rung.parameters) == (Bound(), {"tolerance": 1e-2})
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.6])
+def test_large_strain_errs_by_the_tolerance_at_most_by_all(mu: float) -> None:
+    c = circumstances(mu)
+    whole = BOUND["nonlinearity"](c)
+    rungs = LADDER["nonlinearity"](c)
+    for t, rung in zip((1e-2, 1e-3, 1e-4), rungs, strict=True):
+        expected = geometry(t * 0.2 * 0.35 * FIGURES.px_per_mm, t * 0.1 * whole.force_n)
+        assert values(rung.error) == pytest.approx(values(expected))
+        assert rung.parameters == {"tolerance": t}
+    slight = circumstances(mu, motion=replace(MOTION, depth_mm=1e-5, lateral_mm=0.0))
+    least = BOUND["nonlinearity"](slight)
+    assert 0 < least.markers_px < 1e-2 * 0.2 * 1e-5 * FIGURES.px_per_mm
+    assert LADDER["nonlinearity"](slight)[0].error.markers_px == least.markers_px
+
+
+def test_apparent_depths_miss_what_oblique_rays_and_pressed_gel_lift() -> None:
+    """A point of the gel pressed in by d has d/h less gel over it; at most the whole is missed."""
+    c = circumstances()
+    lift, straight = FIGURES.lift_mm(43.0), FIGURES.lift_mm(0.0)
+    expected_px = FIGURES.lifted_px(lift - straight + 0.35 / 1.9 * lift)
+    near, exact = LADDER["refraction"](c)
+    assert values(near.error) == pytest.approx(values(optics(expected_px)))
+    assert (near.parameters, exact.parameters) == ({"rays": "paraxial"}, {"rays": "exact"})
+    assert exact.error == Bound()
+    deep = replace(c, motion=replace(MOTION, depth_mm=1.6))
+    assert LADDER["refraction"](deep)[0].error == BOUND["refraction"](deep) == optics(
+        FIGURES.lifted_px(lift)
+    )  # fmt: skip
+
+
+def interpolated_apart(step_px: float, reach_px: float) -> float:
+    """Largest error of linear interpolation of cos(x/h) from values `step_px` apart."""
+    x = np.linspace(0.0, step_px, 1001) - step_px / 2
+    ends = math.cos(step_px / 2 / reach_px)
+    return float(np.abs(np.cos(x / reach_px) - ends).max())
+
+
+def test_light_between_grid_points_is_off_by_the_curvature() -> None:
+    """A slope that varies over the gel's thickness, interpolated every few pixels."""
+    c = circumstances(shading=ShadingParameters(ambient_share=0.45))
+    reach_px = 1.9 * FIGURES.px_per_mm
+    rungs = LADDER["shading"](c)
+    assert [rung.parameters["pixel_step"] for rung in rungs] == [8, 4, 2, 1]
+    for rung in rungs:
+        step_px = float(rung.parameters["pixel_step"])
+        share = grey_share(c) * interpolated_apart(step_px, reach_px)
+        whole_px, whole = BOUND["shading"](c).image_px, grey_share(c)
+        assert rung.error == picture(rung.error.image_px)
+        assert rung.error.image_px == pytest.approx(whole_px * share / whole, rel=2e-3)
+
+
+def smeared() -> Iterator[tuple[float, Rung, float]]:
+    """Smear, rung and width of an edge, from a slow motion to one far beyond the edge."""
+    for speed_mm_s in (0.5, 20.0, 900.0):
+        c = circumstances(
+            motion=replace(MOTION, speed_mm_s=speed_mm_s),
+            motion_blur=MotionBlurParameters(shutter_ms=8.0),
+        )
+        smear_px = speed_mm_s * 0.008 * FIGURES.px_per_mm
+        assert BOUND["motion_blur"](c) == picture(pytest.approx(smear_px / 2))
+        for rung in LADDER["motion_blur"](c):
+            yield smear_px, rung, math.hypot(1.0, c.blur_px)
+
+
+def test_instants_leave_a_quarter_of_a_step_or_its_second_moment() -> None:
+    kinds = set()
+    for smear_px, rung, width_px in smeared():
+        step_px = smear_px / rung.parameters["most_poses"]
+        coarse, fine = step_px / 4, step_px**2 / 12 / width_px
+        kinds.add(coarse < fine)
+        assert rung.error.image_px == pytest.approx(min(coarse, fine))
+    assert kinds == {True, False}
+
+
+def test_n_instants_of_a_smear_lack_the_second_moment_of_a_step() -> None:
+    """Variance of n instants in the middles of equal parts against that of the whole smear."""
+    for n in (2, 4, 8, 16, 32):
+        middles = (np.arange(n) + 0.5) / n
+        assert 1 / 12 - middles.var() == pytest.approx((1 / n) ** 2 / 12)
+    assert [r.parameters["most_poses"] for r in LADDER["motion_blur"](APART)] == [2, 4, 8, 16, 32]
+
+
+def test_exact_rungs_have_no_error() -> None:
+    c = circumstances()
+    for name in ("relaxation", "perspective", "marker_print", "drawing", "dirt", "defocus",
+                 "specular", "exposure", "sensor_noise", "compression"):  # fmt: skip
+        assert [rung.error for rung in LADDER[name](c)] == [Bound()], name
+    assert [rung.error for rung in LADDER["lens_distortion"](c)] == [Bound()]
