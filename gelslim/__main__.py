@@ -47,7 +47,7 @@ def _tidy() -> None:
     """Remove temporary files of workers and close files that an error still holds open."""
     import gc
 
-    from gelslim_core.files.scratch import sweep_scratch
+    from gelslim_core.files.replaced_folder import sweep_scratch
 
     gc.collect()
     sweep_scratch()

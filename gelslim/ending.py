@@ -1,11 +1,11 @@
-"""What Ctrl-C and SIGTERM do to `gelslim`, from its first line to its last.
+"""How `gelslim` ends on Ctrl-C and SIGTERM, from its first line to its last.
 
-Nothing is begun while the command line itself loads: the program says so and ends. Later a
-KeyboardInterrupt is raised, so that whatever is open is closed and removed on the way out. It is
-raised neither within the import of a library, which may crash or call itself missing, nor within
-llvmlite, which would free memory twice, but after them. Whoever asks again meanwhile waits for
-that, PATIENCE_S at most. An interrupted process ends without the teardown of the interpreter:
-threads of compiled code may still be running, and would meet what is freed under them.
+While the command line itself loads, there is nothing to clean up: the program prints a line and
+ends. Later a KeyboardInterrupt is raised, so that open files are closed and temporary files are
+removed. It is not raised during the import of a library, which could crash or report that it is
+missing, nor during a call of llvmlite, which would free memory twice, but directly after them. A
+further signal waits for that, at most PATIENCE_S. An interrupted process ends without the teardown
+of the interpreter, because threads of compiled code may still run and would use freed memory.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from types import FrameType
 from typing import Any, NoReturn
 
 PATIENCE_S = 3.0
-"""After the first signal or the end of the work; the next one then ends the process as it is."""
+"""Time after the first signal, or after the work, from which a signal ends the process at once."""
 RETRY_S = 0.02
-"""Between looks at whether an import or a call into llvmlite is over."""
+"""Time between checks whether an import or a call of llvmlite has ended."""
 SAID = {
     signal.SIGINT: ("interrupted", "Interrupted; every file that is there is whole."),
     signal.SIGTERM: ("terminated", "Terminated; every file that is there is whole."),
 }
-"""Kind, as in answers in JSON, and line for people."""
+"""Kind of the error in JSON, and the line that people read."""
 SHOWN_AGAIN = b"\r\x1b[2K\x1b[?25h"
-"""Clears a progress bar's line on a terminal and shows the cursor that it has hidden."""
+"""Clears the line of a progress bar on a terminal and shows the cursor that it has hidden."""
 _IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
 _LLVMLITE = os.sep.join(("", "llvmlite", "binding", ""))
-"""In the paths of its modules. A line of Python after a call of LLVM notes who frees an object."""
+"""Part of the paths of its modules, which record in Python who must free an object of LLVM."""
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, which ends a command as Ctrl-C does but for its status."""
+    """SIGTERM, which ends a command as Ctrl-C does, with another exit status."""
 
 
 class Ending:
-    """One run of the program; `arm` it as early as can be, `begin` the work, `end` with a status.
+    """One run of the program: `arm` it as early as possible, `begin` the work, `end` with a status.
 
-    All of it lives in the main thread, where Python runs signal handlers.
+    All methods run in the main thread, where Python runs signal handlers.
     """
 
     def __init__(self) -> None:
@@ -56,29 +56,29 @@ class Ending:
         self._leaving = False
 
     def arm(self) -> None:
-        """Take both signals over where nobody has them ignored, as `nohup` and shells do."""
+        """Handle both signals, unless the caller ignores them, as `nohup` does."""
         for number in SAID:
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 signal.signal(number, self._asked)
-        # The first to be registered is the last to run: only the interpreter's own end follows.
-        atexit.register(_deafen)
-        sys.excepthook = _but_for_interrupts(sys.excepthook)
+        # The function that is registered first runs last, directly before the interpreter ends.
+        atexit.register(_ignore_signals)
+        sys.excepthook = _without_interrupts(sys.excepthook)
         sys.unraisablehook = self._unraisable(sys.unraisablehook)
         threading.excepthook = self._in_thread(threading.excepthook)
 
     def begin(self) -> None:
-        """From now on there may be something to close."""
+        """From now on there may be something to clean up."""
         self._begun = True
 
     def end(self, status: int) -> int:
-        """The work is done and said; a signal changes nothing any more. Returns `status`."""
-        # In this order: a signal between the two must raise nothing any more.
+        """The work is done and reported; a signal changes nothing any more. Returns `status`."""
+        # The time is set first, so that a signal between the two lines raises nothing.
         self._since = time.monotonic()
         self._status = status
         return status
 
     def leave(self, status: int) -> NoReturn:
-        """End after an interrupt: run the exit functions, flush, and tear nothing down."""
+        """End after an interrupt: run the exit functions and flush, without further teardown."""
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -91,14 +91,14 @@ class Ending:
                 self._leave(number)
         elif not self._begun:
             self._leave(number)
-        elif _not_to_be_cut(frame):
+        elif _uninterruptible(frame):
             self._ask_again(number)
         else:
             self._since = time.monotonic()
             raise KeyboardInterrupt if number == signal.SIGINT else Terminated
 
     def _leave(self, number: int) -> None:
-        """End here and now; buffered streams may be in use, and are left alone."""
+        """End at once. Buffered streams may be in use, so they are not flushed."""
         if self._leaving:
             return
         self._leaving = True
@@ -122,31 +122,31 @@ class Ending:
             self._retrying = False
             send_to_main_thread(number)
 
-        # Not threading.Thread: it takes locks that the code under this handler may hold.
+        # threading.Thread would take locks that the interrupted code may hold.
         _thread.start_new_thread(later, ())
 
     def _unraisable(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
-        def hook(told: Any) -> None:
-            if isinstance(told.exc_value, KeyboardInterrupt) and self._status is None:
-                # It fell into a destructor or compiled code, which swallow it.
+        def hook(raised: Any) -> None:
+            if isinstance(raised.exc_value, KeyboardInterrupt) and self._status is None:
+                # A destructor or compiled code was interrupted and swallowed the exception.
                 self._since = None
-                self._ask_again(number_of(told.exc_value), at_once=True)
+                self._ask_again(number_of(raised.exc_value), at_once=True)
             elif self._since is None:
-                before(told)
+                before(raised)
 
         return hook
 
     def _in_thread(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
-        def hook(told: Any) -> None:
-            # What a thread misses once its work is being taken down is no news.
+        def hook(raised: Any) -> None:
+            # Errors of threads are of no interest while the program ends.
             if self._since is None:
-                before(told)
+                before(raised)
 
         return hook
 
 
 def say(number: int) -> None:
-    """The one line, or the answer in JSON to those who asked for one; past all buffers."""
+    """Print the line, or with `--json` the answer in JSON, without any buffer."""
     kind, line = SAID[signal.Signals(number)]
     text, descriptor = line, 2
     if "--json" in sys.argv[1:]:
@@ -156,7 +156,7 @@ def say(number: int) -> None:
 
 
 def send_to_main_thread(number: int) -> None:
-    """Have the handler of a signal run; a wait of the main thread ends for it where it can."""
+    """Run the handler of a signal in the main thread, and end its wait where that is possible."""
     thread = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and thread is not None:
         signal.pthread_kill(thread, number)
@@ -165,7 +165,7 @@ def send_to_main_thread(number: int) -> None:
 
 
 def asked_to_end(error: BaseException | None) -> int | None:
-    """The signal behind an error: its own, or that of what it was raised from or amidst."""
+    """The signal that caused an error, directly or through its cause or context; else None."""
     seen: set[int] = set()
     todo = [error]
     while todo:
@@ -179,8 +179,8 @@ def asked_to_end(error: BaseException | None) -> int | None:
     return None
 
 
-def _but_for_interrupts(before: Callable[..., Any]) -> Callable[..., None]:
-    """Cython prints what it swallows as if it had reached the top."""
+def _without_interrupts(before: Callable[..., Any]) -> Callable[..., None]:
+    """Cython prints exceptions that it swallows as if nobody had caught them."""
 
     def hook(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         if not isinstance(error, KeyboardInterrupt):
@@ -194,8 +194,8 @@ def number_of(error: BaseException) -> int:
     return signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT
 
 
-def _not_to_be_cut(frame: FrameType | None) -> bool:
-    """Whether an import or a call into llvmlite is under way."""
+def _uninterruptible(frame: FrameType | None) -> bool:
+    """Whether an import or a call of llvmlite is in progress."""
     while frame is not None:
         file = frame.f_code.co_filename
         if file in _IMPORTS or _LLVMLITE in file:
@@ -204,7 +204,7 @@ def _not_to_be_cut(frame: FrameType | None) -> bool:
     return False
 
 
-def _deafen() -> None:
-    """The interpreter, as it ends, would hand the signals back to the system, which kills."""
+def _ignore_signals() -> None:
+    """Ignore both signals; the ending interpreter would restore handlers that kill the process."""
     for number in SAID:
         signal.signal(number, signal.SIG_IGN)

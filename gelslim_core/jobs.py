@@ -33,7 +33,12 @@ MAX_CRASHES = 3
 
 
 class EngineError(GelslimError, ValueError):
-    """Tasks cannot be started, or one of them crashes its workers; the message says why."""
+    """Tasks cannot be started, or one of them crashes its workers; the message says why.
+
+    Attributes:
+        exit_status: 2, as for all input that cannot be used.
+        kind: `bad input`.
+    """
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 from gelslim_cad.build.manifest import json_bytes
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
 from gelslim_cad.geometry.part import Part
-from gelslim_core.files.scratch import scratch_folder
+from gelslim_core.files.replaced_folder import scratch_folder
 
 SECTION_MM = 0.013
 """Position of the sections: off the mid-plane, so that none runs along a face."""

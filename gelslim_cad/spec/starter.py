@@ -12,10 +12,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from gelslim_cad.spec.spec import Spec
+from gelslim_core.yaml.document import RefusedScalarError, resolve
 from gelslim_core.yaml.errors import InputError
 from gelslim_core.yaml.fields import Field, children, range_text
 from gelslim_core.yaml.reader import load_bytes
-from gelslim_core.yaml.scalars import RefusedScalarError, resolve
 from gelslim_core.yaml.suggest import one_of
 
 SPY_CAMERA: dict[str, Any] = {

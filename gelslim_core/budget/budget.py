@@ -16,7 +16,12 @@ _TIME = re.compile(r"([-+0-9.eE]+?)\s*([a-zµ]*)")
 
 
 class BudgetError(GelslimError, ValueError):
-    """A budget that cannot be read, or that no rung of a ladder keeps."""
+    """A budget cannot be read, or no rung of a ladder keeps it.
+
+    Attributes:
+        exit_status: 2, as for all input that cannot be used.
+        kind: `bad input`.
+    """
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM held back over a stretch that must not be cut."""
+"""Ctrl-C and SIGTERM deferred while code runs that must not be interrupted."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ LetThrough = Callable[[], AbstractContextManager[None]]
 
 @contextmanager
 def interrupts_held() -> Iterator[LetThrough]:
-    """Let a Ctrl-C or SIGTERM take effect at the end of the block, not within.
+    """Let Ctrl-C and SIGTERM take effect at the end of the block instead of inside it.
 
-    The value makes blocks inside this one in which they take effect at once: what is made before
-    such a block and removed after it is removed whenever they come. Libraries of compiled code
-    crash, or say that they are not installed, where an interrupt falls into their start.
+    The value makes inner blocks in which both take effect at once. What is made before such a block
+    and removed after it is therefore removed whenever a signal arrives. Libraries of compiled code
+    crash, or report that they are not installed, if they are interrupted while they start.
 
-    Signals that no Python code handles stay as they are. In another thread than the main one,
-    which gets no Ctrl-C, nothing is held.
+    Signals that no Python code handles are left alone. Only the main thread receives Ctrl-C, so
+    nothing is deferred in other threads.
     """
     if threading.current_thread() is not threading.main_thread():
         yield _nothing
@@ -40,7 +40,7 @@ def _nothing() -> Iterator[None]:
 
 
 class _Held:
-    """Signals taken over, with the handlers they had."""
+    """The deferred signals, with their handlers before."""
 
     def __init__(self) -> None:
         self._before: dict[int, Any] = {}
@@ -48,7 +48,7 @@ class _Held:
 
     def hold(self) -> None:
         if threading.current_thread() is not threading.main_thread():
-            # A generator that was left over is closed wherever it is found.
+            # Python may close an abandoned generator in any thread.
             return
         for number in (signal.SIGINT, signal.SIGTERM):
             handler = signal.getsignal(number)
@@ -57,14 +57,14 @@ class _Held:
                 signal.signal(number, self._note)
 
     def release(self) -> None:
-        """Hand the signals back, then what came meanwhile to those who handle it."""
+        """Restore the handlers, then raise the signals that arrived meanwhile."""
         try:
             while self._before:
                 number = next(iter(self._before))
                 signal.signal(number, self._before[number])
                 del self._before[number]
         finally:
-            # One that comes now, with the other signal still to be handed back.
+            # A signal arrived while the other handler was not yet restored.
             if self._before:
                 self.release()
         while self._seen:
@@ -76,10 +76,10 @@ class _Held:
 
 
 class _LetThrough:
-    """Hands the signals back for a block.
+    """Restores the handlers for a block.
 
-    Not a generator: one that is cut as it begins is closed whenever it is found, and would take the
-    signals over again then.
+    It is no generator, because a generator that is interrupted as it begins would be closed at any
+    later time, and would then defer the signals again.
     """
 
     def __init__(self, held: _Held) -> None:

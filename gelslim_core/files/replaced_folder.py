@@ -1,6 +1,7 @@
-"""A folder that is filled beside its place and swapped in whole.
+"""A folder that is replaced in one step, and a folder for temporary files.
 
-What a killed writer left beside it is removed by the next one.
+The new content is written next to the old folder and then exchanged with it. The next writer
+removes what a killed writer left.
 """
 
 from __future__ import annotations
@@ -10,27 +11,31 @@ import ctypes
 import os
 import shutil
 import sys
+import tempfile
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from gelslim_core.files.file_lock import beside
+from gelslim_core.files.file_lock import beside, locked
 from gelslim_core.files.held_interrupt import interrupts_held
 
 _AT_FDCWD = -100
 _EXCHANGE = 2
+_PREFIX = "gelslim-"
+_LOCK = ".lock"
 
 
 class FolderError(OSError):
-    """A folder that must not or cannot be replaced; the message says why and what to do."""
+    """A folder must not or cannot be replaced; the message says why and what to do."""
 
 
 @contextlib.contextmanager
 def replaced_folder(target: Path, ours: Collection[str]) -> Iterator[Path]:
-    """An empty folder that takes the place of `target` when the block ends without an error.
+    """An empty folder that replaces `target` when the block ends without an error.
 
-    `ours` are the paths in `target`, with slashes, that its last writer wrote: they go. Any other
-    file there is the user's and is carried over. Raises OSError; FolderError where that file is in
-    the way or the folder is one that cannot be moved. `target` is then as it was.
+    `ours` are the paths in `target`, with slashes, that its last writer wrote; they are removed.
+    Any other file there belongs to the user and is kept. Raises FolderError if such a file has the
+    name of a new one or the folder cannot be moved, and OSError otherwise; `target` is then
+    unchanged.
     """
     place = Path(os.path.realpath(target))
     _require_movable(place, target)
@@ -48,10 +53,10 @@ def replaced_folder(target: Path, ours: Collection[str]) -> Iterator[Path]:
 
 
 def recover(target: Path) -> None:
-    """Remove what a killed writer left beside `target`, for a caller that may write nothing anew.
+    """Remove what a killed writer left next to `target`, also if nothing new will be written.
 
-    The old folder is brought back if the writer was killed between its two renames. The caller
-    holds the lock that every writer of `target` holds. Raises OSError.
+    If the writer was killed between its two renames, the old folder is restored. The caller holds
+    the lock that every writer of `target` holds. Raises OSError.
     """
     place = Path(os.path.realpath(target))
     retired = _retired(place)
@@ -61,16 +66,16 @@ def recover(target: Path) -> None:
         shutil.rmtree(left, ignore_errors=True)
 
 
-def _require_movable(place: Path, told: Path) -> None:
+def _require_movable(place: Path, given: Path) -> None:
     here = Path.cwd()
     if place == here or place in here.parents:
         raise FolderError(
-            f"{told}: is the folder you are in, and the output is replaced whole; "
-            "name a folder of its own for it"
+            f"{given}: is the current folder, and the whole output folder is replaced; "
+            "choose a folder of its own"
         )
     if os.path.ismount(place):
         raise FolderError(
-            f"{told}: is a mount point, which cannot be replaced whole; name a folder inside it"
+            f"{given}: is a mount point, which cannot be replaced; choose a folder inside it"
         )
 
 
@@ -86,7 +91,7 @@ def _carry_over(place: Path, staging: Path, ours: Collection[str]) -> None:
             new = staging / inner
             if new.exists():
                 raise FolderError(
-                    f"{path}: is not from the last run, and this one would write it; move it away"
+                    f"{path}: is not from the last run, and this run would replace it; move it away"
                 )
             new.parent.mkdir(parents=True, exist_ok=True)
             try:
@@ -96,7 +101,7 @@ def _carry_over(place: Path, staging: Path, ours: Collection[str]) -> None:
 
 
 def _swap(staging: Path, place: Path) -> None:
-    """Put `staging` in place; the old folder is removed."""
+    """Move `staging` to `place` and remove the old folder."""
     if not place.exists():
         os.rename(staging, place)
         return
@@ -122,7 +127,7 @@ def _retired(place: Path) -> Path:
 
 
 def _exchanged(staging: Path, place: Path) -> bool:
-    """Swap both folders in one step where the system can; False where it cannot."""
+    """Exchange both folders in one step. Returns False if the system cannot."""
     if not sys.platform.startswith("linux"):
         return False
     try:
@@ -131,3 +136,33 @@ def _exchanged(staging: Path, place: Path) -> bool:
         return False
     names = (os.fsencode(staging), os.fsencode(place))
     return bool(swap(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _EXCHANGE) == 0)
+
+
+@contextlib.contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A new folder for temporary files, which is removed afterwards.
+
+    The folders of processes that were killed are removed too. Raises OSError if the system has no
+    place for temporary files.
+    """
+    sweep_scratch()
+    folder = Path(tempfile.gettempdir()) / f"{_PREFIX}{os.urandom(8).hex()}"
+    with locked(folder.with_suffix(_LOCK)), interrupts_held() as let_through:
+        try:
+            folder.mkdir(mode=0o700)
+            with let_through():
+                yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def sweep_scratch() -> None:
+    """Remove the temporary folders of processes that were killed."""
+    for lock in list(Path(tempfile.gettempdir()).glob(f"{_PREFIX}????????????????{_LOCK}")):
+        with contextlib.suppress(OSError), locked(lock, _leave_alone) as held:
+            if held:
+                shutil.rmtree(lock.with_suffix(""), ignore_errors=True)
+
+
+def _leave_alone(lock: Path) -> None:
+    raise BlockingIOError

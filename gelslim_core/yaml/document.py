@@ -3,16 +3,20 @@
 Only what a model needs is read: one document of mappings, lists and plain values. Anchors, aliases,
 merge keys, tags, duplicate keys and keys that are not names become problems. The depth and the
 number of values are bounded while parsing, so that a hostile file costs no more than an honest one.
+
+Plain scalars follow the core schema of YAML 1.2 (section 10.3.2). YAML 1.1 reads `no` as false,
+`010` as eight and `1:20` as eighty; version 1.2 reads text, ten and text.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from gelslim_core.yaml.errors import InputError, Problem, listed, shown
-from gelslim_core.yaml.scalars import RefusedScalarError, resolve
 from gelslim_core.yaml.source import Position, Source, refusal
 
 MAX_DEPTH = 24
@@ -38,6 +42,23 @@ _SYNTAX_REMEDIES = (
     ("duplicate", "delete the anchors"),
 )
 _UNCLOSED = ("end of stream", "stream end", "expected ','", "could not find expected ':'")
+MAX_INT = 2**53
+"""Whole numbers beyond this lose digits as a double."""
+
+ScalarValue = str | int | float | bool | None
+
+_WORDS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_INTEGERS = {
+    10: re.compile(r"([-+]?[0-9]+)\Z"),
+    8: re.compile(r"0o([0-7]+)\Z"),
+    16: re.compile(r"0x([0-9a-fA-F]+)\Z"),
+}
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?\Z")
+_NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)\Z|\.(nan|NaN|NAN)\Z")
 
 
 class Mark(NamedTuple):
@@ -284,3 +305,36 @@ def _syntax_error(source: Source, error: Exception, last: Position) -> Problem:
     text = lines[position.line - 1].strip() if position.line <= len(lines) else ""
     value = f"`{shown(text)}`" if text else None
     return Problem(source.path, *position, "", value, message, remedy)
+
+
+class RefusedScalarError(ValueError):
+    """A scalar that YAML allows and no field accepts; the text says what it must be."""
+
+
+def resolve(text: str) -> ScalarValue:
+    """The value of the plain (unquoted) scalar `text`.
+
+    Raises `RefusedScalarError` for NaN, infinities and numbers beyond the range of a double or,
+    for whole numbers, beyond `MAX_INT`.
+    """
+    if text in _WORDS:
+        return _WORDS[text]
+    for base, integer in _INTEGERS.items():
+        if found := integer.match(text):
+            return _bounded_int(found.group(1), base)
+    if _NOT_FINITE.match(text):
+        raise RefusedScalarError("must be a finite number")
+    if not _FLOAT.match(text):
+        return text
+    value = float(text)
+    if not math.isfinite(value):
+        raise RefusedScalarError("must be a finite number, at most about 1.8e308")
+    return value
+
+
+def _bounded_int(digits: str, base: int) -> int:
+    # Python refuses to convert very long digit strings, so their length is checked first.
+    value = int(digits, base) if len(digits.lstrip("+-0")) < 40 and len(digits) < 400 else None
+    if value is None or abs(value) > MAX_INT:
+        raise RefusedScalarError("is too large a whole number, the limit is 2^53")
+    return value

@@ -9,7 +9,15 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from gelslim_core.yaml.document import CORRECT_VALUE, Document, Path, PathPart, join_path
+from gelslim_core.yaml.document import (
+    CORRECT_VALUE,
+    Document,
+    Path,
+    PathPart,
+    RefusedScalarError,
+    join_path,
+    resolve,
+)
 from gelslim_core.yaml.errors import FieldError, Problem, shown
 from gelslim_core.yaml.fields import (
     UNITS,
@@ -21,7 +29,6 @@ from gelslim_core.yaml.fields import (
     range_text,
     unit_label,
 )
-from gelslim_core.yaml.scalars import RefusedScalarError, resolve
 from gelslim_core.yaml.source import Position
 from gelslim_core.yaml.suggest import one_of, suggest_choice, suggest_key
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from gelslim_core.files.scratch import scratch_folder
+from gelslim_core.files.replaced_folder import scratch_folder
 from gelslim_twin.effects.circumstances import SensorFigures
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.question import bundle_figures

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gelslim_core.yaml.scalars import MAX_INT, RefusedScalarError, resolve
+from gelslim_core.yaml.document import MAX_INT, RefusedScalarError, resolve
 
 
 @pytest.mark.parametrize(

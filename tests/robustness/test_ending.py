@@ -93,7 +93,7 @@ def test_the_installed_command_is_guarded_as_the_module_is() -> None:
 @pytest.mark.parametrize("number", BOTH)
 def test_a_second_one_meanwhile_changes_nothing(number: signal.Signals, tmp_path: Path) -> None:
     work = """
-from gelslim_core.files.scratch import scratch_folder
+from gelslim_core.files.replaced_folder import scratch_folder
 with scratch_folder() as folder:
     try:
         (folder / "file").write_bytes(b"x")
@@ -291,7 +291,7 @@ with worker_pool(2, "{method}") as pool:
 TASK = """
 import pathlib, sys, time
 from gelslim_core.files.replaced_file import replacement
-from gelslim_core.files.scratch import scratch_folder
+from gelslim_core.files.replaced_folder import scratch_folder
 HERE = pathlib.Path(__file__).parent
 def task(k):
     with scratch_folder(), replacement(HERE / f"made_{k}") as stream:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gelslim_core.files import file_lock, replaced_file, replaced_folder, scratch
+from gelslim_core.files import file_lock, replaced_file, replaced_folder
 from gelslim_core.files.held_interrupt import interrupts_held
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs import field_chunk
@@ -142,7 +142,7 @@ def write_folder(place: Path) -> None:
 
 
 def use_scratch(place: Path) -> None:
-    with scratch.scratch_folder() as folder:
+    with replaced_folder.scratch_folder() as folder:
         (folder / "inner").write_bytes(b"new")
 
 

