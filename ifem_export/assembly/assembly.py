@@ -28,7 +28,6 @@ from ifem_export.mesh.lattice import Numbering, number_nodes
 from ifem_export.mesh.pad_mesh import PadMesh
 
 Array = NDArray[np.float64]
-_SERIAL_BELOW_BYTES = 50_000_000
 
 
 def mesh_stiffness(mesh: PadMesh, element_matrix: Array) -> sparse.csr_array:
@@ -65,7 +64,7 @@ def assemble_csr(
         element_matrix: (24, 24) in N/mm, symmetric, corners in VTK_HEXAHEDRON order.
         fill: (nx, ny, nz) factor of each cell, > 0 where a cell exists; None for 1.
         numbering: `number_nodes(occupancy)`, where it is known already.
-        threads: Worker threads; None takes one below 50 MB and one per processor above.
+        threads: Worker threads; None takes one per processor.
 
     Returns:
         (3n, 3n) in N/mm with sorted indices, in the node numbering of `PadMesh`.
@@ -83,27 +82,27 @@ def assemble_csr(
             field="element_matrix",
         )
     nodes = number_nodes(occupancy) if numbering is None else numbering
-    scale_rows, scales = np.full(nodes.n_nodes, -1, dtype=np.int32), np.empty((0, 8))
+    scales = np.empty((0, 8))
     if fill is not None:
-        around = corner_fill(occupancy, fill)[nodes.positions]
-        cut = ((around != 0.0) & (around != 1.0)).any(axis=1)
-        scale_rows[cut], scales = np.arange(cut.sum()), around[cut]
+        scales = corner_fill(occupancy, fill)[nodes.positions]
     table = np.ascontiguousarray(occupancy_table(matrix).transpose(0, 2, 1, 3))
     by_corner = np.ascontiguousarray(matrix.reshape(8, 3, 8, 3).transpose(0, 2, 1, 3))
     counts, slots = neighbour_pattern()
     ends = np.cumsum(counts[nodes.masks])
-    blocks, n = int(ends[-1]), nodes.n_nodes
-    index = np.int32 if 9 * blocks <= np.iinfo(np.int32).max else np.int64
+    n, n_values = nodes.n_nodes, 9 * int(ends[-1])
+    index = np.int32 if n_values <= np.iinfo(np.int32).max else np.int64
     indptr = np.empty(3 * n + 1, dtype=index)
-    indptr[-1] = 9 * blocks
-    indices = np.empty(9 * blocks, dtype=index)
-    data = np.empty(9 * blocks)
+    indptr[-1] = n_values
+    indices = np.empty(n_values, dtype=index)
+    data = np.empty(n_values)
     shared: tuple[Any, ...] = (
         nodes.masks, nodes.positions, np.concatenate([[0], ends[:-1]]), nodes.node_index,
         counts, slots, _slot_strides(nodes),
-        (scale_rows, table, scales, by_corner, *_pairs()), indptr, indices, data,
+        (table, scales, by_corner, *_pairs()), indptr, indices, data,
     )  # fmt: skip
-    workers = _worker_count(threads, data.nbytes + indices.nbytes)
+    workers = processors() if threads is None else threads
+    if workers < 1:
+        raise MeshError(f"threads = {threads}: must be >= 1", field="threads", value=threads)
     bounds = np.linspace(0, n, workers + 1).astype(int).tolist()
     with ThreadPoolExecutor(workers) as pool:
         jobs = [pool.submit(fill_csr, a, b, *shared) for a, b in itertools.pairwise(bounds)]
@@ -132,14 +131,6 @@ def _slot_strides(nodes: Numbering) -> NDArray[np.int64]:
     _, ny1, nx1 = nodes.shape
     d = np.arange(-1, 2)
     return ((d[:, None, None] * ny1 + d[None, :, None]) * nx1 + d).reshape(27)
-
-
-def _worker_count(threads: int | None, n_bytes: int) -> int:
-    if threads is None:
-        return 1 if n_bytes < _SERIAL_BELOW_BYTES else processors()
-    if threads < 1:
-        raise MeshError(f"threads = {threads}: must be >= 1", field="threads", value=threads)
-    return threads
 
 
 def corner_fill(occupancy: NDArray[np.bool_], fill: Array) -> Array:

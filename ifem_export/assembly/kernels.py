@@ -30,19 +30,18 @@ def fill_csr(
 ) -> None:
     """Write the scalar CSR rows 3·start … 3·stop.
 
-    `recipe` holds for each node its row in `scales`, or -1 where all cells are full; the `table`
-    (256, 3, 27, 3) of the rows of full cells; the `scales` (k, 8) of the cells around the other
-    nodes; the element's blocks (8, 8, 3, 3); and for each slot the number of shared cells (27,)
-    and the cells themselves (27, 8, 3).
+    `recipe` holds the `table` (256, 3, 27, 3) of the rows of full cells; the `scales` (n, 8) of
+    the cells around each node, empty where all cells are full; the element's blocks (8, 8, 3, 3);
+    and for each slot the number of shared cells (27,) and the cells themselves (27, 8, 3).
     """
-    scale_rows, table, scales, blocks, pair_counts, pairs = recipe
+    table, scales, blocks, pair_counts, pairs = recipe
+    all_full = len(scales) == 0
     for node in range(start, stop):
         mask = masks[node]
         count = counts[mask]
         position = positions[node]
         row_start = 9 * first_block[node]
         width = 3 * count
-        scale_row = scale_rows[node]
         for row in range(3):
             indptr[3 * node + row] = row_start + row * width
         for b in range(count):
@@ -52,12 +51,12 @@ def fill_csr(
             for row in range(3):
                 for c in range(3):
                     indices[at + c] = column + c
-                    if scale_row < 0:
+                    if all_full:
                         data[at + c] = table[mask, row, slot, c]
                         continue
                     total = 0.0
                     for p in range(pair_counts[slot]):
                         bit, here, there = pairs[slot, p]
-                        total += scales[scale_row, bit] * blocks[here, there, row, c]
+                        total += scales[node, bit] * blocks[here, there, row, c]
                     data[at + c] = total
                 at += width
