@@ -17,6 +17,7 @@ from collections import Counter
 from functools import lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ifem_export.errors import MarkerGridError
@@ -51,15 +52,15 @@ _DRAWS = 120
 
 @lru_cache(maxsize=256)
 def _chosen(rows: int, columns: int) -> tuple[tuple[int, int], ...]:
-    wanted = _wanted_count(rows, columns)
+    count = _wanted_count(rows, columns)
     strict = min(rows, columns) >= STRICT_LATTICE
-    for count in (wanted, wanted + 1, wanted - 1, wanted - 2):
-        for spacing in (0.7, 0.5, 0.35, 0.0):
-            least = max(2.0, spacing * float(np.sqrt(rows * columns / count)))
-            for attempt in range(_ATTEMPTS):
-                sites = _draw(rows, columns, count, least, attempt) if count >= 4 else None
-                if sites is not None and (not strict or _is_robust(rows, columns, sites)):
-                    return tuple(sorted(sites))
+    for spacing in (0.7, 0.5):
+        # This is above √2, and two sites cannot be between √2 and 2 pitches apart.
+        least = spacing * float(np.sqrt(rows * columns / count))
+        for attempt in range(_ATTEMPTS):
+            sites = _draw(rows, columns, count, least, attempt)
+            if sites is not None and (not strict or _is_robust(rows, columns, sites)):
+                return tuple(sorted(sites))
     raise MarkerGridError(
         f"no anchor pattern found for a {rows} x {columns} marker lattice; "
         "use more rows or columns, or anchors 'none'",
@@ -116,15 +117,10 @@ def _is_robust(rows: int, columns: int, sites: list[tuple[int, int]]) -> bool:
 
 def _overlaps(few: NDArray[np.bool_], many: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Number of sites of `few` that coincide with sites of `many`, for every shift."""
-    half = [n // 2 for n in few.shape]
-    margin = [h + n for h, n in zip(half, few.shape, strict=True)]
-    padded = np.pad(many.astype(np.int64), [(m, m) for m in margin])
-    total = np.zeros((2 * half[0] + 1, 2 * half[1] + 1), dtype=np.int64)
-    for row, column in np.argwhere(few):
-        top = margin[0] + int(row) - half[0]
-        left = margin[1] + int(column) - half[1]
-        total += padded[top : top + total.shape[0], left : left + total.shape[1]]
-    return total
+    half = np.array(few.shape) // 2
+    padded = np.pad(many.astype(np.int64), np.stack([half, half], axis=1))
+    windows = sliding_window_view(padded, tuple(2 * half + 1))
+    return np.asarray(windows[few].sum(axis=0))
 
 
 def _wanted_count(rows: int, columns: int) -> int:
@@ -133,23 +129,20 @@ def _wanted_count(rows: int, columns: int) -> int:
     return int(np.clip(spread, least, 8))
 
 
-@lru_cache(maxsize=8)
-def _candidates(rows: int, columns: int) -> tuple[tuple[int, int], ...]:
-    """Sites inside the inner ellipse, in the order of the R2 low-discrepancy sequence.
+def _candidates(rows: int, columns: int, attempt: int) -> list[tuple[int, int]]:
+    """Sites inside the inner ellipse, in the order of a section of the R2 low-discrepancy sequence.
 
     The sequence (steps by powers of the plastic number) is evenly distributed and needs no random
     generator, so the pattern does not change with the version of a library.
     """
-    steps = np.arange(_ATTEMPTS * _STRIDE + _DRAWS)
+    steps = attempt * _STRIDE + np.arange(_DRAWS)
     unit = (0.5 + steps[:, None] * np.array([1 / _PLASTIC, 1 / _PLASTIC**2])) % 1.0
     sites = (unit * [rows, columns]).astype(np.int64)
     rim = 0 if min(rows, columns) < ROOMY_LATTICE else 1
     half = np.array([rows / 2 - rim, columns / 2 - rim])
     offset = (sites - [(rows - 1) / 2, (columns - 1) / 2]) / half
-    inside = np.sum(offset**2, axis=1) <= 1.0
-    return tuple(
-        (int(r), int(c)) if ok else (-1, -1) for (r, c), ok in zip(sites, inside, strict=True)
-    )
+    inside = sites[np.sum(offset**2, axis=1) <= 1.0]
+    return list(dict.fromkeys((int(r), int(c)) for r, c in inside))
 
 
 def _draw(
@@ -158,12 +151,7 @@ def _draw(
     """Sites from one section of the sequence that keep motions distinct; None if too few do."""
     sites: list[tuple[int, int]] = []
     used: list[Counter[tuple[int, int]]] = [Counter() for _ in _SYMMETRIES]
-    tried = {(-1, -1)}
-    start = attempt * _STRIDE
-    for site in _candidates(rows, columns)[start : start + _DRAWS]:
-        if site in tried:
-            continue
-        tried.add(site)
+    for site in _candidates(rows, columns, attempt):
         if any((site[0] - r) ** 2 + (site[1] - c) ** 2 < least**2 for r, c in sites):
             continue
         added = _added_shifts(sites, site)
