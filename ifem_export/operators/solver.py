@@ -19,6 +19,7 @@ from ifem_export.operators.pad_system import PadSystem
 Array = NDArray[np.float64]
 Method = Literal["auto", "pcg", "direct"]
 METHODS: tuple[str, ...] = get_args(Method)
+Cause = Literal["rounding", "stagnation", "limit"]
 MOST_ITERATIONS = 500
 DIRECT_BELOW = 2000
 """Number of unknowns below which a factor is faster than the first transform."""
@@ -38,15 +39,23 @@ class ConvergenceError(IfemError):
         residual: Relative residual reached.
         rtol: Relative residual requested.
         iterations: Iterations taken.
+        cause: "rounding" (no smaller residual is possible), "stagnation" (the residual hardly
+            decreases any more) or "limit" (more iterations were not allowed).
     """
 
     def __init__(
-        self, message: str, residual: float = np.nan, rtol: float = np.nan, iterations: int = 0
+        self,
+        message: str,
+        residual: float = np.nan,
+        rtol: float = np.nan,
+        iterations: int = 0,
+        cause: Cause = "limit",
     ) -> None:
         super().__init__(message, field="rtol", value=rtol)
         self.residual = residual
         self.rtol = rtol
         self.iterations = iterations
+        self.cause = cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +131,8 @@ class ConjugateGradients:
         before = np.inf
         # The updated residual drifts from the true one: restart from the true one if it did.
         while rtol < residual < STALLED * before and len(norms) <= self.most_iterations:
-            left = self.most_iterations + 1 - len(norms)
+            # The first residual after a restart counts as an iteration, because it costs as much.
+            left = self.most_iterations - len(norms)
             rest = right - self.matrix @ x
             more, steps = _iterate(self.matrix, rest, self._precondition, rtol * size, left)
             x, norms = x + more, norms + steps
@@ -244,7 +254,7 @@ def _iterate(
     while norms[-1] > tolerance and len(norms) <= most and np.isfinite(norms[-1]):
         z = precondition(r)
         rho, last = float(r @ z), rho
-        p = z if len(norms) == 1 else z + rho / last * p
+        p = z + rho / last * p
         q = matrix @ p
         curvature = float(p @ q)
         if not (curvature > 0 and rho > 0):
@@ -273,22 +283,22 @@ def _no_convergence(
     residual: float, rtol: float, norms: list[float], most: int
 ) -> ConvergenceError:
     """The error with its cause and remedy; `norms` holds the relative residuals."""
-    last = ", ".join(f"{norm:.2g}" for norm in norms[-4:])
-    if not len(norms) > most > 1 or norms[-1] <= rtol:
+    iterations = len(norms) - 1
+    if iterations < most or norms[-1] <= rtol:
+        cause: Cause = "rounding"
         why = (
-            "rounding allows no smaller residual for this matrix and load: request a tolerance of "
-            f"{2 * residual:.0e} or more, or use cells of an aspect nearer 1 or a Poisson's "
-            "ratio further from 0.5"
+            "rounding allows no smaller residual for this matrix and load: request a tolerance "
+            "well above that, or use cells of an aspect nearer 1 or a Poisson's ratio further "
+            "from 0.5"
         )
-    elif len(norms) > 20 and norms[-1] > 0.5 * norms[-20]:
+    elif iterations >= 20 and norms[-1] > 0.5 * norms[-20]:
+        cause = "stagnation"
         why = (
             "it hardly decreases any more, the matrix is ill-conditioned: use method 'direct', "
             "cells of an aspect nearer 1 or a Poisson's ratio further from 0.5"
         )
     else:
+        cause = "limit"
         why = "allow more iterations or a larger tolerance"
-    message = (
-        f"no solution to {rtol:.1g} after {len(norms) - 1} iterations: residual {residual:.2g} "
-        f"(last: {last}); {why}"
-    )
-    return ConvergenceError(message, residual, rtol, len(norms) - 1)
+    message = f"no solution to {rtol:.1g} after {iterations} iterations: residual {residual:.2g}"
+    return ConvergenceError(f"{message}; {why}", residual, rtol, iterations, cause)
