@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
@@ -36,7 +37,7 @@ class _WithCompliance:
     def displacement(self, force_n: ArrayLike) -> Array:
         """Surface part of the solution of K_ff u = f for forces (c, 3) on the surface alone."""
         columns = self.system.columns
-        load = np.zeros((self.system.stiffness.shape[0] // 3, 3))
+        load = np.zeros(self.system.stiffness.shape[0]).reshape(-1, 3)
         load[-columns:] = checked_field(force_n, columns)
         u = self.pad_solver.solve(load, COMPLIANCE_RTOL).x.reshape(-1, 3)
         return np.asarray(u[-columns:])
@@ -73,12 +74,12 @@ class PaperOperator(_WithCompliance):
         masks = s.mesh.numbering.masks[-s.columns :]
         kinds, types = np.unique(masks, return_inverse=True)
         table = occupancy_table(np.asarray(s.element_matrix))[kinds][:, 9:18]
-        rows, columns = s.lattice_positions.T + 1
-        lattice = np.full((rows.max() + 2, columns.max() + 2), s.columns, dtype=np.int64)
+        rows, columns = s.lattice_positions.T
+        lattice = np.full(s.mesh.numbering.shape[1:], s.columns, dtype=np.int64)
         lattice[rows, columns] = np.arange(s.columns)
-        around = [lattice[rows + dy, columns + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+        windows = sliding_window_view(np.pad(lattice, 1, constant_values=s.columns), (3, 3))
         blocks = np.ascontiguousarray(table.transpose(0, 2, 3, 1))
-        return types.astype(np.int64), np.stack(around, axis=1), blocks
+        return types.astype(np.int64), windows[rows, columns].reshape(-1, 9), blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,7 @@ class DenseOperator(_WithCompliance):
         dense = np.empty((n, n), dtype=np.float32)
         coupling = sparse.csc_array(s.surface_to_inner)
         for first in range(0, n, DENSE_BATCH):
-            part = slice(first, min(first + DENSE_BATCH, n))
+            part = slice(first, first + DENSE_BATCH)
             inner = factor.solve(coupling[:, part].toarray())
             dense[:, part] = s.surface[:, part].toarray() - s.inner_to_surface @ inner
         return np.asarray((dense + dense.T) / 2, dtype=np.float32)

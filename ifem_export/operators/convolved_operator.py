@@ -126,6 +126,6 @@ def missing_resultant(system: PadSystem, stiffness: LayeredOperator) -> Array:
         uniform[:, axis] = 1.0
         u = uniform.reshape(-1)
         inner = solver.solve(-(system.surface_to_inner @ u), RESULTANT_RTOL).x
-        exact = (system.surface @ u + system.inner_to_surface @ inner).reshape(-1, 3)
-        missing[:, axis, :] = exact - stiffness(uniform[None])[0]
+        exact = system.surface @ u + system.inner_to_surface @ inner
+        missing[:, axis, :] = exact.reshape(uniform.shape) - stiffness(uniform[None])[0]
     return missing

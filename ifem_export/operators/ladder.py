@@ -38,8 +38,6 @@ REFERENCE_RTOL = 1e-8
 FIELD_SEED = 7
 TIMED_S, TIMED_ROUNDS = 0.12, 3
 NOISE_SEED, NOISE_DRAWS = 11, 6
-_MARGIN = 4
-"""Largest difference in nodes between the boxes of a mesh and its reference, plus one."""
 Choice = tuple[Rung, dict[str, Any]]
 CHOICES: tuple[Choice, ...] = (
     ("paper", {}),
@@ -219,17 +217,22 @@ def refined(mesh: PadMesh) -> PadMesh:
 def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
     """Forces of the fine surface nodes, lumped to the coarse ones by their bilinear functions."""
     offset = (np.array(coarse.origin_mm) - fine.origin_mm) / fine.cell_size_mm
-    right, up = (int(n) + _MARGIN for n in np.rint(offset[:2]))
-    j, i = _surface_positions(fine)
-    rows, columns = _surface_positions(coarse)
-    extent = (max(j.max(), 2 * rows.max() + up), max(i.max(), 2 * columns.max() + right))
-    lattice = np.zeros((extent[0] + 2 * _MARGIN, extent[1] + 2 * _MARGIN, 3))
-    lattice[j + _MARGIN, i + _MARGIN] = force
-    total = np.zeros((len(rows), 3))
-    for dy, wy in ((-1, 0.5), (0, 1.0), (1, 0.5)):
-        for dx, wx in ((-1, 0.5), (0, 1.0), (1, 0.5)):
-            total += wy * wx * lattice[2 * rows + up + dy, 2 * columns + right + dx]
-    return total
+    right, up = (int(n) for n in np.rint(offset[:2]))
+    (fine_rows, fine_columns), (rows, columns) = (
+        fine.numbering.shape[1:],
+        coarse.numbering.shape[1:],
+    )
+    lattice = np.zeros((fine_rows, fine_columns, 3))
+    lattice[_surface_positions(fine)] = force
+    along_y, along_x = _hats(rows, fine_rows, up), _hats(columns, fine_columns, right)
+    total = np.einsum("rj,jic,si->rsc", along_y, lattice, along_x, optimize=True)
+    return np.asarray(total[_surface_positions(coarse)])
+
+
+def _hats(coarse: int, fine: int, offset: int) -> Array:
+    """Linear functions (coarse, fine) of nodes along an axis, at the nodes of half the pitch."""
+    distance = 2 * np.arange(coarse)[:, None] + offset - np.arange(fine)
+    return np.maximum(1.0 - np.abs(distance) / 2.0, 0.0)
 
 
 def noise_forces(operator: SurfaceOperator, count: int) -> Array:
