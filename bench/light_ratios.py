@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.geometry.guide_section import curved_guide, gel_section, straight_guide
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.optics import curved_guide, gel_section, straight_guide
 from gelslim_cad.light.scene import MIRROR_REFLECTANCE, dark_faces, light_scene
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.guide.shapes import (

@@ -100,10 +100,9 @@ def shown(name: str, value: object) -> str:
 def design_sensor() -> Sensor:
     """Camera, print and traced light of the design."""
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.geometry.guide_section import guide_profile
-    from gelslim_cad.geometry.sight import camera_record, virtual_camera
+    from gelslim_cad.geometry.optics import camera_record, guide_profile, virtual_camera
     from gelslim_cad.light.scene import light_scene
-    from gelslim_cad.sensor.pad import marker_grid
+    from gelslim_cad.sensor import marker_grid
     from gelslim_cad.spec.reader import read_spec
     from gelslim_optics.light.trace import trace_light
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.export.brep import bare_copy
-from gelslim_cad.export.patch import Patch
+from gelslim_cad.export.mesh import Patch
 
 Array = NDArray[np.float64]
 Distance = Callable[[Array], Array]

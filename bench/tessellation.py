@@ -28,9 +28,8 @@ from gelslim_cad.build.work import VOLUME_TOLERANCE
 from gelslim_cad.build.writers import GLB_ANGULAR_DEG, GLB_LINEAR_MM
 from gelslim_cad.dimensions import derive
 from gelslim_cad.export.glb import glb_bytes
-from gelslim_cad.export.mesh import RUNGS, mesh_for, tessellate, volume_mm3, welded
-from gelslim_cad.export.patch import face_patches
-from gelslim_cad.export.stl import stl_bytes
+from gelslim_cad.export.mesh import RUNGS, face_patches, mesh_for, tessellate, volume_mm3, welded
+from gelslim_cad.export.print_files import stl_bytes
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.finger import finger_parts
 from gelslim_cad.spec.reader import read_spec

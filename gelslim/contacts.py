@@ -141,7 +141,7 @@ def validate(
     from gelslim.design import chosen_operator, spec_of
     from gelslim.scene_sensor import spec_bundle
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.sensor.pad import measured_ladder
+    from gelslim_cad.sensor import measured_ladder
     from gelslim_twin.simulation.sensor import TwinSensor, store_sensor, stored_sensor
     from gelslim_twin.validation.validate import validate as validated
 

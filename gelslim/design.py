@@ -153,19 +153,19 @@ def make_bundle(
         InputError: The file has faults.
         BudgetError: No operator keeps the budget.
     """
+    from gelslim_cad import sensor
     from gelslim_cad.dimensions import derive as derived
-    from gelslim_cad.sensor import pad
 
     found = spec_of(spec)
     d = derived(found)
-    grid = pad.marker_grid(d)
-    mesh, _ = pad.pad_mesh(d, grid)
+    grid = sensor.marker_grid(d)
+    mesh, _ = sensor.pad_mesh(d, grid)
     ladder, label = None, ""
     remarks: tuple[str, ...] = ()
     if measure:
-        ladder = pad.measured_ladder(found, d, mesh, dense=dense, progress=progress)
+        ladder = sensor.measured_ladder(found, d, mesh, dense=dense, progress=progress)
         label, remarks = chosen_operator(ladder, budget)
-    bundle = pad.make_bundle(
+    bundle = sensor.make_bundle(
         found, d, mesh, grid, with_stiffness=with_stiffness, ladder=ladder, operator=label
     )
     return MeasuredBundle(bundle, ladder, label, remarks)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.build.fingerprint import PACKAGES
-from gelslim_cad.explore.engine import processors
+from gelslim_core.jobs import processors
 from gelslim_core.optional_library import EXTRAS, install_command, installed
 
 REQUIRED = (

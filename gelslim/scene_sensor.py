@@ -49,7 +49,7 @@ def spec_bundle(path: Path, with_light: bool = True) -> Bundle:
     Raises InputError if the spec has faults.
     """
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.sensor import make_bundle, marker_grid, pad_mesh
     from gelslim_cad.spec.reader import read_spec
 
     spec = read_spec(path).spec
@@ -97,8 +97,8 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     import numpy as np
 
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.geometry.sight import camera_record
-    from gelslim_cad.sensor.pad import marker_grid, pad_mesh
+    from gelslim_cad.geometry.optics import camera_record
+    from gelslim_cad.sensor import marker_grid, pad_mesh
     from gelslim_cad.spec.reader import read_spec
     from gelslim_twin.planning.question import figures
 

@@ -18,10 +18,9 @@ if TYPE_CHECKING:
     from gelslim_cad.dimensions.dimensions import Dimensions, derive
     from gelslim_cad.export.glb import glb_bytes
     from gelslim_cad.export.step import step_bytes
-    from gelslim_cad.geometry.guide_section import guide_profile
+    from gelslim_cad.geometry.optics import guide_profile, virtual_camera
     from gelslim_cad.geometry.part import Part
-    from gelslim_cad.geometry.sight import virtual_camera
-    from gelslim_cad.sensor.pad import make_bundle, marker_grid, pad_mesh
+    from gelslim_cad.sensor import make_bundle, marker_grid, pad_mesh
     from gelslim_cad.solids.finger import finger_parts, tooling_parts
     from gelslim_cad.solids.shapes import SolidError
     from gelslim_cad.spec.reader import LoadedSpec, read_spec

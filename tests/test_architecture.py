@@ -161,7 +161,7 @@ def f():
         "gelslim_core.yaml.reader",
         "gelslim_cad.spec.reader",
         "gelslim_cad.dimensions",
-        "gelslim_cad.geometry.sight",
+        "gelslim_cad.geometry.optics",
         "gelslim_optics.camera.virtual_camera",
         "ifem_export.bundle.files",
         "gelslim_twin.planning.planner",

@@ -17,11 +17,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gelslim_cad.explore.axis import Axis, parse_axis
-from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.judge import judge
-from gelslim_cad.explore.space import Space
+from gelslim_cad.explore.space import Axis, Space, parse_axis
 from gelslim_cad.explore.study import Request, explore
+from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec.reader import read_spec
 
 ROOT = Path(__file__).parents[1]

@@ -1,8 +1,10 @@
-"""Tables, instructions and report of a build."""
+"""Tables, bill of materials, instructions and report of a build."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+import io
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +14,24 @@ from gelslim_cad.build.page import pictures, report_data
 from gelslim_cad.build.writers import LIGHT_JSON
 from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.geometry.part import Part
 from gelslim_cad.report import BomLine, render_report
 from gelslim_cad.solids.casting import cast_gel
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Plan, Stages
 
+
 Documents = dict[str, tuple[bytes, str]]
+DENSITY_G_CM3 = {
+    "tough resin": 1.15,
+    "PETG": 1.27,
+    "PA12": 0.95,
+    "cast acrylic": 1.18,
+    "front-surface mirror": 2.5,
+    "silicone sheet": 1.15,
+}
+"""Typical densities, for masses in the BOM only."""
 
 
 def data_documents(stages: Stages, plan: Plan, bom: tuple[BomLine, ...]) -> Documents:
@@ -102,3 +115,50 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [plain(v) for v in value]
     return value.item() if hasattr(value, "item") else value
+
+
+def bill_of_materials(parts: Iterable[Part], gel_density_kg_m3: float) -> tuple[BomLine, ...]:
+    """Lines in the order of the parts; screws of one kind share a line."""
+    lines = []
+    for part in parts:
+        if part.quantity < 1:
+            continue
+        name = part.name
+        if "fastener" in part.tags:
+            name = name.rsplit("_", 1)[0]
+        lines.append(
+            BomLine(
+                name,
+                part.quantity,
+                part.material,
+                part.process,
+                _mass_g(part, gel_density_kg_m3),
+                part.note,
+                not part.in_assembly,
+            )
+        )
+    return tuple(lines)
+
+
+def _mass_g(part: Part, gel_density_kg_m3: float) -> float | None:
+    volume_cm3 = part.solid.Volume() / 1000
+    if part.name == "gel_pad":
+        return round(volume_cm3 * gel_density_kg_m3 / 1000, 2)
+    for material, density in DENSITY_G_CM3.items():
+        if part.material.startswith(material):
+            return round(volume_cm3 * density, 2)
+    return None
+
+
+def bom_csv(lines: Iterable[BomLine]) -> bytes:
+    """The bill as CSV (UTF-8, comma, quoted where needed)."""
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["part", "quantity", "material", "process", "use", "mass_g", "note"])
+    for line in lines:
+        use = "tooling" if line.tooling else "finger"
+        mass = "" if line.mass_g is None else f"{line.mass_g:.2f}"
+        writer.writerow(
+            [line.name, line.quantity, line.material, line.process, use, mass, line.note]
+        )
+    return text.getvalue().encode()

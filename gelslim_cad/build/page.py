@@ -12,7 +12,7 @@ from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions, definition
-from gelslim_cad.geometry.sight import virtual_camera
+from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.report import (
     BomLine,

@@ -7,11 +7,17 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Literal
 
+import cadquery as cq
+import numpy as np
+from numpy.typing import NDArray
+
 from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.export.mesh import face_patches
 from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.prism import Hole
+from gelslim_cad.solids.shapes import Hole, single
 
 INTERFERENCE_MM3 = 1e-3
 UNDERCUT_MM2 = 1e-3
@@ -20,12 +26,21 @@ LEAST_WALL_MM = 3.0
 LEAST_WEB_MM = 0.8
 """Between two openings of the lid: two passes of a common nozzle, more than a laser's kerf."""
 LEAST_VENTS = 2
+OPTICAL_PARTS = frozenset({"light_guide", "gel_pad", "mirror", "camera"})
+"""Parts that bound the view or that the light passes through."""
+INSET_MM = 0.02
+Points = NDArray[np.float64]
+LINEAR_MM = 0.02
+ANGLE_DEG = 5.0
+SLOPE = 1e-4
+"""Walls inclined by less than this (0.006°) count as parallel to the pull."""
+OPENING_MM = 1e-6
 
 
 def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
     """Line of sight past the actual solids, and interference between all pairs of parts."""
+    from gelslim_cad.build.solid_checks import blocked_volumes
     from gelslim_cad.proof.solids import interferences
-    from gelslim_cad.solids.corridor import blocked_volumes
 
     blocked = blocked_volumes(d, parts)
     pairs = interferences(parts, tolerance_mm3=INTERFERENCE_MM3)
@@ -47,9 +62,8 @@ def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
 
 def check_mould(d: Dimensions) -> tuple[Check, ...]:
     """Undercut of the cavity, thickness of its walls, webs between the lid's openings, vents."""
-    from gelslim_cad.solids.tooling.mould import cavity_in_mould
-    from gelslim_cad.solids.tooling.mould_plan import plan_mould
-    from gelslim_cad.solids.tooling.undercut import undercut_area_mm2
+    from gelslim_cad.build.solid_checks import undercut_area_mm2
+    from gelslim_cad.solids.tooling.mould import cavity_in_mould, plan_mould
 
     plan = plan_mould(d)
     wall_mm = _least_wall_mm(plan.cavity, (*plan.bolts, *plan.dowels))
@@ -137,3 +151,80 @@ def _check(
 _mould_check = partial(
     _check, measured_on="mould and cavity", group="Printing, casting and marking"
 )
+
+
+def corner_rays(d: Dimensions) -> tuple[Points, Points, Points]:
+    """Virtual pinhole (3,), and the points (4, 3) where the corner rays meet mirror and window."""
+    camera = virtual_camera(d)
+    x, y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
+    corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], dtype=float)
+    rays = camera.air_directions(corners)
+    angle = math.radians(d["mirror.angle_deg"])
+    normal = np.array([-math.sin(angle), 0, math.cos(angle)])
+    on_mirror = np.array([d["mirror.lower_x_mm"], 0, d["mirror.lower_z_mm"]])
+    start = camera.position_mm
+    to_mirror = ((on_mirror - start) @ normal) / (rays @ normal)
+    to_window = (camera.window_bottom_z_mm - start[2]) / rays[:, 2]
+    return start, start + rays * to_mirror[:, None], start + rays * to_window[:, None]
+
+
+def view_corridor(d: Dimensions) -> tuple[cq.Solid, cq.Solid]:
+    """Pyramid from camera to mirror and frustum from mirror to window, inset by 0.02 mm."""
+    _, mirror, window = corner_rays(d)
+    pinhole = np.array([d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]])
+    angle = math.radians(d["mirror.angle_deg"])
+    lift = INSET_MM * np.array([-math.sin(angle), 0, math.cos(angle)])
+    face, under = mirror + lift, window - np.array([0, 0, INSET_MM])
+    pyramid = [[pinhole, face[k], face[(k + 1) % 4]] for k in range(4)]
+    pyramid.append(list(face))
+    frustum = [[face[k], face[(k + 1) % 4], under[(k + 1) % 4], under[k]] for k in range(4)]
+    frustum += [list(face), list(under)]
+    return _polyhedron(pyramid, "camera view"), _polyhedron(frustum, "gel view")
+
+
+def _polyhedron(faces: Iterable[list[Points]], name: str) -> cq.Solid:
+    planar = []
+    for points in faces:
+        # Triangles instead of quadrilaterals, whose four corners are not exactly coplanar.
+        for k in range(1, len(points) - 1):
+            loop = [cq.Vector(*points[0]), cq.Vector(*points[k]), cq.Vector(*points[k + 1])]
+            planar.append(cq.Face.makeFromWires(cq.Wire.makePolygon([*loop, loop[0]])))
+    shell = cq.Shell.makeShell(planar)
+    solid = cq.Solid.makeSolid(shell)
+    return single(solid.fix() if solid.Volume() < 0 else solid, name)
+
+
+def blocked_volumes(d: Dimensions, parts: Iterable[Part]) -> dict[str, float]:
+    """Volume in mm³ by which each part obstructs the view; empty when the view is free."""
+    pieces = view_corridor(d)
+    taken: dict[str, float] = {}
+    for part in parts:
+        if part.name in OPTICAL_PARTS:
+            continue
+        volume = sum(abs(part.solid.intersect(piece).Volume()) for piece in pieces)
+        if volume > 1e-4:
+            taken[part.name] = volume
+    return taken
+
+
+def undercut_area_mm2(
+    casting: cq.Shape, pull: tuple[float, float, float] = (0.0, 0.0, 1.0)
+) -> float:
+    """Area (mm²) of the casting's surface that is undercut when the casting is pulled out.
+
+    The casting fills the cavity, whose opening is the plane farthest along `pull`. A surface whose
+    outward normal has a component along `pull` lies under a part of the mould, unless it is the
+    opening itself. The surface is sampled on a mesh within 0.02 mm, with the exact normals of the
+    CAD faces: the facets of an upright cylinder may be inclined although the cylinder is not.
+    """
+    axis = np.asarray(pull, dtype=float)
+    axis = axis / np.linalg.norm(axis)
+    patches = face_patches(casting, LINEAR_MM, ANGLE_DEG)
+    corners = np.concatenate([p.nodes_mm[p.triangles] for p in patches])
+    normals = np.concatenate([p.normals[p.triangles].mean(axis=1) for p in patches])
+    sides = corners[:, 1:] - corners[:, :1]
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+    height = corners @ axis
+    opening = height.min(axis=1) >= height.max() - OPENING_MM
+    inclined = normals @ axis > SLOPE
+    return float(area[inclined & ~opening].sum())

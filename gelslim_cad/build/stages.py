@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from gelslim_cad.build.bom import bill_of_materials, bom_csv
+from gelslim_cad.build.documents import bill_of_materials, bom_csv
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.build.work import PackedPart, Unit
 from gelslim_cad.checks import Check, check
 from gelslim_cad.checks.binding import binding_sentences
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.light.inputs import light_inputs
+from gelslim_cad.light.scene import light_inputs
 from gelslim_cad.report.view_figures import view_inputs
-from gelslim_cad.sensor.pad import marker_grid, marker_print, spec_hash
+from gelslim_cad.sensor import marker_grid, marker_print, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_core.files.held_interrupt import interrupts_held
 from ifem_export.markers.grid import MarkerGrid

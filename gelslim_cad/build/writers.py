@@ -98,7 +98,7 @@ def write_mould(parts: Sequence[Part], scale: float) -> Written:
 def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
     """The sensor's bundle with its ladder, read back, and the pad for ParaView."""
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.sensor.pad import make_bundle, marker_grid, measured_ladder, pad_mesh
+    from gelslim_cad.sensor import make_bundle, marker_grid, measured_ladder, pad_mesh
     from gelslim_cad.spec import Spec
     from ifem_export.bundle.files import load_bundle, write_bundle
     from ifem_export.mesh.vtu import write_vtu
@@ -121,8 +121,7 @@ def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
 def write_light(parts: Sequence[Part], **values: Any) -> Written:
     """Trace light through this guide and through straight ones; `values` are `light_inputs`."""
     from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
-    from gelslim_cad.light.record import study_record
-    from gelslim_cad.light.study import study_light
+    from gelslim_cad.light.study import study_light, study_record
 
     study = study_light(values)
     files = {
@@ -169,8 +168,7 @@ def _meshes(
     part: Part, files: Files, purposes: dict[str, str]
 ) -> dict[str, Callable[[Path], Proofs]]:
     from gelslim_cad.export.mesh import mesh_for, print_mesh
-    from gelslim_cad.export.stl import stl_bytes
-    from gelslim_cad.export.threemf import NamedMesh, threemf_bytes
+    from gelslim_cad.export.print_files import NamedMesh, stl_bytes, threemf_bytes
     from gelslim_cad.proof.mesh import prove_3mf, prove_stl
 
     mesh, rung = mesh_for(part.solid, VOLUME_TOLERANCE)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
-from gelslim_cad.spec.material import STIFF_GEL_MPA
+from gelslim_cad.spec.spec import STIFF_GEL_MPA
 
 MOST_NODES = 400_000
 

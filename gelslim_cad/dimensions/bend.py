@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from gelslim_cad.dimensions.registry import dimension
+
+LEAST, MOST, STEP = 0.5, 6.0, 0.25
+GOOD_ENOUGH = 0.99
+RAYS = 1 << 14
 
 
 @dimension(
@@ -47,8 +53,6 @@ def guide_bend_ratio(
     """Inner bend radius over guide thickness, R/t."""
     if not chosen_here(light_guide_bend_radius_ratio):
         return light_guide_bend_radius_ratio
-    from gelslim_cad.light.bend_choice import brightest_ratio
-
     # The guide's own extent follows from the fold, which needs the bends: take the gel's.
     end = gel_length_mm / 2 + 0.2 + light_guide_end_support_mm
     inputs = {
@@ -99,3 +103,43 @@ def _at(value: Any, row: int) -> Any:
     if not isinstance(value, np.ndarray):
         return value
     return float(np.ravel(value)[row if value.size > 1 else 0])
+
+
+def brightest_ratio(values: Mapping[str, Any]) -> float:
+    """Least R/t whose light is within 1 % of the most.
+
+    `values` holds what `light_scene` and `curved_guide` look up by dotted name, with side wall
+    and envelope.max_width_mm; wider bends than that allows are not tried, but at least R/t = 0.5.
+    """
+    return _brightest(tuple(sorted(values.items())))
+
+
+@lru_cache(maxsize=4096)
+def _brightest(items: tuple[tuple[str, Any], ...]) -> float:
+    from gelslim_cad.geometry.optics import curved_guide, gel_section
+    from gelslim_cad.light.scene import light_scene
+    from gelslim_optics.guide.shapes import curved_profile
+    from gelslim_optics.light.trace import trace_light
+
+    values = dict(items)
+    own = curved_guide({**values, "guide.inner_radius_mm": LEAST})
+    gel, ratios = gel_section(values), candidates(values)
+    light = []
+    for ratio in ratios:
+        profile = curved_profile(replace(own, inner_radius_mm=ratio * own.thickness_mm), gel)
+        light.append(trace_light(light_scene(values, profile), RAYS).value("delivered"))
+    enough = np.asarray(light) >= GOOD_ENOUGH * max(light)
+    return float(ratios[int(np.argmax(enough))])
+
+
+def candidates(values: Mapping[str, Any]) -> list[float]:
+    """Ratios R/t to try, in ascending order, up to the largest that the width allows."""
+    limit, most = values["design.envelope.max_width_mm"], MOST
+    if limit is not None:
+        t = values["design.light_guide.thickness_mm"]
+        wall = values["design.housing.side_wall_mm"] + values["design.housing.fit_clearance_mm"]
+        radius = limit / 2 - wall - t - values["guide.flat_width_mm"] / 2
+        most = min(MOST, radius / t)
+    steps = [float(r) for r in np.arange(LEAST, most, STEP)]
+    last = [] if most < LEAST else [int(most * 1000) / 1000]
+    return [*(s for s in steps if not last or s < last[0]), *last] or [LEAST]

@@ -8,7 +8,7 @@ from typing import Any
 
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.exposure import exposure_at
-from gelslim_cad.light.inputs import NAMES
+from gelslim_cad.light.scene import NAMES
 
 EXPOSED = (
     "camera.f_number",
@@ -35,7 +35,7 @@ class Traced:
 
 def trace(values: Mapping[str, Any], rays: int) -> Traced:
     """Trace the guide of a design given by `TRACED`; a fixed seed, so the same rays for all."""
-    from gelslim_cad.geometry.guide_section import guide_profile
+    from gelslim_cad.geometry.optics import guide_profile
     from gelslim_cad.light.scene import light_scene
     from gelslim_optics.light.trace import trace_light
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gelslim_cad.checks import RULES
-from gelslim_cad.explore.axis import Axis, shown
 from gelslim_cad.explore.judge import REFUSED
 from gelslim_cad.explore.pareto import THICKNESS, TRADES, Goal, front
+from gelslim_cad.explore.space import Axis, shown
 from gelslim_cad.explore.study import Exploration
 from gelslim_core.figure import as_png, new_figure
 

@@ -11,11 +11,10 @@ from gelslim_cad.checks import margins_batch
 from gelslim_cad.checks.binding import LIMITS, SETTERS
 from gelslim_cad.checks.rule_ids import RuleId
 from gelslim_cad.dimensions import DimensionsBatch, derive_batch
-from gelslim_cad.explore.axis import Axis, Value
 from gelslim_cad.explore.force_error import PAD_NAMES
-from gelslim_cad.explore.space import changed, grouped, illegal
+from gelslim_cad.explore.space import Axis, Value, changed, grouped, illegal
 from gelslim_cad.geometry.names import DimensionName
-from gelslim_cad.light.inputs import NAMES as LIGHT_NAMES
+from gelslim_cad.light.scene import NAMES as LIGHT_NAMES
 from gelslim_cad.spec import Spec
 
 Columns = dict[str, list[Any]]

@@ -11,12 +11,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gelslim_cad.explore.axis import Axis, ExploreError, Value
-from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.judge import judge
 from gelslim_cad.explore.pareto import Goal
-from gelslim_cad.explore.space import Space
+from gelslim_cad.explore.space import Axis, ExploreError, Space, Value
 from gelslim_cad.explore.study import Exploration, Progress, Request, explore
+from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec import Spec
 from gelslim_core.yaml.fields import field_at
 

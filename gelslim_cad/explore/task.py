@@ -1,17 +1,23 @@
-"""Tasks for workers on any machine: plain data in and out, with the same result everywhere."""
+"""Tasks for workers on any machine: plain data in and out, with the same result everywhere.
+
+Results of workers with other code are refused.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from gelslim_cad.build.fingerprint import code_hash, combined
-from gelslim_cad.explore.axis import Axis
 from gelslim_cad.explore.brightness import trace
 from gelslim_cad.explore.force_error import Patch, patch_error
 from gelslim_cad.explore.judge import judge
+from gelslim_cad.explore.space import Axis, ExploreError
 from gelslim_cad.spec import Spec
+from gelslim_core.jobs import Engine as WorkEngine
+from gelslim_core.jobs import EngineError
 
 Kind = Literal["designs", "light", "force"]
 
@@ -67,3 +73,34 @@ def unpacked(packed: dict[str, Any], count: int) -> list[Any]:
     if "all" in packed:
         return [packed["all"]] * count
     return list(packed["each"])
+
+
+@dataclass(frozen=True)
+class Engine:
+    """`jobs` processes here, or the workers behind the Dask scheduler at `scheduler`."""
+
+    jobs: int = 1
+    scheduler: str = ""
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, dict[str, Any]]]:
+        """Each task with its result, in the order they finish.
+
+        Raises ExploreError where no cluster answers, its workers have other code, or a task kills
+        its workers, and what a task raises.
+        """
+        here = code_hash()
+        try:
+            for number, (code, result) in WorkEngine(self.jobs, self.scheduler).run(signed, tasks):
+                if code != here:
+                    raise ExploreError(
+                        f"--scheduler {self.scheduler}: a worker has another version of "
+                        "gelslim-cad or of its libraries than this machine; install the same there"
+                    )
+                yield tasks[number], result
+        except EngineError as error:
+            raise ExploreError(f"{error}; what was finished is kept: run again") from error
+
+
+def signed(task: Task) -> tuple[str, dict[str, Any]]:
+    """A task's result with the digest of the code and libraries that gave it."""
+    return code_hash(), perform(task)

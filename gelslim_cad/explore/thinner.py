@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from gelslim_cad.checks import margins_batch
 from gelslim_cad.checks.relaxation import given, relaxations
 from gelslim_cad.dimensions import derive_batch
-from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.brightness import RAYS
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX
 from gelslim_cad.explore.price import Measured, Price, measured, prices
-from gelslim_cad.explore.space import changed, illegal
+from gelslim_cad.explore.space import ExploreError, changed, illegal
 from gelslim_cad.spec import Spec
 
 LIMIT_FIELD, LIMIT_RULE = "design.envelope.max_thickness_mm", "finger.thickness_mm"

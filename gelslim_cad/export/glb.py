@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.export import ExportError
-from gelslim_cad.export.patch import Patch, face_patches
+from gelslim_cad.export.mesh import Patch, face_patches
 from gelslim_cad.geometry.part import Part
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125

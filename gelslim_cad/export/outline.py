@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelslim_cad.export import ExportError
 from gelslim_cad.export.brep import only_solid
 from gelslim_cad.export.contour import Circle, contours_of, frame_of
-from gelslim_cad.markers.drawing import fixed_metadata
+from gelslim_cad.markers.dxf import fixed_metadata
 
 _CUT_COLOUR, _ENGRAVE_COLOUR = 1, 5
 _MILLIMETRES = 4

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import LightStudy
 from gelslim_core.figure import as_png, new_figure

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelslim_cad.geometry.guide_section import guide_profile
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import COLOURS, RATIOS, study_light
 from gelslim_core.budget.ladder import Ladder, Rung, Wording

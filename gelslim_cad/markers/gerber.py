@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_cad.markers.layout import check_inside
-from gelslim_cad.markers.number import decimal
+from gelslim_cad.markers.layout import check_inside, decimal
 from gelslim_cad.markers.outline import Outline, arc_centre, as_outline
 from gelslim_cad.markers.stencil import StencilSheet
 from gelslim_core import __version__

@@ -1,4 +1,4 @@
-"""Layout of a sheet around the dots: registration crosses, scale bar, arrow and notes."""
+"""Layout of a sheet around the dots: crosses, scale bar, arrow, notes; numbers as text."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.markers.number import decimal
 from gelslim_cad.markers.outline import Outline, as_outline
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
@@ -105,3 +104,11 @@ def notes(grid: MarkerGrid, layout: SheetLayout) -> list[str]:
     if len(grid.omitted):
         lines.append(f"{len(grid.omitted)} sites left empty are anchors")
     return lines
+
+
+def decimal(value: float, places: int = 4) -> str:
+    """Return `value` rounded to `places`, without trailing zeros, exponent or minus zero."""
+    text = f"{float(value):.{places}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

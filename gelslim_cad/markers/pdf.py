@@ -8,8 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_cad.markers.layout import CROSS_ARM_MM, SheetLayout, lay_out, notes
-from gelslim_cad.markers.number import decimal
+from gelslim_cad.markers.layout import CROSS_ARM_MM, SheetLayout, decimal, lay_out, notes
 from gelslim_cad.markers.outline import Outline, as_outline
 from ifem_export.markers.grid import MarkerGrid
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_cad.markers.drawing import Drawing
+from gelslim_cad.markers.dxf import Drawing
 from gelslim_cad.markers.layout import check_inside, tip_arrow
 from gelslim_cad.markers.outline import Outline, as_outline
 from ifem_export.markers.grid import MarkerGrid

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_cad.markers.layout import CROSS_ARM_MM, SCALE_BAR_MM, SheetLayout, lay_out, notes
-from gelslim_cad.markers.number import decimal
+from gelslim_cad.markers.layout import (
+    CROSS_ARM_MM,
+    SCALE_BAR_MM,
+    SheetLayout,
+    decimal,
+    lay_out,
+    notes,
+)
 from gelslim_cad.markers.outline import Outline, as_outline
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 

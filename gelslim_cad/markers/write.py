@@ -6,8 +6,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from gelslim_cad.markers.csv import render_csv
-from gelslim_cad.markers.nodes import NearestNodes
+from gelslim_cad.markers.nodes import NearestNodes, render_csv
 from gelslim_cad.markers.outline import Outline, as_outline
 from gelslim_core.files.replaced_file import replace_file
 from ifem_export.markers.grid import MarkerGrid

@@ -8,7 +8,7 @@ import numpy as np
 
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
-from gelslim_cad.geometry.sight import virtual_camera
+from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_core.figure import as_png, new_figure
 from gelslim_optics.camera.projection_error import ErrorMap, ErrorModel, error_map
 from gelslim_optics.camera.view_quality import fit_homography

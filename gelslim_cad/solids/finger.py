@@ -7,24 +7,24 @@ from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.stencil import lay_out_stencil
 from gelslim_cad.solids.adapter import adapter
-from gelslim_cad.solids.bezel import bezel
+from gelslim_cad.solids.bezel import bezel, shims
 from gelslim_cad.solids.body import body
 from gelslim_cad.solids.camera import camera, camera_clamp
 from gelslim_cad.solids.cover import cover
 from gelslim_cad.solids.gel import gel_pad
-from gelslim_cad.solids.guide import guide_blank, light_guide
-from gelslim_cad.solids.leds import led_boards
+from gelslim_cad.solids.guide import guide_blank, led_boards, light_guide
 from gelslim_cad.solids.mirror import mirror, mirror_seat
 from gelslim_cad.solids.screws import screws
-from gelslim_cad.solids.shims import shims
-from gelslim_cad.solids.tooling.calibration_target import calibration_target
-from gelslim_cad.solids.tooling.cutting_template import cutting_template
-from gelslim_cad.solids.tooling.fabric_skin import fabric_skin
+from gelslim_cad.solids.tooling.calibration import calibration_target, sphere_indenter
 from gelslim_cad.solids.tooling.fit_coupon import fit_coupon
 from gelslim_cad.solids.tooling.focus_jig import focus_jig
 from gelslim_cad.solids.tooling.mould import mould_parts
-from gelslim_cad.solids.tooling.sphere_indenter import sphere_indenter
-from gelslim_cad.solids.tooling.stencil import stencil, stencil_problem
+from gelslim_cad.solids.tooling.sheets import (
+    cutting_template,
+    fabric_skin,
+    stencil,
+    stencil_problem,
+)
 from ifem_export.markers.grid import MarkerGrid
 
 

@@ -12,8 +12,7 @@ import cadquery as cq
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.prism import prism
-from gelslim_cad.solids.shapes import single
+from gelslim_cad.solids.shapes import prism, single
 
 GEL = (0.93, 0.93, 0.90, 0.55)
 

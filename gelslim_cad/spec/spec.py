@@ -1,17 +1,168 @@
-"""The whole spec: what the user chose."""
+"""The whole spec: camera, design, material, manufacturing and mesh as the user chose them."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from gelslim_cad.spec.camera import Camera
 from gelslim_cad.spec.design import Design
-from gelslim_cad.spec.manufacturing import Manufacturing
-from gelslim_cad.spec.material import Material
-from gelslim_cad.spec.mesh import Mesh
 from gelslim_core.yaml.base import Block, require_folder_name
+from gelslim_core.yaml.errors import FieldError
+
+STIFF_GEL_MPA = 5.0
+PrintProcess = Literal["sla", "fdm", "sls"]
+MarkingProcess = Literal["laser_opened_paint", "laser_etch", "uv_print", "stencil"]
+Positive = Annotated[float, Field(gt=0, le=1000)]
+Count = Annotated[int, Field(ge=1, le=400)]
+
+
+class GelMaterial(Block):
+    """Platinum-cure silicone of the pad."""
+
+    name: str = Field(default="XP-565 silicone", max_length=80, description="Gel, for the BOM")
+    youngs_modulus_mpa: float = Field(default=0.147, gt=0, le=2000, description="Young's modulus E")
+    poissons_ratio: float = Field(default=0.3223, ge=0, lt=0.5, description="Poisson's ratio")
+    youngs_modulus_tolerance_ratio: float = Field(
+        default=0.1,
+        gt=0,
+        le=1,
+        description="Standard deviation of Young's modulus between batches, as a part of it",
+    )
+    poissons_ratio_tolerance: float = Field(
+        default=0.02, gt=0, le=0.2, description="Standard deviation of Poisson's ratio"
+    )
+    density_kg_m3: float = Field(default=1020.0, ge=200, le=4000, description="Density")
+    refractive_index: float = Field(default=1.41, ge=1, le=2, description="Refractive index")
+    coat_reflectance: float = Field(
+        default=0.5, ge=0, le=0.98, description="Part of the light that the painted coat scatters"
+    )
+    mix_ratio_a: float = Field(default=15.0, gt=0, le=1000, description="Parts A by mass")
+    mix_ratio_b: float = Field(default=1.0, gt=0, le=1000, description="Parts B by mass")
+
+
+class AcrylicMaterial(Block):
+    """PMMA of the light guide."""
+
+    refractive_index: float = Field(default=1.4906, gt=1, le=2, description="Refractive index")
+    absorption_per_m: float = Field(
+        default=2.0, ge=0, le=200, description="Absorption coefficient per metre"
+    )
+
+
+class Material(Block):
+    """Gel and acrylic."""
+
+    gel: GelMaterial = Field(default=GelMaterial(), description="The gel")
+    acrylic: AcrylicMaterial = Field(default=AcrylicMaterial(), description="The light guide")
+    allow_stiff_gel: bool = Field(
+        default=False, description="Accept a gel stiffer than 5 MPa (no tactile gel is)"
+    )
+
+    @model_validator(mode="after")
+    def _soft(self) -> Material:
+        modulus = self.gel.youngs_modulus_mpa
+        if modulus > STIFF_GEL_MPA and not self.allow_stiff_gel:
+            raise FieldError(
+                "gel.youngs_modulus_mpa",
+                f"must be <= {STIFF_GEL_MPA:g} MPa",
+                f"did you mean {modulus / 1000:g}, that is {modulus:g} kPa? Tactile gels have "
+                "about 0.05 to 1 MPa; set material.allow_stiff_gel: true for a stiffer one",
+            )
+        return self
+
+
+class Manufacturing(Block):
+    """Processes, tolerances and stock."""
+
+    print_process: PrintProcess = Field(
+        default="sla", description="Process of the printed finger parts"
+    )
+    print_tolerance_mm: float = Field(
+        default=0.1, ge=0.005, le=1, description="Accuracy of the printed parts, plus or minus"
+    )
+    max_overhang_deg: float = Field(
+        default=45.0, ge=0, le=90, description="Steepest unsupported overhang from the vertical"
+    )
+    mould_process: Literal["acrylic", "sla", "fdm", "aluminium"] = Field(
+        default="acrylic", description="What the gel mould is made of"
+    )
+    gel_shrinkage_percent: float = Field(
+        default=0.1, ge=0, le=10, description="Linear shrinkage of the gel while curing"
+    )
+    gel_thickness_tolerance_mm: float = Field(
+        default=0.05, gt=0, le=1, description="Standard deviation of the cast gel's thickness"
+    )
+    marking_process: MarkingProcess = Field(
+        default="laser_opened_paint", description="How the markers get onto the gel"
+    )
+    acrylic_stock_mm: tuple[Positive, ...] = Field(
+        default=(1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0),
+        min_length=1,
+        max_length=50,
+        description="Acrylic thicknesses on sale",
+    )
+    acrylic_tolerance_ratio: float = Field(
+        default=0.1, ge=0, le=0.5, description="How far stock acrylic may differ from nominal"
+    )
+    mirror_stock_mm: tuple[Positive, ...] = Field(
+        default=(0.7, 1.0, 1.5, 2.0, 3.0),
+        min_length=1,
+        max_length=50,
+        description="Front-surface mirror thicknesses on sale",
+    )
+    fabric_skin: bool = Field(default=True, description="Make an outline for a fabric skin")
+
+
+class Mesh(Block):
+    """Cells of the pad mesh: by pitch (a divisor of the marker pitch) or by counts."""
+
+    nodes_per_marker_pitch: int = Field(
+        default=2,
+        ge=1,
+        le=20,
+        description="Mesh cells per marker pitch; nodes meet markers",
+    )
+    cells_along: Count | None = Field(
+        default=None, description="Cells along the finger, instead of nodes_per_marker_pitch"
+    )
+    cells_across: Count | None = Field(
+        default=None, description="Cells across the finger, instead of nodes_per_marker_pitch"
+    )
+    layers: int = Field(
+        default=4,
+        ge=1,
+        le=32,
+        description="Cell layers through the thickness; one is the paper's form",
+    )
+    element: Literal["full", "bbar", "incompatible"] = Field(
+        default="bbar",
+        description="Hex-8 element: full 2×2×2 integration, B-bar (mean dilatation) or "
+        "incompatible modes (best in bending)",
+    )
+    weighting: Literal["cell_centre", "volume_fraction"] = Field(
+        default="cell_centre",
+        description="Cells that the gel's outline or crown cuts: kept or dropped whole by their "
+        "centre, or scaled by the share of their volume that the gel fills",
+    )
+    least_fill: float = Field(
+        default=0.01,
+        gt=0,
+        le=1,
+        description="Share of its volume below which volume_fraction drops a cell",
+    )
+
+    @model_validator(mode="after")
+    def _both(self) -> Mesh:
+        if (self.cells_along is None) != (self.cells_across is None):
+            raise FieldError(
+                "cells_along",
+                "must be given together with cells_across, or neither",
+                "add the other or delete it",
+                ("cells_across",),
+            )
+        return self
 
 
 class Spec(Block):

@@ -15,7 +15,7 @@ cq = pytest.importorskip("cadquery")
 
 from surface_deviation import deviation_um, lattice  # noqa: E402
 
-from gelslim_cad.export.patch import face_patches  # noqa: E402
+from gelslim_cad.export.mesh import face_patches  # noqa: E402
 
 
 def test_deviation_of_a_cylinder_is_its_sagitta() -> None:

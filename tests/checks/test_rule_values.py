@@ -13,7 +13,7 @@ from gelslim_cad.checks.apply import _check
 from gelslim_cad.checks.rule import Finding, Rule
 from gelslim_cad.dimensions import derive, derive_batch
 from gelslim_cad.geometry.gel_shape import GelShape
-from gelslim_cad.sensor.pad import marker_grid
+from gelslim_cad.sensor import marker_grid
 from ifem_export.markers.grid import build_marker_grid
 
 

@@ -10,7 +10,7 @@ import pytest
 from cli_samples import MINI20, ROOT, altered, too_long
 
 from gelslim.cli import main
-from gelslim_cad.compare.comparison import compare, differ
+from gelslim_cad.compare import compare, differ
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
 

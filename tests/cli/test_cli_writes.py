@@ -18,7 +18,7 @@ from gelslim.cli.output import replace_file
 from gelslim_cad.build import BuildResult
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
-from gelslim_cad.sensor.pad import marker_grid, spec_hash
+from gelslim_cad.sensor import marker_grid, spec_hash
 from gelslim_cad.spec.reader import read_spec
 from ifem_export.bundle.files import load_bundle
 

@@ -11,7 +11,7 @@ from fold_samples import mini20, shipped
 from gelslim_cad.dimensions import definition, derive
 from gelslim_cad.dimensions.dimensions import ORDER, PATHS
 from gelslim_cad.dimensions.registry import REGISTRY
-from gelslim_cad.geometry.sight import virtual_camera
+from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_optics.camera.virtual_camera import reflect_direction, reflect_point
 
 DESIGN_NAMES = ["mini20", "gelslim2"]

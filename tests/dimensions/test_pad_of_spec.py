@@ -7,7 +7,7 @@ import pytest
 
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.gel_shape import GelShape
-from gelslim_cad.sensor.pad import marker_grid, pad_mesh, reference_mesh
+from gelslim_cad.sensor import marker_grid, pad_mesh, reference_mesh
 from gelslim_cad.spec.reader import read_spec
 
 NO_COUNTS = {"cells_along": None, "cells_across": None}

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.geometry.sight import virtual_camera
+from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.camera.projection_error import ErrorModel, error_map
 from ifem_export.elements.material import Material

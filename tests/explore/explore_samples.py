@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gelslim_cad.explore.axis import parse_axis
-from gelslim_cad.explore.space import Space
+from gelslim_cad.explore.space import Space, parse_axis
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
 

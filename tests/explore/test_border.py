@@ -9,10 +9,10 @@ from explore_samples import mini20, space
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
-from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.optimum import border, optimise
 from gelslim_cad.explore.space import changed
 from gelslim_cad.explore.study import Request
+from gelslim_cad.explore.task import Engine
 
 
 def failed(**values: float) -> set[str]:

@@ -12,11 +12,11 @@ from explore_samples import MINI20, mini20, space
 
 from gelslim.cli import main
 from gelslim_cad.dimensions import derive_batch, solver
-from gelslim_cad.explore.axis import ExploreError, parse_axis, shown
-from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.judge import judge
+from gelslim_cad.explore.space import ExploreError, parse_axis, shown
 from gelslim_cad.explore.study import Request, explore
 from gelslim_cad.explore.table import csv_bytes, parquet_bytes
+from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.spec.starter import spec_text
 

@@ -9,9 +9,8 @@ from explore_samples import mini20, space
 from gelslim_cad.checks import check, check_batch, margins_batch
 from gelslim_cad.checks.relaxation import given
 from gelslim_cad.dimensions import derive, derive_batch
-from gelslim_cad.explore.axis import Axis
 from gelslim_cad.explore.judge import SHOWN, judge
-from gelslim_cad.explore.space import changed, illegal
+from gelslim_cad.explore.space import Axis, changed, illegal
 from gelslim_cad.spec import Spec
 from gelslim_core.yaml.fields import field_at, field_table
 

@@ -10,12 +10,12 @@ from explore_samples import MINI20, mini20, space
 
 from gelslim_cad.checks import check, check_batch
 from gelslim_cad.dimensions import derive, derive_batch
-from gelslim_cad.explore.axis import ExploreError
-from gelslim_cad.explore.engine import Engine
 from gelslim_cad.explore.optimum import optimise
 from gelslim_cad.explore.pareto import TRADES, front
 from gelslim_cad.explore.price import FIGURES, Price
+from gelslim_cad.explore.space import ExploreError
 from gelslim_cad.explore.study import Request
+from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.spec.starter import spec_text
 

@@ -12,11 +12,10 @@ from explore_samples import MINI20, ROOT, mini20
 from gelslim.cli import main
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
-from gelslim_cad.explore.axis import ExploreError
 from gelslim_cad.explore.brightness import RAYS
 from gelslim_cad.explore.force_error import Patch, patch_error
 from gelslim_cad.explore.price import FIGURES, Price, measured, prices
-from gelslim_cad.explore.space import changed
+from gelslim_cad.explore.space import ExploreError, changed
 from gelslim_cad.explore.thinner import LIMIT_RULE, Offer, thinner
 from gelslim_cad.light.exposure import exposure
 from gelslim_cad.spec import Spec
@@ -48,7 +47,7 @@ def test_prices_are_what_the_tools_say_of_each_finger() -> None:
     assert told["gel.area_mm2"].verdict == told["gel.stiffness_n_mm"].verdict == ""
     # Of a thinner gel of the same stuff: stiffer.
     assert told["gel.stiffness_n_mm"].change == pytest.approx(1 / 3, abs=0.05)
-    from gelslim_cad.geometry.guide_section import guide_profile
+    from gelslim_cad.geometry.optics import guide_profile
     from gelslim_cad.light.scene import light_scene
     from gelslim_optics.light.trace import trace_light
 

@@ -7,8 +7,15 @@ import itertools
 import pytest
 from explore_samples import mini20, space
 
-from gelslim_cad.explore.axis import ExploreError, parse_axis
-from gelslim_cad.explore.space import CHUNK, Space, changed, grouped, illegal
+from gelslim_cad.explore.space import (
+    CHUNK,
+    ExploreError,
+    Space,
+    changed,
+    grouped,
+    illegal,
+    parse_axis,
+)
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ from explore_samples import MINI20, ROOT, space
 
 from gelslim_cad.explore import space as space_module
 from gelslim_cad.explore import study
-from gelslim_cad.explore.axis import ExploreError
-from gelslim_cad.explore.engine import Engine
+from gelslim_cad.explore.space import ExploreError
 from gelslim_cad.explore.study import Request, explore
 from gelslim_cad.explore.table import csv_bytes, parquet_bytes
+from gelslim_cad.explore.task import Engine
 from gelslim_core.optional_library import MissingLibraryError
 
 RAYS = 1 << 11
@@ -63,7 +63,7 @@ def test_a_worker_with_other_code_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr("gelslim_cad.explore.engine.signed", lambda task: ("other", {}))
+    monkeypatch.setattr("gelslim_cad.explore.task.signed", lambda task: ("other", {}))
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
@@ -77,7 +77,7 @@ def test_a_worker_with_other_code_is_refused(
 def test_a_killed_worker_is_told_and_the_rest_kept(
     tmp_path: Path, small_chunks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gelslim_cad.explore.engine.signed", _deadly)
+    monkeypatch.setattr("gelslim_cad.explore.task.signed", _deadly)
     with pytest.raises(ExploreError, match="use fewer jobs"):
         explore(request(), tmp_path / "x", Engine(2))
     monkeypatch.undo()

@@ -12,9 +12,8 @@ from gelslim_cad.export.brep import shape_digest
 from gelslim_cad.export.glb import glb_bytes
 from gelslim_cad.export.mesh import mesh_for
 from gelslim_cad.export.outline import outline_dxf_bytes
+from gelslim_cad.export.print_files import NamedMesh, stl_bytes, threemf_bytes
 from gelslim_cad.export.step import step_bytes
-from gelslim_cad.export.stl import stl_bytes
-from gelslim_cad.export.threemf import NamedMesh, threemf_bytes
 
 NAMES = ("busy", "dimple", "plate", "window")
 

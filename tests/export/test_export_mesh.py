@@ -18,15 +18,14 @@ from gelslim_cad.export.glb import glb_bytes
 from gelslim_cad.export.mesh import (
     RUNGS,
     bad_edges,
+    face_patches,
     mesh_for,
     print_mesh,
     rotation,
     tessellate,
     volume_mm3,
 )
-from gelslim_cad.export.patch import face_patches
-from gelslim_cad.export.stl import stl_bytes
-from gelslim_cad.export.threemf import NamedMesh, threemf_bytes
+from gelslim_cad.export.print_files import NamedMesh, stl_bytes, threemf_bytes
 
 VOLUMES_MM3 = {
     "plate": samples.drilled_plate_area_mm2() * 6,

@@ -12,9 +12,8 @@ from gelslim_cad.export import ExportError
 from gelslim_cad.export.glb import glb_bytes
 from gelslim_cad.export.mesh import mesh_for, tessellate
 from gelslim_cad.export.outline import outline_dxf_bytes
+from gelslim_cad.export.print_files import NamedMesh, stl_bytes, threemf_bytes
 from gelslim_cad.export.step import step_bytes
-from gelslim_cad.export.stl import stl_bytes
-from gelslim_cad.export.threemf import NamedMesh, threemf_bytes
 from gelslim_cad.proof.mesh import prove_3mf, prove_glb, prove_stl
 from gelslim_cad.proof.outline import prove_dxf
 from gelslim_cad.proof.solids import (

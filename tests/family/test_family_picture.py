@@ -12,9 +12,18 @@ import pytest
 
 from gelslim.cli import main
 from gelslim_cad.dimensions import derive
-from gelslim_cad.family import picture
-from gelslim_cad.family.member import Member, Mesh, dots
-from gelslim_cad.family.picture import EDGE, FRONT, _middles, _row, _upright, family_png
+from gelslim_cad.family import (
+    EDGE,
+    FRONT,
+    Member,
+    Mesh,
+    _middles,
+    _row,
+    _upright,
+    dots,
+    family_png,
+    picture,
+)
 from gelslim_cad.spec.reader import read_spec
 from gelslim_core.optional_library import install_command
 

@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
-from gelslim_cad.geometry.guide_section import guide_profile
-from gelslim_cad.light.bend_choice import brightest_ratio, candidates
+from gelslim_cad.dimensions.bend import brightest_ratio, candidates
+from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.light.exposure import exposure
-from gelslim_cad.light.inputs import light_inputs
-from gelslim_cad.light.record import study_record
-from gelslim_cad.light.scene import dark_faces, launched_na, light_scene
-from gelslim_cad.light.study import Comparison, study_light
+from gelslim_cad.light.scene import dark_faces, launched_na, light_inputs, light_scene
+from gelslim_cad.light.study import Comparison, study_light, study_record
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.guide.shapes import MirrorGuide, mirror_profile

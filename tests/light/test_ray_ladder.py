@@ -10,7 +10,7 @@ import pytest
 
 from gelslim.cli import main
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.geometry.guide_section import guide_profile
+from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.light import ray_ladder
 from gelslim_cad.light.ray_ladder import (
     BEYOND,
@@ -26,7 +26,7 @@ from gelslim_cad.light.ray_ladder import (
 )
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.light.study import COLOURS, study_light
-from gelslim_cad.sensor.pad import spec_hash
+from gelslim_cad.sensor import spec_hash
 from gelslim_cad.spec.reader import read_spec
 from gelslim_core.budget.budget import Budget, BudgetError
 from gelslim_core.budget.machine_times import read_times, write_times

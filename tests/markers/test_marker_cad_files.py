@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from pygerber.gerberx3.api.v2 import FileTypeEnum, GerberFile
 
-from gelslim_cad.markers.csv import COLUMNS, render_csv
 from gelslim_cad.markers.dxf import render_dxf
 from gelslim_cad.markers.gerber import (
     render_gerber,
     render_gerber_alignment,
     render_gerber_profile,
 )
-from gelslim_cad.markers.nodes import nearest_nodes
+from gelslim_cad.markers.nodes import COLUMNS, nearest_nodes, render_csv
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.stencil import lay_out_stencil, render_stencil
 

@@ -14,8 +14,12 @@ import pytest
 
 cq = pytest.importorskip("cadquery", reason="solids need the [cad] extra")
 
-from gelslim_cad.solids.prism import outline_wire, prism, rounded_polygon  # noqa: E402
-from gelslim_cad.solids.shapes import rounded_wire  # noqa: E402
+from gelslim_cad.solids.shapes import (  # noqa: E402
+    outline_wire,
+    prism,
+    rounded_polygon,
+    rounded_wire,
+)
 from gelslim_cad.solids.tooling.fit_coupon import _gauge  # noqa: E402
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from finger_samples import fingers, parts_of
 
+from gelslim_cad.build.solid_checks import blocked_volumes, corner_rays, view_corridor
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.corridor import blocked_volumes, corner_rays, view_corridor
 
 each_finger = pytest.mark.parametrize("name", list(fingers()))
 

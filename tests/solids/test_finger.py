@@ -11,8 +11,8 @@ from finger_samples import fingers, part, parts_of
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof.solids import interferences
+from gelslim_cad.solids.guide import led_positions_mm
 from gelslim_cad.solids.layout import Layout
-from gelslim_cad.solids.leds import led_positions_mm
 
 NAMES = list(fingers())
 each_finger = pytest.mark.parametrize("name", NAMES)

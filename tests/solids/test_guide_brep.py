@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.geometry.guide_section import guide_profile
+from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.solids.guide import light_guide
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.guide.profile import Arc, GuideProfile, Segment

@@ -9,13 +9,19 @@ import cadquery as cq
 import pytest
 from tooling_samples import gelslim2
 
+from gelslim_cad.build.solid_checks import undercut_area_mm2
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.solids.gel import gel_solid
-from gelslim_cad.solids.tooling.mould import cavity_in_mould, cavity_solid, mould_parts
-from gelslim_cad.solids.tooling.mould_plan import BORDER_MM, MouldPlan, plan_mould
-from gelslim_cad.solids.tooling.stock import plate_stock
-from gelslim_cad.solids.tooling.undercut import undercut_area_mm2
+from gelslim_cad.solids.tooling.mould import (
+    BORDER_MM,
+    MouldPlan,
+    cavity_in_mould,
+    cavity_solid,
+    mould_parts,
+    plan_mould,
+    plate_stock,
+)
 
 PROCESSES = ("acrylic", "sla", "fdm", "aluminium")
 CASES = list(itertools.product(PROCESSES, (0.0, 1.2)))

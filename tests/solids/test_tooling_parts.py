@@ -9,26 +9,30 @@ import numpy as np
 import pytest
 from tooling_samples import clipped_grid, gelslim2, random_dimensions
 
+from gelslim_cad.build.solid_checks import undercut_area_mm2
 from gelslim_cad.export.mesh import mesh_for
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.markers.stencil import lay_out_stencil
 from gelslim_cad.solids.finger import tooling_parts
 from gelslim_cad.solids.gel import gel_pad
-from gelslim_cad.solids.prism import outline_wire, prism, rectangle, rounded_polygon
-from gelslim_cad.solids.shapes import SolidError
-from gelslim_cad.solids.tooling.calibration_target import (
+from gelslim_cad.solids.shapes import SolidError, outline_wire, prism, rectangle, rounded_polygon
+from gelslim_cad.solids.tooling.calibration import (
     calibration_target,
+    sphere_indenter,
     target_holes,
     target_pitch_mm,
 )
-from gelslim_cad.solids.tooling.cutting_template import cutting_template
-from gelslim_cad.solids.tooling.fabric_skin import fabric_skin, skin_flap_mm, skin_outline
 from gelslim_cad.solids.tooling.fit_coupon import fit_coupon, plan_coupon
 from gelslim_cad.solids.tooling.focus_jig import focus_jig, plan_jig
 from gelslim_cad.solids.tooling.mould import cavity_in_mould
-from gelslim_cad.solids.tooling.sphere_indenter import sphere_indenter
-from gelslim_cad.solids.tooling.stencil import stencil, stencil_problem
-from gelslim_cad.solids.tooling.undercut import undercut_area_mm2
+from gelslim_cad.solids.tooling.sheets import (
+    cutting_template,
+    fabric_skin,
+    skin_flap_mm,
+    skin_outline,
+    stencil,
+    stencil_problem,
+)
 from ifem_export.markers.grid import build_marker_grid
 
 

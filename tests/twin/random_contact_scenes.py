@@ -14,8 +14,8 @@ import numpy as np
 from scene_samples import ROOT
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.geometry.sight import camera_record
-from gelslim_cad.sensor.pad import marker_grid
+from gelslim_cad.geometry.optics import camera_record
+from gelslim_cad.sensor import marker_grid
 from gelslim_cad.spec.reader import read_spec
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.bundle.files import write_bundle

@@ -130,7 +130,7 @@ def bench_light(path: Path, progress: Progress | None = None) -> Part:
     """Measure the study of the light of a spec for each number of rays."""
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.ray_ladder import measure_times, times_key
-    from gelslim_cad.sensor.pad import spec_hash
+    from gelslim_cad.sensor import spec_hash
     from gelslim_cad.spec.reader import read_spec
 
     spec = read_spec(path).spec

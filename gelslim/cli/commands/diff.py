@@ -15,8 +15,7 @@ from gelslim_core.optional_library import install_command
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from gelslim_cad.compare.comparison import Change, Comparison, RuleChange
-    from gelslim_cad.compare.part_change import PartChanges
+    from gelslim_cad.compare import Change, Comparison, PartChanges, RuleChange
 
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
 FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
@@ -41,7 +40,7 @@ def diff(
     second finger costs against the first. Nothing is built. The exit status is 0 whether or not
     they differ.
     """
-    from gelslim_cad.compare.comparison import compare
+    from gelslim_cad.compare import compare
     from gelslim_cad.explore.price import measured, prices
     from gelslim_cad.spec.reader import read_spec
 
@@ -68,7 +67,7 @@ def _parts(one: Any, two: Any) -> tuple[PartChanges | None, str]:
 
     if not installed("cadquery"):
         return None, f"not compared: cadquery is missing; run: {install_command('cad')}"
-    from gelslim_cad.compare.part_change import part_changes
+    from gelslim_cad.compare import part_changes
     from gelslim_cad.solids.shapes import SolidError
 
     try:
@@ -143,7 +142,7 @@ def _note_unshown(count: int) -> None:
 
 
 def _limit(before: float | None, after: float | None) -> str:
-    from gelslim_cad.compare.comparison import differ
+    from gelslim_cad.compare import differ
 
     if differ(before, after):
         return f"{number(before)} → {number(after)}"

@@ -66,12 +66,12 @@ def explore(
     of what is feasible and what limits the other designs. After an interrupt, run it again: it
     continues where it stopped.
     """
-    from gelslim_cad.explore.axis import ExploreError, parse_axis
-    from gelslim_cad.explore.engine import Engine, processors
-    from gelslim_cad.explore.space import Space
+    from gelslim_cad.explore.space import ExploreError, Space, parse_axis
     from gelslim_cad.explore.study import Request
     from gelslim_cad.explore.study import explore as run
+    from gelslim_cad.explore.task import Engine
     from gelslim_cad.spec.reader import read_spec
+    from gelslim_core.jobs import processors
 
     started = time.monotonic()
     loaded = read_spec(spec)
@@ -154,9 +154,9 @@ def refusals(found: Exploration) -> dict[str, int]:
 
 
 def _report(found: Exploration) -> None:
-    from gelslim_cad.explore.axis import shown
     from gelslim_cad.explore.judge import REFUSED
     from gelslim_cad.explore.pareto import THICKNESS, TRADES, front
+    from gelslim_cad.explore.space import shown
 
     rows = found.rows_where("feasible")
     resumed = f", {found.taken_over} tasks reused from before" if found.taken_over else ""

@@ -24,7 +24,7 @@ from gelslim.cli.options import AsJson
 from gelslim.cli.output import replace_file
 
 if TYPE_CHECKING:
-    from gelslim_cad.family.member import Member
+    from gelslim_cad.family import Member
     from gelslim_cad.spec import Spec
 
 
@@ -92,7 +92,7 @@ def _built(specs: list[tuple[Path, Spec]], out: Path, jobs: int | None, quiet: b
     from gelslim_cad.build import build_variant
     from gelslim_cad.build.variant import BuildRefusedError
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.family.member import member
+    from gelslim_cad.family import member
 
     built = _Built([], {}, {})
     with progress_bar(quiet=quiet) as tell:
@@ -126,7 +126,7 @@ def _named(tell: Any, name: str) -> Any:
 def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
     """Write table and picture; return their names and why there is no picture, if so."""
     from gelslim_cad.explore.table import csv_bytes
-    from gelslim_cad.family.picture import family_png
+    from gelslim_cad.family import family_png
     from gelslim_cad.pictures.finger_pictures import PictureError
 
     if not members:

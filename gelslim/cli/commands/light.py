@@ -69,8 +69,7 @@ def light(
     against straight guides with 45° mirrors, exposure and frame rate. Writes pictures.
     """
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.light.record import study_record
-    from gelslim_cad.light.study import RAYS, study_light
+    from gelslim_cad.light.study import RAYS, study_light, study_record
     from gelslim_cad.spec.reader import read_spec
 
     started = time.monotonic()
@@ -118,7 +117,7 @@ def _budgeted(
         rung_name,
         times_key,
     )
-    from gelslim_cad.sensor.pad import spec_hash
+    from gelslim_cad.sensor import spec_hash
     from gelslim_core.budget.machine_times import read_times
 
     key = times_key(spec_hash(spec))

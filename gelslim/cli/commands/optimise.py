@@ -109,11 +109,11 @@ def _best(
     spec: Spec, vary: list[str], aim: Aim, folder: Path, effort: _Effort, *, quiet: bool
 ) -> Optimum:
     """Return the best feasible design. Raises CommandError for bad axes or if there is none."""
-    from gelslim_cad.explore.axis import ExploreError, parse_axis
-    from gelslim_cad.explore.engine import Engine, processors
     from gelslim_cad.explore.optimum import optimise as run
-    from gelslim_cad.explore.space import Space
+    from gelslim_cad.explore.space import ExploreError, Space, parse_axis
     from gelslim_cad.explore.study import Request
+    from gelslim_cad.explore.task import Engine
+    from gelslim_core.jobs import processors
 
     try:
         space = Space.of(spec, [parse_axis(v) for v in vary])
@@ -141,7 +141,7 @@ def _record(best: Optimum, words: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
-    from gelslim_cad.explore.axis import shown
+    from gelslim_cad.explore.space import shown
 
     value = best.row[best.goal.column]
     say(
@@ -169,7 +169,7 @@ def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
 
 def _stop(n: Neighbour) -> str:
     """Return what stops a further step, and beyond which value."""
-    from gelslim_cad.explore.axis import shown
+    from gelslim_cad.explore.space import shown
 
     if n.status == "feasible":
         return ""

@@ -37,7 +37,7 @@ def thinner(
     of keystone, blur, brightness, exposure, force error and stiffness in per cent. Nothing is
     written. The exit status is 1 if no single field reaches the thickness.
     """
-    from gelslim_cad.explore.axis import ExploreError
+    from gelslim_cad.explore.space import ExploreError
     from gelslim_cad.explore.thinner import thinner as run
     from gelslim_cad.spec.reader import read_spec
 

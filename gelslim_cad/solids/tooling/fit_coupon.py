@@ -18,8 +18,7 @@ from gelslim_cad.geometry.fasteners import SCREWS
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.solids.materials import PRINTED
-from gelslim_cad.solids.prism import Hole, prism, rectangle, rounded_polygon
-from gelslim_cad.solids.shapes import box, single, union
+from gelslim_cad.solids.shapes import Hole, box, prism, rectangle, rounded_polygon, single, union
 
 PLATE_MM = 3.0
 TONGUE_MM = (8.0, 3.0)

@@ -20,8 +20,7 @@ from dataclasses import dataclass
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.materials import PRINTED
-from gelslim_cad.solids.prism import prism, rectangle
-from gelslim_cad.solids.shapes import box, single, subtract, union
+from gelslim_cad.solids.shapes import box, prism, rectangle, single, subtract, union
 
 BASE_MM = 4.0
 ROOT_MM = 2.0

@@ -9,7 +9,7 @@ import pytest
 from scene_samples import MINIMAL, ROOT, load
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.geometry.sight import camera_record
+from gelslim_cad.geometry.optics import camera_record
 from gelslim_cad.spec.reader import read_spec
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_twin.effects.dot_positions import LENS_DISTORTION, REFRACTION

@@ -1,4 +1,4 @@
-"""3MF (core specification 1.x): meshes in mm with names and colours."""
+"""Files of meshes for printing: STL, and 3MF (core specification 1.x) with names and colours."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
+
+import numpy as np
 
 from gelslim_cad.export import ExportError
 from gelslim_cad.export.mesh import TriangleMesh
@@ -26,6 +28,8 @@ _RELATIONS = f"""{_XML}<Relationships xmlns="{_OPC}/relationships">
 Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
 </Relationships>
 """
+HEADER = b"gelslim-cad binary STL, millimetres"
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 @dataclass(frozen=True)
@@ -96,3 +100,14 @@ def _object(number: int, item: NamedMesh) -> str:
 
 def _hex(colour: tuple[float, float, float, float]) -> str:
     return "#" + "".join(f"{round(255 * min(max(c, 0.0), 1.0)):02X}" for c in colour)
+
+
+def stl_bytes(mesh: TriangleMesh) -> bytes:
+    """Write a mesh as binary STL in mm: 80-byte header, count, 50 bytes a triangle."""
+    corners = mesh.vertices_mm[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    records = np.zeros(len(corners), dtype=_RECORD)
+    records["normal"] = normals / np.where(length > 0, length, 1.0) + 0.0
+    records["corners"] = corners
+    return HEADER.ljust(80) + np.uint32(len(corners)).tobytes() + records.tobytes()

@@ -1,4 +1,6 @@
-"""Calibration target: a cap with a lattice of holes at a known pitch, hooked over the finger.
+"""Tooling for calibration: a target for the camera, a sphere for forces.
+
+The target is a cap with a lattice of holes at a known pitch, hooked over the finger:
 
       from above                         across (looking to the tip)
       .--------------------.             .------------------------.
@@ -9,19 +11,38 @@
 
 The middle hole and its neighbour towards the tip are larger: they mark origin and x axis. Rests
 on the bezel keep the lattice in the plane z = 0, where it touches the gel without pressing it.
+
+The indenter is a spherical cap of known radius on a flange:
+
+     .-""-.         spherical cap, radius R
+     |    |         stem, as thick as the cap
+.----'    '----.
+|  o        o  |    flange with two holes for M3, onto a force gauge
+'--------------'
 """
 
 from __future__ import annotations
 
 import math
 
+import cadquery as cq
+
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.solids.materials import PRINTED
-from gelslim_cad.solids.prism import Hole, Point2, prism, rectangle, rounded_polygon
-from gelslim_cad.solids.shapes import single, union
+from gelslim_cad.solids.shapes import (
+    Hole,
+    Point2,
+    box,
+    prism,
+    rectangle,
+    rod,
+    rounded_polygon,
+    single,
+    union,
+)
 
 PLATE_MM = 3.0
 HOOK_MM = 2.5
@@ -34,6 +55,14 @@ PITCHES_MM = (1.0, 2.0, 2.5, 5.0, 10.0)
 MOST_ACROSS = 15
 MARK_RATIO = 1.6
 TARGET = (0.12, 0.12, 0.13, 1.0)
+RADIUS_MM = 5.0
+FLANGE_MM = 24.0
+FLANGE_WIDTH_MM = 14.0
+FLANGE_THICKNESS_MM = 5.0
+STEM_MM = 8.0
+BOLT_MM = 3.4
+BOLT_SPACING_MM = 16.0
+INDENTER = (0.85, 0.86, 0.88, 1.0)
 
 
 def target_pitch_mm(length_mm: float, width_mm: float) -> float:
@@ -120,3 +149,46 @@ def _u_shape(start_x: float, outer: Point2, inner: Point2) -> Outline:
         ],
         0.5,
     )
+
+
+def indenter_radius_mm(shape: GelShape) -> float:
+    """Radius of the sphere: 5 mm, or less for a gel that is too small for it."""
+    return min(RADIUS_MM, 0.4 * min(shape.length_mm, shape.width_mm))
+
+
+def sphere_indenter(d: Dimensions) -> Part:
+    """The indenter, flange at z = 0, cap upwards."""
+    radius = indenter_radius_mm(GelShape.of(d))
+    apex = FLANGE_THICKNESS_MM + STEM_MM
+    half = BOLT_SPACING_MM / 2
+    flange = prism(
+        rectangle(
+            (-FLANGE_MM / 2, FLANGE_MM / 2), (-FLANGE_WIDTH_MM / 2, FLANGE_WIDTH_MM / 2), 3.0
+        ),
+        (0.0, FLANGE_THICKNESS_MM),
+        [(-half, 0.0, BOLT_MM), (half, 0.0, BOLT_MM)],
+    )
+    stem = rod(0.0, 0.0, (1.0, apex + 1.0), 1.6 * radius)
+    side = (-1.5 * radius, 1.5 * radius)
+    above = box(side, side, (apex - radius, apex + 2.0)).cut(_ball(radius, apex - radius))
+    solid = union([flange, stem.cut(above)])
+    return Part(
+        name="sphere_indenter",
+        solid=single(solid, "sphere_indenter"),
+        material=PRINTED[d["manufacturing.print_process"]],
+        process="print",
+        colour=INDENTER,
+        in_assembly=False,
+        note=f"spherical cap of radius {radius:g} mm; polish it, screw it to a force gauge or "
+        "load it with weights and press it on the gel",
+        tags=frozenset({"tooling"}),
+    )
+
+
+def _ball(radius: float, centre_z: float) -> cq.Shape:
+    """Sphere with its poles on the x axis and its seam below: the cap contains neither."""
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+
+    axes = gp_Ax2(gp_Pnt(0, 0, centre_z), gp_Dir(1, 0, 0), gp_Dir(0, 0, -1))
+    return cq.Shape.cast(BRepPrimAPI_MakeSphere(axes, radius).Solid())

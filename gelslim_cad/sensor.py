@@ -11,8 +11,7 @@ import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
-from gelslim_cad.geometry.guide_section import guide_profile
-from gelslim_cad.geometry.sight import camera_record
+from gelslim_cad.geometry.optics import camera_record, guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline

@@ -1,1 +1,0 @@
-"""What changes between two specs: fields, dimensions, rules, parts, bundle."""

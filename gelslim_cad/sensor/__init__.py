@@ -1,1 +1,0 @@
-"""A sensor made from a spec, for bundle, force pipeline and twin."""
