@@ -6,17 +6,16 @@ import csv
 import io
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gelslim_cad.build.instructions import build_guide
-from gelslim_cad.build.manifest import FileEntry, json_bytes
-from gelslim_cad.build.page import pictures, report_data
-from gelslim_cad.build.writers import LIGHT_JSON
-from gelslim_cad.checks import Check
-from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
+from gelslim_cad.build.page import report_data
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.report import BomLine, render_report
-from gelslim_cad.solids.casting import cast_gel
+from gelslim_cad.markers.write import render_marker_files
+from gelslim_cad.report.render import render_report
+from gelslim_cad.report.tables import BomLine
+from gelslim_cad.sensor import marker_print
 
 if TYPE_CHECKING:
     from gelslim_cad.build.stages import Plan, Stages
@@ -34,87 +33,44 @@ DENSITY_G_CM3 = {
 """Typical densities, for masses in the BOM only."""
 
 
-def data_documents(stages: Stages, plan: Plan, bom: tuple[BomLine, ...]) -> Documents:
-    """Spec copy, dimensions.json, checks.json and BUILD.md."""
-    d = stages.dimensions
-    batch = cast_gel(d).weighable()
-    return {
-        "spec.yaml": (stages.loaded.text.encode(), "the spec this was built from"),
-        "dimensions.json": (
-            json_bytes(dimensions_content(stages, d)),
-            "dependent dimensions with formulas and inputs",
-        ),
-        "checks.json": (checks_json(plan.checks), "design rules with margins"),
-        "BUILD.md": (
-            build_guide(d, stages.grid, batch, bom, stages.name),
-            "how to make and assemble it",
-        ),
-    }
-
-
-def dimensions_content(stages: Stages, d: Dimensions) -> dict[str, Any]:
-    """Every dependent dimension with unit, formula, source and inputs."""
-    return {
-        "format": "gelslim-dimensions/1",
-        "name": stages.name,
-        "spec_hash": stages.spec_hash,
-        "binding": list(stages.binding),
-        "dimensions": {
-            name: {
-                "value": value,
-                "unit": definition(name).unit,
-                "meaning": definition(name).title,
-                "formula": definition(name).formula,
-                "source": definition(name).source,
-                "inputs": {
-                    n: plain(v)
-                    for n, v in d.inputs(name)
-                    if isinstance(v, (int, float, str, tuple)) or v is None
-                },
-            }
-            for name, value in d.values.items()
-        },
-    }
-
-
-def report_document(
+def documents(
     stages: Stages,
     plan: Plan,
-    bom: tuple[BomLine, ...],
     contents: Mapping[str, bytes],
     files: Mapping[str, FileEntry],
     missing: str,
-) -> tuple[bytes, str]:
-    """The report page; `missing` says why there are no pictures, where there are none."""
-    shown = {path: data for path, data in contents.items() if path.startswith("pictures/")}
-    data = report_data(
-        stages.name,
-        stages.loaded.text,
-        stages.spec_hash,
-        stages.dimensions,
-        stages.grid,
-        plan.checks,
-        stages.binding,
-        contents.get(f"{stages.name}.glb", b""),
-        pictures(shown, missing),
-        files,
-        bom,
-        contents.get(LIGHT_JSON, b""),
-        shown,
-    )
-    return render_report(data), "report with 3D viewer, offline"
+) -> Documents:
+    """Everything that is quick to write: markers, tables, instructions, report.
 
-
-def checks_json(checks: tuple[Check, ...]) -> bytes:
-    """Content of checks.json."""
-    return json_bytes([{k: plain(v) for k, v in asdict(c).items()} for c in checks])
-
-
-def plain(value: Any) -> Any:
-    """Replace tuples and numpy scalars by what JSON can hold."""
-    if isinstance(value, tuple):
-        return [plain(v) for v in value]
-    return value.item() if hasattr(value, "item") else value
+    `contents` are those of the built files by path, `files` their entries; `missing` says why
+    there are no pictures, where there are none.
+    """
+    d, grid = stages.dimensions, stages.grid
+    parts = (*plan.finger, *plan.tooling)
+    bom = bill_of_materials(parts, d["material.gel.density_kg_m3"])
+    dimensions = {
+        "format": "gelslim-dimensions/1",
+        "name": stages.name,
+        "spec_hash": stages.spec_hash,
+        "binding": stages.binding,
+        "dimensions": {name: d.record(name) for name in d.values},
+    }
+    markers = render_marker_files(grid, *marker_print(d, grid))
+    made: Documents = {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
+    made |= {
+        "spec.yaml": (stages.loaded.text.encode(), "the spec this was built from"),
+        "dimensions.json": (
+            json_bytes(dimensions),
+            "dependent dimensions with formulas and inputs",
+        ),
+        "checks.json": (json_bytes([asdict(c) for c in plan.checks]), "design rules with margins"),
+        "BUILD.md": (build_guide(d, grid, bom, stages.name), "how to make and assemble it"),
+        "BOM.csv": (bom_csv(bom), "bill of materials"),
+    }
+    own = {path: entry(data, purpose, "documents") for path, (data, purpose) in made.items()}
+    page = render_report(report_data(stages, plan, bom, contents, {**files, **own}, missing))
+    made["report.html"] = (page, "report with 3D viewer, offline")
+    return made
 
 
 def bill_of_materials(parts: Iterable[Part], gel_density_kg_m3: float) -> tuple[BomLine, ...]:

@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.manifest import FileEntry
-from gelslim_cad.checks import Check
-from gelslim_cad.dimensions import Dimensions, definition
+from gelslim_cad.build.writers import LIGHT_JSON
+from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.markers.outline import Outline
-from gelslim_cad.report import (
-    BomLine,
-    CameraView,
-    DimensionRow,
-    FileRow,
-    Note,
-    Picture,
-    ReportData,
-)
+from gelslim_cad.report.camera_view import CameraView
+from gelslim_cad.report.render import Picture, ReportData
+from gelslim_cad.report.tables import BomLine, Note
 from gelslim_cad.report.view_figures import projection_sentence
 from ifem_export.markers.grid import MarkerGrid
+
+if TYPE_CHECKING:
+    from gelslim_cad.build.stages import Plan, Stages
 
 PICTURES = {
     "pictures/whole.png": ("The finger", "Assembled, seen from the tip."),
@@ -48,26 +46,6 @@ LIGHT_PICTURES = {
 }
 
 
-def dimension_rows(d: Dimensions) -> tuple[DimensionRow, ...]:
-    """Every dependent dimension with its formula and inputs."""
-    rows = []
-    for name, value in d.values.items():
-        entry = definition(name)
-        inputs = tuple((n, v) for n, v in d.inputs(name) if isinstance(v, (int, float, str)))
-        rows.append(
-            DimensionRow(
-                name=name,
-                value=value,
-                unit=entry.unit,
-                formula=entry.formula,
-                inputs=inputs,
-                source=entry.source,
-                group=name.split(".")[0],
-            )
-        )
-    return tuple(rows)
-
-
 def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
     """The numbers a reader looks for first."""
     return (
@@ -86,7 +64,7 @@ def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
 
 
 def pictures(
-    files: Mapping[str, bytes], problem: str, wanted: Mapping[str, tuple[str, str]] = PICTURES
+    files: Mapping[str, bytes], wanted: Mapping[str, tuple[str, str]], problem: str = ""
 ) -> tuple[Picture, ...]:
     """Rendered pictures; where one is missing the report says why."""
     return tuple(
@@ -109,41 +87,35 @@ def light_notes(record: bytes) -> tuple[Note, ...]:
 
 
 def report_data(
-    name: str,
-    spec_text: str,
-    spec_hash: str,
-    d: Dimensions,
-    grid: MarkerGrid,
-    checks: tuple[Check, ...],
-    binding: tuple[str, ...],
-    glb: bytes,
-    shown: tuple[Picture, ...],
-    files: Mapping[str, FileEntry],
+    stages: Stages,
+    plan: Plan,
     bom: tuple[BomLine, ...],
-    light: bytes = b"",
-    drawn: Mapping[str, bytes] = MappingProxyType({}),
+    contents: Mapping[str, bytes],
+    files: Mapping[str, FileEntry],
+    missing: str,
 ) -> ReportData:
-    """Everything the report shows, as plain values; `light` is the build's light.json,
-    `drawn` its pictures by path."""
+    """Everything the report shows; `missing` says why there are no pictures, where none are.
+
+    `contents` are those of the built files by path, `files` their entries with the documents'.
+    """
+    d = stages.dimensions
     return ReportData(
-        name=name,
-        spec_text=spec_text,
-        spec_hash=spec_hash,
+        name=stages.name,
+        spec_text=stages.loaded.text,
+        spec_hash=stages.spec_hash,
         headline=headline(d),
-        dimensions=dimension_rows(d),
-        rules=checks,
-        binding=binding,
-        glb=glb,
-        pictures=shown,
-        camera_view=view_of_markers(d, grid),
-        files=tuple(
-            FileRow(path, e.size_bytes, e.sha256, e.purpose) for path, e in sorted(files.items())
-        ),
+        dimensions={name: d.record(name) for name in d.values},
+        rules=plan.checks,
+        binding=stages.binding,
+        glb=contents[f"{stages.name}.glb"],
+        pictures=pictures(contents, PICTURES, missing),
+        camera_view=view_of_markers(d, stages.grid),
+        files=files,
         bom=bom,
-        light=pictures(drawn, "", LIGHT_PICTURES) if light else (),
-        projection=pictures(drawn, "", PROJECTION_PICTURES),
+        light=pictures(contents, LIGHT_PICTURES),
+        light_notes=light_notes(contents[LIGHT_JSON]),
+        projection=pictures(contents, PROJECTION_PICTURES),
         projection_notes=(Note("Projection", projection_sentence(d)),),
-        light_notes=light_notes(light) if light else (),
         versions=versions(),
     )
 
@@ -162,12 +134,17 @@ def view_of_markers(d: Dimensions, grid: MarkerGrid) -> CameraView:
         d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.corner_radius_mm"]
     ).flattened(0.02)
     edge = np.column_stack([outline, np.zeros(len(outline))])
-    return CameraView.from_arrays(
-        (camera.image_width_px, camera.image_height_px),
-        camera.project(points),
-        axes,
-        angle,
-        blur_px,
-        camera.project(edge),
-        anchors=np.flatnonzero(np.asarray(grid.kind) != 0).tolist(),
+    return CameraView(
+        image_width_px=float(camera.image_width_px),
+        image_height_px=float(camera.image_height_px),
+        markers_px=_pairs(camera.project(points)),
+        marker_axes_px=_pairs(axes),
+        marker_angle_deg=tuple(angle.tolist()),
+        blur_px=tuple(blur_px.tolist()),
+        outline_px=_pairs(camera.project(edge)),
+        anchors=frozenset(np.flatnonzero(np.asarray(grid.kind) != 0).tolist()),
     )
+
+
+def _pairs(array: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:
+    return tuple((u, v) for u, v in array.tolist())

@@ -1,13 +1,10 @@
-"""The stages of a build: dimensions, rules, parts, units of work and documents."""
+"""The stages of a build before its files: dimensions, rules, parts and units of work."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from gelslim_cad.build.documents import bill_of_materials, bom_csv
-from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.build.work import PackedPart, Unit
 from gelslim_cad.checks import Check, check
 from gelslim_cad.checks.binding import binding_sentences
@@ -15,7 +12,7 @@ from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.light.scene import light_inputs
 from gelslim_cad.report.view_figures import view_inputs
-from gelslim_cad.sensor import marker_grid, marker_print, spec_hash
+from gelslim_cad.sensor import marker_grid, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_core.files.held_interrupt import interrupts_held
 from ifem_export.markers.grid import MarkerGrid
@@ -107,34 +104,3 @@ class Stages:
         cavity = replace(gel.unpacked(), name="cavity", solid=cavity_solid(self.dimensions))
         scale = 1 / (1 - self.dimensions["manufacturing.gel_shrinkage_percent"] / 100)
         return Unit("mould cavity", "mould", (PackedPart.of(cavity), gel), (("scale", scale),))
-
-    def documents(
-        self,
-        plan: Plan,
-        contents: Mapping[str, bytes],
-        files: Mapping[str, FileEntry],
-        missing: str = "",
-    ) -> dict[str, tuple[bytes, str]]:
-        """Everything that is quick to write: markers, tables, instructions, report."""
-        from gelslim_cad.build.documents import data_documents, report_document
-
-        made = self._marker_files()
-        parts = (*plan.finger, *plan.tooling)
-        bom = bill_of_materials(parts, self.loaded.spec.material.gel.density_kg_m3)
-        made |= data_documents(self, plan, bom)
-        made["BOM.csv"] = (bom_csv(bom), "bill of materials")
-        listed = {**files, **_entries(made)}
-        made["report.html"] = report_document(self, plan, bom, contents, listed, missing)
-        return made
-
-    def _marker_files(self) -> dict[str, tuple[bytes, str]]:
-        from gelslim_cad.markers.write import render_marker_files
-
-        rendered = render_marker_files(self.grid, *marker_print(self.dimensions, self.grid))
-        return {f"markers/{n}": (data, "marker print, 1:1") for n, data in rendered.items()}
-
-
-def _entries(made: Mapping[str, tuple[bytes, str]]) -> dict[str, FileEntry]:
-    from gelslim_cad.build.manifest import entry
-
-    return {path: entry(data, purpose, "documents") for path, (data, purpose) in made.items()}

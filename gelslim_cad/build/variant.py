@@ -110,6 +110,8 @@ def build_variant(
 def _build(
     stages: Stages, target: Path, previous: Manifest | None, key: str, jobs: int, notify: Progress
 ) -> BuildResult:
+    from gelslim_cad.build.documents import documents
+
     notify("solids", 0, 1)
     plan = stages.plan()
     _require_rules(stages.name, plan.checks)
@@ -121,7 +123,7 @@ def _build(
     with staged(target, () if previous is None else {*previous.files, NAME}) as folder:
         contents, files = _gathered(list(keys), target, previous, reused, written)
         note = " ".join(w.note for w in written.values() if w.note)
-        for path, (data, purpose) in stages.documents(plan, contents, files, note).items():
+        for path, (data, purpose) in documents(stages, plan, contents, files, note).items():
             contents[path] = data
             files[path] = entry(data, purpose, "documents")
         # A unit that could not be done on this machine is tried again by the next build.

@@ -65,6 +65,22 @@ class Derived:
         entry = definition(name)
         return tuple(self.argument(p) for p in entry.inputs)
 
+    def record(self, name: str) -> dict[str, Any]:
+        """A dimension as plain values: with unit, meaning, formula, source and plain inputs."""
+        entry = definition(name)
+        return {
+            "value": self.values[name],
+            "unit": entry.unit,
+            "meaning": entry.title,
+            "formula": entry.formula,
+            "source": entry.source,
+            "inputs": {
+                n: v
+                for n, v in self.inputs(name)
+                if isinstance(v, int | float | str | tuple) or v is None
+            },
+        }
+
 
 @dataclass(frozen=True)
 class Dimensions(Derived, NamedValues):

@@ -3,13 +3,35 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-from gelslim_cad.report.data import CameraView
 from gelslim_cad.report.markup import coordinate, text
+
+Pairs = tuple[tuple[float, float], ...]
 
 LEVELS = 16
 RAMP = ((68, 56, 160), (45, 112, 190), (28, 160, 160), (110, 200, 100), (250, 220, 60))
 """Dark to light, so that the order also reads in grey; sRGB."""
+
+
+@dataclass(frozen=True)
+class CameraView:
+    """Markers as the camera sees them; pixel (0, 0) is the image's upper left corner.
+
+    `marker_axes_px` holds the full length of the two axes of each dot's ellipse,
+    `marker_angle_deg` the direction of the first one from +u towards +v, `blur_px` the diameter
+    of the blur circle, `outline_px` the closed outline of the gel, `anchors` the indices of the
+    markers which differ from the lattice.
+    """
+
+    image_width_px: float
+    image_height_px: float
+    markers_px: Pairs
+    marker_axes_px: Pairs
+    marker_angle_deg: tuple[float, ...]
+    blur_px: tuple[float, ...]
+    outline_px: Pairs
+    anchors: frozenset[int]
 
 
 def camera_view(view: CameraView) -> str:
@@ -34,8 +56,6 @@ def colour(level: int) -> str:
 
 def levels(values: tuple[float, ...] | list[float]) -> list[int]:
     """Sort values into LEVELS equal steps from the smallest to the largest."""
-    if not values:
-        return []
     low, span = min(values), max(values) - min(values)
     if span <= 1e-9 * max(1.0, abs(low)):
         return [LEVELS // 2] * len(values)
@@ -55,7 +75,7 @@ def ramp_style() -> str:
 def _drawing(view: CameraView, blur: tuple[float, ...], areas: list[float]) -> str:
     width, height = coordinate(view.image_width_px), coordinate(view.image_height_px)
     points = " ".join(f"{coordinate(u)},{coordinate(v)}" for u, v in view.outline_px)
-    outline = f'<polygon class="outline" points="{points}"/>' if points else ""
+    outline = f'<polygon class="outline" points="{points}"/>'
     by_blur, by_size = levels(blur), levels(areas)
     dots = "".join(_dot(view, index, by_blur[index], by_size[index]) for index in range(len(areas)))
     pad = view.image_width_px / 40
@@ -108,8 +128,6 @@ def _choice() -> str:
 
 
 def _legend(kind: str, values: tuple[float, ...] | list[float]) -> str:
-    if not values:
-        return ""
     cells = "".join(
         f'<rect class="k{level}" x="{level}" width="1" height="1" stroke-width="0.02"/>'
         for level in range(LEVELS)
@@ -125,25 +143,22 @@ def _numbers(view: CameraView, areas: list[float]) -> str:
     rows = [("markers", str(len(areas)))]
     if view.anchors:
         rows.append(("of these anchors (ringed)", str(len(view.anchors))))
-    if areas:
-        inside = sum(
-            0 <= u <= view.image_width_px and 0 <= v <= view.image_height_px
-            for u, v in view.markers_px
-        )
-        rows += [
-            ("inside the image", str(inside)),
-            ("largest dot, mean axis", f"{max(areas):.1f} px"),
-            ("smallest dot, mean axis", f"{min(areas):.1f} px"),
-            ("narrowest axis", f"{min(min(pair) for pair in view.marker_axes_px):.1f} px"),
-            ("largest blur", f"{max(view.blur_px):.2f} px"),
-        ]
-    if len(view.outline_px) > 2:
-        share = _area(view.outline_px) / (view.image_width_px * view.image_height_px)
-        rows.append(("gel's share of the image", f"{100 * share:.0f} %"))
+    inside = sum(
+        0 <= u <= view.image_width_px and 0 <= v <= view.image_height_px for u, v in view.markers_px
+    )
+    share = _area(view.outline_px) / (view.image_width_px * view.image_height_px)
+    rows += [
+        ("inside the image", str(inside)),
+        ("largest dot, mean axis", f"{max(areas):.1f} px"),
+        ("smallest dot, mean axis", f"{min(areas):.1f} px"),
+        ("narrowest axis", f"{min(min(pair) for pair in view.marker_axes_px):.1f} px"),
+        ("largest blur", f"{max(view.blur_px):.2f} px"),
+        ("gel's share of the image", f"{100 * share:.0f} %"),
+    ]
     body = "".join(f"<dt>{text(name)}</dt><dd>{text(value)}</dd>" for name, value in rows)
     return f"<dl>{body}</dl><p class='soft'>The soft rim of a dot is its blur circle.</p>"
 
 
-def _area(outline: tuple[tuple[float, float], ...]) -> float:
+def _area(outline: Pairs) -> float:
     pairs = zip(outline, outline[1:] + outline[:1], strict=True)
     return abs(sum(u0 * v1 - u1 * v0 for (u0, v0), (u1, v1) in pairs)) / 2

@@ -7,7 +7,8 @@ import math
 import re
 from urllib.parse import quote
 
-from gelslim_cad.report.data import Scalar
+Scalar = float | int | str | bool | None
+"""A value as shown: number, text, yes/no, or nothing."""
 
 
 def text(value: object) -> str:

@@ -5,13 +5,21 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import resources
+from typing import TYPE_CHECKING, Any
 
 from gelslim_cad.report import tables
-from gelslim_cad.report.camera_view import camera_view, ramp_style
-from gelslim_cad.report.data import Note, Picture, ReportData
+from gelslim_cad.report.camera_view import CameraView, camera_view, ramp_style
 from gelslim_cad.report.markup import text
-from gelslim_cad.report.rules import pill, rules, verdict
+from gelslim_cad.report.rules import MARKS, pill, rules, verdict
+from gelslim_cad.report.tables import BomLine, Note
+
+if TYPE_CHECKING:
+    from gelslim_cad.build.manifest import FileEntry
+    from gelslim_cad.checks.rule import Check
 
 SCRIPTS = (
     "viewer_glb.js",
@@ -21,6 +29,43 @@ SCRIPTS = (
     "viewer_input.js",
     "page.js",
 )
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A PNG, or, where `png` is empty, the `problem` that kept it from being made."""
+
+    title: str
+    caption: str
+    png: bytes
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """Everything `render_report` shows for one finger."""
+
+    name: str
+    spec_text: str
+    spec_hash: str
+    headline: tuple[tuple[str, str], ...]
+    dimensions: Mapping[str, Mapping[str, Any]]
+    """What `Dimensions.record` gives, by name."""
+    rules: tuple[Check, ...]
+    binding: tuple[str, ...]
+    glb: bytes
+    pictures: tuple[Picture, ...]
+    camera_view: CameraView
+    files: Mapping[str, FileEntry]
+    """Files beside the report by path, with forward slashes."""
+    bom: tuple[BomLine, ...]
+    light: tuple[Picture, ...]
+    """Pictures of the light, each as wide as the page."""
+    light_notes: tuple[Note, ...]
+    projection: tuple[Picture, ...]
+    """Pictures of the projection, shown below the camera's view, with notes."""
+    projection_notes: tuple[Note, ...]
+    versions: tuple[tuple[str, str], ...]
 
 
 def render_report(data: ReportData) -> bytes:
@@ -56,45 +101,37 @@ def render_report(data: ReportData) -> bytes:
 
 
 def _sections(data: ReportData) -> list[tuple[str, str, str]]:
-    view = data.camera_view
-    found = [
+    counts = Counter(rule.status for rule in data.rules)
+    tally = ", ".join(f"{counts[status]} {status}" for status in MARKS)
+    projection = tables.notes(data.projection_notes) + _pictures(data.projection, "pictures wide")
+    light = tables.notes(data.light_notes) + _pictures(data.light, "pictures wide")
+    return [
         ("view", "View", _viewer(data)),
         ("pictures", "Pictures", _pictures(data.pictures)),
-        (
-            "camera",
-            "What the camera sees",
-            (camera_view(view) if view else '<p class="card empty">No markers were projected.</p>')
-            + _notes_and_pictures(data.projection_notes, data.projection),
-        ),
-        *_light(data),
+        ("camera", "What the camera sees", camera_view(data.camera_view) + projection),
+        ("light", "How the gel is lit", light),
         ("thickness", "What sets the thickness", _binding(data.binding)),
-        ("rules", f"Design rules <small>{text(_tally(data))}</small>", rules(data.rules)),
+        ("rules", f"Design rules <small>{tally}</small>", rules(data.rules)),
         ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),
         ("files", "Files", tables.files(data.files)),
         ("bom", "Bill of materials", tables.bom(data.bom)),
+        ("spec", "Spec", tables.spec(data.spec_text, data.spec_hash)),
     ]
-    if data.notes:
-        found.append(("notes", "Notes", tables.notes(data.notes)))
-    found.append(("spec", "Spec", tables.spec(data.spec_text, data.spec_hash)))
-    return found
 
 
 def _header(data: ReportData) -> str:
     tiles = "".join(
         f"<div><dt>{text(label)}</dt><dd>{text(value)}</dd></div>" for label, value in data.headline
     )
-    summary = f'<p class="summary">{text(data.summary)}</p>' if data.summary else ""
     return (
         '<p class="kicker">Vision-based tactile finger</p>'
-        f'<div class="title"><h1>{text(data.name)}</h1>{pill(*verdict(data))}</div>{summary}'
+        f'<div class="title"><h1>{text(data.name)}</h1>{pill(*verdict(data.rules))}</div>'
         f'<dl class="tiles">{tiles}</dl>'
     )
 
 
 def _viewer(data: ReportData) -> str:
     shown = [picture for picture in data.pictures if picture.png]
-    if not data.glb:
-        return '<p class="card empty">This report was written without a 3D model.</p>'
     instead = (
         "A picture instead:" if shown else "Open the STEP or GLB file of the list below instead."
     )
@@ -103,33 +140,17 @@ def _viewer(data: ReportData) -> str:
 
 
 def _model(glb: bytes) -> str:
-    if not glb:
-        return ""
     encoded = base64.b64encode(glb).decode("ascii")
     return f'<script type="application/octet-stream" id="model">{encoded}</script>'
 
 
-def _light(data: ReportData) -> list[tuple[str, str, str]]:
-    content = _notes_and_pictures(data.light_notes, data.light)
-    return [("light", "How the gel is lit", content)] if content else []
-
-
-def _notes_and_pictures(notes: tuple[Note, ...], shown: tuple[Picture, ...]) -> str:
-    """Notes, then pictures as wide as the page; empty where there are none."""
-    written = tables.notes(notes) if notes else ""
-    return written + (_pictures(shown, "pictures wide") if shown else "")
-
-
 def _pictures(pictures: tuple[Picture, ...], look: str = "pictures") -> str:
-    if not pictures:
-        return '<p class="card empty">No pictures were made.</p>'
     shown = []
     for picture in pictures:
         if picture.png:
             body = _image(picture)
         else:
-            reason = text(picture.problem or "it was not made")
-            body = f'<p class="missing">This picture is missing: {reason}</p>'
+            body = f'<p class="missing">This picture is missing: {text(picture.problem)}</p>'
         shown.append(
             f'<figure class="card">{body}<figcaption><strong>{text(picture.title)}</strong>'
             f"{text(picture.caption)}</figcaption></figure>"
@@ -143,21 +164,14 @@ def _image(picture: Picture) -> str:
 
 
 def _binding(sentences: tuple[str, ...]) -> str:
-    if not sentences:
-        return '<p class="card empty">The thickness was not analysed.</p>'
     items = "".join(f"<li>{text(sentence)}</li>" for sentence in sentences)
     return f'<ul class="card binding">{items}</ul>'
-
-
-def _tally(data: ReportData) -> str:
-    counts = data.counts
-    return f"{counts['pass']} pass, {counts['warn']} warn, {counts['fail']} fail"
 
 
 def _footer(data: ReportData) -> str:
     versions = ", ".join(f"{text(name)} {text(version)}" for name, version in data.versions)
     return (
-        f"<p>Spec hash <code>{text(data.spec_hash)}</code>. {versions}{'.' if versions else ''} "
+        f"<p>Spec hash <code>{text(data.spec_hash)}</code>. {versions}. "
         "Sensor frame: origin at the centre of the gel’s outer surface, x towards the tip, "
         "y across, z out of the gel.</p>"
     )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Literal
+from collections import Counter
+from typing import TYPE_CHECKING
 
-from gelslim_cad.report.data import ReportData
 from gelslim_cad.report.markup import anchor, coordinate, text, with_unit
 
 if TYPE_CHECKING:
-    from gelslim_cad.checks.rule import Check, Status
+    from gelslim_cad.checks.rule import Check, Sense, Status
 
 MARKS: dict[Status, str] = {"pass": "✓", "warn": "!", "fail": "✕"}
 ORDER: dict[Status, int] = {"fail": 0, "warn": 1, "pass": 2}
@@ -22,8 +22,6 @@ LEAST_MARGIN = 1e-5
 
 def rules(rows: tuple[Check, ...]) -> str:
     """List the rules, failures first, then warnings, then the rest, each in the given order."""
-    if not rows:
-        return '<p class="card empty">No design rules were checked.</p>'
     ordered = sorted(rows, key=lambda row: ORDER[row.status])
     body = "".join(_rule(row) for row in ordered)
     return (
@@ -34,36 +32,20 @@ def rules(rows: tuple[Check, ...]) -> str:
     )
 
 
-def verdict(data: ReportData) -> tuple[Status, str]:
+def verdict(rows: tuple[Check, ...]) -> tuple[Status, str]:
     """Summarise the rules as a status and a phrase."""
-    counts = data.counts
-    total = sum(counts.values())
-    if not total:
-        return "warn", "rules not checked"
+    counts = Counter(row.status for row in rows)
     if counts["fail"]:
-        return "fail", f"{counts['fail']} of {total} rules fail"
+        return "fail", f"{counts['fail']} of {len(rows)} rules fail"
     if counts["warn"]:
-        return "warn", f"passes, {_many(counts['warn'], 'warning')}"
-    return "pass", f"passes all {total} rules" if total > 1 else "passes the one rule"
+        return "warn", f"passes, {counts['warn']} warning{'s' if counts['warn'] > 1 else ''}"
+    return "pass", f"passes all {len(rows)} rules"
 
 
 def pill(status: Status, phrase: str) -> str:
     """Draw a status as a coloured label with a mark, so that it is also legible without colour."""
     mark = f'<span aria-hidden="true">{MARKS[status]}</span>'
     return f'<span class="pill {status}">{mark}{text(phrase)}</span>'
-
-
-def sense_of(row: Check) -> Literal["max", "min", ""]:
-    """Whether the limit is the largest or smallest legal value: given, or by the margin's sign."""
-    if row.sense:
-        return row.sense
-    value, limit = _real(row.value), _real(row.limit)
-    if value is None or limit is None:
-        return ""
-    holds = row.margin >= 0 if row.margin is not None else row.status != "fail"
-    if value == limit:
-        return "max"
-    return "max" if (value < limit) == holds else "min"
 
 
 def _rule(row: Check) -> str:
@@ -82,26 +64,25 @@ def _rule(row: Check) -> str:
 
 
 def _gauge(row: Check) -> str:
-    sense = sense_of(row)
-    sign = {"max": "≤ ", "min": "≥ ", "": ""}[sense]
-    margin = ""
+    # A rule that leaves its sense open has a largest value.
+    sense: Sense = row.sense or "max"
+    margin = limit = ""
     if row.margin is not None:
         margin = f"margin {with_unit(_shown_margin(row), row.unit, 3)}"
-    if isinstance(row.limit, bool | str):
-        sign = "wanted: "
-    limit = "" if row.limit is None else f"{sign}{with_unit(row.limit, row.unit, 4)}"
-    value = "" if row.value is None else f"<strong>{with_unit(row.value, row.unit, 4)}</strong>"
+    if row.limit is not None:
+        sign = "≤ " if sense == "max" else "≥ "
+        limit = f"{sign}{with_unit(row.limit, row.unit, 4)}"
     return (
-        f'<div class="numbers"><span>{value}</span><span class="soft">{limit}</span></div>'
+        f'<div class="numbers"><span><strong>{with_unit(row.value, row.unit, 4)}</strong></span>'
+        f'<span class="soft">{limit}</span></div>'
         f'{_bar(row, sense)}<div class="soft">{margin}</div>'
     )
 
 
-def _bar(row: Check, sense: Literal["max", "min", ""]) -> str:
-    value, limit = _real(row.value), _real(row.limit)
-    if value is None or limit is None or not sense:
+def _bar(row: Check, sense: Sense) -> str:
+    if row.limit is None or not math.isfinite(row.value):
         return ""
-    zero, at_value, at_limit = bar_positions(value, limit)
+    zero, at_value, at_limit = bar_positions(row.value, row.limit)
     left, width = min(zero, at_value), max(abs(at_value - zero), 1.5)
     bad_left, bad_width = (at_limit, WIDTH - at_limit) if sense == "max" else (0.0, at_limit)
     return (
@@ -131,23 +112,14 @@ def bar_positions(value: float, limit: float) -> tuple[float, float, float]:
     return zero, at_value, at_limit
 
 
-def _real(value: object) -> float | None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        return None
-    return float(value)
-
-
 def _shown_margin(row: Check) -> float:
     """The margin, or 0 where it is smaller than value and limit show: 3e-7 mm is solver noise."""
     assert row.margin is not None
-    scale = max((abs(x) for x in (_real(row.value), _real(row.limit)) if x is not None), default=0)
+    assert row.limit is not None
+    scale = max(abs(row.value), abs(row.limit))
     return 0.0 if abs(row.margin) < LEAST_MARGIN * scale else row.margin
 
 
 def _sentences(reason: str) -> str:
     """Start every sentence of a reason with a capital letter."""
     return re.sub(r"(^|[.!?] )([a-z])", lambda hit: hit[1] + hit[2].upper(), reason)
-
-
-def _many(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -3,21 +3,51 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from gelslim_cad.report.data import BomLine, DimensionRow, FileRow, Note, Scalar
-from gelslim_cad.report.markup import anchor, href, number, size, text, with_unit
+from gelslim_cad.report.markup import Scalar, anchor, href, number, size, text, with_unit
+
+if TYPE_CHECKING:
+    from gelslim_cad.build.manifest import FileEntry
 
 
-def dimensions(rows: tuple[DimensionRow, ...]) -> str:
-    """List the dimensions by group; each row unfolds to its formula with numbers and source."""
-    if not rows:
-        return '<p class="card empty">No dimensions were given.</p>'
-    known = {row.name for row in rows}
-    groups = list(dict.fromkeys(row.group for row in rows))
+@dataclass(frozen=True)
+class BomLine:
+    """One line of the bill of materials."""
+
+    name: str
+    quantity: int
+    material: str
+    process: str
+    mass_g: float | None = None
+    note: str = ""
+    tooling: bool = False
+
+
+@dataclass(frozen=True)
+class Note:
+    """A short remark under a heading of its own, e.g. on the light guide."""
+
+    title: str
+    text: str
+
+
+def dimensions(records: Mapping[str, Mapping[str, Any]]) -> str:
+    """List the dimensions by group; each row unfolds to its formula with numbers and source.
+
+    `records` are those of `Dimensions.record` by the dimensions' dotted names.
+    """
+    groups = list(dict.fromkeys(name.split(".")[0] for name in records))
     options = "".join(f'<option value="{text(name)}">{text(name)}</option>' for name in groups)
     blocks = []
     for group in groups:
-        body = "".join(_dimension(row, known) for row in rows if row.group == group)
+        body = "".join(
+            _dimension(name, record, records)
+            for name, record in records.items()
+            if name.split(".")[0] == group
+        )
         blocks.append(
             f'<div class="group" data-group="{text(group)}"><h3>{text(group)}</h3>{body}</div>'
         )
@@ -32,43 +62,44 @@ def dimensions(rows: tuple[DimensionRow, ...]) -> str:
     )
 
 
-def _dimension(row: DimensionRow, known: set[str]) -> str:
-    value = with_unit(row.value, row.unit)
-    steps = [f'<p class="chain"><code>{text(row.name)} = {text(row.formula)}</code></p>']
-    filled = substituted(row.formula, row.inputs)
-    if filled != row.formula:
+def _dimension(name: str, record: Mapping[str, Any], known: Mapping[str, Any]) -> str:
+    value, formula = with_unit(record["value"], record["unit"]), record["formula"]
+    inputs = {n: v for n, v in record["inputs"].items() if isinstance(v, int | float | str)}
+    steps = [f'<p class="chain"><code>{text(name)} = {text(formula)}</code></p>']
+    filled = substituted(formula, inputs)
+    if filled != formula:
         steps.append(f'<p class="chain"><code>= {text(filled)}</code></p>')
     steps.append(f'<p class="chain"><code>= {value}</code></p>')
-    if row.inputs:
-        chips = "".join(f"<li>{_input(name, given, known)}</li>" for name, given in row.inputs)
+    if inputs:
+        chips = "".join(f"<li>{_input(n, given, known)}</li>" for n, given in inputs.items())
         steps.append(f'<ul class="inputs" aria-label="Inputs">{chips}</ul>')
-    if row.source:
-        steps.append(f'<p class="chain soft">Source: {text(row.source)}</p>')
+    if record["source"]:
+        steps.append(f'<p class="chain soft">Source: {text(record["source"])}</p>')
     return (
-        f'<details class="dimension" id="{anchor("dim", row.name)}">'
-        f'<summary><code class="name">{text(row.name)}</code><span class="value">{value}</span>'
-        f'<code class="formula">{text(row.formula)}</code></summary>'
+        f'<details class="dimension" id="{anchor("dim", name)}">'
+        f'<summary><code class="name">{text(name)}</code><span class="value">{value}</span>'
+        f'<code class="formula">{text(formula)}</code></summary>'
         f'<div class="body">{"".join(steps)}</div></details>'
     )
 
 
-def _input(name: str, value: Scalar, known: set[str]) -> str:
+def _input(name: str, value: Scalar, known: Mapping[str, Any]) -> str:
     label = f"<code>{text(name)}</code>"
     if name in known:
         label = f'<a href="#{anchor("dim", name)}">{label}</a>'
     return f"{label} = {text(number(value))}"
 
 
-def substituted(formula: str, inputs: tuple[tuple[str, Scalar], ...]) -> str:
+def substituted(formula: str, inputs: Mapping[str, Scalar]) -> str:
     """Put the inputs' numbers in place of their names, whole names only, longest name first.
 
     An input called `camera.focal_length_mm` is also found as `focal_length_mm` where that last
     part is not shared by another input.
     """
     values: dict[str, str] = {}
-    short = [name.rsplit(".", 1)[-1] for name, _ in inputs]
-    for (name, value), last in zip(inputs, short, strict=True):
-        if isinstance(value, str) or value is None:
+    short = [name.rsplit(".", 1)[-1] for name in inputs]
+    for (name, value), last in zip(inputs.items(), short, strict=True):
+        if isinstance(value, str):
             continue
         values[name] = number(value)
         if short.count(last) == 1:
@@ -80,24 +111,21 @@ def substituted(formula: str, inputs: tuple[tuple[str, Scalar], ...]) -> str:
     return pattern.sub(lambda found: values[found.group()], formula)
 
 
-def files(rows: tuple[FileRow, ...]) -> str:
+def files(entries: Mapping[str, FileEntry]) -> str:
     """List the files by folder with size and sha256; links are relative to the report."""
-    if not rows:
-        return '<p class="card empty">No files were written beside this report.</p>'
-    ordered = sorted(rows, key=lambda row: (row.path.count("/") > 0, row.path))
     folder = ""
     lines = []
-    for row in ordered:
-        here, _, base = row.path.rpartition("/")
+    for path, entry in sorted(entries.items(), key=lambda item: ("/" in item[0], item[0])):
+        here, _, base = path.rpartition("/")
         if here != folder:
             folder = here
             lines.append(
                 f'<tr class="folder"><th colspan="4" scope="rowgroup">{text(here)}/</th></tr>'
             )
         lines.append(
-            f'<tr><td><a href="{href(row.path)}">{text(base)}</a></td><td>{text(row.purpose)}</td>'
-            f'<td class="num">{size(row.size_bytes)}</td>'
-            f'<td class="hash mono" title="{text(row.sha256)}">{text(row.sha256)}</td></tr>'
+            f'<tr><td><a href="{href(path)}">{text(base)}</a></td><td>{text(entry.purpose)}</td>'
+            f'<td class="num">{size(entry.size_bytes)}</td>'
+            f'<td class="hash mono" title="{text(entry.sha256)}">{text(entry.sha256)}</td></tr>'
         )
     return (
         '<div class="card files scroll"><table><thead><tr><th>File</th><th>For</th>'
@@ -108,8 +136,6 @@ def files(rows: tuple[FileRow, ...]) -> str:
 
 def bom(rows: tuple[BomLine, ...]) -> str:
     """List what to make and to buy."""
-    if not rows:
-        return '<p class="card empty">No bill of materials was given.</p>'
     lines = "".join(
         f'<tr><td class="num">{row.quantity}</td><td>{text(row.name)}'
         f"{' (tooling)' if row.tooling else ''}</td>"

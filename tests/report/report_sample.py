@@ -12,16 +12,11 @@ import numpy as np
 import trimesh
 from trimesh.creation import box, cylinder, torus
 
+from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.checks import Check
-from gelslim_cad.report import (
-    BomLine,
-    CameraView,
-    DimensionRow,
-    FileRow,
-    Note,
-    Picture,
-    ReportData,
-)
+from gelslim_cad.report.camera_view import CameraView
+from gelslim_cad.report.render import Picture, ReportData
+from gelslim_cad.report.tables import BomLine, Note
 
 Piece = tuple[
     str,
@@ -199,9 +194,14 @@ def camera() -> CameraView:
         620 - focal * corners[:, 0] * math.cos(tilt) / deep,
     ]
     axes = np.c_[long, short]
-    return CameraView.from_arrays(
-        (1600, 1200), np.c_[u, v], axes, 3 * (u - 800) / 100, blur, outline, anchors=(84, 287, 491)
-    )
+    return CameraView(
+        1600.0, 1200.0, pairs(np.c_[u, v]), pairs(axes), tuple((3 * (u - 800) / 100).tolist()),
+        tuple(blur.tolist()), pairs(outline), frozenset((84, 287, 491)),
+    )  # fmt: skip
+
+
+def pairs(array: np.ndarray) -> tuple[tuple[float, float], ...]:
+    return tuple((u, v) for u, v in array.tolist())
 
 
 def rules() -> tuple[Check, ...]:
@@ -223,52 +223,58 @@ def rules() -> tuple[Check, ...]:
         ),
         Check(
             "optics.marker_pixels", "Pixels per marker at the far edge", 14.2, 5.0, "px", 9.2,
-            "pass", "The smallest dot spans 14.2 px.", "design.markers.diameter_mm",
+            "pass", "The smallest dot spans 14.2 px.", "design.markers.diameter_mm", sense="min",
         ),
         Check(
             "parts.clearance", "Smallest gap between parts", 0.15, 0.0, "mm", 0.15, "pass",
-            "body to mirror", "manufacturing.clearance_mm",
+            "body to mirror", "manufacturing.clearance_mm", sense="min",
         ),
         Check(
             "parts.interference", "Parts do not overlap", 0.0, 0.0, "mm³", 0.0, "pass",
             "55 pairs were cut with each other.", "",
         ),
         Check(
-            "light.led_hidden", "No LED is visible to the lens", True, True, "", None, "pass",
+            "light.led_hidden", "No LED is visible to the lens", 1.2, None, "", None, "pass",
             "Total reflection keeps 0 of 14 chips in sight.", "design.light.led_offset_mm",
         ),
     )  # fmt: skip
 
 
-def dimensions() -> tuple[DimensionRow, ...]:
+def record(value: float, unit: str, formula: str, inputs: dict, source: str) -> dict:
+    return {
+        "value": value, "unit": unit, "meaning": "m", "formula": formula, "source": source,
+        "inputs": inputs,
+    }  # fmt: skip
+
+
+def dimensions() -> dict[str, dict]:
     """A few dimensions which refer to each other."""
-    rows = [
-        DimensionRow(
-            "finger.thickness_mm", 17.4, "mm", "stack.depth_mm + wall_mm + cover_mm",
-            (("stack.depth_mm", 12.4), ("design.wall_mm", 2.0), ("design.cover_mm", 3.0)),
-            "sum along z at the mirror's far end", "finger",
+    rows = {
+        "finger.thickness_mm": record(
+            17.4, "mm", "stack.depth_mm + wall_mm + cover_mm",
+            {"stack.depth_mm": 12.4, "design.wall_mm": 2.0, "design.cover_mm": 3.0},
+            "sum along z at the mirror's far end",
         ),
-        DimensionRow(
-            "stack.depth_mm", 12.4, "mm", "mirror_mm*sin(tilt_deg) + gel_mm",
-            (("mirror_mm", 24.0), ("mirror.tilt_deg", 22.0), ("design.gel.thickness_mm", 3.41)),
-            "Fig. 3; equation (4)", "finger",
+        "stack.depth_mm": record(
+            12.4, "mm", "mirror_mm*sin(tilt_deg) + gel_mm",
+            {"mirror_mm": 24.0, "mirror.tilt_deg": 22.0, "design.gel.thickness_mm": 3.41},
+            "Fig. 3; equation (4)",
         ),
-        DimensionRow(
-            "mirror.tilt_deg", 22.0, "deg", "(90 - optics.incidence_deg)/2",
-            (("optics.incidence_deg", 46.0),), "law of reflection", "mirror",
+        "mirror.tilt_deg": record(
+            22.0, "deg", "(90 - optics.incidence_deg)/2", {"optics.incidence_deg": 46.0},
+            "law of reflection",
         ),
-        DimensionRow("lens.extension_mm", -0.0421, "mm", "1/(1/f_mm - 1/s_mm) - f_mm",
-            (("f_mm", 3.6), ("s_mm", 41.0)), "thin lens", "camera"),
-        DimensionRow("mesh.cells", 1764, "", "nx*ny", (("nx", 42), ("ny", 42)), "", "mesh"),
-    ]  # fmt: skip
-    rows += [
-        DimensionRow(
-            f"led.{i}.x_mm", -18.0 + 3 * i, "mm", "(i - 6)*pitch_mm", (("pitch_mm", 3.0),),
-            "even spacing", "light",
+        "lens.extension_mm": record(
+            -0.0421, "mm", "1/(1/f_mm - 1/s_mm) - f_mm", {"f_mm": 3.6, "s_mm": 41.0}, "thin lens"
+        ),
+        "mesh.cells": record(1764, "", "nx*ny", {"nx": 42, "ny": 42, "left": None}, ""),
+    }  # fmt: skip
+    return rows | {
+        f"led.x{i}_mm": record(
+            -18.0 + 3 * i, "mm", "(i - 6)*pitch_mm", {"pitch_mm": 3.0}, "even spacing"
         )
         for i in range(12)
-    ]  # fmt: skip
-    return tuple(rows)
+    }
 
 
 def report(name: str = "gelslim2", pictures: tuple[Picture, ...] = ()) -> ReportData:
@@ -276,7 +282,6 @@ def report(name: str = "gelslim2", pictures: tuple[Picture, ...] = ()) -> Report
     listed = ("step/assembly.step", "print/body.stl", "print/body.3mf", "markers/grid.svg")
     return ReportData(
         name=name,
-        summary="A 42 × 26 mm gel behind a 17.4 mm thin finger, seen over a mirror.",
         spec_text="format: gelslim-spec/1\ncamera:\n  focal_length_mm: 3.6  # <spy camera>\n",
         spec_hash=hashlib.sha256(b"spec").hexdigest(),
         headline=(
@@ -295,14 +300,19 @@ def report(name: str = "gelslim2", pictures: tuple[Picture, ...] = ()) -> Report
         glb=glb(),
         pictures=pictures,
         camera_view=camera(),
-        files=tuple(
-            FileRow(path, 1000 * 7**i, hashlib.sha256(path.encode()).hexdigest(), "to print & hold")
+        files={
+            path: FileEntry(
+                hashlib.sha256(path.encode()).hexdigest(), 1000 * 7**i, "to print & hold", "unit"
+            )
             for i, path in enumerate((*listed, "manifest.json"))
-        ),
+        },
         bom=(
             BomLine("body", 1, "PA12", "print", 24.1, "sand the mirror seat <flat>"),
             BomLine("screw M2×8", 4, "steel A2", "buy", None),
         ),
-        notes=(Note("Light guide", "12 LEDs a side; all flux within 3 % of even."),),
+        light=(),
+        light_notes=(Note("Light guide", "12 LEDs a side; all flux within 3 % of even."),),
+        projection=(),
+        projection_notes=(),
         versions=(("gelslim-cad", "0.1.0"), ("cadquery", "2.8")),
     )

@@ -18,7 +18,7 @@ import report_sample
 import trimesh
 from PIL import Image
 
-from gelslim_cad.report import Picture, render_report
+from gelslim_cad.report.render import Picture, render_report
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -249,7 +249,7 @@ def test_search_jump_and_filters(tmp_path, page):
         const all = (s) => [...document.querySelectorAll(s)];
         const visible = (s) => all(s).filter((e) => e.offsetParent).length;
         out.before = visible(".dimension");
-        search.value = "SPACING led.1"; search.dispatchEvent(new Event("input"));
+        search.value = "SPACING led.x1"; search.dispatchEvent(new Event("input"));
         out.found = visible(".dimension"); out.groups = visible(".group");
         out.said = document.getElementById("dimension-count").textContent;
         search.value = ""; search.dispatchEvent(new Event("input"));
@@ -262,7 +262,7 @@ def test_search_jump_and_filters(tmp_path, page):
         "--window-size=500,900",
     )  # fmt: skip
     assert out["before"] == 17
-    assert out["found"] == 3  # led.1, led.10, led.11
+    assert out["found"] == 3  # led.x1, led.x10, led.x11
     assert out["groups"] == 1
     assert out["said"] == "3 of 17 dimensions"
     assert out["rules"] == 2

@@ -14,16 +14,10 @@ from pathlib import Path
 import pytest
 import report_sample
 
+from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.checks import Check
-from gelslim_cad.report import (
-    BomLine,
-    DimensionRow,
-    FileRow,
-    Note,
-    Picture,
-    ReportData,
-    render_report,
-)
+from gelslim_cad.report.render import Picture, ReportData, render_report
+from gelslim_cad.report.tables import BomLine, Note
 
 VOID = {"meta", "link", "input", "img", "br", "hr"}
 PNG = base64.b64decode(
@@ -86,12 +80,12 @@ def hostile() -> ReportData:
     bad = HOSTILE
     return replace(
         report_sample.report(),
-        name=bad, spec_text=bad, spec_hash=bad, summary=bad, headline=((bad, bad),),
-        dimensions=(DimensionRow(bad, bad, bad, bad, ((bad, bad),), bad, bad),),
-        rules=(Check(bad, bad, bad, bad, bad, 0.5, "fail", bad, bad),),
+        name=bad, spec_text=bad, spec_hash=bad, headline=((bad, bad),),
+        dimensions={bad: report_sample.record(bad, bad, bad, {bad: bad}, bad)},
+        rules=(Check(bad, bad, 1.0, 0.5, bad, 0.5, "fail", bad, bad),),
         binding=(bad,), pictures=(Picture(bad, bad, PNG), Picture(bad, bad, b"", bad)),
-        files=(FileRow("a<b>&\"'/javascript ?#%.step", 1, bad, bad),),
-        bom=(BomLine(bad, 1, bad, bad, 1.0, bad),), notes=(Note(bad, bad),),
+        files={"a<b>&\"'/javascript ?#%.step": FileEntry(bad, 1, bad, bad)},
+        bom=(BomLine(bad, 1, bad, bad, 1.0, bad),), light_notes=(Note(bad, bad),),
         versions=((bad, bad),),
     )  # fmt: skip
 
@@ -106,7 +100,7 @@ def test_page_is_well_formed_and_ids_are_unique(page):
 def test_all_sections_are_there_and_the_navigation_reaches_them(page):
     document = Document(page)
     wanted = {"view", "pictures", "thickness", "rules", "camera", "dimensions", "files", "bom"}
-    assert wanted | {"notes", "spec"} <= set(document.ids)
+    assert wanted | {"light", "spec"} <= set(document.ids)
     jumps = [a["href"][1:] for a in document.elements("a") if a["href"].startswith("#")]
     assert set(jumps) <= set(document.ids)
     assert {"view", "rules", "files"} <= set(jumps)
@@ -179,7 +173,7 @@ def test_hostile_text_stays_text():
 def test_same_data_gives_the_same_bytes_in_a_fresh_process(page):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import report_sample, hashlib\n"
-        "from gelslim_cad.report import render_report\n"
+        "from gelslim_cad.report.render import render_report\n"
         "print(hashlib.sha256(render_report(report_sample.report())).hexdigest())"
     )
     command = [sys.executable, "-c", code, str(Path(__file__).parent)]
@@ -191,21 +185,12 @@ def test_same_data_gives_the_same_bytes_in_a_fresh_process(page):
 
 def test_report_imports_no_cad_and_no_vtk():
     code = (
-        "import sys, gelslim_cad.report\n"
+        "import sys, gelslim_cad.report.render\n"
         "heavy = {'cadquery', 'OCP', 'vtk', 'vtkmodules', 'pyvista', 'PIL', 'numpy'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
-
-
-def test_an_empty_report_still_says_what_is_missing():
-    document = Document(render_report(ReportData("bare", "", "0" * 64)))
-    assert document.problems == []
-    words = " ".join(document.words)
-    assert "rules not checked" in words
-    assert "written without a 3D model" in words
-    assert not [attrs for attrs in document.elements("script") if attrs.get("id") == "model"]
 
 
 def test_missing_picture_says_why():
@@ -217,10 +202,10 @@ def test_missing_picture_says_why():
 def test_files_are_linked_relative_with_size_and_hash(page):
     document = Document(page)
     links = [a["href"] for a in document.elements("a") if a["href"].startswith("./")]
-    assert sorted(links) == sorted("./" + row.path for row in report_sample.report().files)
+    assert sorted(links) == sorted("./" + path for path in report_sample.report().files)
     words = " ".join(document.words)
-    for row in report_sample.report().files:
-        assert row.sha256 in words
+    for entry in report_sample.report().files.values():
+        assert entry.sha256 in words
     assert "2.4 MB" in words
 
 
@@ -234,7 +219,7 @@ def test_rows_are_grouped_and_unfold_to_formula_with_numbers(page):
     assert "= 12.4 + 2 + 3" in body
     assert 'href="#dim-stack.depth_mm"' in body
     assert "sum along z" in body
-    assert text.count('class="group"') == 5
+    assert text.count('class="group"') == 6
 
 
 def test_failures_come_first(page):

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from gelslim_cad.checks import Check
 from gelslim_cad.report.camera_view import LEVELS, colour, levels
-from gelslim_cad.report.data import CameraView, FileRow, ReportData
 from gelslim_cad.report.markup import coordinate, href, number, size, text
-from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_positions, rules, sense_of, verdict
+from gelslim_cad.report.rules import LIMIT_AT, WIDTH, bar_positions, rules, verdict
 from gelslim_cad.report.tables import substituted
 
 REAL = st.floats(-1e6, 1e6, allow_nan=False)
@@ -23,22 +22,11 @@ def rule(value, limit, margin, status="pass", sense=""):
     return Check("a.b", "t", value, limit, "mm", margin, status, "r", "p", sense=sense)
 
 
-@given(st.floats(1e-3, 1e6), st.floats(1e-3, 1e6))
-def test_sense_follows_from_a_true_margin(value, limit):
-    if value == limit:
-        return
-    upper = "pass" if value <= limit else "fail"
-    lower = "pass" if value >= limit else "fail"
-    assert sense_of(rule(value, limit, limit - value, upper)) == "max"
-    assert sense_of(rule(value, limit, value - limit, lower)) == "min"
-
-
-def test_sense_without_margin_or_numbers():
-    assert sense_of(rule(1.0, 2.0, None, "fail")) == "min"
-    assert sense_of(rule(1.0, 2.0, None, "warn")) == "max"
-    assert sense_of(rule(True, True, None)) == ""
-    assert sense_of(rule(math.nan, 1.0, 0.1)) == ""
-    assert sense_of(rule(3.0, 3.0, 0.0, "pass", "min")) == "min"
+def test_a_limit_is_the_largest_value_unless_the_rule_says_least():
+    assert "≤ 2<" in rules((rule(1.0, 2.0, 1.0),)).replace('<span class="unit">', "<")
+    assert "≥ 2<" in rules((rule(3.0, 2.0, 1.0, sense="min"),)).replace('<span class="unit">', "<")
+    assert "svg" not in rules((rule(math.nan, 1.0, 0.1),))
+    assert "svg" not in rules((rule(1.0, None, None),))
 
 
 @given(REAL, REAL)
@@ -55,11 +43,11 @@ def test_bar_keeps_order_and_stays_inside(value, limit):
 
 
 def test_substitution_takes_whole_names_only():
-    inputs = (("f_mm", 3.6), ("mirror.f_mm_far", -2.0), ("n", 4), ("kind", "flat"))
+    inputs = {"f_mm": 3.6, "mirror.f_mm_far": -2.0, "n": 4, "kind": "flat"}
     assert substituted("f_mm*f_mm_far + xf_mm + n(n)", inputs) == "3.6*\u22122 + xf_mm + n(4)"
     assert substituted("kind + 1", inputs) == "kind + 1"
     assert substituted("a.f_mm", inputs) == "a.f_mm"
-    both = (("gel.h_mm", 1.0), ("guide.h_mm", 2.0))
+    both = {"gel.h_mm": 1.0, "guide.h_mm": 2.0}
     assert substituted("gel.h_mm + guide.h_mm + h_mm", both) == "1 + 2 + h_mm"
 
 
@@ -89,21 +77,12 @@ def test_sizes_and_links():
     assert text("a\x00b<\ud83d\ude00>"[:3]) == "a\ufffdb"
 
 
-@pytest.mark.parametrize(
-    "path", ["/etc/passwd", "../x", "a/../b", "http://x", "javascript:1", "", "a//b", "a\\b", "."]
-)
-def test_file_paths_that_leave_the_folder_are_refused(path):
-    with pytest.raises(ValueError, match="path"):
-        FileRow(path, 1, "0")
-
-
 def test_levels_cover_the_range_and_keep_order():
     values = [0.0, 0.1, 0.5, 0.99, 1.0]
     found = levels(values)
     assert (found[0], found[-1]) == (0, LEVELS - 1)
     assert found == sorted(found)
     assert set(levels([2.0, 2.0])) == {LEVELS // 2}
-    assert levels([]) == []
 
 
 def test_ramp_grows_lighter_so_that_it_also_reads_in_grey():
@@ -115,34 +94,13 @@ def test_ramp_grows_lighter_so_that_it_also_reads_in_grey():
     assert all(low < high for low, high in itertools.pairwise(light))
 
 
-def test_camera_view_refuses_what_cannot_be_drawn():
-    def view(**changed):
-        given = {
-            "image_size_px": (100, 80), "markers_px": [(1, 2)], "marker_axes_px": [(3, 2)],
-            "marker_angle_deg": [0.0], "blur_px": [0.5], "outline_px": [], "anchors": (),
-        }  # fmt: skip
-        return CameraView.from_arrays(**(given | changed))
-
-    assert view().markers_px == ((1.0, 2.0),)
-    with pytest.raises(ValueError, match="blur_px"):
-        view(blur_px=[1, 2])
-    with pytest.raises(ValueError, match="markers_px"):
-        view(markers_px=[(math.nan, 2)])
-    with pytest.raises(ValueError, match="width"):
-        view(image_size_px=(0, 80))
-    with pytest.raises(ValueError, match="anchor"):
-        view(anchors=(1,))
-
-
 def test_verdict_counts():
     def data(*statuses):
-        rows = tuple(rule(1.0, 2.0, 1.0, status) for status in statuses)
-        return ReportData("x", "", "", rules=rows)
+        return tuple(rule(1.0, 2.0, 1.0, status) for status in statuses)
 
     assert verdict(data("pass", "fail", "warn")) == ("fail", "1 of 3 rules fail")
     assert verdict(data("pass", "warn")) == ("warn", "passes, 1 warning")
     assert verdict(data("pass", "pass")) == ("pass", "passes all 2 rules")
-    assert verdict(data())[0] == "warn"
 
 
 def test_a_margin_below_what_value_and_limit_show_is_none():

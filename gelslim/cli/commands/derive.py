@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gelslim.cli.answer import console, number, print_json, say
 from gelslim.cli.options import AsJson, SpecFile
@@ -43,7 +43,7 @@ def derive(spec: SpecFile, as_json: AsJson = False) -> int:
                 "format": "gelslim-dimensions/1",
                 "name": loaded.spec.name,
                 "feasible": feasible,
-                "dimensions": {n: _record(dimensions, n) for n in dimensions.values},
+                "dimensions": {n: dimensions.record(n) for n in dimensions.values},
             }
         )
         return 0
@@ -55,22 +55,6 @@ def derive(spec: SpecFile, as_json: AsJson = False) -> int:
             style="bold red",
         )
     return 0
-
-
-def _record(d: Dimensions, name: str) -> dict[str, Any]:
-    from gelslim_cad.dimensions import definition
-
-    entry = definition(name)
-    return {
-        "value": d.values[name],
-        "unit": entry.unit,
-        "meaning": entry.title,
-        "formula": entry.formula,
-        "source": entry.source,
-        "inputs": {
-            n: v for n, v in d.inputs(name) if isinstance(v, int | float | str | tuple) or v is None
-        },
-    }
 
 
 def _print_table(d: Dimensions) -> None:
