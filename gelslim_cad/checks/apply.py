@@ -29,17 +29,6 @@ def check(d: Dimensions) -> Checks:
     return Checks(_check(entry, d) for entry in ordered)
 
 
-def check_batch(d: DimensionsBatch) -> Mapping[RuleId, NDArray[np.bool_]]:
-    """For each rule, where (n,) it fails, for the n designs of a batch."""
-    count = len(d)
-    failed = {}
-    for entry in RULES.values():
-        found = _find(entry, d)
-        missed = np.ravel(_missed(found) & (not found.advisory))
-        failed[entry.id] = np.broadcast_to(missed, (count,))
-    return failed
-
-
 def margins_batch(d: DimensionsBatch) -> Mapping[RuleId, NDArray[np.float64]]:
     """For each rule its margin (n,) as a part of its limit; below 0 exactly where it fails.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.dimensions.registry import Real
 
 
 @rule(
@@ -16,9 +15,8 @@ from gelslim_cad.checks.rule import Finding, rule
     why="below 0.5 acrylic cannot be bent; below 1/(n-1), 2.04 for acrylic, not even collimated "
     "light is fully guided (a bare LED needs 9.49; 3 to 4 is brightest)",
     advice="use a larger bend radius; the finger gets wider by twice the difference",
-    unit="",
 )
-def bend_ratio(guide_bend_ratio: Any, guide_full_guidance_ratio: Any) -> Finding:
+def bend_ratio(guide_bend_ratio: Real, guide_full_guidance_ratio: Real) -> Finding:
     """R/t with its two limits."""
     return Finding(guide_bend_ratio, 0.5, least=True, caution=guide_full_guidance_ratio)
 
@@ -31,7 +29,7 @@ def bend_ratio(guide_bend_ratio: Any, guide_full_guidance_ratio: Any) -> Finding
     advice="use a smaller LED, a thicker guide, or place the LEDs more exactly",
 )
 def led_fits(
-    leds_package_mm: Any, light_guide_thickness_mm: Any, leds_placement_tolerance_mm: Any
+    leds_package_mm: Real, light_guide_thickness_mm: Real, leds_placement_tolerance_mm: Real
 ) -> Finding:
     """Package size against the thickness t minus two placement tolerances."""
     return Finding(leds_package_mm, light_guide_thickness_mm - 2 * leds_placement_tolerance_mm)
@@ -44,7 +42,7 @@ def led_fits(
     why="packages must not touch",
     advice="allow a larger LED pitch or use smaller LEDs",
 )
-def led_gap(led_pitch_mm: Any, leds_package_mm: Any, leds_min_gap_mm: Any) -> Finding:
+def led_gap(led_pitch_mm: Real, leds_package_mm: Real, leds_min_gap_mm: Real) -> Finding:
     """Gap between neighbouring packages: pitch minus package size."""
     return Finding(led_pitch_mm - leds_package_mm, leds_min_gap_mm, least=True)
 
@@ -56,7 +54,7 @@ def led_gap(led_pitch_mm: Any, leds_package_mm: Any, leds_min_gap_mm: Any) -> Fi
     why="the count is capped, so the light gets less even",
     advice="allow more LEDs",
 )
-def led_pitch(led_pitch_mm: Any, leds_max_pitch_mm: Any) -> Finding:
+def led_pitch(led_pitch_mm: Real, leds_max_pitch_mm: Real) -> Finding:
     """Pitch against the largest pitch that the spec allows."""
     return Finding(led_pitch_mm, leds_max_pitch_mm, advisory=True, tolerance=1e-9)
 
@@ -69,12 +67,12 @@ def led_pitch(led_pitch_mm: Any, leds_max_pitch_mm: Any) -> Finding:
     advice="support the guide further at its ends, or use a smaller LED pitch",
 )
 def led_on_board(
-    gel_length_mm: Any,
-    led_pitch_mm: Any,
-    leds_package_mm: Any,
-    led_board_length_mm: Any,
-    guide_proximal_end_x_mm: Any,
-    guide_distal_end_x_mm: Any,
+    gel_length_mm: Real,
+    led_pitch_mm: Real,
+    leds_package_mm: Real,
+    led_board_length_mm: Real,
+    guide_proximal_end_x_mm: Real,
+    guide_distal_end_x_mm: Real,
 ) -> Finding:
     """Length of the board beyond the outermost LED at each end."""
     middle = (guide_proximal_end_x_mm + guide_distal_end_x_mm) / 2
@@ -90,7 +88,7 @@ def led_on_board(
     why="the board is as wide as the channel allows",
     advice="use a smaller LED or a thicker guide",
 )
-def led_board_width(leds_package_mm: Any, led_board_width_mm: Any) -> Finding:
+def led_board_width(leds_package_mm: Real, led_board_width_mm: Real) -> Finding:
     """Package size against the width of the board."""
     return Finding(leds_package_mm, led_board_width_mm)
 
@@ -102,7 +100,9 @@ def led_board_width(leds_package_mm: Any, led_board_width_mm: Any) -> Finding:
     why="sheets come in stock thicknesses",
     advice="choose one of manufacturing.acrylic_stock_mm, or add yours to it",
 )
-def guide_stock(light_guide_thickness_mm: Any, manufacturing_acrylic_stock_mm: Any) -> Finding:
+def guide_stock(
+    light_guide_thickness_mm: Real, manufacturing_acrylic_stock_mm: tuple[float, ...]
+) -> Finding:
     """Distance to the nearest stock thickness."""
     return Finding(_off(light_guide_thickness_mm, manufacturing_acrylic_stock_mm), 0.01)
 
@@ -114,12 +114,14 @@ def guide_stock(light_guide_thickness_mm: Any, manufacturing_acrylic_stock_mm: A
     why="front-surface mirrors come in stock thicknesses",
     advice="choose one of manufacturing.mirror_stock_mm, or add yours to it",
 )
-def mirror_stock(mirror_thickness_mm: Any, manufacturing_mirror_stock_mm: Any) -> Finding:
+def mirror_stock(
+    mirror_thickness_mm: Real, manufacturing_mirror_stock_mm: tuple[float, ...]
+) -> Finding:
     """Distance to the nearest stock thickness."""
     return Finding(_off(mirror_thickness_mm, manufacturing_mirror_stock_mm), 0.01)
 
 
-def _off(value: Any, stock: tuple[float, ...]) -> Any:
+def _off(value: Real, stock: tuple[float, ...]) -> Real:
     return np.min([np.abs(np.asarray(value) - s) for s in stock], axis=0)
 
 
@@ -130,7 +132,7 @@ def _off(value: Any, stock: tuple[float, ...]) -> Any:
     why="the gel must not reach into the bend, nor the bezel onto the gel",
     advice="widen the side margin",
 )
-def gel_on_window(light_guide_side_margin_mm: Any) -> Finding:
+def gel_on_window(light_guide_side_margin_mm: Real) -> Finding:
     """Width of the flat window beyond the gel on each side."""
     return Finding(light_guide_side_margin_mm, 0.1, least=True, caution=0.3)
 
@@ -141,10 +143,9 @@ def gel_on_window(light_guide_side_margin_mm: Any) -> Finding:
     parameter="material.gel.refractive_index",
     why="a gel denser than acrylic, or much thinner, changes what light enters",
     advice="use a silicone of index 1.40 to 1.49",
-    unit="",
 )
 def gel_index(
-    material_gel_refractive_index: Any, material_acrylic_refractive_index: Any
+    material_gel_refractive_index: Real, material_acrylic_refractive_index: Real
 ) -> Finding:
     """Index of the gel over that of the acrylic, which limits the light that enters the gel."""
     return Finding(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.dimensions.registry import Real
 from gelslim_cad.markers.process import MARKING_PROCESSES
 
 LONGEST_BRIDGE_MM = {"sla": 60.0, "fdm": 30.0, "sls": 1e9}
@@ -21,7 +20,7 @@ LONGEST_BRIDGE_MM = {"sla": 60.0, "fdm": 30.0, "sls": 1e9}
     advice="print with supports, or by sla or sls",
 )
 def overhang(
-    finger_width_mm: Any, housing_side_wall_mm: Any, manufacturing_print_process: str
+    finger_width_mm: Real, housing_side_wall_mm: Real, manufacturing_print_process: str
 ) -> Finding:
     """Inner width of the chamber."""
     bridge = finger_width_mm - 2 * housing_side_wall_mm
@@ -34,7 +33,6 @@ def overhang(
     parameter="manufacturing.mould_process",
     why="uncured resin of a printed mould stops platinum silicone from curing",
     advice="coat the mould (acrylic lacquer), post-cure it well, or make it of acrylic",
-    unit="",
 )
 def mould_cure(manufacturing_mould_process: str) -> Finding:
     """Value 1 where the material of the mould inhibits the cure of the silicone."""
@@ -48,7 +46,7 @@ def mould_cure(manufacturing_mould_process: str) -> Finding:
     why="thinner layers tear when they leave the mould",
     advice="use a thicker gel",
 )
-def mould_gel(gel_thickness_mm: Any) -> Finding:
+def mould_gel(gel_thickness_mm: Real) -> Finding:
     """Gel thickness."""
     return Finding(gel_thickness_mm, 0.5, least=True, caution=1.0)
 
@@ -60,7 +58,7 @@ def mould_gel(gel_thickness_mm: Any) -> Finding:
     why="platinum-cure silicone shrinks by about 0.1 %",
     advice="measure the shrinkage of your gel",
 )
-def shrinkage(manufacturing_gel_shrinkage_percent: Any) -> Finding:
+def shrinkage(manufacturing_gel_shrinkage_percent: Real) -> Finding:
     """Linear shrinkage."""
     return Finding(manufacturing_gel_shrinkage_percent, 2.0, advisory=True)
 
@@ -72,7 +70,7 @@ def shrinkage(manufacturing_gel_shrinkage_percent: Any) -> Finding:
     why="optics and mesh take the marked surface as nearly flat",
     advice="use a lower crown",
 )
-def crown(gel_crown_height_mm: Any, gel_length_mm: Any, gel_width_mm: Any) -> Finding:
+def crown(gel_crown_height_mm: Real, gel_length_mm: Real, gel_width_mm: Real) -> Finding:
     """Height of the crown against a sixth of the shorter side."""
     side = np.minimum(gel_length_mm, gel_width_mm)
     return Finding(gel_crown_height_mm, side / 6, caution=side / 20)
@@ -84,9 +82,8 @@ def crown(gel_crown_height_mm: Any, gel_length_mm: Any, gel_width_mm: Any) -> Fi
     parameter="design.markers.pitch_mm",
     why="closer dots merge under blur and are mistaken for one another",
     advice="use a larger pitch or smaller dots",
-    unit="",
 )
-def marker_pitch(markers_pitch_mm: Any, markers_diameter_mm: Any) -> Finding:
+def marker_pitch(markers_pitch_mm: Real, markers_diameter_mm: Real) -> Finding:
     """Pitch over diameter."""
     return Finding(markers_pitch_mm / markers_diameter_mm, 2.0, least=True, tolerance=1e-9)
 
@@ -98,7 +95,7 @@ def marker_pitch(markers_pitch_mm: Any, markers_diameter_mm: Any) -> Finding:
     why="the marking process resolves nothing smaller",
     advice="use larger dots or another marking process",
 )
-def marker_diameter(markers_diameter_mm: Any, manufacturing_marking_process: str) -> Finding:
+def marker_diameter(markers_diameter_mm: Real, manufacturing_marking_process: str) -> Finding:
     """Diameter against the smallest that the marking process can make."""
     process = MARKING_PROCESSES[manufacturing_marking_process]
     return Finding(markers_diameter_mm, process.min_diameter_mm, least=True)
@@ -112,7 +109,7 @@ def marker_diameter(markers_diameter_mm: Any, manufacturing_marking_process: str
     advice="use a larger pitch or another marking process",
 )
 def marker_gap(
-    markers_pitch_mm: Any, markers_diameter_mm: Any, manufacturing_marking_process: str
+    markers_pitch_mm: Real, markers_diameter_mm: Real, manufacturing_marking_process: str
 ) -> Finding:
     """Gap between dots, also next to a larger anchor, against the smallest of the process."""
     process = MARKING_PROCESSES[manufacturing_marking_process]
@@ -128,11 +125,11 @@ def marker_gap(
     advice="use fewer rows or columns, or a smaller pitch",
 )
 def marker_inside(
-    gel_length_mm: Any,
-    gel_width_mm: Any,
-    marker_grid_span_x_mm: Any,
-    marker_grid_span_y_mm: Any,
-    markers_diameter_mm: Any,
+    gel_length_mm: Real,
+    gel_width_mm: Real,
+    marker_grid_span_x_mm: Real,
+    marker_grid_span_y_mm: Real,
+    markers_diameter_mm: Real,
 ) -> Finding:
     """Gel beyond the outermost dots, without the dots that would cross a rounded corner."""
     beyond = np.minimum(gel_length_mm - marker_grid_span_x_mm, gel_width_mm - marker_grid_span_y_mm)
@@ -149,12 +146,12 @@ def marker_inside(
     advice="use a smaller corner radius, or a wider edge margin",
 )
 def marker_corner(
-    gel_length_mm: Any,
-    gel_width_mm: Any,
-    gel_corner_radius_mm: Any,
-    marker_grid_span_x_mm: Any,
-    marker_grid_span_y_mm: Any,
-    markers_diameter_mm: Any,
+    gel_length_mm: Real,
+    gel_width_mm: Real,
+    gel_corner_radius_mm: Real,
+    marker_grid_span_x_mm: Real,
+    marker_grid_span_y_mm: Real,
+    markers_diameter_mm: Real,
 ) -> Finding:
     """Gel beyond the dot in the corner of the lattice, measured along the corner's radius."""
     to_x = (gel_length_mm - marker_grid_span_x_mm) / 2
@@ -172,10 +169,9 @@ def marker_corner(
     parameter="design.markers.rows",
     why="anchors need at least five rows and columns; without them tracking can slip by a pitch",
     advice="use a smaller pitch, more markers, or anchors: none",
-    unit="",
 )
 def marker_lattice(
-    marker_grid_rows: Any, marker_grid_columns: Any, markers_anchors: str
+    marker_grid_rows: Real, marker_grid_columns: Real, markers_anchors: str
 ) -> Finding:
     """Number of dots along the shorter side of the lattice."""
     least = 2 if markers_anchors == "none" else 5
@@ -188,7 +184,6 @@ def marker_lattice(
     parameter="design.markers.anchors",
     why="a plain grid looks the same after a slip of one pitch",
     advice="use odd_sized or omitted anchors",
-    unit="",
 )
 def marker_anchors(markers_anchors: str) -> Finding:
     """Value 1 where the lattice has anchors."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.dimensions.registry import Real
 from gelslim_cad.spec.spec import STIFF_GEL_MPA
 
 MOST_NODES = 400_000
@@ -20,7 +19,7 @@ MOST_NODES = 400_000
     advice="check the unit: tactile gels have 0.05 to 1 MPa",
     unit="MPa",
 )
-def gel_modulus(material_gel_youngs_modulus_mpa: Any, material_allow_stiff_gel: bool) -> Finding:
+def gel_modulus(material_gel_youngs_modulus_mpa: Real, material_allow_stiff_gel: bool) -> Finding:
     """Young's modulus against the upper limit, unless the spec allows a stiffer gel."""
     limit = np.inf if material_allow_stiff_gel else STIFF_GEL_MPA
     return Finding(material_gel_youngs_modulus_mpa, limit, caution=1.0)
@@ -34,7 +33,7 @@ def gel_modulus(material_gel_youngs_modulus_mpa: Any, material_allow_stiff_gel: 
     advice="check the unit: tactile gels have 0.05 to 1 MPa",
     unit="MPa",
 )
-def gel_soft(material_gel_youngs_modulus_mpa: Any) -> Finding:
+def gel_soft(material_gel_youngs_modulus_mpa: Real) -> Finding:
     """Young's modulus against the lower limit of tactile gels."""
     return Finding(material_gel_youngs_modulus_mpa, 0.02, least=True, advisory=True)
 
@@ -45,9 +44,8 @@ def gel_soft(material_gel_youngs_modulus_mpa: Any) -> Finding:
     parameter="mesh.layers",
     why="one bonded layer locks as Poisson's ratio nears 0.5, whatever the element",
     advice="use at least two layers (four for a good field) and the bbar or incompatible element",
-    unit="",
 )
-def mesh_layers(mesh_layers: Any, mesh_element: str, material_gel_poissons_ratio: Any) -> Finding:
+def mesh_layers(mesh_layers: Real, mesh_element: str, material_gel_poissons_ratio: Real) -> Finding:
     """Poisson's ratio against the largest that layers and element can represent."""
     one = np.asarray(mesh_layers) <= 1
     full = mesh_element == "full"
@@ -63,7 +61,7 @@ def mesh_layers(mesh_layers: Any, mesh_element: str, material_gel_poissons_ratio
     why="where they do not, displacements are interpolated between markers",
     advice="use nodes_per_marker_pitch instead of cell counts",
 )
-def mesh_alignment(pad_mesh_alignment_mm: Any) -> Finding:
+def mesh_alignment(pad_mesh_alignment_mm: Real) -> Finding:
     """Largest distance of a marker line to a node line."""
     return Finding(pad_mesh_alignment_mm, 0.0, advisory=True, tolerance=1e-6)
 
@@ -74,10 +72,9 @@ def mesh_alignment(pad_mesh_alignment_mm: Any) -> Finding:
     parameter="mesh.layers",
     why="flat or tall cells cost accuracy and condition",
     advice="change layers or cell size",
-    unit="",
 )
 def mesh_aspect(
-    pad_mesh_cell_x_mm: Any, pad_mesh_cell_y_mm: Any, pad_mesh_cell_z_mm: Any
+    pad_mesh_cell_x_mm: Real, pad_mesh_cell_y_mm: Real, pad_mesh_cell_z_mm: Real
 ) -> Finding:
     """Ratio of the longest to the shortest edge of a cell."""
     edges = np.broadcast_arrays(pad_mesh_cell_x_mm, pad_mesh_cell_y_mm, pad_mesh_cell_z_mm)
@@ -92,7 +89,9 @@ def mesh_aspect(
     why="every column of the mesh needs a whole cell under the gel's surface",
     advice="use more layers, a thicker gel or a lower crown",
 )
-def mesh_crown(gel_thickness_mm: Any, gel_crown_height_mm: Any, pad_mesh_cell_z_mm: Any) -> Finding:
+def mesh_crown(
+    gel_thickness_mm: Real, gel_crown_height_mm: Real, pad_mesh_cell_z_mm: Real
+) -> Finding:
     """Thickness of the gel at its rim against the height of a cell."""
     crowned = np.asarray(gel_crown_height_mm) > 0
     least = np.where(crowned, pad_mesh_cell_z_mm, 0.0)
@@ -107,7 +106,7 @@ def mesh_crown(gel_thickness_mm: Any, gel_crown_height_mm: Any, pad_mesh_cell_z_
     advice="use fewer cells or layers",
     unit="nodes",
 )
-def mesh_size(pad_mesh_node_count: Any) -> Finding:
+def mesh_size(pad_mesh_node_count: Real) -> Finding:
     """Number of nodes of the pad mesh."""
     return Finding(pad_mesh_node_count, MOST_NODES, caution=100_000)
 
@@ -119,7 +118,7 @@ def mesh_size(pad_mesh_node_count: Any) -> Finding:
     why="the envelope of the gripper",
     advice="relax what binds the thickness, as `gelslim check` lists it, or allow more",
 )
-def thickness(finger_thickness_mm: Any, envelope_max_thickness_mm: Any) -> Finding:
+def thickness(finger_thickness_mm: Real, envelope_max_thickness_mm: Real | None) -> Finding:
     """Thickness against its limit."""
     return _envelope(finger_thickness_mm, envelope_max_thickness_mm)
 
@@ -131,7 +130,7 @@ def thickness(finger_thickness_mm: Any, envelope_max_thickness_mm: Any) -> Findi
     why="the envelope of the gripper",
     advice="narrow the gel, use a smaller bend radius ratio or thinner acrylic",
 )
-def width(finger_width_mm: Any, envelope_max_width_mm: Any) -> Finding:
+def width(finger_width_mm: Real, envelope_max_width_mm: Real | None) -> Finding:
     """Width against its limit."""
     return _envelope(finger_width_mm, envelope_max_width_mm)
 
@@ -143,10 +142,10 @@ def width(finger_width_mm: Any, envelope_max_width_mm: Any) -> Finding:
     why="the envelope of the gripper",
     advice="shorten the gel or the tongue, or use a wider field of view",
 )
-def length(finger_length_mm: Any, envelope_max_length_mm: Any) -> Finding:
+def length(finger_length_mm: Real, envelope_max_length_mm: Real | None) -> Finding:
     """Length against its limit."""
     return _envelope(finger_length_mm, envelope_max_length_mm)
 
 
-def _envelope(value: Any, limit: Any) -> Finding:
+def _envelope(value: Real, limit: Real | None) -> Finding:
     return Finding(value, np.inf if limit is None else limit, tolerance=1e-9)

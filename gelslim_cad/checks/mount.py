@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from gelslim_cad.checks.rule import Finding, rule
 from gelslim_cad.dimensions.housing import TONGUE_ROOM_MM
+from gelslim_cad.dimensions.registry import Real
 from gelslim_cad.geometry.fasteners import SCREWS
 
 
@@ -16,7 +15,7 @@ from gelslim_cad.geometry.fasteners import SCREWS
     why="a tongue needs 1.5 mm of material on both sides of its hole",
     advice="use a smaller bolt or a narrower cable",
 )
-def mount_bolt(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
+def mount_bolt(tongue_inner_y_mm: Real, tongue_outer_y_mm: Real, mount_bolt: str) -> Finding:
     """Width of the tongue minus the diameter of the hole."""
     width = tongue_outer_y_mm - tongue_inner_y_mm
     return Finding(width - SCREWS[mount_bolt].clearance_mm, 3.0, least=True)
@@ -29,7 +28,7 @@ def mount_bolt(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) 
     why="the sunk head must not break out at the side",
     advice="use a smaller bolt",
 )
-def mount_head(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) -> Finding:
+def mount_head(tongue_inner_y_mm: Real, tongue_outer_y_mm: Real, mount_bolt: str) -> Finding:
     """Half the width of the tongue minus half the diameter of the head."""
     half = (tongue_outer_y_mm - tongue_inner_y_mm) / 2
     return Finding(half - SCREWS[mount_bolt].cap_head_mm / 2, 0.0, least=True)
@@ -43,10 +42,10 @@ def mount_head(tongue_inner_y_mm: Any, tongue_outer_y_mm: Any, mount_bolt: str) 
     advice="use a thinner tongue",
 )
 def mount_block(
-    finger_thickness_mm: Any,
-    housing_gel_proud_mm: Any,
-    mount_tongue_thickness_mm: Any,
-    housing_fit_clearance_mm: Any,
+    finger_thickness_mm: Real,
+    housing_gel_proud_mm: Real,
+    mount_tongue_thickness_mm: Real,
+    housing_fit_clearance_mm: Real,
 ) -> Finding:
     """Thickness of the material above the slot."""
     height = finger_thickness_mm - housing_gel_proud_mm
@@ -62,10 +61,10 @@ def mount_block(
     advice="use a thinner tongue",
 )
 def mount_cover_screw(
-    tongue_z_mm: Any,
-    mount_tongue_thickness_mm: Any,
-    housing_fit_clearance_mm: Any,
-    cover_top_z_mm: Any,
+    tongue_z_mm: Real,
+    mount_tongue_thickness_mm: Real,
+    housing_fit_clearance_mm: Real,
+    cover_top_z_mm: Real,
 ) -> Finding:
     """Depth of the pilot hole."""
     slot = tongue_z_mm - mount_tongue_thickness_mm / 2 - housing_fit_clearance_mm
@@ -79,7 +78,7 @@ def mount_cover_screw(
     why="the bolt's hole needs 1.2 mm of tongue beyond it",
     advice="lengthen the tongue or use a smaller bolt",
 )
-def mount_tongue(mount_tongue_length_mm: Any, mount_bolt: str) -> Finding:
+def mount_tongue(mount_tongue_length_mm: Real, mount_bolt: str) -> Finding:
     """Length of the tongue beyond the hole."""
     size = SCREWS[mount_bolt]
     centre = size.cap_head_mm / 2 + 1.2
@@ -94,7 +93,7 @@ def mount_tongue(mount_tongue_length_mm: Any, mount_bolt: str) -> Finding:
     advice="the chamber follows the bend radius; report this as a fault",
 )
 def cable_bend(
-    camera_pose_rear_x_mm: Any, chamber_rear_x_mm: Any, camera_cable_bend_radius_mm: Any
+    camera_pose_rear_x_mm: Real, chamber_rear_x_mm: Real, camera_cable_bend_radius_mm: Real
 ) -> Finding:
     """Length of the chamber behind the camera against the bend radius of the cable."""
     room = camera_pose_rear_x_mm - chamber_rear_x_mm
@@ -108,6 +107,6 @@ def cable_bend(
     why="the cable leaves through the middle of the mount",
     advice="use a narrower cable or a wider finger",
 )
-def cable_slot(camera_cable_width_mm: Any, tongue_outer_y_mm: Any) -> Finding:
+def cable_slot(camera_cable_width_mm: Real, tongue_outer_y_mm: Real) -> Finding:
     """Half the cable, with gap and tongue beside it, against the outer side of the tongues."""
     return Finding(camera_cable_width_mm / 2 + TONGUE_ROOM_MM, tongue_outer_y_mm)

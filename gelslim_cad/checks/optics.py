@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.registry import Real
 
 TOLERANCE = 1e-4
 """Tolerance for limits at which the search places the design."""
@@ -19,9 +19,8 @@ TOLERANCE_OF_FOLD = 1e-6
     parameter="design.gel.length_mm",
     why="a part of the gel that is not seen gives no force",
     advice="shorten the gel, widen the field of view, or allow more thickness",
-    unit="",
 )
-def coverage_along(view_along_use: Any, optics_image_margin: Any) -> Finding:
+def coverage_along(view_along_use: Real, optics_image_margin: Real) -> Finding:
     """Gel corners against the image's height."""
     return Finding(view_along_use, 1 - optics_image_margin, tolerance=TOLERANCE)
 
@@ -32,9 +31,8 @@ def coverage_along(view_along_use: Any, optics_image_margin: Any) -> Finding:
     parameter="design.gel.width_mm",
     why="the near edge of the gel is the tightest",
     advice="narrow the gel, widen the field of view, or allow more thickness",
-    unit="",
 )
-def coverage_across(view_across_use: Any, optics_image_margin: Any) -> Finding:
+def coverage_across(view_across_use: Real, optics_image_margin: Real) -> Finding:
     """Gel corners against the image's width."""
     return Finding(view_across_use, 1 - optics_image_margin, tolerance=TOLERANCE)
 
@@ -46,7 +44,7 @@ def coverage_across(view_across_use: Any, optics_image_margin: Any) -> Finding:
     why="a fixed-focus lens must be unscrewed by f²/(s - f) from infinity",
     advice="unscrew the lens that far (a longer thread or a spacer), or use a closer-focusing lens",
 )
-def focus_travel(view_lens_extension_mm: Any, camera_lens_travel_mm: Any) -> Finding:
+def focus_travel(view_lens_extension_mm: Real, camera_lens_travel_mm: Real) -> Finding:
     """Needed against possible lens extension."""
 
     def reason() -> str:
@@ -67,9 +65,8 @@ def focus_travel(view_lens_extension_mm: Any, camera_lens_travel_mm: Any) -> Fin
     parameter="design.optics.blur_per_diameter",
     why="markers wash out: 1/3 of a diameter is sharp, 1/2 is the limit",
     advice="stop the lens down, use larger markers, shorten the gel, or allow more thickness",
-    unit="",
 )
-def blur_gel(view_near_blur_mm: Any, view_far_blur_mm: Any, markers_diameter_mm: Any) -> Finding:
+def blur_gel(view_near_blur_mm: Real, view_far_blur_mm: Real, markers_diameter_mm: Real) -> Finding:
     """Largest blur on the pad."""
     worst = np.maximum(view_near_blur_mm, view_far_blur_mm) / markers_diameter_mm
     return Finding(worst, 0.5, caution=1 / 3, tolerance=TOLERANCE)
@@ -83,7 +80,9 @@ def blur_gel(view_near_blur_mm: Any, view_far_blur_mm: Any, markers_diameter_mm:
     advice="allow more blur, stop the lens down, or use larger markers",
     unit="mm",
 )
-def blur_limit(view_near_blur_mm: Any, view_far_blur_mm: Any, view_blur_limit_mm: Any) -> Finding:
+def blur_limit(
+    view_near_blur_mm: Real, view_far_blur_mm: Real, view_blur_limit_mm: Real
+) -> Finding:
     """Largest blur on the pad against the design's own limit."""
     worst = np.maximum(view_near_blur_mm, view_far_blur_mm)
     return Finding(worst, view_blur_limit_mm, tolerance=TOLERANCE * view_blur_limit_mm)
@@ -96,7 +95,7 @@ def blur_limit(view_near_blur_mm: Any, view_far_blur_mm: Any, view_blur_limit_mm
     why="fine texture is softer than the sensor could show; markers are judged by blur on the gel",
     advice="stop the lens down for sharper texture, at the cost of light",
 )
-def blur_image(view_image_blur_px: Any, camera_circle_of_confusion_px: Any) -> Finding:
+def blur_image(view_image_blur_px: Real, camera_circle_of_confusion_px: Real) -> Finding:
     """Blur at the far edge in the image."""
     return Finding(view_image_blur_px, camera_circle_of_confusion_px, advisory=True)
 
@@ -109,7 +108,7 @@ def blur_image(view_image_blur_px: Any, camera_circle_of_confusion_px: Any) -> F
     advice="use larger markers, more pixels, a longer lens, or allow more thickness",
 )
 def marker_far(
-    view_marker_across_px: Any, view_marker_along_px: Any, optics_min_px_per_marker: Any
+    view_marker_across_px: Real, view_marker_along_px: Real, optics_min_px_per_marker: Real
 ) -> Finding:
     """Smaller image axis of a far marker."""
     least = np.minimum(view_marker_across_px, view_marker_along_px)
@@ -123,9 +122,8 @@ def marker_far(
     parameter="design.optics.max_keystone",
     why="marker size and resolution vary by this ratio over the pad",
     advice="allow more keystone or more thickness",
-    unit="",
 )
-def keystone(view_keystone: Any, optics_max_keystone: Any) -> Finding:
+def keystone(view_keystone: Real, optics_max_keystone: Real) -> Finding:
     """Ratio of far to near distance, or its inverse where the axis is tilted back."""
     ratio = np.maximum(view_keystone, 1 / np.asarray(view_keystone))
     return Finding(ratio, optics_max_keystone, tolerance=TOLERANCE)
@@ -138,7 +136,7 @@ def keystone(view_keystone: Any, optics_max_keystone: Any) -> Finding:
     why="a mirror beside or behind the lens cannot fold its view",
     advice="no such finger exists for this camera and gel; change the gel's length or the lens",
 )
-def mirror_before_camera(mirror_lower_x_mm: Any, camera_pose_front_x_mm: Any) -> Finding:
+def mirror_before_camera(mirror_lower_x_mm: Real, camera_pose_front_x_mm: Real) -> Finding:
     """Gap between the camera's front and the mirror's lower end."""
     return Finding(mirror_lower_x_mm - camera_pose_front_x_mm, 0.0, least=True)
 
@@ -149,9 +147,8 @@ def mirror_before_camera(mirror_lower_x_mm: Any, camera_pose_front_x_mm: Any) ->
     parameter="design.gel.length_mm",
     why="every limit of the folded view must hold at once",
     advice="see the other rules that fail and the advice on what limits the thickness",
-    unit="",
 )
-def fold_feasible(fold_layout: Any) -> Finding:
+def fold_feasible(fold_layout: Fold) -> Finding:
     """Sum of the parts by which limits of the fold are missed."""
 
     def reason() -> str:
@@ -170,13 +167,13 @@ def fold_feasible(fold_layout: Any) -> Finding:
     advice="lengthen the legs, so that the LEDs sit deeper behind the baffle",
 )
 def led_hidden(
-    baffle_top_z_mm: Any,
-    baffle_inner_y_mm: Any,
-    led_y_mm: Any,
-    led_top_z_mm: Any,
-    leds_package_mm: Any,
-    camera_pose_z_mm: Any,
-    camera_lens_diameter_mm: Any,
+    baffle_top_z_mm: Real,
+    baffle_inner_y_mm: Real,
+    led_y_mm: Real,
+    led_top_z_mm: Real,
+    leds_package_mm: Real,
+    camera_pose_z_mm: Real,
+    camera_lens_diameter_mm: Real,
 ) -> Finding:
     """Baffle above the highest straight line from an LED to the square around the lens."""
     radius, half = camera_lens_diameter_mm / 2, leds_package_mm / 2
@@ -187,7 +184,8 @@ def led_hidden(
         for side in (-1, 1)
         for end in (-1, 1)
     ]
-    line = led_top_z_mm + np.max([share * rise for share in shares], axis=0)
+    highest = np.max(np.broadcast_arrays(*(share * rise for share in shares)), axis=0)
+    line = led_top_z_mm + highest
     return Finding(baffle_top_z_mm - line, 0.0, least=True)
 
 
@@ -199,7 +197,7 @@ def led_hidden(
     advice="use a larger bend radius, a wider side margin, or a smaller mirror border",
 )
 def mirror_between(
-    mirror_width_mm: Any, baffle_inner_y_mm: Any, housing_fit_clearance_mm: Any
+    mirror_width_mm: Real, baffle_inner_y_mm: Real, housing_fit_clearance_mm: Real
 ) -> Finding:
     """Gap between the mirror and the baffle on each side."""
     room = baffle_inner_y_mm - mirror_width_mm / 2
@@ -213,6 +211,6 @@ def mirror_between(
     why="a baffle in the view shades the gel's side",
     advice="use a larger bend radius or a wider side margin",
 )
-def view_between(baffle_inner_y_mm: Any, gel_width_mm: Any) -> Finding:
+def view_between(baffle_inner_y_mm: Real, gel_width_mm: Real) -> Finding:
     """Baffles outside the gel's width, above which the view lies."""
     return Finding(baffle_inner_y_mm - gel_width_mm / 2, 0.0, least=True)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.dimensions.registry import Real
 from gelslim_cad.geometry.fasteners import LENGTHS_MM, SCREW_EDGE_MM, SCREWS
 
 THINNEST_WALL_MM = {
@@ -26,10 +25,10 @@ SMALLEST_GAP_MM = {"sla": 0.1, "fdm": 0.15, "sls": 0.15}
     advice="thicken side wall, back wall, baffle or ledge, whichever is the thinnest",
 )
 def wall(
-    housing_side_wall_mm: Any,
-    housing_back_wall_mm: Any,
-    housing_baffle_mm: Any,
-    housing_ledge_mm: Any,
+    housing_side_wall_mm: Real,
+    housing_back_wall_mm: Real,
+    housing_baffle_mm: Real,
+    housing_ledge_mm: Real,
     manufacturing_print_process: str,
 ) -> Finding:
     """Smallest of the four wall thicknesses."""
@@ -54,8 +53,8 @@ def wall(
     advice="widen the clearance or print more exactly",
 )
 def fit(
-    housing_fit_clearance_mm: Any,
-    manufacturing_print_tolerance_mm: Any,
+    housing_fit_clearance_mm: Real,
+    manufacturing_print_tolerance_mm: Real,
     manufacturing_print_process: str,
 ) -> Finding:
     """Clearance against the print tolerance and the smallest gap of the process."""
@@ -75,7 +74,7 @@ def fit(
     why="the head must sink into the plate between acrylic and outside",
     advice="let the gel stand less proud, use a thicker gel, or a smaller screw",
 )
-def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
+def bezel_thickness(bezel_thickness_mm: Real, housing_screw: str) -> Finding:
     """Thickness of the plate against the conical head, a cone of 90° down to the thread's core."""
     size = SCREWS[housing_screw]
     cone = (size.countersunk_head_mm - size.pilot_mm) / 2
@@ -89,7 +88,7 @@ def bezel_thickness(bezel_thickness_mm: Any, housing_screw: str) -> Finding:
     why="the head must sink into the cover",
     advice="thicken the back wall or use a smaller screw",
 )
-def cover_thickness(housing_back_wall_mm: Any, housing_screw: str) -> Finding:
+def cover_thickness(housing_back_wall_mm: Real, housing_screw: str) -> Finding:
     """Thickness of the cover against the height of the screw's head."""
     size = SCREWS[housing_screw]
     return Finding(housing_back_wall_mm, size.countersunk_height_mm, least=True, tolerance=1e-9)
@@ -102,7 +101,7 @@ def cover_thickness(housing_back_wall_mm: Any, housing_screw: str) -> Finding:
     why="the gel must touch the object before the bezel does",
     advice="let the gel stand at least 0.2 mm proud",
 )
-def gel_proud(housing_gel_proud_mm: Any) -> Finding:
+def gel_proud(housing_gel_proud_mm: Real) -> Finding:
     """Height of the gel above the bezel."""
     return Finding(housing_gel_proud_mm, 0.0, least=True, caution=0.2)
 
@@ -114,7 +113,7 @@ def gel_proud(housing_gel_proud_mm: Any) -> Finding:
     why="a pilot hole too near an edge splits the wall",
     advice="lengthen the tip wall or use a smaller screw",
 )
-def screw_wall(housing_tip_wall_mm: Any, housing_screw: str) -> Finding:
+def screw_wall(housing_tip_wall_mm: Real, housing_screw: str) -> Finding:
     """Smallest wall around the pilot hole in the tip block and around the head."""
     size = SCREWS[housing_screw]
     beside = (housing_tip_wall_mm - size.countersunk_head_mm) / 2
@@ -128,7 +127,7 @@ def screw_wall(housing_tip_wall_mm: Any, housing_screw: str) -> Finding:
     why="two screws side by side need room for their heads and for the gel's window",
     advice="widen the gel or use a smaller screw",
 )
-def screw_apart(finger_width_mm: Any, housing_side_wall_mm: Any, housing_screw: str) -> Finding:
+def screw_apart(finger_width_mm: Real, housing_side_wall_mm: Real, housing_screw: str) -> Finding:
     """Distance between the two screws minus the diameter of a head."""
     apart = finger_width_mm - 2 * (housing_side_wall_mm + SCREW_EDGE_MM)
     return Finding(apart - SCREWS[housing_screw].countersunk_head_mm, 1.0, least=True)
@@ -142,9 +141,9 @@ def screw_apart(finger_width_mm: Any, housing_side_wall_mm: Any, housing_screw: 
     advice="use a smaller corner radius, a longer tip wall or a smaller screw",
 )
 def corner_screw(
-    housing_corner_radius_mm: Any,
-    housing_tip_wall_mm: Any,
-    housing_side_wall_mm: Any,
+    housing_corner_radius_mm: Real,
+    housing_tip_wall_mm: Real,
+    housing_side_wall_mm: Real,
     housing_screw: str,
 ) -> Finding:
     """Material between the head and the rounded corner."""
@@ -166,10 +165,10 @@ def corner_screw(
     advice="compress more, with a thicker shim",
 )
 def precompression_tolerance(
-    housing_precompression_mm: Any,
-    manufacturing_acrylic_tolerance_ratio: Any,
-    light_guide_thickness_mm: Any,
-    manufacturing_print_tolerance_mm: Any,
+    housing_precompression_mm: Real,
+    manufacturing_acrylic_tolerance_ratio: Real,
+    light_guide_thickness_mm: Real,
+    manufacturing_print_tolerance_mm: Real,
 ) -> Finding:
     """Compression against the worst case of the acrylic and print tolerances."""
     stack = (
@@ -186,7 +185,7 @@ def precompression_tolerance(
     why="an elastic sheet cannot be pressed to less than about 40 %",
     advice="use thicker shims or compress less",
 )
-def precompression_shim(shim_compressed_mm: Any, housing_shim_thickness_mm: Any) -> Finding:
+def precompression_shim(shim_compressed_mm: Real, housing_shim_thickness_mm: Real) -> Finding:
     """Compressed thickness of the shim."""
     return Finding(shim_compressed_mm, 0.4 * housing_shim_thickness_mm, least=True)
 
@@ -199,11 +198,11 @@ def precompression_shim(shim_compressed_mm: Any, housing_shim_thickness_mm: Any)
     advice="use a larger bend radius, a smaller camera, or a longer gel",
 )
 def clamp_beside(
-    clamp_width_mm: Any,
-    baffle_inner_y_mm: Any,
-    camera_pose_front_x_mm: Any,
-    guide_proximal_end_x_mm: Any,
-    housing_fit_clearance_mm: Any,
+    clamp_width_mm: Real,
+    baffle_inner_y_mm: Real,
+    camera_pose_front_x_mm: Real,
+    guide_proximal_end_x_mm: Real,
+    housing_fit_clearance_mm: Real,
 ) -> Finding:
     """Gap between the clamp and the LED channel, at its side or in front of it."""
     beside = baffle_inner_y_mm - clamp_width_mm / 2
@@ -219,13 +218,13 @@ def clamp_beside(
     advice="use a thicker guide, bezel (thicker gel) or back wall, or a thinner tongue",
 )
 def screw_shortest(
-    bezel_thickness_mm: Any,
-    light_guide_thickness_mm: Any,
-    housing_back_wall_mm: Any,
-    tongue_z_mm: Any,
-    mount_tongue_thickness_mm: Any,
-    housing_fit_clearance_mm: Any,
-    cover_top_z_mm: Any,
+    bezel_thickness_mm: Real,
+    light_guide_thickness_mm: Real,
+    housing_back_wall_mm: Real,
+    tongue_z_mm: Real,
+    mount_tongue_thickness_mm: Real,
+    housing_fit_clearance_mm: Real,
+    cover_top_z_mm: Real,
 ) -> Finding:
     """Depth of plate and hole for the screws of bezel and cover."""
     slot = tongue_z_mm - mount_tongue_thickness_mm / 2 - housing_fit_clearance_mm
@@ -242,7 +241,7 @@ def screw_shortest(
     advice="give the view more clearance, lengthen the gel, or use a camera with a shorter lens",
 )
 def clamp_before_seat(
-    mirror_seat_x_mm: Any, clamp_front_x_mm: Any, housing_fit_clearance_mm: Any
+    mirror_seat_x_mm: Real, clamp_front_x_mm: Real, housing_fit_clearance_mm: Real
 ) -> Finding:
     """Gap between the lips of the clamp and the stop of the mirror's seat."""
     return Finding(mirror_seat_x_mm - clamp_front_x_mm, housing_fit_clearance_mm, least=True)

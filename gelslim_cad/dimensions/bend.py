@@ -9,82 +9,61 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.dimensions.registry import dimension
+from gelslim_cad.dimensions.registry import Real, dimension
+from gelslim_cad.geometry.names import Name
 
 LEAST, MOST, STEP = 0.5, 6.0, 0.25
 GOOD_ENOUGH = 0.99
 RAYS = 1 << 14
+GIVEN: Name = "design.light_guide.bend_radius_ratio"
+LIGHT_NAMES: tuple[Name, ...] = (
+    "design.gel.length_mm",
+    "design.gel.width_mm",
+    "design.gel.thickness_mm",
+    "design.gel.corner_radius_mm",
+    "design.gel.crown_height_mm",
+    "guide.flat_width_mm",
+    "stack.gel_bottom_z_mm",
+    "design.light_guide.thickness_mm",
+    "design.light_guide.leg_length_mm",
+    "design.light_guide.end_support_mm",
+    "led.count",
+    "led.pitch_mm",
+    "design.leds.package_mm",
+    "design.leds.emission",
+    "design.leds.dome_half_angle_deg",
+    "design.leds.emission_angle_deg",
+    "design.leds.emission_intensity",
+    "design.leds.red_wavelength_nm",
+    "design.leds.green_wavelength_nm",
+    "design.housing.fit_clearance_mm",
+    "design.housing.side_wall_mm",
+    "design.envelope.max_width_mm",
+    "material.gel.refractive_index",
+    "material.gel.coat_reflectance",
+    "material.acrylic.refractive_index",
+    "material.acrylic.absorption_per_m",
+)
+"""What the light and the widest bend depend on."""
 
 
 @dimension(
     "guide.bend_ratio",
     formula="given; auto: least R/t within 1 % of the most light that max_width_mm has room for",
     source="docs/physics.md#light",
+    inputs=(GIVEN, *LIGHT_NAMES),
 )
-def guide_bend_ratio(
-    light_guide_bend_radius_ratio: Any,
-    gel_length_mm: Any,
-    gel_width_mm: Any,
-    gel_thickness_mm: Any,
-    gel_corner_radius_mm: Any,
-    gel_crown_height_mm: Any,
-    guide_flat_width_mm: Any,
-    stack_gel_bottom_z_mm: Any,
-    light_guide_thickness_mm: Any,
-    light_guide_leg_length_mm: Any,
-    light_guide_end_support_mm: Any,
-    led_count: Any,
-    led_pitch_mm: Any,
-    leds_package_mm: Any,
-    leds_emission: str,
-    leds_dome_half_angle_deg: Any,
-    leds_emission_angle_deg: tuple[float, ...],
-    leds_emission_intensity: tuple[float, ...],
-    leds_red_wavelength_nm: Any,
-    leds_green_wavelength_nm: Any,
-    housing_fit_clearance_mm: Any,
-    housing_side_wall_mm: Any,
-    envelope_max_width_mm: Any,
-    material_gel_refractive_index: Any,
-    material_gel_coat_reflectance: Any,
-    material_acrylic_refractive_index: Any,
-    material_acrylic_absorption_per_m: Any,
-) -> Any:
+def guide_bend_ratio(values: Mapping[str, Any]) -> Real:
     """Inner bend radius over guide thickness, R/t."""
-    if not chosen_here(light_guide_bend_radius_ratio):
-        return light_guide_bend_radius_ratio
+    if not chosen_here(values[GIVEN]):
+        return values[GIVEN]
     # The guide's own extent follows from the fold, which needs the bends: take the gel's.
-    end = gel_length_mm / 2 + 0.2 + light_guide_end_support_mm
-    inputs = {
-        "design.gel.length_mm": gel_length_mm,
-        "design.gel.width_mm": gel_width_mm,
-        "design.gel.thickness_mm": gel_thickness_mm,
-        "design.gel.corner_radius_mm": gel_corner_radius_mm,
-        "design.gel.crown_height_mm": gel_crown_height_mm,
-        "guide.flat_width_mm": guide_flat_width_mm,
-        "guide.proximal_end_x_mm": -end,
-        "guide.distal_end_x_mm": end,
-        "stack.gel_bottom_z_mm": stack_gel_bottom_z_mm,
-        "design.light_guide.thickness_mm": light_guide_thickness_mm,
-        "design.light_guide.leg_length_mm": light_guide_leg_length_mm,
-        "led.count": led_count,
-        "led.pitch_mm": led_pitch_mm,
-        "design.leds.package_mm": leds_package_mm,
-        "design.leds.emission": leds_emission,
-        "design.leds.dome_half_angle_deg": leds_dome_half_angle_deg,
-        "design.leds.emission_angle_deg": leds_emission_angle_deg,
-        "design.leds.emission_intensity": leds_emission_intensity,
-        "design.leds.red_wavelength_nm": leds_red_wavelength_nm,
-        "design.leds.green_wavelength_nm": leds_green_wavelength_nm,
-        "design.housing.fit_clearance_mm": housing_fit_clearance_mm,
-        "material.gel.refractive_index": material_gel_refractive_index,
-        "material.gel.coat_reflectance": material_gel_coat_reflectance,
-        "material.acrylic.refractive_index": material_acrylic_refractive_index,
-        "material.acrylic.absorption_per_m": material_acrylic_absorption_per_m,
-        "design.housing.side_wall_mm": housing_side_wall_mm,
-        "design.envelope.max_width_mm": envelope_max_width_mm,
-    }
-    rows = [brightest_ratio(row) for row in _rows(inputs)]
+    end = values["design.gel.length_mm"] / 2 + 0.2 + values["design.light_guide.end_support_mm"]
+    inputs = {name: values[name] for name in LIGHT_NAMES}
+    rows = [
+        brightest_ratio(row)
+        for row in _rows(inputs | {"guide.proximal_end_x_mm": -end, "guide.distal_end_x_mm": end})
+    ]
     return rows[0] if len(rows) == 1 else np.array(rows)
 
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from gelslim_cad.dimensions import bend, guide, housing, pad, placement, view  # noqa: F401  (registers)
 from gelslim_cad.dimensions.fold import Fold
-from gelslim_cad.dimensions.registry import REGISTRY, Dimension
+from gelslim_cad.dimensions.registry import REGISTRY, Dimension, identifier
 from gelslim_cad.dimensions.solver import threads
 from gelslim_cad.geometry.lookup import NamedValues
 from gelslim_cad.geometry.names import DimensionName, FloatName, IntName
@@ -20,14 +20,8 @@ from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import leaves
 from gelslim_core.html_table import table_html
 
-SHORT_BLOCK = "design."
 KEPT = 1e-6
 """A fold that misses its limits by no more than this part of their scales keeps them."""
-
-
-def identifier(path: str) -> str:
-    """Function-parameter name of a spec path: `design.gel.length_mm` is `gel_length_mm`."""
-    return path.removeprefix(SHORT_BLOCK).replace(".", "_")
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,18 @@ other blocks keep their name, `camera.f_number` is `camera_f_number`) or of othe
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = float | NDArray[np.float64]
+"""The value of one design, or an array (n,) of the values of n designs."""
+Compute = TypeVar("Compute", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
@@ -28,7 +36,7 @@ class Dimension:
     @property
     def identifier(self) -> str:
         """The name as a function parameter."""
-        return self.name.replace(".", "_")
+        return identifier(self.name)
 
     @property
     def title(self) -> str:
@@ -40,14 +48,38 @@ REGISTRY: dict[str, Dimension] = {}
 """All dimensions by identifier, in the order of definition."""
 
 
-def dimension(
-    name: str, *, formula: str, source: str = "", internal: bool = False
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Register a function as the dimension `name`; its unit is the name's suffix."""
+SHORT_BLOCK = "design."
 
-    def register(function: Callable[..., Any]) -> Callable[..., Any]:
-        inputs = tuple(inspect.signature(function).parameters)
-        entry = Dimension(name, unit_of(name), formula, source, inputs, function, internal)
+
+def identifier(path: str) -> str:
+    """Function-parameter name of a spec path: `design.gel.length_mm` is `gel_length_mm`."""
+    return path.removeprefix(SHORT_BLOCK).replace(".", "_")
+
+
+def dimension(
+    name: str,
+    *,
+    formula: str,
+    source: str = "",
+    internal: bool = False,
+    inputs: tuple[str, ...] = (),
+) -> Callable[[Compute], Compute]:
+    """Register a function as the dimension `name`; its unit is the name's suffix.
+
+    A function of many inputs names them by `inputs` and takes one mapping from these names.
+    """
+
+    def register(function: Compute) -> Compute:
+        compute: Callable[..., Any] = function
+        parameters = tuple(inspect.signature(function).parameters)
+        if inputs:
+            parameters = tuple(map(identifier, inputs))
+
+            @functools.wraps(function)
+            def compute(*values: Any) -> Any:
+                return function(dict(zip(inputs, values, strict=True)))
+
+        entry = Dimension(name, unit_of(name), formula, source, parameters, compute, internal)
         if entry.identifier in REGISTRY:
             raise ValueError(f"dimension {name} is defined twice")
         if function.__name__ != entry.identifier:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gelslim_cad.markers.layout import CROSS_ARM_MM, lay_out, notes
-from gelslim_cad.markers.outline import Outline, as_outline
+from gelslim_cad.markers.outline import Outline
 from ifem_export.markers.grid import MarkerGrid
 
 _TEXT_MM = 2.0
@@ -20,16 +20,14 @@ _COLOURS = {"MARKERS": 7, "HOLES": 7, "OUTLINE": 5, "SHEET": 1, "ALIGNMENT": 3, 
 _OTHER_COLOUR = 8
 
 
-def render_dxf(
-    grid: MarkerGrid, gel_outline: Outline | ArrayLike, *, mirrored: bool = False
-) -> bytes:
+def render_dxf(grid: MarkerGrid, gel_outline: Outline) -> bytes:
     """Return a DXF with the dots as circles on MARKERS and the gel's closed outline on OUTLINE.
 
     REGISTRATION carries crosses outside the gel, NOTES an arrow to the tip and the view in
-    words. Coordinates are those of the sensor frame (outside view), y negated when `mirrored`.
+    words. Coordinates are those of the sensor frame (outside view).
     Raises ValueError when a dot crosses the outline.
     """
-    layout = lay_out(grid, as_outline(gel_outline), mirrored=mirrored)
+    layout = lay_out(grid, gel_outline)
     drawing = Drawing()
     for layer in ("MARKERS", "OUTLINE", "REGISTRATION", "NOTES"):
         drawing.add_layer(layer)

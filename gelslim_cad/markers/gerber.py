@@ -7,10 +7,10 @@ decimals, one flash per dot with a round aperture per diameter.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gelslim_cad.markers.layout import check_inside, decimal
-from gelslim_cad.markers.outline import Outline, arc_centre, as_outline
+from gelslim_cad.markers.outline import Outline, arc_centre
 from gelslim_cad.markers.stencil import StencilSheet
 from gelslim_core import __version__
 from ifem_export.markers.grid import MarkerGrid
@@ -19,18 +19,17 @@ _PROFILE_MM = 0.05
 _GREATEST_MM = 9999.0
 
 
-def render_gerber(grid: MarkerGrid, gel_outline: Outline | ArrayLike) -> bytes:
+def render_gerber(grid: MarkerGrid, gel_outline: Outline) -> bytes:
     """Return the paste layer: one flash per dot, in the sensor frame (outside view).
 
     Raises ValueError when a dot crosses the outline.
     """
-    check_inside(grid, as_outline(gel_outline))
+    check_inside(grid, gel_outline)
     return _flashes("Paste,Top", grid.positions_mm, grid.diameter_mm)
 
 
-def render_gerber_profile(gel_outline: Outline | ArrayLike) -> bytes:
+def render_gerber_profile(outline: Outline) -> bytes:
     """Return the profile layer: the gel's outline as one closed path, arcs as arcs."""
-    outline = as_outline(gel_outline)
     body = ["%TA.AperFunction,Profile*%", f"%ADD10C,{decimal(_PROFILE_MM, 6)}*%", "%TD*%"]
     body += ["D10*", f"{_xy(outline.points_mm[0])}D02*"]
     ends = np.roll(outline.points_mm, -1, axis=0)

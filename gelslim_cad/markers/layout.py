@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.markers.outline import Outline, as_outline
+from gelslim_cad.markers.outline import Outline
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 CROSS_ARM_MM = 2.0
@@ -38,13 +38,12 @@ class SheetLayout:
         return "inside view (mirrored)" if self.mirrored else "outside view"
 
 
-def lay_out(grid: MarkerGrid, gel_outline: Outline, *, mirrored: bool = False) -> SheetLayout:
+def lay_out(grid: MarkerGrid, outline: Outline, *, mirrored: bool = False) -> SheetLayout:
     """Return the layout as seen from outside the gel, or mirrored as seen from inside.
 
     From outside the viewer looks against z: x points right and y up. From inside y points down.
     Raises ValueError when a dot reaches beyond the outline.
     """
-    outline = as_outline(gel_outline)
     check_inside(grid, outline)
     sign = np.array([1.0, -1.0 if mirrored else 1.0])
     drawn = outline.mirrored() if mirrored else outline

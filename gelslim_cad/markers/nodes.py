@@ -7,7 +7,7 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gelslim_cad.markers.layout import decimal
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
@@ -34,36 +34,22 @@ class NearestNodes:
     node_id: NDArray[np.int64]
     distance_mm: NDArray[np.float64]
 
-    def __post_init__(self) -> None:
-        if self.node_id.ndim != 1 or self.node_id.shape != self.distance_mm.shape:
-            raise ValueError(
-                f"nearest nodes: ids have shape {self.node_id.shape} and distances "
-                f"{self.distance_mm.shape}; both must be (m,)"
-            )
-
 
 def nearest_nodes(
-    positions_mm: ArrayLike, nodes_mm: ArrayLike, node_ids: ArrayLike | None = None
+    positions_mm: NDArray[np.float64], nodes_mm: NDArray[np.float64], node_ids: NDArray[np.integer]
 ) -> NearestNodes:
     """Return the nearest of the surface nodes for each marker.
 
-    `positions_mm` (m, 2), `nodes_mm` (n, 2) or (n, 3) in the sensor frame (z is not used),
-    `node_ids` (n,) names the nodes, 0 to n-1 if left out. Of nodes equally far the smallest id
-    wins. Raises ValueError for no nodes or lengths that disagree.
+    `positions_mm` (m, 2), `nodes_mm` (n, 3) in the sensor frame (z is not used), `node_ids` (n,)
+    names the nodes. Of nodes equally far the smallest id wins.
     """
     from scipy.spatial import cKDTree
 
-    markers = np.asarray(positions_mm, dtype=np.float64)
-    nodes = np.asarray(nodes_mm, dtype=np.float64)
-    if nodes.ndim != 2 or len(nodes) == 0 or nodes.shape[1] not in (2, 3):
-        raise ValueError(f"nearest nodes: nodes have shape {nodes.shape}; expected (n, 2 or 3)")
-    ids = np.arange(len(nodes)) if node_ids is None else np.asarray(node_ids, dtype=np.int64)
-    if ids.shape != (len(nodes),):
-        raise ValueError(f"nearest nodes: {len(nodes)} nodes but ids of shape {ids.shape}")
-    count = min(_CANDIDATES, len(nodes))
-    distance, index = cKDTree(nodes[:, :2]).query(markers, k=list(range(1, count + 1)))
+    count = min(_CANDIDATES, len(nodes_mm))
+    tree = cKDTree(nodes_mm[:, :2])
+    distance, index = tree.query(positions_mm, k=list(range(1, count + 1)))
     tied = distance <= distance[:, :1] + _SAME_MM
-    chosen = np.where(tied, ids[index], np.iinfo(np.int64).max).min(axis=1)
+    chosen = np.where(tied, node_ids[index], np.iinfo(np.int64).max).min(axis=1)
     return NearestNodes(node_id=chosen, distance_mm=distance[:, 0])
 
 
@@ -71,10 +57,8 @@ def render_csv(grid: MarkerGrid, nodes: NearestNodes) -> bytes:
     """Return one line per marker, in the order of the ids, under a header with units.
 
     Coordinates are in the sensor frame (x to the tip, y across, origin at the gel's centre);
-    `kind` is `regular` or `anchor`. Raises ValueError when there is not one node per marker.
+    `kind` is `regular` or `anchor`.
     """
-    if len(nodes.node_id) != len(grid):
-        raise ValueError(f"{len(grid)} markers but {len(nodes.node_id)} nearest nodes")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)

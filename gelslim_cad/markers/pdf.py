@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import io
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gelslim_cad.markers.layout import CROSS_ARM_MM, SheetLayout, decimal, lay_out, notes
-from gelslim_cad.markers.outline import Outline, as_outline
+from gelslim_cad.markers.outline import Outline
 from ifem_export.markers.grid import MarkerGrid
 
-Paper = Literal["a4", "letter"]
 SCALE_BAR_MM = 50.0
 """Length of the scale bars: long enough to see a printer's 1 % with a ruler."""
 _MM = 72.0 / 25.4
-_PAPERS_MM: dict[str, list[tuple[float, float]]] = {
-    "a4": [(210.0, 297.0), (297.0, 420.0), (420.0, 594.0)],
-    "letter": [(215.9, 279.4), (279.4, 431.8)],
-}
+_PAPERS_MM = ((210.0, 297.0), (297.0, 420.0), (420.0, 594.0))
+"""A4, A3 and A2."""
 _MARGIN_MM = 15.0
 _HEAD_MM = 38.0
 _FOOT_MM = 76.0
@@ -27,22 +24,16 @@ _SIDE_MM = 12.0
 _LINE_MM = 0.1
 
 
-def render_pdf(
-    grid: MarkerGrid,
-    gel_outline: Outline | ArrayLike,
-    *,
-    mirrored: bool = False,
-    paper: Paper = "a4",
-) -> bytes:
+def render_pdf(grid: MarkerGrid, gel_outline: Outline, *, mirrored: bool = False) -> bytes:
     """Return a one-page PDF to print at 100 %, with a 50 mm scale bar in each direction.
 
-    The page is `paper` if the drawing fits, else the next larger size of that family, else a
-    page of its own. Raises ValueError when a dot crosses the outline or the paper is unknown.
+    The page is A4 if the drawing fits, else the next larger size, else a page of its own.
+    Raises ValueError when a dot crosses the outline.
     """
     from reportlab.pdfgen.canvas import Canvas
 
-    layout = lay_out(grid, as_outline(gel_outline), mirrored=mirrored)
-    wide, tall = _page_mm(layout, paper)
+    layout = lay_out(grid, gel_outline, mirrored=mirrored)
+    wide, tall = _page_mm(layout)
     file = io.BytesIO()
     canvas = Canvas(file, pagesize=(wide * _MM, tall * _MM), invariant=1, pageCompression=1)
     canvas.setTitle(f"Gel marker print, {layout.view}")
@@ -52,7 +43,7 @@ def render_pdf(
     # Viewers that honour it then offer no fit-to-page.
     canvas.setViewerPreference("PrintScaling", "None")
     canvas.scale(_MM, _MM)
-    _draw_head(canvas, [*notes(grid, layout)], tall)
+    _draw_head(canvas, notes(grid, layout), tall)
     x0, y0, x1, y1 = layout.box_mm
     canvas.saveState()
     canvas.translate(
@@ -66,12 +57,10 @@ def render_pdf(
     return file.getvalue()
 
 
-def _page_mm(layout: SheetLayout, paper: str) -> tuple[float, float]:
-    if paper not in _PAPERS_MM:
-        raise ValueError(f"paper {paper!r} is unknown: must be one of {', '.join(_PAPERS_MM)}")
+def _page_mm(layout: SheetLayout) -> tuple[float, float]:
     x0, y0, x1, y1 = layout.box_mm
     need = (x1 - x0 + 2 * _SIDE_MM, y1 - y0 + _HEAD_MM + _FOOT_MM)
-    for short, long in _PAPERS_MM[paper]:
+    for short, long in _PAPERS_MM:
         for wide, tall in ((short, long), (long, short)):
             if need[0] <= wide and need[1] <= tall:
                 return wide, tall

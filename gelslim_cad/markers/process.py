@@ -10,13 +10,9 @@ STENCIL_AREA_RATIO = 0.66
 """Least opening area over wall area for paste to leave a stencil (IPC-7525)."""
 
 
-def least_stencil_dot_mm(foil_mm: float = STENCIL_FOIL_MM) -> float:
-    """Return the smallest round opening that releases its ink or paste.
-
-    A hole of diameter d in a foil of thickness t has the area ratio (pi d²/4)/(pi d t) = d/(4t),
-    which IPC-7525 wants to be at least 0.66.
-    """
-    return 4.0 * STENCIL_AREA_RATIO * foil_mm
+STENCIL_DOT_MM = 4.0 * STENCIL_AREA_RATIO * STENCIL_FOIL_MM
+"""The smallest round opening that releases its ink or paste: a hole of diameter d in a foil of
+thickness t has the area ratio (pi d²/4)/(pi d t) = d/(4t)."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +69,12 @@ _ALL = (
     MarkingProcess(
         name="stencil",
         title="Stencil from Gerber",
-        min_diameter_mm=round(least_stencil_dot_mm(), 3),
+        min_diameter_mm=round(STENCIL_DOT_MM, 3),
         min_gap_mm=0.2,
         files=("markers-F_Paste.gbr", "markers-Edge_Cuts.gbr", "markers-Alignment.gbr"),
         reason=(
             f"A round hole lets go of its ink when d/(4t) is at least {STENCIL_AREA_RATIO} "
-            f"(IPC-7525), {least_stencil_dot_mm():.3f} mm for a foil of {STENCIL_FOIL_MM} mm; "
+            f"(IPC-7525), {STENCIL_DOT_MM:.3f} mm for a foil of {STENCIL_FOIL_MM} mm; "
             "webs under two foil thicknesses bend when the stencil is lifted or wiped."
         ),
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gelslim_cad.markers.layout import (
     CROSS_ARM_MM,
@@ -13,7 +13,7 @@ from gelslim_cad.markers.layout import (
     lay_out,
     notes,
 )
-from gelslim_cad.markers.outline import Outline, as_outline
+from gelslim_cad.markers.outline import Outline
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 _LINE_MM = 0.1
@@ -23,9 +23,7 @@ _STRIP_MM = 3.0
 _MARGIN_MM = 3.0
 
 
-def render_svg(
-    grid: MarkerGrid, gel_outline: Outline | ArrayLike, *, mirrored: bool = False
-) -> bytes:
+def render_svg(grid: MarkerGrid, gel_outline: Outline, *, mirrored: bool = False) -> bytes:
     """Return an SVG whose page and user unit are millimetres.
 
     Groups `markers`, `outline`, `registration`, `scale-bar` and `notes` can be switched off or
@@ -33,7 +31,7 @@ def render_svg(
     that of the sensor frame and y points down the page: cx = x and cy = -y in the outside view,
     cy = y when `mirrored`. Raises ValueError when a dot crosses the outline.
     """
-    layout = lay_out(grid, as_outline(gel_outline), mirrored=mirrored)
+    layout = lay_out(grid, gel_outline, mirrored=mirrored)
     lines = notes(grid, layout)
     left, low, right, high = layout.box_mm
     words_mm = max(len(line) for line in lines) * _TEXT_MM * _TEXT_ADVANCE

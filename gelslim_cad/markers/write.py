@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from numpy.typing import ArrayLike
-
 from gelslim_cad.markers.nodes import NearestNodes, render_csv
-from gelslim_cad.markers.outline import Outline, as_outline
+from gelslim_cad.markers.outline import Outline
 from gelslim_core.files.replaced_file import replace_file
 from ifem_export.markers.grid import MarkerGrid
 
@@ -16,16 +14,11 @@ FIRST_FILE = "markers-Alignment.gbr"
 
 
 def render_marker_files(
-    grid: MarkerGrid,
-    nodes: NearestNodes,
-    gel_outline: Outline | ArrayLike,
-    *,
-    kerf_mm: float = 0.0,
+    grid: MarkerGrid, nodes: NearestNodes, outline: Outline
 ) -> dict[str, bytes]:
     """Return the content of every marker file by its name.
 
-    `kerf_mm` is that of the cutter for `stencil.dxf`. Raises ValueError when a dot crosses the
-    outline or there is not one node per marker.
+    Raises ValueError when a dot crosses the outline.
     """
     from gelslim_cad.markers.dxf import render_dxf
     from gelslim_cad.markers.gerber import (
@@ -37,7 +30,6 @@ def render_marker_files(
     from gelslim_cad.markers.stencil import lay_out_stencil, render_stencil
     from gelslim_cad.markers.svg import render_svg
 
-    outline = as_outline(gel_outline)
     sheet = lay_out_stencil(grid, outline)
     return {
         "markers.csv": render_csv(grid, nodes),
@@ -49,28 +41,20 @@ def render_marker_files(
         "markers-F_Paste.gbr": render_gerber(grid, outline),
         "markers-Edge_Cuts.gbr": render_gerber_profile(outline),
         "markers-Alignment.gbr": render_gerber_alignment(sheet),
-        "stencil.dxf": render_stencil(sheet, kerf_mm=kerf_mm),
+        "stencil.dxf": render_stencil(sheet),
     }
 
 
 def write_marker_files(
-    directory: Path,
-    grid: MarkerGrid,
-    nodes: NearestNodes,
-    gel_outline: Outline | ArrayLike,
-    *,
-    kerf_mm: float = 0.0,
+    directory: Path, grid: MarkerGrid, nodes: NearestNodes, outline: Outline
 ) -> list[Path]:
     """Write every marker file into `directory` and return the paths, sorted by name.
 
     All files are rendered before the first one is written, and each is replaced as a whole.
     Raises ValueError as `render_marker_files`, OSError when the folder cannot be written.
     """
-    files = render_marker_files(grid, nodes, gel_outline, kerf_mm=kerf_mm)
-    directory = Path(directory)
+    files = render_marker_files(grid, nodes, outline)
     directory.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name in sorted(files):
-        replace_file(directory / name, files[name])
-        paths.append(directory / name)
-    return paths
+    for name, content in files.items():
+        replace_file(directory / name, content)
+    return [directory / name for name in sorted(files)]

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from gelslim1_forms import gelslim1_closed_form, gelslim1_length_mm
 from rule_samples import smallest
-
-from gelslim_cad.checks import gelslim1_closed_form, gelslim1_length_mm
 
 
 def crossing(p: np.ndarray, u: np.ndarray, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:

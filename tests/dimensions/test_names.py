@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import pytest
 
 from gelslim_cad.checks import Finding
 from gelslim_cad.checks.rule import RULES, rule
 from gelslim_cad.dimensions.dimensions import PATHS
-from gelslim_cad.dimensions.registry import REGISTRY, UNITS, dimension
+from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.registry import REGISTRY, UNITS, Real, dimension
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
@@ -20,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 import dimension_names  # noqa: E402
 
 SNIPPET = """\
-from gelslim_cad.checks import check, check_batch
+from gelslim_cad.checks import check, margins_batch
 from gelslim_cad.dimensions import derive, derive_batch
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.spec.reader import read_spec
@@ -36,7 +37,7 @@ d["gel.length_mm"]  # refused
 b = d["design.gel.length_mm"]  # refused
 batch["finger.thickness_um"]  # refused
 check(d).of("fold.feasable")  # refused
-check_batch(batch)["gel.crown_um"]  # refused
+margins_batch(batch)["gel.crown_um"]  # refused
 
 
 def look_up(values: Lookup) -> float:
@@ -109,3 +110,37 @@ def test_cyclic_or_open_dimensions_are_refused(monkeypatch: pytest.MonkeyPatch) 
     registry.dimension("loose.second_mm", formula="")(loose_second_mm)
     with pytest.raises(ValueError, match="loose_first_mm"):
         dimensions._ordered()
+
+
+def expected_type(parameter: str) -> object:
+    """The type of a parameter's values: of one design, or arrays of n designs."""
+    if parameter == "fold_layout":
+        return Fold
+    if parameter in REGISTRY:
+        return Real
+    kind = dimension_names._kind(PATHS[parameter])
+    return {
+        "FloatName": Real,
+        "IntName": Real,
+        "BoolName": bool,
+        "TextName": str,
+        "FloatsName": tuple[float, ...],
+        "OptionalFloatName": Real | None,
+        "OptionalIntName": Real | None,
+    }[kind]
+
+
+def test_parameters_of_dimensions_and_rules_have_the_types_of_their_values() -> None:
+    functions = [entry.compute for entry in REGISTRY.values()]
+    functions += [entry.judge for entry in RULES.values()]
+    seen = 0
+    for function in functions:
+        hints = get_type_hints(function)
+        returned = hints.pop("return")
+        assert returned in (Real, Fold, Finding), function
+        if "values" in hints:  # one mapping of many inputs
+            continue
+        for parameter, annotation in hints.items():
+            assert annotation == expected_type(parameter), (function, parameter)
+            seen += 1
+    assert seen > 400

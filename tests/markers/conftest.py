@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from gelslim_cad.markers import Outline, nearest_nodes
+from gelslim_cad.markers.nodes import nearest_nodes
+from gelslim_cad.markers.outline import Outline
 from ifem_export.markers.grid import build_marker_grid
 
 

@@ -118,8 +118,3 @@ def test_a_dot_that_crosses_the_outline_is_refused(outline):
         render_svg(grid, outline)
     with pytest.raises(ValueError, match="729 of 729"):
         render_svg(grid, Outline.rounded_rectangle(0.1, 0.1))
-
-
-def test_bare_points_will_do_for_an_outline(grid):
-    corners = [(-12, -13), (12, -13), (12, 13), (-12, 13)]
-    assert len(circles(ET.fromstring(render_svg(grid, corners)))) == len(grid)

@@ -1,22 +1,23 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-from gelslim_cad.markers import MARKING_PROCESSES, write_marker_files
-from gelslim_cad.markers.write import render_marker_files
+from gelslim_cad.markers.process import MARKING_PROCESSES
+from gelslim_cad.markers.write import render_marker_files, write_marker_files
 from ifem_export.markers.grid import build_marker_grid
 
 SCRIPT = """
 import hashlib
-from gelslim_cad.markers import Outline, nearest_nodes
+import numpy as np
+from gelslim_cad.markers.nodes import nearest_nodes
+from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.write import render_marker_files
 from ifem_export.markers.grid import build_marker_grid
 outline = Outline.rounded_rectangle(20, 21, 2)
 grid = build_marker_grid(15, 17, 1.1, 0.4, "omitted")
-nodes = nearest_nodes(grid.positions_mm, grid.positions_mm)
+nodes = nearest_nodes(grid.positions_mm, grid.positions_mm, np.arange(len(grid)))
 for name, content in sorted(render_marker_files(grid, nodes, outline).items()):
     print(name, hashlib.sha256(content).hexdigest())
 """
@@ -55,7 +56,7 @@ def test_a_refused_design_leaves_the_folder_untouched(tmp_path, nodes, outline):
 
 def test_importing_the_package_loads_no_heavy_library():
     code = (
-        "import sys, gelslim_cad.markers, ifem_export.markers.grid; "
+        "import sys, gelslim_cad.markers.write, ifem_export.markers.grid; "
         "print([m for m in ('ezdxf', 'reportlab', 'matplotlib', 'cadquery') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -82,7 +83,3 @@ def test_stencil_limit_is_the_area_ratio_of_a_round_hole():
     # d/(4t) = 0.66 for a foil of 0.1 mm.
     diameter = MARKING_PROCESSES["stencil"].min_diameter_mm
     assert diameter**2 / 4 / (diameter * 0.1) == pytest.approx(0.66, abs=1e-3)
-
-
-def test_folder_may_be_given_as_text(tmp_path, grid, nodes, outline):
-    assert all(isinstance(p, Path) for p in write_marker_files(str(tmp_path), grid, nodes, outline))
