@@ -1,4 +1,4 @@
-"""The gallery: docs/gallery.md and its pictures, each made by the command that stands under it.
+"""The gallery: docs/gallery.md and its pictures, each made by the commands under it.
 
 Usage: python tools/gallery.py [--page-only] [NAME ...]    (names of pictures; all if left out)
 """
@@ -23,21 +23,21 @@ SHEAR = f"{FOLDER}/shear_sphere"
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture: the commands that make it, the file they leave, what it shows."""
+    """One picture: the commands that make it, the file that they write, and what it shows."""
 
     name: str
     title: str
     caption: str
     commands: tuple[str, ...]
     made: str
-    """File under the repository; of several that match, the last."""
+    """Pattern of the file in the repository; the last match is taken."""
     width_px: int = 900
     colours: int = 160
-    """0: all of them."""
+    """Number of colours in the PNG; 0 keeps all."""
 
     @property
     def file(self) -> Path:
-        """Where it is kept."""
+        """Path of the picture in the documentation."""
         return IMAGES / f"gallery_{self.name}.png"
 
 
@@ -51,7 +51,7 @@ PICTURES = (
     Picture(
         "family",
         "A family of fingers",
-        "Three specs that differ in the gel: 20 × 20, 28 × 28 and 50 × 25 mm, to scale.",
+        "Three fingers, drawn to scale, with gels of 20 × 20, 28 × 28 and 50 × 25 mm.",
         (
             "family designs/mini20.yaml designs/gelslim2.yaml designs/long50.yaml"
             f" -o {FOLDER}/family",
@@ -61,42 +61,46 @@ PICTURES = (
     Picture(
         "exploded",
         "All parts",
-        "The 20 mm finger taken apart; `report.html` does this with a slider.",
+        "All parts of the 20 mm finger, moved apart. A slider in `report.html` does the same.",
         (f"build designs/mini20.yaml -o {FOLDER}/mini20",),
         f"{FOLDER}/mini20/pictures/exploded.png",
     ),
     Picture(
         "section",
         "Section along the finger",
-        "Camera, fold mirror, window and gel, cut in the middle.",
+        "The finger is cut in the middle, so that camera, fold mirror, window and gel are visible.",
         (f"build designs/mini20.yaml -o {FOLDER}/mini20",),
         f"{FOLDER}/mini20/pictures/section.png",
     ),
     Picture(
         "light_paths",
         "Light in the guide",
-        "Rays from the LEDs up the leg, round the bend and under the gel, with what leaks.",
+        "Rays of light run from the LEDs up the leg, through the bend and under the gel. Some"
+        " leak.",
         (f"light designs/gelslim2.yaml -o {FOLDER}/light",),
         f"{FOLDER}/light/light_paths.png",
     ),
     Picture(
         "irradiance",
         "Light on the gel",
-        "Red from one side, green from the other, traced.",
+        "Traced irradiance of the gel: red light comes from one side and green light from the"
+        " other.",
         (f"light designs/gelslim2.yaml -o {FOLDER}/light",),
         f"{FOLDER}/light/irradiance.png",
     ),
     Picture(
         "projection_error",
-        "What the paper's compensation misses",
-        "A marker pressed in seems to move sideways. Error of each formula over the gel.",
+        "Error of the paper's compensation",
+        "A marker that is pressed into the gel seems to move sideways. The maps show the"
+        " error of each formula that corrects this.",
         (f"build designs/mini20.yaml -o {FOLDER}/mini20",),
         f"{FOLDER}/mini20/pictures/projection_error.png",
     ),
     Picture(
         "feasibility",
-        "What is feasible, and what binds",
-        "Gel length against gel thickness, coloured by the rule or limit that stops the design.",
+        "Feasible designs",
+        "Each cell is a design with one length and one thickness of the gel. Its colour shows"
+        " the rule or limit that it breaks.",
         (
             "explore designs/mini20.yaml --vary gel.length_mm=10:30:0.5"
             f" --vary gel.thickness_mm=0.5:5:0.25 -o {FOLDER}/explore",
@@ -105,9 +109,9 @@ PICTURES = (
     ),
     Picture(
         "pareto",
-        "Thickness against everything else",
-        "Every dot a design: length of the gel, f-number and allowed blur varied, light traced and"
-        " force error computed; the best trades marked.",
+        "Thickness against other properties",
+        "Each dot is a design with its own gel length, f-number and allowed blur. Its light"
+        " was traced and its force error computed. The line is the Pareto front.",
         (
             "explore designs/mini20.yaml --vary gel.length_mm=16:24:2"
             " --vary camera.f_number=2,2.9,4 --vary optics.blur_per_diameter=0.25,0.333,0.5"
@@ -115,14 +119,23 @@ PICTURES = (
         ),
         f"{FOLDER}/trades/pareto.png",
     ),
-    _scene("press_ring", "A ring, as the camera sees it", "Simulated; forces known at every node."),
-    _scene("textured_plane", "A knurled plane", "Simulated, with the same camera and light."),
+    _scene(
+        "press_ring",
+        "A ring, as the camera sees it",
+        "A simulated frame; the force at every node is known.",
+    ),
+    _scene(
+        "textured_plane",
+        "A knurled plane",
+        "Another simulated frame, with the same camera and light.",
+    ),
     Picture(
         "forces",
         "Forces of a ball pressed and pushed aside",
-        "Estimated from simulated frames, given the ball's radius: motion yellow, shear red,"
-        " pressure shaded, the wrench at the side. True at this frame: Fx +0.54, Fy +0.27,"
-        " Fz −1.08 N (the simulation's `truth.csv`).",
+        "Forces that were estimated from simulated frames; the radius of the ball was given."
+        " Yellow arrows are motion, red arrows shear, shading is pressure, and the wrench"
+        " stands at the side. The true force in this frame is Fx +0.54, Fy +0.27, Fz −1.08 N"
+        " (`truth.csv` of the simulation).",
         (
             f"bundle designs/gelslim2.yaml -o {FOLDER}/bundle",
             f"simulate designs/scenes/shear_sphere.yaml -o {SHEAR}",
@@ -135,10 +148,11 @@ PICTURES = (
     ),
     Picture(
         "fields",
-        "Force fields, true and found",
-        "The deepest push of a validation: the true nodal forces; ours, found from the picture and"
-        " the ball's size alone, for a linear and a neo-Hookean gel; and the paper's choices, which"
-        " put forces where nothing touches.",
+        "True and estimated force fields",
+        "Nodal forces of the deepest contact of a validation. The first panel is the truth."
+        " The next two were estimated from the picture and the size of the ball, for a linear"
+        " and a neo-Hookean gel. The choices of the paper also give forces where nothing"
+        " touches the gel.",
         (f"validate designs/mini20.yaml -o {FOLDER}/validation",),
         f"{FOLDER}/validation/fields.png",
         width_px=1300,
@@ -147,8 +161,8 @@ PICTURES = (
     Picture(
         "resultants",
         "The paper's experiment, repeated",
-        "Resultants of 56 contacts against the truth; the dotted lines are 15 %, what the paper"
-        " reports for its sensor.",
+        "Estimated against true resultants of 56 contacts. The dotted lines are errors of 15 %, "
+        "which the paper reports for its sensor.",
         (f"validate designs/mini20.yaml -o {FOLDER}/validation",),
         f"{FOLDER}/validation/resultants.png",
     ),
@@ -158,8 +172,8 @@ _HEAD = """\
 
 <!-- Made by `make docs`; do not edit by hand. -->
 
-Every picture is what the command under it leaves behind, made smaller. `python tools/gallery.py`
-makes them all anew, in a few minutes.
+Each picture is an output of the commands under it, reduced in size. `python tools/gallery.py` makes
+all of them again in a few minutes.
 """
 _TAIL = """\
 ## What accuracy costs
@@ -168,8 +182,8 @@ _TAIL = """\
 
 ![Contact: field error against time by tolerance, steps and layers](images/twin_contact.png)
 
-Stiffness operators for one gel, and contact in the twin. There is a figure for every step that
-offers a choice in [accuracy against time](accuracy_vs_time.md).
+The figures show the stiffness operators of one gel, and contact in the twin. The page
+[accuracy against time](accuracy_vs_time.md) has a figure for every step that offers a choice.
 
     make bench
 """

@@ -12,7 +12,7 @@ import typer
 from gelslim.cli.answer import print_json, say
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import out_folder
-from gelslim.cli.output import spare_strangers
+from gelslim.cli.output import require_own_file
 
 if TYPE_CHECKING:
     from gelslim_force.outputs.overlay import Overlay
@@ -80,7 +80,7 @@ def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -
     from gelslim_force.outputs.sinks import RecorderSink
 
     if overwrite:
-        spare_strangers(target, b"gelslim", "recording of gelslim")
+        require_own_file(target, b"gelslim", "recording of gelslim")
         target.unlink(missing_ok=True)
     return RecorderSink(stack.enter_context(McapRecording(target, about=identity)))
 

@@ -24,37 +24,37 @@ def replace_file(target: Path, data: bytes) -> None:
     whole_file(target, data, parents=True)
 
 
-def spare_strangers(target: Path, mark: bytes, what: str) -> None:
+def require_own_file(target: Path, mark: bytes, what: str) -> None:
     """Raise CommandError if `target` is a file without `mark` near its beginning.
 
     A file of an earlier run may be replaced, a file of the user must not.
     """
-    if not target.is_file():
-        return
-    with open(target, "rb") as stream:
-        if mark in stream.read(MARK_BYTES):
-            return
-    raise CommandError(f"{target} exists and is not a {what}; give another name or remove the file")
+    if target.is_file() and not _has_mark(target, mark):
+        raise CommandError(
+            f"{target} exists and is not a {what}; give another name or remove the file"
+        )
 
 
-def spare_strangers_in(folder: Path, names: Iterable[str], first: str, mark: bytes) -> None:
+def require_own_files(folder: Path, names: Iterable[str], first: str, mark: bytes) -> None:
     """Raise CommandError if `folder` has files of these names that no earlier run wrote.
 
     A run writes the file `first` before all others, with `mark` near its beginning.
     """
     there = [name for name in names if (folder / name).exists()]
-    if not there:
-        return
+    if there and not _has_mark(folder / first, mark):
+        raise CommandError(
+            f"{folder}: the file {there[0]} was not written by gelslim and would be replaced; "
+            "choose another --out"
+        )
+
+
+def _has_mark(path: Path, mark: bytes) -> bool:
+    """Whether a file can be read and has `mark` near its beginning."""
     try:
-        with open(folder / first, "rb") as stream:
-            if mark in stream.read(MARK_BYTES):
-                return
+        with open(path, "rb") as stream:
+            return mark in stream.read(MARK_BYTES)
     except OSError:
-        pass
-    raise CommandError(
-        f"{folder}: the file {there[0]} was not written by gelslim and would be replaced; "
-        "choose another --out"
-    )
+        return False
 
 
 def written(folder: Path, files: Sized) -> str:

@@ -12,7 +12,7 @@ from gelslim.cli.answer import BAD_INPUT, console, print_json, progress_bar, say
 from gelslim.cli.budget import FieldError, FrameTime, budget_of
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, Force, SpecFile, out_folder
-from gelslim.cli.output import require_pad_rules, spare_strangers, written
+from gelslim.cli.output import require_own_file, require_pad_rules, written
 
 if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
@@ -184,7 +184,7 @@ def bundle_export(
             f"{file}: the ending {file.suffix!r} names no format; use {', '.join(EXPORTS)}",
             BAD_INPUT,
         )
-    spare_strangers(file, MARKS[file.suffix], "export of a bundle")
+    require_own_file(file, MARKS[file.suffix], "export of a bundle")
     export_matrix(load_bundle(path), file)
     print(f"Wrote {file} ({file.stat().st_size / 1e6:.2f} MB)")
     return 0

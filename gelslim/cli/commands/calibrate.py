@@ -9,7 +9,7 @@ import typer
 
 from gelslim.cli.answer import print_json, say
 from gelslim.cli.options import AsJson, SensorBundle
-from gelslim.cli.output import replace_file, spare_strangers
+from gelslim.cli.output import replace_file, require_own_file
 
 if TYPE_CHECKING:
     from gelslim_force.calibration.sensor_calibration import Calibration
@@ -52,7 +52,7 @@ def calibrate(
     from ifem_export.bundle.files import load_bundle
 
     if out is not None:
-        spare_strangers(out, b"gelslim-calibration/", "calibration")
+        require_own_file(out, b"gelslim-calibration/", "calibration")
     sensor = load_bundle(bundle)
     found = calibrated(sensor, read_reference(reference), allow_contact=allow_contact)
     record = calibration_record(found)

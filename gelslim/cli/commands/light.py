@@ -13,7 +13,7 @@ from gelslim.cli.answer import console, print_json, progress_bar, say, table
 from gelslim.cli.budget import budget_of, keep_times, note_choice
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, DrawPictures, SpecFile, out_folder
-from gelslim.cli.output import replace_file, spare_strangers_in
+from gelslim.cli.output import replace_file, require_own_files
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +80,7 @@ def light(
         raise CommandError("give --rays or a budget (--error, --time), not both")
     folder = out or Path("out") / f"{loaded.spec.name}-light"
     if pictures:
-        spare_strangers_in(folder, PICTURES, PICTURES[0], MARK.encode())
+        require_own_files(folder, PICTURES, PICTURES[0], MARK.encode())
     with progress_bar(quiet=as_json) as tell:
         if not budget.unlimited:
             rays = _budgeted(loaded.spec, d, budget, seed, spec, tell)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from gelslim.cli.answer import print_json
 from gelslim.cli.options import AsJson, Force, SpecFile, out_folder
-from gelslim.cli.output import require_pad_rules, spare_strangers_in, written
+from gelslim.cli.output import require_own_files, require_pad_rules, written
 
 
 def markers(
@@ -32,7 +32,7 @@ def markers(
     grid = marker_grid(d)
     nodes, outline = marker_print(d, grid)
     folder = out or Path("out") / f"{loaded.spec.name}-markers"
-    spare_strangers_in(folder, render_marker_files(grid, nodes, outline), FIRST_FILE, b"gelslim")
+    require_own_files(folder, render_marker_files(grid, nodes, outline), FIRST_FILE, b"gelslim")
     paths = write_marker_files(folder, grid, nodes, outline)
     process = MARKING_PROCESSES[loaded.spec.manufacturing.marking_process]
     if as_json:

@@ -22,7 +22,7 @@ from gelslim.cli.answer import (
 from gelslim.cli.commands.explore import Jobs, NoisePx, Rays, Scheduler, Vary
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, SpecFile, out_folder
-from gelslim.cli.output import replace_file, spare_strangers
+from gelslim.cli.output import replace_file, require_own_file
 from gelslim.cli.price_table import price_record, print_broken, print_prices
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def optimise(
     from gelslim_cad.spec.starter import spec_text
 
     if save is not None:
-        spare_strangers(save, b"gelslim-spec/", "spec")
+        require_own_file(save, b"gelslim-spec/", "spec")
     loaded = read_spec(spec)
     folder = out or Path("out") / f"{loaded.spec.name}-optimise"
     effort = _Effort(jobs, scheduler, rays, marker_noise_px, rounds)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gelslim.cli.output import replace_file, spare_strangers
+from gelslim.cli.output import replace_file, require_own_file
 
 
 def schema(
@@ -32,7 +32,7 @@ def schema(
         print(text, end="")
         return 0
 
-    spare_strangers(out, b"gelslim-", "schema of gelslim")
+    require_own_file(out, b"gelslim-", "schema of gelslim")
     replace_file(out, text.encode())
     use = "" if markdown else " In VS Code, name it in the setting yaml.schemas."
     print(f"Wrote {out}.{use}")

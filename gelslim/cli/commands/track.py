@@ -10,7 +10,7 @@ import typer
 from gelslim.cli.answer import print_json, progress_bar, say
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, out_folder
-from gelslim.cli.output import replace_file, spare_strangers_in
+from gelslim.cli.output import replace_file, require_own_files
 
 if TYPE_CHECKING:
     import numpy as np
@@ -77,7 +77,7 @@ def track(
         None if reference is None else _at_rest(read_reference(reference), settings, str(reference))
     )
     folder = out or Path("out") / f"{_name(frames)}-track"
-    spare_strangers_in(folder, FILES, FILES[0], b"places_px")
+    require_own_files(folder, FILES, FILES[0], b"places_px")
     with open_frames(frames, frames_per_s) as source, progress_bar(quiet=as_json) as tell:
         first = _Frames(source, most_frames, tell)
         if rest is None:

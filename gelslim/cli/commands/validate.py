@@ -12,7 +12,7 @@ import typer
 from gelslim.cli.answer import print_json, progress_bar
 from gelslim.cli.budget import FieldError, FrameTime, budget_of
 from gelslim.cli.options import AsJson, SpecFile, out_folder
-from gelslim.cli.output import replace_file, spare_strangers_in
+from gelslim.cli.output import replace_file, require_own_files
 
 if TYPE_CHECKING:
     from gelslim_twin.simulation.sensor import TwinSensor
@@ -56,7 +56,7 @@ def validate(
             RECORD,
             *(picture_names(TwinSensor(spec_bundle(spec, with_light=False))) if pictures else []),
         ]
-        spare_strangers_in(folder, names, RECORD, b"gelslim-validation/1")
+        require_own_files(folder, names, RECORD, b"gelslim-validation/1")
         found = validated(spec, folder / "sensor", budget, seed=seed, progress=tell)
     for remark in found.remarks:
         print(f"gelslim: {remark}", file=sys.stderr)
