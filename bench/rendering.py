@@ -268,7 +268,7 @@ def shading_rows(sensor: Sensor, repeats: int) -> list[dict[str, Any]]:
     from gelslim_twin.render.shading import Shading
 
     blank, now = np.zeros((480, 640), dtype=np.float32), pressed()
-    exact = sensor.renderer(Look(shading=Shading(pixel_step=1, rounds=12))).values(blank, now)
+    exact = sensor.renderer(Look(shading=Shading(pixel_step=1))).values(blank, now)
     rows: list[dict[str, Any]] = []
     for step in (1, 2, 4, 8, 16):
         r = sensor.renderer(Look(shading=Shading(pixel_step=step)))

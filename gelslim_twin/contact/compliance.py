@@ -12,6 +12,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,11 +68,13 @@ class SurfaceCompliance:
     def _operator(self) -> SurfaceOperator:
         return self.bundle.surface_operator("factor")
 
+    @property
+    def _system(self) -> Any:
+        return self._operator.system  # type: ignore[attr-defined]
+
     @cached_property
-    def _factor(self) -> SuperLU | RowFactor | None:
-        system = getattr(self._operator, "system", None)
-        if system is None or system.columns != self.nodes:
-            return None
+    def _factor(self) -> SuperLU | RowFactor:
+        system = self._system
         if type(system) is not PadSystem:
             return factored(system.stiffness)
         places = np.asarray(system.lattice_positions)
@@ -204,23 +207,15 @@ class SurfaceCompliance:
 
     def _solved(self, nodes: Nodes) -> Array:
         """Columns (n, 3, c, 3)."""
-        n, factor = len(nodes), self._factor
-        if factor is None:
-            return np.stack([[self._one(node, axis) for axis in range(3)] for node in nodes])
-        unknowns = self._operator.system.stiffness.shape[0]  # type: ignore[attr-defined]
+        n, unknowns = len(nodes), self._system.stiffness.shape[0]
         first = unknowns - 3 * self.nodes
         # The number of right-hand sides is constant, because it affects the last bits: results
         # must not depend on which columns were requested before.
         loads = np.zeros((unknowns, 3 * BATCH))
         own = (3 * nodes[:, None] + np.arange(3)).ravel()
         loads[first + own, np.arange(3 * n)] = 1.0
-        moved = np.asarray(factor.solve(loads))[first:, : 3 * n]
+        moved = np.asarray(self._factor.solve(loads))[first:, : 3 * n]
         return np.asarray(moved.T.reshape(n, 3, self.nodes, 3))
-
-    def _one(self, node: int, axis: int) -> Array:
-        force = np.zeros((self.nodes, 3))
-        force[node, axis] = 1.0
-        return self._operator.displacement(force)
 
 
 GRID = 1e-6

@@ -12,7 +12,7 @@ indefinite far from equilibrium, and rounding decides the direction of the steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,10 +149,9 @@ class _Start:
 
 def _way(start: Pose, end: Pose) -> Array:
     """Difference of two poses in mm; angles count with the arm of a typical contact."""
-    turns = [f"{name}_deg" for name in ("twist", "tilt_x", "tilt_y")]
-    moved = [getattr(end, n) - getattr(start, n) for n in ("x_mm", "y_mm", "depth_mm")]
-    return np.array(moved + [ARM_MM * np.radians(getattr(end, n) - getattr(start, n))
-                             for n in turns])  # fmt: skip
+    way = np.subtract(astuple(end)[1:], astuple(start)[1:])
+    way[3:] = ARM_MM * np.radians(way[3:])
+    return way
 
 
 class _NewtonSolve:

@@ -6,8 +6,8 @@ is off the tool by more than its share of the tolerance.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,8 @@ from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
 FIRST, GROWTH = 0.5, 1.25
-
-
-class NormalDamping(Protocol):
-    """A rule for how far the normals turn in one iteration."""
-
-    def share(self, way: Array) -> Array:
-        """Share (n,) to apply of the changes `way` (n, 3) of the normals."""
+NormalDamping = Callable[[Array], Array]
+"""Share (n,) to apply of the changes (n, 3) of the normals in one iteration."""
 
 
 @dataclass
@@ -34,8 +29,8 @@ class AveragedNormals:
 
     _count: int = 1
 
-    def share(self, way: Array) -> Array:
-        """See `NormalDamping`."""
+    def __call__(self, way: Array) -> Array:
+        """Share (n,) to apply of the changes `way` (n, 3)."""
         self._count += 1
         return np.full(len(way), 1 / self._count)
 
@@ -52,8 +47,8 @@ class BisectedNormals:
     _most: Array = field(default_factory=lambda: np.zeros(0))
     _way: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
-    def share(self, way: Array) -> Array:
-        """See `NormalDamping`."""
+    def __call__(self, way: Array) -> Array:
+        """Share (n,) to apply of the changes `way` (n, 3)."""
         if len(self._way) == 0:
             self._share, self._most = np.full(len(way), FIRST), np.ones(len(way))
             self._way = np.zeros_like(way)
@@ -146,7 +141,7 @@ class PlaneIteration:
             u_before, u = u, new
             if turn >= DAMPED_FROM:
                 # Damping, because a node at an edge jumps from one flank to the other and back.
-                share = turning.share(shape.normal - used.normal)
+                share = turning(shape.normal - used.normal)
                 mixed = shape.turned(used, share)
                 u = u_before + 0.5 * (u - u_before)
                 shape = tool_surface(self.tool, self.pose, self.points_mm + u, mixed)

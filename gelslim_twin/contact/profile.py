@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from gelslim_twin.scene.footprint import stl_corners
 from gelslim_twin.scene.indenter import (
@@ -43,7 +44,7 @@ def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
         case Ring():
             inner = indenter.inner_radius_mm - RIM_MM
             outer = indenter.outer_radius_mm + RIM_MM
-            return lambda x, y: _flat((np.hypot(x, y) >= inner) & (np.hypot(x, y) <= outer))
+            return lambda x, y: _within((np.hypot(x, y) >= inner) & (np.hypot(x, y) <= outer), 0.0)
         case FlatPunch():
             return _punch(indenter)
         case Wedge():
@@ -65,9 +66,9 @@ def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
 def _punch(punch: FlatPunch) -> Profile:
     if punch.radius_mm is not None:
         radius = punch.radius_mm + RIM_MM
-        return lambda x, y: _flat(np.hypot(x, y) <= radius)
+        return lambda x, y: _within(np.hypot(x, y) <= radius, 0.0)
     a, b = (punch.length_mm or 0.0) / 2 + RIM_MM, (punch.width_mm or 0.0) / 2 + RIM_MM
-    return lambda x, y: _flat((np.abs(x) <= a) & (np.abs(y) <= b))
+    return lambda x, y: _within((np.abs(x) <= a) & (np.abs(y) <= b), 0.0)
 
 
 def _texture(plane: TexturedPlane, seed: int) -> Profile:
@@ -114,11 +115,7 @@ def _tipped(tip: float, half: float, reach: Array) -> Array:
     return np.where(reach <= edge, _arc(tip, np.minimum(reach, edge)), flank)
 
 
-def _flat(inside: NDArray[np.bool_]) -> Array:
-    return np.where(inside, 0.0, np.inf)
-
-
-def _within(inside: NDArray[np.bool_], height: Array) -> Array:
+def _within(inside: NDArray[np.bool_], height: Array | float) -> Array:
     return np.where(inside, height, np.inf)
 
 
@@ -197,26 +194,13 @@ def _lowest(corners: Array, x: Array, y: Array) -> Array:
 
 def _interpolated(x: Array, y: Array, height: Array) -> Profile:
     """Bilinear; infinite where a corner is, and beside the grid."""
-    sx, sy = x[1] - x[0], y[1] - y[0]
+    missing = ~np.isfinite(height)
+    known = np.where(missing, 0.0, height)
 
     def profile(px: Array, py: Array) -> Array:
-        u, v = (px - x[0]) / sx, (py - y[0]) / sy
-        inside = (u >= 0) & (v >= 0) & (u <= len(x) - 1) & (v <= len(y) - 1)
-        u, v = np.where(inside, u, 0.0), np.where(inside, v, 0.0)
-        i = np.minimum(u.astype(int), len(x) - 2)
-        j = np.minimum(v.astype(int), len(y) - 2)
-        p, q = u - i, v - j
-        total = np.zeros(np.shape(u))
-        for a, b, w in (
-            (0, 0, (1 - p) * (1 - q)),
-            (1, 0, p * (1 - q)),
-            (0, 1, (1 - p) * q),
-            (1, 1, p * q),
-        ):
-            corner = height[i + a, j + b]
-            # Rounding must not make a grid point infinite because of a neighbour outside the shape.
-            counted = w > NEGLIGIBLE
-            total += np.where(counted, w * np.where(counted, corner, 0.0), 0.0)
-        return np.where(inside, total, np.inf)
+        at = [(px - x[0]) / (x[1] - x[0]), (py - y[0]) / (y[1] - y[0])]
+        share = map_coordinates(missing.astype(float), at, order=1, cval=1.0)
+        # Rounding must not make a grid point infinite because of a neighbour outside the shape.
+        return np.where(share > NEGLIGIBLE, np.inf, map_coordinates(known, at, order=1))
 
     return profile

@@ -59,17 +59,12 @@ class Candidates:
         inside[self.nodes] = True
         new = np.flatnonzero(wanted & ~inside)
         if len(self.nodes) + len(new) > SPARE * count:
-            return candidates_of(wanted, compliance)
+            nodes = np.flatnonzero(wanted)
+            return Candidates(nodes, compliance.block(nodes))
         if len(new) == 0:
             return self
         nodes = np.concatenate([self.nodes, new])
         return Candidates(nodes, compliance.block(nodes, self.block))
-
-
-def candidates_of(wanted: NDArray[np.bool_], compliance: SurfaceCompliance) -> Candidates:
-    """The `wanted` (c,) nodes as candidates."""
-    nodes = np.flatnonzero(wanted)
-    return Candidates(nodes, compliance.block(nodes))
 
 
 @dataclass(frozen=True)
@@ -98,7 +93,7 @@ class ContactSolver:
         self.points_mm = np.asarray(mesh.surface_mm)
         self._cell = min(mesh.cell_size_mm[:2])
         self._longest = self.settings.longest_step * self._cell
-        self._reach: Candidates | None = None
+        self._reach = Candidates(np.zeros(0, np.intp), np.zeros((0, 0), np.float32))
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """A state per pose, starting from the undeformed gel. Raises ContactError."""
@@ -162,7 +157,7 @@ class ContactSolver:
             if min(deepest, depth) <= 0:
                 return replace(GelState.at_rest(len(moved)), displacement_mm=offset.copy())
             wanted |= room < CANDIDATE_SHARE * deepest
-            self._reach = self._reached(wanted)
+            self._reach = self._reach.including(wanted, self.compliance)
             nodes = self._reach.nodes
             iteration = PlaneIteration(
                 self.tool, pose, self._reach.block, self.points_mm[nodes], offset[nodes],
@@ -234,11 +229,6 @@ class ContactSolver:
         }
         held = np.where((touch == STICK)[:, None], target, u)
         return AnchoredState(u, force, touch, report, held), gap
-
-    def _reached(self, wanted: NDArray[np.bool_]) -> Candidates:
-        if self._reach is None:
-            return candidates_of(wanted, self.compliance)
-        return self._reach.including(wanted, self.compliance)
 
 
 def even_steps(before: Pose, after: Pose, count: int) -> Iterator[Pose]:

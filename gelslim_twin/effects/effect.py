@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import Any
 
 from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
@@ -36,12 +36,7 @@ class Bound:
 
     def at_most(self, other: Bound) -> Bound:
         """The smaller error of each observable."""
-        return Bound(
-            min(self.force_n, other.force_n),
-            min(self.displacement_px, other.displacement_px),
-            min(self.markers_px, other.markers_px),
-            min(self.image_px, other.image_px),
-        )
+        return Bound(*map(min, astuple(self), astuple(other)))
 
     def to_record(self) -> dict[str, float]:
         """Errors by observable and unit."""

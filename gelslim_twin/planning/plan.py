@@ -41,16 +41,11 @@ class Choice:
 
     def most_relevant(self, bound: Bound) -> tuple[float, str]:
         """The value of `bound` that is largest relative to its share, with its unit, N or px."""
-
-        def against(pair: tuple[str, float]) -> float:
-            observable, share = pair
-            return bound.of(observable) / share if share > 0 else bound.of(observable)
-
         if not self.shares:
             value = bound.force_n
             pixels = max(bound.displacement_px, bound.markers_px, bound.image_px)
             return (value, "N") if value > 0 and pixels == 0 else (pixels, "px")
-        observable = max(self.shares, key=against)[0]
+        observable, _ = max(self.shares, key=lambda pair: bound.of(pair[0]) / (pair[1] or 1.0))
         return bound.of(observable), "N" if unit_of(observable) == "n" else "px"
 
     def to_record(self) -> dict[str, Any]:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from gelslim_core.budget.budget import Budget
-from gelslim_core.budget.ladder import Ladder
-from gelslim_core.budget.ladder import Rung as BudgetRung
 from gelslim_core.errors import GelslimError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
@@ -40,21 +37,19 @@ class Question:
     force_n: float
     image_px: float
     circumstances: Circumstances
-    _kept: dict[int, tuple[Effect, Bound, tuple[Rung, ...]]] = field(
+    _kept: dict[Effect, tuple[Bound, tuple[Rung, ...]]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
     """Bounds and ladders by effect, since the planner needs them in every iteration."""
 
-    def weighed(self, effect: Effect) -> tuple[Effect, Bound, tuple[Rung, ...]]:
-        """An effect, its bound (zero where its parameters do nothing) and its ladder."""
-        found = self._kept.get(id(effect))
-        if found is None:
+    def weighed(self, effect: Effect) -> tuple[Bound, tuple[Rung, ...]]:
+        """The bound of an effect (zero where its parameters do nothing) and its ladder."""
+        if effect not in self._kept:
             c = self.circumstances
             bound = effect.bound(c)
             bound = Bound() if effect.is_null(c, bound) else bound
-            # The effect is stored too, so that its id is not given to another object.
-            found = self._kept[id(effect)] = effect, bound, tuple(effect.ladder(c))
-        return found
+            self._kept[effect] = bound, tuple(effect.ladder(c))
+        return self._kept[effect]
 
     def tolerance(self, observable: str) -> float:
         """Of one observable, in its unit."""
@@ -145,7 +140,7 @@ def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
 
     An effect that must be simulated and has exact rungs only causes none.
     """
-    _, bound, ladder = question.weighed(effect)
+    bound, ladder = question.weighed(effect)
     lost = bound.of(observable)
     if lost <= 0:
         return False
@@ -156,7 +151,7 @@ def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
 
 def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str, float]) -> Choice:
     c, use = question.circumstances, question.use(effect)
-    _, bound, ladder = question.weighed(effect)
+    bound, ladder = question.weighed(effect)
     if not relevant:
         return _choice(effect, bound, "not observed", {})
     if use == "off":
@@ -206,19 +201,13 @@ def _choice(
 
 
 def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
-    """The cheapest rung within the shares, or else the one that exceeds them least.
-
-    The error given to the budget is the largest part of a share that a rung uses up.
-    """
+    """The cheapest rung within the shares, or else the one that exceeds them least."""
     errors = [
         max((_excess(r.error.of(o), s) for o, s in shares.items()), default=0.0) for r in ladder
     ]
-    rungs = tuple(
-        BudgetRung(str(k), error, rung.milliseconds, rung.milliseconds)
-        for k, (rung, error) in enumerate(zip(ladder, errors, strict=True))
-    )
-    if min(errors) <= 1.0:
-        return ladder[int(Ladder(rungs).choose(Budget(error=1.0)).rung.name)]
+    able = [k for k, error in enumerate(errors) if error <= 1.0]
+    if able:
+        return ladder[min(able, key=lambda k: ladder[k].milliseconds)]
     totals = [sum(r.error.of(o) for o in shares) for r in ladder]
     return ladder[min(range(len(ladder)), key=lambda k: (errors[k], totals[k]))]
 

@@ -47,10 +47,6 @@ class Defocus:
         """Whether nothing is blurred."""
         return self.aperture_mm == 0 and self.still_px == 0
 
-    def field(self, camera: VirtualCamera, length_mm: float, width_mm: float) -> BlurField:
-        """Blur diameters over a pad, computed once."""
-        return BlurField.of(camera, self.aperture_mm, self.focus_mm, (length_mm, width_mm))
-
     def sigma_px(self, field: BlurField, points_mm: Array, scale_px_per_mm: Array) -> Array:
         """Standard deviation (n,) in px at points (n, 3) where the picture has that scale (n,)."""
         spread = field.at(points_mm[:, 0], points_mm[:, 1], points_mm[:, 2]) * scale_px_per_mm / 4

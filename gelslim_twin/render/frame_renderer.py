@@ -97,8 +97,11 @@ class FrameRenderer:
 
     @cached_property
     def _blur_field(self) -> BlurField:
+        from gelslim_twin.render.defocus import BlurField
+
         assert self.look.defocus is not None
-        return self.look.defocus.field(self.camera, self.pad.length_mm, self.pad.width_mm)
+        lens, pad = self.look.defocus, (self.pad.length_mm, self.pad.width_mm)
+        return BlurField.of(self.camera, lens.aperture_mm, lens.focus_mm, pad)
 
     @cached_property
     def _glare(self) -> Image:
@@ -109,7 +112,8 @@ class FrameRenderer:
 
     @cached_property
     def _shading_sight(self) -> Sight | None:
-        return None if self.look.shading is None else self.look.shading.sight(self.camera)
+        shading = self.look.shading
+        return None if shading is None else Sight.of(self.camera, shading.pixel_step)
 
     @cached_property
     def _curve(self) -> NDArray[np.uint8]:
@@ -224,11 +228,10 @@ class FrameRenderer:
         return float(np.sign(np.median(centroids_px(self._rest_outlines)[1])))
 
     def _inside(self, outlines: Array) -> NDArray[np.bool_]:
-        from gelslim_twin.render.dot_kernel import within
-
-        inside = np.empty(len(outlines), dtype=bool)
-        within(outlines, self.camera.image_width_px, self.camera.image_height_px, inside)
-        return inside
+        """Whether (m,) every corner lies in the picture, whose pixels are about integers."""
+        size = np.array([self.camera.image_width_px, self.camera.image_height_px])
+        inside = (outlines >= -0.5) & (outlines <= size - 0.5)
+        return np.asarray(inside.all(axis=(1, 2)))
 
     def _ink(
         self,

@@ -5,6 +5,7 @@ These are motion blur, exposure with the response curve, noise, and JPEG compres
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from functools import cache
 
@@ -42,10 +43,7 @@ class MotionBlur:
 
     def poses(self, start: Array, now: Array) -> NDArray[np.int64]:
         """How many poses (m,) to draw of each dot; 1 for a dot that stands still."""
-        from gelslim_twin.render.dot_kernel import farthest
-
-        path = np.empty(len(now))
-        farthest(start, now, path)
+        path = np.sqrt(((now - start) ** 2).sum(axis=2).max(axis=1))
         wanted = np.ceil(path / self.px_per_pose)
         return np.clip(wanted, 1, self.most_poses).astype(np.int64)
 
@@ -139,8 +137,6 @@ class Compression:
         """
         if self.quality is None:
             return image
-        import io
-
         pillow = load("PIL.Image", "the effect compression")
         store = io.BytesIO()
         pillow.fromarray(image).save(store, "JPEG", quality=self.quality, subsampling=2)

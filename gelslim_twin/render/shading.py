@@ -16,46 +16,31 @@ from numpy.typing import NDArray
 from gelslim_twin.render.surroundings import Sight
 
 if TYPE_CHECKING:
-    from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
-_NEAR_MM = 1e-3
+_ROUNDS, _NEAR_MM = 8, 1e-3
+"""Limits of the iteration for the intersection of a ray with the deformed surface."""
 
 
 @dataclass(frozen=True)
 class Shading:
-    """Ambient share of the light, and spacing `pixel_step` of the lattice that is computed.
-
-    `rounds` limits the iterations for the intersection of a ray with the deformed surface.
-    """
+    """Ambient share of the light, and spacing `pixel_step` of the lattice that is computed."""
 
     ambient_share: float = 0.3
     pixel_step: int = 4
-    rounds: int = 8
-
-    def sight(self, camera: VirtualCamera) -> Sight:
-        """The lattice of pixels on which the shading is computed."""
-        return Sight.of(camera, self.pixel_step)
 
     def gain(self, sight: Sight, state: SurfaceState, light: LightMap) -> NDArray[np.float32]:
         """Irradiance (rows, columns, k) over that of a level surface, on the lattice of `sight`."""
-        from gelslim_twin.render.surface_kernel import seen_slopes
+        from gelslim_twin.render.surface_kernel import lambert, seen_slopes
 
         rest = sight.rest_mm.reshape(-1, 2)
         slopes = np.zeros((len(rest), 2))
         seen_slopes(
             state.padded_mm, state.origin_mm, state.step_mm,
-            rest, sight.slope.reshape(-1, 2), self.rounds, _NEAR_MM, slopes,
+            rest, sight.slope.reshape(-1, 2), _ROUNDS, _NEAR_MM, slopes,
         )  # fmt: skip
-        gain = self.of_slopes(slopes, light)
+        gain = np.empty((len(rest), light.sources), dtype=np.float32)
+        lambert(slopes, light.directions, self.ambient_share, gain)
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
-
-    def of_slopes(self, slopes: Array, light: LightMap) -> NDArray[np.float32]:
-        """Irradiance (n, k) over that of a level surface at slopes (n, 2); exactly 1 at 0."""
-        from gelslim_twin.render.surface_kernel import lambert
-
-        gain = np.empty((len(slopes), light.sources), dtype=np.float32)
-        lambert(np.ascontiguousarray(slopes), light.directions, self.ambient_share, gain)
-        return gain

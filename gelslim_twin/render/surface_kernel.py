@@ -33,29 +33,6 @@ def cell_of(at: Any, count: Any) -> Any:
 
 
 @njit(**COMPILED)
-def displacement(padded: Any, origin: Any, step: Any, points: Any, out: Any) -> None:
-    """Write the displacement `out` (n, 3) at material points (n, 2).
-
-    `padded` (ny + 2, nx + 2, 3) has one ring of ghost nodes; `origin` and `step` (2,) in mm.
-    """
-    ny, nx = padded.shape[0] - 2, padded.shape[1] - 2
-    wx, wy, d = np.empty(4), np.empty(4), np.empty(4)
-    for n in range(points.shape[0]):
-        i, u = cell_of((points[n, 0] - origin[0]) / step[0], nx)
-        j, v = cell_of((points[n, 1] - origin[1]) / step[1], ny)
-        weights(u, wx, d)
-        weights(v, wy, d)
-        a = b = c = 0.0
-        for q in range(4):
-            for p in range(4):
-                w = wy[q] * wx[p]
-                a += w * padded[j + q, i + p, 0]
-                b += w * padded[j + q, i + p, 1]
-                c += w * padded[j + q, i + p, 2]
-        out[n, 0], out[n, 1], out[n, 2] = a, b, c
-
-
-@njit(**COMPILED)
 def _here(padded: Any, j: Any, i: Any, wy: Any, wx: Any) -> Any:
     """Displacement at weights `wy`, `wx` (4,) of the nodes about cell j, i."""
     a = b = c = 0.0
@@ -70,6 +47,22 @@ def _here(padded: Any, j: Any, i: Any, wy: Any, wx: Any) -> Any:
         b += wy[q] * f
         c += wy[q] * g
     return a, b, c
+
+
+@njit(**COMPILED)
+def displacement(padded: Any, origin: Any, step: Any, points: Any, out: Any) -> None:
+    """Write the displacement `out` (n, 3) at material points (n, 2).
+
+    `padded` (ny + 2, nx + 2, 3) has one ring of ghost nodes; `origin` and `step` (2,) in mm.
+    """
+    ny, nx = padded.shape[0] - 2, padded.shape[1] - 2
+    wx, wy, d = np.empty(4), np.empty(4), np.empty(4)
+    for n in range(points.shape[0]):
+        i, u = cell_of((points[n, 0] - origin[0]) / step[0], nx)
+        j, v = cell_of((points[n, 1] - origin[1]) / step[1], ny)
+        weights(u, wx, d)
+        weights(v, wy, d)
+        out[n, 0], out[n, 1], out[n, 2] = _here(padded, j, i, wy, wx)
 
 
 @njit(**COMPILED)

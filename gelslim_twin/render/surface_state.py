@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[np.float64]
-_EVEN = 1e-6
 _ROUNDS = 12
 _NEAR_MM = 1e-5
 
@@ -24,8 +23,8 @@ class SurfaceState:
     """Displacement `displacement_mm` (ny, nx, 3) at material points on uniform axes (nx,), (ny,).
 
     It is interpolated by cubic convolution (Keys 1981), which has continuous slopes and is exact
-    for linear fields and at the nodes. Raises ValueError for axes that are not uniform, other
-    shapes, values not finite.
+    for linear fields and at the nodes. Raises ValueError for other shapes and values
+    that are not finite.
     """
 
     x_mm: Array
@@ -35,8 +34,6 @@ class SurfaceState:
     def __post_init__(self) -> None:
         for name in ("x_mm", "y_mm", "displacement_mm"):
             object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
-        for name in ("x_mm", "y_mm"):
-            _check_even(name, getattr(self, name))
         shape = (len(self.y_mm), len(self.x_mm), 3)
         if self.displacement_mm.shape != shape:
             raise ValueError(f"displacement_mm is {self.displacement_mm.shape}: must be {shape}")
@@ -99,17 +96,6 @@ class SurfaceState:
         if self.moves:
             displacement(self.padded_mm, self.origin_mm, self.step_mm, points, out)
         return out
-
-
-def _check_even(name: str, axis: Array) -> None:
-    if axis.ndim != 1 or len(axis) < 3:
-        raise ValueError(f"{name} of a surface must be three or more values, not {axis.shape}")
-    gaps = np.diff(axis)
-    if not (np.isfinite(axis).all() and gaps.min() > 0 and np.ptp(gaps) < _EVEN * gaps.mean() * 10):
-        raise ValueError(
-            f"{name} of a surface must increase in even steps: interpolate the displacement to an "
-            "even grid first"
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import math
 import os
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 
 from gelslim_core.yaml.errors import InputError, Problem, listed, shown
 from gelslim_core.yaml.source import MAX_BYTES, read_source
@@ -108,15 +108,10 @@ class FrameTime:
 def frame_times(poses: Sequence[Pose], frame_rate_hz: float | None = None) -> tuple[FrameTime, ...]:
     """Times of frames: one per pose, or from the first pose on at an even rate.
 
-    The last frame at an even rate is the last that is not after the last pose. Raises ValueError
-    without poses or for a rate that is not positive.
+    The last frame at an even rate is the last that is not after the last pose.
     """
-    if not poses:
-        raise ValueError("a motion without poses has no frames")
     if frame_rate_hz is None:
         return tuple(FrameTime(pose.time_s, k, 0.0) for k, pose in enumerate(poses))
-    if not (math.isfinite(frame_rate_hz) and frame_rate_hz > 0):
-        raise ValueError(f"a frame rate of {frame_rate_hz} Hz: must be positive")
     times = [pose.time_s for pose in poses]
     # A frame on the last pose must not be lost to rounding.
     count = math.floor((times[-1] - times[0]) * frame_rate_hz * (1 + 1e-12)) + 1
@@ -133,8 +128,6 @@ def _between(times: Sequence[float], time: float) -> FrameTime:
     return FrameTime(time, before, (time - start) / (end - start))
 
 
-COLUMNS = tuple(field.name for field in fields(Pose))
-REQUIRED = ("time_s", "depth_mm")
 LIMITS = {
     "time_s": (0.0, 1e6),
     "x_mm": (-100.0, 100.0),
@@ -144,6 +137,7 @@ LIMITS = {
     "tilt_x_deg": (-45.0, 45.0),
     "tilt_y_deg": (-45.0, 45.0),
 }
+COLUMNS, REQUIRED = tuple(LIMITS), ("time_s", "depth_mm")
 
 
 def read_motion_csv(path: str | os.PathLike[str]) -> tuple[Pose, ...]:

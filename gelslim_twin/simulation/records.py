@@ -121,11 +121,11 @@ class FrameTruth:
     pose: Pose
     """Tool at that time."""
     state: GelState
-    markers_px: Array | None
+    markers_px: Array | None = None
     """(m, 2) images of the dots' centres, where markers are observed."""
-    centroids_px: Array | None
+    centroids_px: Array | None = None
     """(m, 2) centroids of the dots drawn, where a picture was."""
-    drawn: NDArray[np.bool_] | None
+    drawn: NDArray[np.bool_] | None = None
 
 
 def wrench_csv(frames: Sequence[FrameTruth], points_mm: Array) -> bytes:

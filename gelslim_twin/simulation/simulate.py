@@ -9,7 +9,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -81,7 +81,7 @@ class Ledger:
     poses_solved: int = 0
     frames_drawn: int = 0
     frames_kept: int = 0
-    worst: dict[str, float] = field(default_factory=dict)
+    solver_worst: dict[str, float] = field(default_factory=dict)
     """Largest residual, penetration and complementarity of any pose."""
 
     def add(self, stage: str, since: float) -> float:
@@ -93,17 +93,11 @@ class Ledger:
     def judge(self, state: GelState) -> None:
         """Update the largest values that the solver reports."""
         for name, value in state.solver.items():
-            self.worst[name] = max(self.worst.get(name, 0.0), float(value))
+            self.solver_worst[name] = max(self.solver_worst.get(name, 0.0), float(value))
 
     def to_record(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "seconds": self.seconds,
-            "poses_solved": self.poses_solved,
-            "frames_drawn": self.frames_drawn,
-            "frames_kept": self.frames_kept,
-            "solver_worst": self.worst,
-        }
+        return asdict(self)
 
 
 @single_threaded
@@ -201,7 +195,7 @@ def _seen(
     for number, when in enumerate(times):
         state = _at(states, when)
         started = time.perf_counter()
-        truth = FrameTruth(number, when.time_s, _pose(job.poses, when), state, None, None, None)
+        truth = FrameTruth(number, when.time_s, _at(job.poses, when), state)
         if viewer is not None:
             truth = replace(truth, markers_px=viewer.markers_px(state))
             started = ledger.add("markers", started)
@@ -222,14 +216,7 @@ def _seen(
         yield truth
 
 
-def _at(states: StateStore, when: FrameTime) -> GelState:
-    first = states[when.before]
-    return first if when.part == 0 else first.blended(states[when.before + 1], when.part)
-
-
-def _pose(poses: tuple[Pose, ...], when: FrameTime) -> Pose:
-    first = poses[when.before]
-    if when.part == 0:
-        return first
-    later = poses[when.before + 1]
-    return replace(first.blended(later, when.part), time_s=when.time_s)
+def _at(values: Any, when: FrameTime) -> Any:
+    """The pose or state at the time of a frame."""
+    first = values[when.before]
+    return first if when.part == 0 else first.blended(values[when.before + 1], when.part)

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
 from gelslim_force.motion.marker_motion import Compensation, MarkerView
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.tool import rotation
+from gelslim_twin.scene.pose import Pose
 from gelslim_twin.validation.score import Spread, spread
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
@@ -133,15 +135,8 @@ def error_budget(
 
 
 def _row(rig: BudgetRig, source: Source, states: Sequence[GelState]) -> Spread:
-    operator, turn = rig.operator(source), _rotation(source.pose_deg)
+    operator = rig.operator(source)
+    turn = rotation(Pose(tilt_x_deg=source.pose_deg, tilt_y_deg=source.pose_deg))
     true = np.array([s.force_n.sum(axis=0) for s in states])
     found = np.array([operator.force(rig.motion_mm(s, source)).sum(axis=0) for s in states])
     return spread(source.name, true @ turn.T, found)
-
-
-def _rotation(angle_deg: float) -> Array:
-    """Of the reference's axes about x, then y."""
-    c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
-    about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    about_y = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    return np.asarray(about_y @ about_x)

@@ -124,7 +124,9 @@ class Bench:
         self.reference: Image = self.renderer.frame(number=0).image
         self.calibration: Calibration = calibrate(sensor.bundle, self.reference)
         self.chains = chains_for(sensor.bundle, budget)
-        self._pipelines = {c.name: self._pipeline(c) for c in self.chains}
+        self._pipelines = {
+            c.name: ForcePipeline(sensor.bundle, self.calibration, c.settings) for c in self.chains
+        }
         places = sensor.grid.positions_mm[self.calibration.reference.markers]
         self._to_markers: Any = marker_to_node(sensor.points_mm, places)
 
@@ -173,9 +175,6 @@ class Bench:
         """The score of one result."""
         error = self.marker_error_mm(truth, result)
         return score(test, frame, chain.name, self.sensor.points_mm, truth, result, error)
-
-    def _pipeline(self, chain: Chain) -> ForcePipeline:
-        return ForcePipeline(self.sensor.bundle, self.calibration, chain.settings)
 
     def _source(self, chain: Chain, known: str) -> IndenterSource:
         from gelslim_force.sensor import indenter_source

@@ -11,6 +11,7 @@ import pytest
 from contact_pads import dense_compliance, small_pad, violations
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from tool_height import tool_height_mm
 
 from gelslim_twin.contact.coulomb_contact import FREE, SLIP, STICK, solve_contact_forces
 from gelslim_twin.contact.coulomb_kernel import node_force
@@ -47,7 +48,7 @@ class Walk:
         self.broken: dict[str, float] = {}
 
     def to(self, pose: Pose, tolerance: float = 1e-6) -> None:
-        height = self.tool.height_mm(pose, self.points[:, 0], self.points[:, 1])
+        height = tool_height_mm(self.tool, pose, self.points[:, 0], self.points[:, 1])
         places = self.points + self.motion
         carried = places if self.before is None else self.tool.carried(self.before, pose, places)
         target = self.motion[:, :2] + (carried - places)[:, :2]
@@ -131,7 +132,7 @@ def test_frictionless_is_the_least_energy(poisson: float) -> None:
     """Against Lawson and Hanson's non-negative least squares, min |L'(f - C⁻¹h)|."""
     walk = Walk(SHAPES["sphere"], poisson, 0.0)
     walk.to(Pose(0, 1.0, 0.5, 0.7), 1e-9)
-    height = walk.tool.height_mm(Pose(0, 1.0, 0.5, 0.7), *walk.points[:, :2].T)
+    height = tool_height_mm(walk.tool, Pose(0, 1.0, 0.5, 0.7), *walk.points[:, :2].T)
     near = np.flatnonzero(height < REACH_MM)
     normal = walk.compliance[2::3, 2::3][np.ix_(near, near)]
     lower = np.linalg.cholesky(normal)
@@ -161,7 +162,7 @@ def test_first_forces_do_not_matter() -> None:
     walk = Walk(SHAPES["sphere"], 0.49, 0.3)
     for pose in path(0.0)[:7]:
         walk.to(pose)
-    height = walk.tool.height_mm(walk.before, *walk.points[:, :2].T)
+    height = tool_height_mm(walk.tool, walk.before, *walk.points[:, :2].T)
     near = np.flatnonzero(height < REACH_MM)
     dof = (3 * near[:, None] + np.arange(3)).ravel()
     block, h = walk.compliance[np.ix_(dof, dof)], height[near]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_pads import small_pad
+from tool_height import tool_height_mm
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import GelState
@@ -120,7 +121,7 @@ def test_pressed_to_half_in_a_few_steps(friction: float) -> None:
     for pose, state in zip(poses[4:-1], states[4:-1], strict=True):
         assert state.solver["residual"] <= TOLERANCE
         places = model.solver.points_mm + state.displacement_mm
-        height = model.solver.tool.height_mm(pose, places[:, 0], places[:, 1])
+        height = tool_height_mm(model.solver.tool, pose, places[:, 0], places[:, 1])
         assert (height - places[:, 2]).min() > -3e-3
         assert np.abs(height - places[:, 2])[state.touch > 0].max() < 3e-3
     assert max(iterations(states)) <= MOST_STEPS

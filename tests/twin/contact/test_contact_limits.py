@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from contact_pads import YOUNGS_MPA, small_pad
 from numpy.typing import NDArray
+from tool_height import tool_height_mm
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.coulomb_contact import solve_contact_forces
@@ -150,7 +151,7 @@ def test_deep_press(friction: float) -> None:
     assert not large[6].displacement_mm.any()
     points = model.solver.points_mm + large[4].displacement_mm
     touched = large[4].touch > 0
-    height = model.solver.tool.height_mm(Pose(depth_mm=1.2), points[:, 0], points[:, 1])
+    height = tool_height_mm(model.solver.tool, Pose(depth_mm=1.2), points[:, 0], points[:, 1])
     assert np.abs(points[touched, 2] - height[touched]).max() < 3e-3
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from contact_pads import dense_compliance, small_pad
 from numpy.typing import NDArray
+from tool_height import tool_height_mm
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import ContactError, ContactStatus, GelState
@@ -95,7 +96,7 @@ def test_nodes_lie_on_the_tool(shape: Indenter, place: tuple[float, float]) -> N
     state = walk(one, *press(0.4, x_mm=x, y_mm=y), pose)[-1]
     touched = state.touch > 0
     now = one.points_mm + state.displacement_mm
-    height = one.tool.height_mm(pose, now[:, 0], now[:, 1])
+    height = tool_height_mm(one.tool, pose, now[:, 0], now[:, 1])
     # A node may end just beyond a rim that it slipped off in this step; the next one lets it go.
     held = touched & np.isfinite(height)
     assert held.sum() > 0.9 * touched.sum() > 0

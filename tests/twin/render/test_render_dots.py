@@ -181,18 +181,6 @@ def test_dots_shrink_with_distance_and_are_not_drawn_outside_the_picture():
     assert 0 < away.drawn.sum() < frame.drawn.sum()
 
 
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ({"x_mm": [0, 1, 3], "y_mm": [0, 1, 2]}, "even steps"),
-        ({"x_mm": [0, 1], "y_mm": [0, 1, 2]}, "three or more"),
-    ],
-)
-def test_surfaces_that_cannot_be_interpolated_are_refused(values, words):
-    with pytest.raises(ValueError, match=words):
-        SurfaceState(displacement_mm=np.zeros((3, 3, 3)), **values)
-
-
 def test_a_small_picture_is_the_middle_of_the_large_one():
     """Another size of picture, no multiple of the strips that frames are made in."""
     small = replace(CAMERA, image_width_px=202, image_height_px=150)

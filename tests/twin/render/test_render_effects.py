@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 
 from gelslim_optics.camera.view_quality import blur_map
 from gelslim_twin.render.blemishes import Dirt, Specular
-from gelslim_twin.render.defocus import Defocus, kernel_taps
+from gelslim_twin.render.defocus import BlurField, Defocus, kernel_taps
 from gelslim_twin.render.image_sensor import Compression, Exposure, MotionBlur, SensorNoise
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.printed_dots import MarkerPrint, PrintedDots
@@ -173,7 +173,7 @@ def test_defocus_grows_away_from_the_focus_as_the_camera_says():
     places = np.column_stack([x, np.full(7, 2.3), np.zeros(7)])
     focus = float(CAMERA.apparent_distance_mm(places[3:4])[0])
     lens = Defocus(1.24, focus)
-    field = lens.field(CAMERA, 22.0, 21.0)
+    field = BlurField.of(CAMERA, 1.24, focus, (22.0, 21.0))
     exact = blur_map(CAMERA, x, [2.3], 1.24, focus)[0] * 20 / 4
     assert lens.sigma_px(field, places, np.full(7, 20.0)) == pytest.approx(exact, abs=0.02)
     assert exact[0] > 0.4

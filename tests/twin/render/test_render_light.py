@@ -69,7 +69,9 @@ def test_light_from_bins_keeps_place_and_mean():
 @pytest.mark.parametrize("slope", [(0.0, 0.1), (0.15, 0.0), (-0.1, -0.2), (0.0, 0.6)])
 def test_a_tilted_plane_is_as_bright_as_lambert_says(slope):
     shading = Shading(ambient_share=0.2)
-    gain = shading.gain(shading.sight(CAMERA), tilted(*slope), light(elevation_deg=30))
+    gain = shading.gain(
+        Sight.of(CAMERA, shading.pixel_step), tilted(*slope), light(elevation_deg=30)
+    )
     normal = np.array([-slope[0], -slope[1], 1.0]) / np.sqrt(1 + slope[0] ** 2 + slope[1] ** 2)
     for k, side in enumerate((1.0, -1.0)):
         towards = np.array([0.0, side * np.cos(np.pi / 6), np.sin(np.pi / 6)])
@@ -83,7 +85,7 @@ def test_shading_is_seen_where_the_line_of_sight_meets_the_dent():
     """The darkest red lies on the far flank, projected through the camera at its depth."""
     shading, lit = Shading(pixel_step=1, ambient_share=0.0), light()
     state = dent(0.6, 0.0, 0.0)
-    gain = shading.gain(shading.sight(CAMERA), state, lit)
+    gain = shading.gain(Sight.of(CAMERA, shading.pixel_step), state, lit)
     y, x = np.unravel_index(gain[..., 0].argmin(), gain.shape[:2])
     grid = np.stack(np.meshgrid(np.linspace(-6, 6, 481), np.linspace(-6, 6, 481)), 2)
     u = state.at(grid.reshape(-1, 2)).reshape(481, 481, 3)
@@ -116,7 +118,7 @@ def test_level_gel_is_not_shaded_bit_for_bit():
     for state in (SurfaceState.at_rest(22, 21), moved((0.0, 0.0, 0.0))):
         assert np.array_equal(renderer(Look(shading=Shading())).frame(state).image, plain)
     shifted = moved((0.01, 0.0, 0.0))
-    gain = Shading().gain(Shading().sight(CAMERA), shifted, light())
+    gain = Shading().gain(Sight.of(CAMERA, 4), shifted, light())
     assert np.array_equal(gain, np.ones_like(gain))
     shaded = renderer(Look(shading=Shading(ambient_share=1.0))).frame(dent()).image
     assert np.array_equal(shaded, renderer().frame(dent()).image)

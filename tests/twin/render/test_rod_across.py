@@ -11,6 +11,7 @@ from sim_rig import small_sensor
 
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.render.surface_state import SurfaceState
+from gelslim_twin.render.surroundings import Sight
 from gelslim_twin.scene.indenter import Cylinder
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.validation.experiment import TruthGel
@@ -42,7 +43,9 @@ def test_light_from_the_sides_shows_a_rod_along_and_hardly_one_across() -> None:
         u = np.zeros((*x.shape, 3))
         u[..., 2] = -0.3 * np.exp(-((off / 1.5) ** 2))
         shading = Shading(ambient_share=0.0)
-        gain = shading.gain(shading.sight(CAMERA), SurfaceState(AXIS_X, AXIS_Y, u), light())
+        gain = shading.gain(
+            Sight.of(CAMERA, shading.pixel_step), SurfaceState(AXIS_X, AXIS_Y, u), light()
+        )
         spread[name] = float(np.abs(gain - 1).max())
     steepest = 0.3 / 1.5 * np.sqrt(2) * np.exp(-0.5)
     # A flank towards the light gains slope x cot(25°); one across loses the cosine of its slope.

@@ -106,10 +106,3 @@ def test_frames_at_an_even_rate_lie_between_their_poses(rate):
         after = POSES[min(frame.before + 1, len(POSES) - 1)].time_s
         assert 0 <= frame.part < 1
         assert start + frame.part * (after - start) == pytest.approx(frame.time_s, abs=1e-12)
-
-
-def test_no_frames_without_poses_or_rate():
-    with pytest.raises(ValueError, match="without poses"):
-        frame_times(())
-    with pytest.raises(ValueError, match="must be positive"):
-        frame_times(POSES, 0.0)
