@@ -10,7 +10,7 @@ import csv
 import io
 import json
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
@@ -62,7 +62,7 @@ class StateStore:
         self._last = None
 
     def __getitem__(self, index: int) -> GelState:
-        """State `index`. Raises IndexError beyond the last."""
+        """State `index`. Raises IndexError beyond the last, which ends a loop over all states."""
         if not 0 <= index < self.count:
             raise IndexError(index)
         if index >= self._stored:
@@ -71,10 +71,6 @@ class StateStore:
         if self._last is None or self._last[0] != number:
             self._last = number, _unpacked(self._path(number))
         return self._last[1][index % CHUNK]
-
-    def __iter__(self) -> Iterator[GelState]:
-        """All states."""
-        return (self[k] for k in range(self.count))
 
     def _path(self, number: int) -> Path:
         return self.folder / f"states_{number:05d}.npz"

@@ -176,8 +176,8 @@ def _solved(job: SimulationJob, store: StateStore, ledger: Ledger, tell: Progres
             tell("gel", index + 1, total)
         store.flush()
         ledger.add("gel", started)
-    for state in store:
-        ledger.judge(state)
+    for index in range(total):
+        ledger.judge(store[index])
     return store
 
 
