@@ -28,21 +28,24 @@ COMPILED = {
     "_nrt": False,
 }
 INLINED = {**COMPILED, "forceinline": True}
+MISSED = (0, 0.0, False, 0.0, False)
+"""What `crossings` returns for a line that does not cross the edge."""
 
 
 @njit(**INLINED)
 def crossings(
     shape: Any, facts: Any, e: int, last: int, y: float, z: float, dy: float, dz: float
 ) -> Any:
-    """Crossings of the line with edge e: count, then (t, left to right) of up to two."""
+    """Crossings of the line with edge e: count, then (t, left to right) of first and last."""
     ay, az, by, bz = shape[e, 0] - y, shape[e, 1] - z, shape[e, 2] - y, shape[e, 3] - z
     ca, cb = dy * az - dz * ay, dy * bz - dz * by
     apart = (ca >= 0) != (cb >= 0)
     sense = shape[e, 7]
     if sense == 0.0:
         if not apart or e == last:
-            return 0, 0.0, False, 0.0, False
-        return 1, (ay * (bz - az) - az * (by - ay)) / (cb - ca), cb > ca, 0.0, False
+            return MISSED
+        t = (ay * (bz - az) - az * (by - ay)) / (cb - ca)
+        return 1, t, cb > ca, t, cb > ca
     my, mz, r = y - shape[e, 4], z - shape[e, 5], shape[e, 6]
     s2 = dy * dy + dz * dz
     along, off = my * dy + mz * dz, dy * mz - dz * my
@@ -50,24 +53,25 @@ def crossings(
     if not apart:
         # Two crossings or none: the point of the line nearest to the centre decides.
         if off * off >= s2 * r * r:
-            return 0, 0.0, False, 0.0, False
+            return MISSED
         side = (by - ay) * (along * dz + s2 * az) - (bz - az) * (along * dy + s2 * ay)
         if side * sense <= 0:
-            return 0, 0.0, False, 0.0, False
+            return MISSED
     if last >= 0 and facts[last, CIRCLE] == facts[e, CIRCLE]:
         # The ray starts on this circle; only the other root is new.
         t = -2 * along / s2
         if t <= 0 or (apart and leaves != (cb > ca)):
-            return 0, 0.0, False, 0.0, False
-        return 1, t, leaves, 0.0, False
+            return MISSED
+        return 1, t, leaves, t, leaves
     # The discriminant as a product, because the difference loses digits near a tangent.
     span = math.sqrt(s2) * r
     root = math.sqrt(max((span - abs(off)) * (span + abs(off)), 0.0))
-    if apart:
-        if leaves == (cb > ca):
-            return 1, (root - along) / s2, leaves, 0.0, False
-        return 1, (-root - along) / s2, not leaves, 0.0, False
-    return 2, (-root - along) / s2, not leaves, (root - along) / s2, leaves
+    first, second = (-root - along) / s2, (root - along) / s2
+    if not apart:
+        return 2, first, not leaves, second, leaves
+    if leaves == (cb > ca):
+        return 1, second, leaves, second, leaves
+    return 1, first, not leaves, first, not leaves
 
 
 @njit(**INLINED)

@@ -22,7 +22,7 @@ SPANS = {
     "guide_index": (1.4, 1.7),
     "half_horizontal_tan": (0.3, 1.2),
     "half_vertical_tan": (0.25, 0.9),
-    "focal_length_mm": (1.5, 4.0),
+    "focal_length_mm": (1.5, 40.0),
     "focal_px": (400.0, 1500.0),
     "aperture_mm": (0.3, 2.0),
     "lens_travel_mm": (0.0, 0.6),
@@ -126,6 +126,7 @@ def test_grids_shrink_around_the_best_of_each_band() -> None:
 
     def nearest(mid: np.ndarray, spread: np.ndarray, mirror: np.ndarray, _: np.ndarray) -> Best:
         asked.append(np.array([np.ptp(axis, axis=1).max() for axis in (mid, spread, mirror)]))
+        assert all((np.diff(axis, axis=1) >= 0).all() for axis in (mid, spread, mirror))
         found = []
         for grid in range(len(mid)):
             target = targets[grid % len(targets)]

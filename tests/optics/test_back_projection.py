@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 from camera_cases import HEIGHT, WIDTH, finger_camera, random_pose, traced
+from scipy.interpolate import RegularGridInterpolator
 
+from gelslim_optics.camera import back_projection
 from gelslim_optics.camera.back_projection import HeightGrid
 from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.virtual_camera import VirtualCamera
@@ -171,3 +173,92 @@ def test_default_heights_need_a_gel() -> None:
 def test_bad_height_grids_are_refused(x: list, y: list, z: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         HeightGrid(x, y, z)
+
+
+def steps_to(
+    surface: HeightGrid, pixels: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> tuple[int, np.ndarray]:
+    """How often rays are followed to a height, and where they end."""
+    followed = [0]
+    original = back_projection.points_along
+
+    def counted(*arguments: object) -> np.ndarray:
+        followed[0] += 1
+        return original(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(back_projection, "points_along", counted)
+        found = finger_camera().backproject(pixels, surface)
+    return followed[0], found
+
+
+def test_a_gentle_surface_needs_few_steps_and_a_steep_one_a_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Rays steeper than the grid anywhere cross it once; others are followed height by height."""
+    camera = finger_camera()
+    pixels = camera.project(np.column_stack([np.linspace(-5, 5, 9), np.zeros(9), np.zeros(9)]))
+    slopes = camera.pixel_slopes(pixels)
+    size = np.hypot(*slopes.T).max()
+    # Steepest ray in the layer of the smallest index, 1.41.
+    in_gel = size / math.sqrt(1.41**2 + (1.41**2 - 1) * size**2)
+    # Flatter than 0.9 of the ray, the margin that is kept.
+    for share, searched in ((0.88, False), (0.92, True)):
+        rise = share / in_gel
+        axis = np.array([-20.0, 0.0, 0.4, 20.0])
+        heights = np.array([-0.4 * rise, -0.4 * rise, 0.0, 0.0])
+        grid = HeightGrid(axis, [-15.0, 15.0], np.tile(heights, (2, 1)))
+        count, found = steps_to(grid, pixels, monkeypatch)
+        assert (count > back_projection.LEVELS) == searched
+        assert count < back_projection.LEVELS + 20
+        np.testing.assert_allclose(found[:, 2], grid(found[:, 0], found[:, 1]), atol=1e-12)
+    in_window = HeightGrid([-20.0, 20.0], [-15.0, 15.0], np.full((2, 2), -4.6))
+    assert steps_to(in_window, pixels, monkeypatch)[0] > back_projection.LEVELS
+
+
+def test_heights_are_searched_from_the_gels_back_to_a_gel_above_it() -> None:
+    camera = finger_camera()
+    pixel = camera.project([[1.0, 0.5, 0.0]])
+    # The gel is 2 mm thick with its face at 0.
+    for height in (-1.99, 1.99):
+        found = camera.backproject(pixel, lambda x, y, z=height: 0 * x + z)
+        assert found[0, 2] == pytest.approx(height)
+    for height in (-2.01, 2.01):
+        with pytest.raises(ValueError, match="1 of 1 pixels"):
+            camera.backproject(pixel, lambda x, y, z=height: 0 * x + z)
+
+
+def test_the_edge_of_a_grid_belongs_to_it_and_a_micron_beyond_does_not() -> None:
+    grid = HeightGrid([0.0, 2.0], [1.0, 4.0], np.zeros((2, 2)))
+    for x, y, inside in (
+        (0.0, 1.0, True), (2.0, 4.0, True), (-1e-3, 2.0, False), (2.001, 2.0, False),
+        (1.0, 0.999, False), (1.0, 4.001, False), (-5e-10, 4.0 + 5e-10, True),
+    ):  # fmt: skip
+        assert bool(grid.contains(x, y)) == inside
+    assert bool(grid.contains(-0.05, 2.0, 0.1))
+
+
+def test_uneven_grids_are_bilinear_and_bound_their_gradient() -> None:
+    rng = np.random.default_rng(12)
+    x, y = np.array([-4.0, -1.0, 0.5, 5.0]), np.array([-3.0, 0.0, 1.0])
+    grid = HeightGrid(x, y, rng.normal(0, 1, (3, 4)))
+    truth = RegularGridInterpolator((y, x), grid.z_mm)
+    at = rng.uniform((-4, -3), (5, 1), (300, 2))
+    np.testing.assert_allclose(grid(*at.T), truth(at[:, ::-1]), atol=1e-13)
+    h = 1e-6
+    inner = at[
+        (at > np.array([-3.99, -2.99])).all(axis=1) & (at < np.array([4.9, 0.9])).all(axis=1)
+    ]
+    gx = (grid(inner[:, 0] + h, inner[:, 1]) - grid(*inner.T)) / h
+    gy = (grid(inner[:, 0], inner[:, 1] + h) - grid(*inner.T)) / h
+    assert np.hypot(gx, gy).max() <= grid.max_gradient + 1e-6
+    along = max(abs(np.diff(row) / np.diff(x)).max() for row in grid.z_mm)
+    across = max(abs(np.diff(column) / np.diff(y)).max() for column in grid.z_mm.T)
+    assert grid.max_gradient == pytest.approx(math.hypot(along, across))
+
+
+def test_a_surface_that_jumps_back_and_forth_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(back_projection, "MAX_STEPS", 3)
+    pixels = finger_camera().project([[1.0, 0.5, 0.0]])
+    with pytest.raises(ValueError, match="do not converge"):
+        finger_camera().backproject(pixels, dent)

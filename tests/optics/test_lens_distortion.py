@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gelslim_optics.camera import lens_distortion, undistort_kernel
 from gelslim_optics.camera.lens_distortion import LensDistortion
 
 LENSES = [
@@ -13,6 +14,9 @@ LENSES = [
     LensDistortion(k1=-0.2),
     LensDistortion(k1=0.15, k2=-0.05),
     LensDistortion(p1=0.01, p2=0.02),
+    # Newton's full steps leave the disc near its rim: they must be halved up to four times.
+    LensDistortion(k1=0.72, k2=0.17, p1=0.0315, p2=-0.0087, k3=-0.196),
+    LensDistortion(k1=0.7, k2=-0.25, p1=0.012, p2=-0.019, k3=-0.05),
 ]
 
 
@@ -142,3 +146,78 @@ def test_the_compiled_steps_find_what_the_careful_ones_do() -> None:
         keep = np.arange(200) != 3
         assert np.abs(whole - one_by_one)[keep].max() < 1e-14
         assert np.abs(whole - true)[keep].max() < 1e-13
+
+
+def compiled(lens: LensDistortion, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    coefficients = np.array([lens.k1, lens.k2, lens.k3, lens.p1, lens.p2])
+    out, converged = np.full_like(seen, 7.0), np.zeros(len(seen), dtype=bool)
+    undistort_kernel.undistort(seen, coefficients, lens.monotone_radius, out, converged)
+    return out, converged
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_compiled_steps_converge_by_themselves_where_the_lens_bends_little(
+    lens: LensDistortion,
+) -> None:
+    """Their derivative is exact, or they would not reach the last digits in a few steps."""
+    true = disc(0.35 * min(lens.monotone_radius, 1.0), 300, seed=3)
+    found, converged = compiled(lens, lens.distort(true))
+    assert converged.all()
+    np.testing.assert_allclose(found, true, atol=2e-15)
+
+
+def test_compiled_steps_need_few_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's method doubles the digits in each step, by the plain function as well."""
+    monkeypatch.setattr(lens_distortion, "MAX_NEWTON_STEPS", 6)
+    for lens in LENSES:
+        true = disc(0.35 * min(lens.monotone_radius, 1.0), 40, seed=4)
+        np.testing.assert_allclose(lens.undistort(lens.distort(true)), true, atol=4e-15)
+
+
+def test_compiled_steps_refuse_what_lies_beyond_the_disc() -> None:
+    """A radial lens has a second, wrong solution beyond the fold."""
+    lens = LensDistortion(k1=-0.2)
+    beyond = 1.05 * lens.monotone_radius * _circle(16)
+    seen = beyond * (1 - 0.2 * (1.05 * lens.monotone_radius) ** 2)
+    for start in (seen, beyond):
+        found, converged = compiled(lens, np.ascontiguousarray(start))
+        inside = np.hypot(*found.T) < lens.monotone_radius
+        assert not (converged & ~inside).any()
+
+
+def test_few_points_need_no_compiled_steps_and_many_take_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[int] = []
+
+    def spy(target: np.ndarray, *_: object) -> None:
+        asked.append(len(target))
+
+    monkeypatch.setattr(undistort_kernel, "undistort", spy)
+    monkeypatch.setattr(lens_distortion, "BLOCK", 7)
+    lens = LENSES[1]
+    for count in (63, 64, 100):
+        true = disc(0.5, count, seed=5)
+        np.testing.assert_allclose(lens.undistort(lens.distort(true)), true, atol=1e-14)
+    assert asked == [64, 100]
+
+
+def test_monotone_radius_is_the_first_at_which_the_map_is_no_longer_convex() -> None:
+    """Against the least eigenvalue over directions and along the radius, in small steps."""
+    rng = np.random.default_rng(6)
+    for _ in range(12):
+        k1, k2, k3 = rng.normal(0, 0.3, 3)
+        lens = LensDistortion(k1, k2, k3=k3)
+        rho = np.linspace(0, 3, 30_001)
+        square = rho**2
+        around = 1 + square * (k1 + square * (k2 + square * k3))
+        outward = 1 + square * (3 * k1 + square * (5 * k2 + square * 7 * k3))
+        lost = np.flatnonzero(np.minimum(around, outward) <= 0)
+        expected = rho[lost[0]] if len(lost) else np.inf
+        if expected < np.inf or lens.monotone_radius < 3:
+            assert lens.monotone_radius == pytest.approx(expected, abs=2e-4)
+        p = 0.03
+        bent = LensDistortion(k1, k2, 0.6 * p, 0.8 * p, k3)
+        lost = np.flatnonzero(np.minimum(around, outward) <= 6 * p * rho)
+        if len(lost):
+            assert bent.monotone_radius == pytest.approx(rho[lost[0]], abs=2e-4)

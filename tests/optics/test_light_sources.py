@@ -44,7 +44,16 @@ def test_a_measured_law_of_cosines_is_lambertian() -> None:
 
 @pytest.mark.parametrize(
     ("angles", "values"),
-    [((0.0,), (1.0,)), ((5.0, 10.0), (1.0, 1.0)), ((0.0, 95.0), (1.0, 1.0)), ((0.0, 9.0), (0, 0))],
+    [
+        ((0.0,), (1.0,)),
+        ((5.0, 10.0), (1.0, 1.0)),
+        ((0.0, 95.0), (1.0, 1.0)),
+        ((0.0, 9.0), (0, 0)),
+        ((0.0, 9.0), (1.0, -0.5)),
+        ((0.0, 9.0), (1.0, math.inf)),
+        ((0.0, 9.0, 9.0), (1, 1, 1)),
+        ((0.0, 9.0), (1.0, 1.0, 1.0)),
+    ],
 )
 def test_bad_tables_are_refused(angles: tuple, values: tuple) -> None:
     with pytest.raises(ValueError, match=r"angle|intensity|intensities"):

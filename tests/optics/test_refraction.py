@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from gelslim_optics.camera.rays import ray_slope
-from gelslim_optics.camera.refraction import lateral_reach, reach_growth
+from gelslim_optics.camera import rays, refraction_kernel, refraction_newton
+from gelslim_optics.camera.rays import as_points, check_above, ray_slope
+from gelslim_optics.camera.refraction import Layer, LayerStack, lateral_reach, reach_growth
 from gelslim_optics.camera.refraction_newton import newton_slope
 
 LAYERS = [
@@ -226,3 +227,90 @@ def test_layers_that_make_no_sense_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         ray_slope(reach, heights, indices)
+
+
+def test_short_arrays_take_the_plain_way_and_long_ones_the_compiled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    taken: list[str] = []
+
+    def spy(name: str, module: object) -> None:
+        original = getattr(module, name)
+
+        def noted(*arguments: object) -> object:
+            taken.append(name)
+            return original(*arguments)
+
+        monkeypatch.setattr(module, name, noted)
+
+    spy("newton_slope", rays)
+    spy("newton_rays", rays)
+    spy("solve_slopes", refraction_kernel)
+    spy("solve_rays", refraction_kernel)
+    for size, expected in ((19_999, "newton_slope"), (20_000, "solve_slopes")):
+        ray_slope(np.linspace(-3, 3, size), [5.0, 2.0], [1.0, 1.5])
+        assert taken == [expected]
+        taken.clear()
+    stack = LayerStack.above(-20.0, -4.0, (Layer(2.0, 1.5), Layer(2.0, 1.4)))
+    pinhole = np.array([0.3, -0.2, -20.0])
+    for size, expected in ((19_999, "newton_rays"), (20_000, "solve_rays")):
+        points = np.column_stack([np.linspace(-3, 3, size), np.ones(size), np.zeros(size)])
+        found = rays.rays_on_axes(pinhole, stack, np.eye(3), points)
+        assert taken[0] == expected
+        taken.clear()
+        # The same rays by the other function, point by point.
+        some = slice(0, size, 1111)
+        slopes = rays.air_slopes(pinhole, stack, points[some])
+        np.testing.assert_allclose(found[some], np.column_stack([slopes, np.ones(len(slopes))]))
+        taken.clear()
+
+
+@pytest.mark.parametrize(("heights", "indices"), [*LAYERS, *GRAZING])
+def test_newton_needs_few_steps_because_it_starts_near_the_root(
+    heights: list[float], indices: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slopes = np.geomspace(1e-3, 1e7, 60)
+    reaches = lateral_reach(slopes, heights, indices)
+    steps = 7 if heights[0] >= 0.5 else 16
+    monkeypatch.setattr(refraction_newton, "MAX_NEWTON_STEPS", steps)
+    angles = np.arctan(ray_slope(reaches, heights, indices))
+    np.testing.assert_allclose(angles, np.arctan(slopes), rtol=0, atol=1e-12)
+
+
+def test_reaches_up_to_the_limit_are_solved_and_above_it_refused() -> None:
+    air = np.array([2.0, 5.0])
+    assert np.isfinite(ray_slope(air * 0.99e150, [air, 2.0], [1.0, 1.5])).all()
+    with pytest.raises(ValueError, match="limit"):
+        ray_slope(air * [0.5e150, 1.01e150], [air, 2.0], [1.0, 1.5])
+    with pytest.raises(ValueError, match="limit"):
+        ray_slope([1.0, -1e151], [5.0, 2.0], [1.0, 1.5])
+    # An index of 1 and a layer of no height are the least that is allowed.
+    assert ray_slope(3.0, [2.0, 0.0, 1.0], [1.0, 1.0, 1.0]) == pytest.approx(1.0)
+
+
+def test_points_have_three_coordinates() -> None:
+    assert as_points([1.0, 2.0, 3.0]).shape == (1, 3)
+    assert as_points(np.zeros((5, 3))).shape == (5, 3)
+    for wrong in (np.zeros((5, 2)), np.zeros((2, 5, 3)), np.zeros(4)):
+        with pytest.raises(ValueError, match="shape"):
+            as_points(wrong)
+    check_above(np.array([0.0, 0.0, -2.0]), np.array([-1.999, 3.0, np.nan]))
+    for low in (-2.0, -2.5):
+        with pytest.raises(ValueError, match="1 of 2 points"):
+            check_above(np.array([0.0, 0.0, -2.0]), np.array([low, 3.0]))
+
+
+def test_a_stack_knows_its_media_at_every_height() -> None:
+    stack = LayerStack.above(-20.0, -4.5, (Layer(2.5, 1.49), Layer(2.0, 1.41)))
+    assert stack.tops_mm == (-4.5, -2.0, math.inf)
+    assert stack.indices == (1.0, 1.49, 1.41)
+    z = np.array([-19.0, -4.5, -3.0, -2.0, 0.0, 5.0])
+    np.testing.assert_array_equal(stack.index_at(z), [1.0, 1.49, 1.49, 1.41, 1.41, 1.41])
+    crossed = np.array(stack.crossed_mm(z))
+    np.testing.assert_allclose(crossed[0], [1.0, 15.5, 15.5, 15.5, 15.5, 15.5])
+    np.testing.assert_allclose(crossed[1], [0, 0, 1.5, 2.5, 2.5, 2.5])
+    np.testing.assert_allclose(crossed[2], [0, 0, 0, 0, 2.0, 7.0])
+    for wrong in ((-1e-9, 1.4), (math.inf, 1.4), (1.0, 0.999), (1.0, math.nan)):
+        with pytest.raises(ValueError, match="of a layer must be"):
+            Layer(*wrong)
+    assert Layer(0.0, 1.0).thickness_mm == 0

@@ -145,3 +145,56 @@ def test_two_by_two_points_fix_a_homography() -> None:
 def test_bad_requests_are_refused(call: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call(finger_camera())
+
+
+def test_pad_axes_count_cells_that_fit_to_rounding() -> None:
+    # 0.3 / 0.1 is a little below 3, 0.7 / 0.1 a little below 7, 2.1 / 0.7 a little above 3.
+    for size, pitch, cells in ((0.3, 0.1, 3), (0.7, 0.1, 7), (2.1, 0.7, 3), (1.0, 0.3, 4)):
+        x, y = pad_axes(size, 5 * pitch, pitch)
+        assert (len(x), len(y)) == (cells + 1, 6)
+        np.testing.assert_allclose(np.diff(x), size / cells)
+    assert pad_axes(1.0, 2.0, 5.0)[0].tolist() == [-0.5, 0.5]
+    for wrong in ((0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 0.0)):
+        with pytest.raises(ValueError, match="positive"):
+            pad_axes(*wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [([0.0, np.inf], [1.0], 0.0), ([0.0], [np.nan, 1.0], 0.0), ([0.0], [1.0], np.nan),
+     ([], [1.0], 0.0), ([1.0], [], 0.0), ([[0.0, 1.0]], [1.0], 0.0), ([0.0], [[1.0, 2.0]], 0.0)],
+)  # fmt: skip
+def test_axes_and_height_of_a_grid_are_finite_and_plain(wrong: tuple) -> None:
+    with pytest.raises(ValueError, match="grid axes"):
+        grid_points(*wrong)
+
+
+def test_points_of_a_grid_run_along_x_first() -> None:
+    x, y, points = grid_points([1.0, 2.0, 4.0], 7.0, -0.3)
+    assert (x.tolist(), y.tolist()) == ([1, 2, 4], [7])
+    np.testing.assert_array_equal(points, [[1, 7, -0.3], [2, 7, -0.3], [4, 7, -0.3]])
+    _, _, points = grid_points([1.0, 2.0], [3.0, 5.0])
+    np.testing.assert_array_equal(points[:, :2], [[1, 3], [2, 3], [1, 5], [2, 5]])
+
+
+def test_blur_off_the_plane_of_the_fold_is_that_of_the_worse_image() -> None:
+    """By the heights r/t and dr/dt at which rays side by side and one above another meet."""
+    camera = finger_camera()
+    x, y, z = [-7.0, 3.0], [-6.0, 8.0], -0.3
+    blur = blur_map(camera, x, y, 1.3, 33.0, z)
+    for i, at_x in enumerate(x):
+        for j, at_y in enumerate(y):
+            dx, dy = camera.air_slopes([[at_x, at_y, z]])[0]
+            t = math.hypot(dx, dy)
+            heights = [-4.5 - camera.position_mm[2], 2.5, 2.0 + z]
+
+            def reach(slope: float, heights: list[float] = heights) -> float:
+                sines = [math.sin(math.atan(slope)) / n for n in (1.0, 1.4906, 1.41)]
+                return sum(
+                    h * s / math.sqrt(1 - s * s) for h, s in zip(heights, sines, strict=True)
+                )
+
+            images = (reach(t) / t, (reach(t + 1e-5) - reach(t - 1e-5)) / 2e-5)
+            along_axis = np.array([dx, dy, 1.0]) @ camera.forward
+            expected = max(1.3 * abs(h * along_axis - 33.0) / 33.0 for h in images)
+            assert blur[j, i] == pytest.approx(expected, rel=1e-7)
