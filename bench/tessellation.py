@@ -78,8 +78,7 @@ def stl_rows(parts: Parts, rungs: Sequence[Tolerances], repeats: int) -> list[di
         chosen = [(linear, angular)] * len(parts)
         rows.append(row(named(linear, angular), parts, chosen, cpu_s, files))
     files, cpu_s = timed(partial(built_stl_files, parts), repeats)
-    found = [mesh_for(p.solid, VOLUME_TOLERANCE)[1] for p in parts]
-    chosen = [(t.linear_mm, t.angular_deg) for t in found]
+    chosen = [mesh_for(p.solid, VOLUME_TOLERANCE)[1] for p in parts]
     return [*rows, row("as built", parts, chosen, cpu_s, files)]
 
 

@@ -256,7 +256,7 @@ def _key(part: Part) -> str:
 
 def _inputs(unit: Unit) -> tuple[Any, ...]:
     """All inputs of a unit of work except the solids of the finger's parts."""
-    return unit.kind, repr(unit.options), unit.content, tuple(p.part.name for p in unit.parts)
+    return unit.kind, repr(unit.options), tuple(p.part.name for p in unit.parts)
 
 
 def _change(name: str, before: Part | None, after: Part | None) -> PartChange:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from gelslim_cad.build.instructions import build_guide
 from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
 from gelslim_cad.build.page import report_data
+from gelslim_cad.build.work import Files
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.write import render_marker_files
 from gelslim_cad.report.render import render_report
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from gelslim_cad.build.stages import Plan, Stages
 
 
-Documents = dict[str, tuple[bytes, str]]
 DENSITY_G_CM3 = {
     "tough resin": 1.15,
     "PETG": 1.27,
@@ -39,7 +39,7 @@ def documents(
     contents: Mapping[str, bytes],
     files: Mapping[str, FileEntry],
     missing: str,
-) -> Documents:
+) -> Files:
     """Everything that is quick to write: markers, tables, instructions, report.
 
     `contents` are those of the built files by path, `files` their entries; `missing` says why
@@ -56,7 +56,7 @@ def documents(
         "dimensions": {name: d.record(name) for name in d.values},
     }
     markers = render_marker_files(grid, *marker_print(d, grid))
-    made: Documents = {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
+    made: Files = {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
     made |= {
         "spec.yaml": (stages.loaded.text.encode(), "the spec this was built from"),
         "dimensions.json": (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -44,15 +44,7 @@ class Manifest:
             "key": self.key,
             "versions": dict(self.versions),
             "units": dict(sorted(self.units.items())),
-            "files": {
-                path: {
-                    "sha256": e.sha256,
-                    "size_bytes": e.size_bytes,
-                    "purpose": e.purpose,
-                    "unit": e.unit,
-                }
-                for path, e in sorted(self.files.items())
-            },
+            "files": {path: asdict(e) for path, e in sorted(self.files.items())},
             "proofs": [dict(p) for p in self.proofs],
         }
         return json_bytes(content)

@@ -19,7 +19,6 @@ from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.shapes import Hole, single
 
-INTERFERENCE_MM3 = 1e-3
 UNDERCUT_MM2 = 1e-3
 LEAST_WALL_MM = 3.0
 """Between the cavity and the nearest hole: the wall holds liquid silicone and a clamp's force."""
@@ -39,11 +38,10 @@ OPENING_MM = 1e-6
 
 def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
     """Line of sight past the actual solids, and interference between all pairs of parts."""
-    from gelslim_cad.build.solid_checks import blocked_volumes
-    from gelslim_cad.proof.solids import interferences
+    from gelslim_cad.proof.solids import TOLERANCE_MM3, interferences
 
     blocked = blocked_volumes(d, parts)
-    pairs = interferences(parts, tolerance_mm3=INTERFERENCE_MM3)
+    pairs = interferences(parts)
     return (
         _check(
             ("view.line_of_sight", "View from gel over mirror to camera is free"),
@@ -53,7 +51,7 @@ def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
         ),
         _check(
             ("assembly.interference", "No two parts share space"),
-            (sum(p.volume_mm3 for p in pairs), INTERFERENCE_MM3, "mm³"),
+            (sum(p.volume_mm3 for p in pairs), TOLERANCE_MM3, "mm³"),
             "; ".join(f"{p.first} and {p.second} share {p.volume_mm3:.3f} mm³" for p in pairs),
             ("design.housing.fit_clearance_mm", "give the parts more room"),
         ),
@@ -62,7 +60,6 @@ def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
 
 def check_mould(d: Dimensions) -> tuple[Check, ...]:
     """Undercut of the cavity, thickness of its walls, webs between the lid's openings, vents."""
-    from gelslim_cad.build.solid_checks import undercut_area_mm2
     from gelslim_cad.solids.tooling.mould import cavity_in_mould, plan_mould
 
     plan = plan_mould(d)

@@ -179,9 +179,9 @@ def _gathered(
                 contents[path] = (target / path).read_bytes()
                 files[path] = previous.files[path]
             continue
-        for path, data in written[name].files.items():
+        for path, (data, purpose) in written[name].files.items():
             contents[path] = data
-            files[path] = entry(data, written[name].purposes[path], name)
+            files[path] = entry(data, purpose, name)
     return contents, files
 
 

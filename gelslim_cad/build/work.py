@@ -12,7 +12,8 @@ from typing import Any
 from gelslim_cad.build.fingerprint import code_hash, combined
 from gelslim_cad.geometry.part import Part
 
-Files = dict[str, bytes]
+Files = dict[str, tuple[bytes, str]]
+"""Content and purpose of files by their path."""
 VOLUME_TOLERANCE = 2e-4
 """Largest volume error of meshes for printing; smaller than the proof's limit, for smooth arcs."""
 
@@ -22,7 +23,6 @@ class Written:
     """Files that a unit wrote, and the results of their checks."""
 
     files: Files
-    purposes: dict[str, str]
     proofs: tuple[dict[str, Any], ...] = ()
     note: str = ""
     """Why a file could not be made, where the design is not the reason."""
@@ -74,15 +74,12 @@ class Unit:
     kind: str
     parts: tuple[PackedPart, ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
-    content: str = ""
-    """Key of inputs that are not parts."""
     cost: float = field(default=1.0, compare=False)
 
     def key(self) -> str:
         """Key of everything that shapes the unit's files."""
-        return combined(
-            code_hash(), self.kind, repr(self.options), self.content, *(p.key() for p in self.parts)
-        )
+        keys = (p.key() for p in self.parts)
+        return combined(code_hash(), self.kind, repr(self.options), *keys)
 
 
 def run(unit: Unit) -> Written:

@@ -23,6 +23,8 @@ LEDGER_LIMIT = 1e-9
 LOST_LIMIT = 1e-9
 
 Proofs = list[Any]
+Provers = dict[str, Callable[[Path], Proofs]]
+"""What reads a file back and checks it, by the file's suffix."""
 
 
 def write_part(parts: Sequence[Part]) -> Written:
@@ -32,15 +34,13 @@ def write_part(parts: Sequence[Part]) -> Written:
 
     (part,) = parts
     folder = "mould" if "mould" in part.tags else "step"
-    files: Files = {f"{folder}/{part.name}.step": step_bytes(part)}
-    purposes = {f"{folder}/{part.name}.step": "exact solid, AP242"}
-    provers: dict[str, Callable[[Path], Proofs]] = {".step": lambda path: prove_step(path, part)}
+    files: Files = {f"{folder}/{part.name}.step": (step_bytes(part), "exact solid, AP242")}
+    provers: Provers = {".step": lambda path: prove_step(path, part)}
     if part.process == "print":
-        provers |= _meshes(part, files, purposes)
+        provers |= _meshes(part, files)
     if part.process in ("laser", "cut"):
-        provers |= _outline(part, files, purposes)
-    proofs = _on_disk(files, lambda path: provers[path.suffix](path))
-    return Written(files, purposes, proofs)
+        provers |= _outline(part, files)
+    return Written(files, _on_disk(files, lambda path: provers[path.suffix](path)))
 
 
 def write_assembly(parts: Sequence[Part], name: str) -> Written:
@@ -48,10 +48,9 @@ def write_assembly(parts: Sequence[Part], name: str) -> Written:
     from gelslim_cad.export.step import step_bytes
     from gelslim_cad.proof.step import prove_step
 
-    path = f"step/{name}_assembly.step"
-    files = {path: step_bytes(parts, name=name)}
-    proofs = _on_disk(files, lambda written: prove_step(written, parts))
-    return Written(files, {path: "assembly with names and colours, AP242"}, proofs)
+    data = step_bytes(parts, name=name)
+    files: Files = {f"step/{name}_assembly.step": (data, "assembly with names and colours, AP242")}
+    return Written(files, _on_disk(files, lambda written: prove_step(written, parts)))
 
 
 def write_glb(parts: Sequence[Part], name: str) -> Written:
@@ -59,10 +58,9 @@ def write_glb(parts: Sequence[Part], name: str) -> Written:
     from gelslim_cad.export.glb import glb_bytes
     from gelslim_cad.proof.mesh import prove_glb
 
-    path = f"{name}.glb"
-    files = {path: glb_bytes(parts, linear_mm=GLB_LINEAR_MM, angular_deg=GLB_ANGULAR_DEG)}
-    proofs = _on_disk(files, lambda written: prove_glb(written, parts))
-    return Written(files, {path: "coloured mesh of the assembly, metres"}, proofs)
+    data = glb_bytes(parts, linear_mm=GLB_LINEAR_MM, angular_deg=GLB_ANGULAR_DEG)
+    files: Files = {f"{name}.glb": (data, "coloured mesh of the assembly, metres")}
+    return Written(files, _on_disk(files, lambda written: prove_glb(written, parts)))
 
 
 def write_pictures(parts: Sequence[Part]) -> Written:
@@ -82,8 +80,8 @@ def write_pictures(parts: Sequence[Part]) -> Written:
             "pictures/section_across.png": finger_pictures.picture_section(meshes, "x", SECTION_MM),
         }
     except finger_pictures.PictureError as error:
-        return Written({}, {}, note=str(error))
-    return Written(files, dict.fromkeys(files, "picture"))
+        return Written({}, note=str(error))
+    return Written({path: (data, "picture") for path, data in files.items()})
 
 
 def write_mould(parts: Sequence[Part], scale: float) -> Written:
@@ -91,8 +89,7 @@ def write_mould(parts: Sequence[Part], scale: float) -> Written:
     from gelslim_cad.proof.solids import prove_mould
 
     cavity, gel = parts
-    results = prove_mould(cavity.solid, gel.solid, scale)
-    return Written({}, {}, _recorded(results))
+    return Written({}, _recorded(prove_mould(cavity.solid, gel.solid, scale)))
 
 
 def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
@@ -114,8 +111,12 @@ def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
         write_bundle(folder, bundle)
         load_bundle(folder, verify=True)
         write_vtu(folder / "pad.vtu", mesh)
-        files = {f"bundle/{p.name}": p.read_bytes() for p in sorted(folder.iterdir())}
-    return Written(files, dict.fromkeys(files, "sensor bundle"))
+        return Written(
+            {
+                f"bundle/{p.name}": (p.read_bytes(), "sensor bundle")
+                for p in sorted(folder.iterdir())
+            }
+        )
 
 
 def write_light(parts: Sequence[Part], **values: Any) -> Written:
@@ -124,24 +125,21 @@ def write_light(parts: Sequence[Part], **values: Any) -> Written:
     from gelslim_cad.light.study import study_light, study_record
 
     study = study_light(values)
-    files = {
-        LIGHT_JSON: json_bytes(study_record(study)),
-        "pictures/light_paths.png": paths_png(values),
-        "pictures/irradiance.png": irradiance_png(values, study),
-        "pictures/light_ratio.png": ratio_png(study),
+    record = json_bytes(study_record(study))
+    files: Files = {
+        LIGHT_JSON: (record, "light guide: certificate, flux ledger, comparison, exposure"),
+        "pictures/light_paths.png": (paths_png(values), "picture of the light"),
+        "pictures/irradiance.png": (irradiance_png(values, study), "picture of the light"),
+        "pictures/light_ratio.png": (ratio_png(study), "picture of the light"),
     }
-    purposes = dict.fromkeys(files, "picture of the light")
-    purposes[LIGHT_JSON] = "light guide: certificate, flux ledger, comparison, exposure"
-    return Written(files, purposes, _light_proofs(study))
+    return Written(files, _light_proofs(study))
 
 
 def write_view(parts: Sequence[Part], **values: Any) -> Written:
     """Map of the projection errors; `values` are `view_inputs`."""
     from gelslim_cad.report.view_figures import projection_png
 
-    return Written(
-        {ERROR_PICTURE: projection_png(values)}, {ERROR_PICTURE: "picture of the projection error"}
-    )
+    return Written({ERROR_PICTURE: (projection_png(values), "picture of the projection error")})
 
 
 def _light_proofs(study: Any) -> tuple[dict[str, Any], ...]:
@@ -164,37 +162,37 @@ def _light_proof(check: str, ok: bool, value: float, detail: str) -> dict[str, A
     return {"file": LIGHT_JSON, "check": check, "ok": ok, "value": rounded, "detail": detail}
 
 
-def _meshes(
-    part: Part, files: Files, purposes: dict[str, str]
-) -> dict[str, Callable[[Path], Proofs]]:
+def _meshes(part: Part, files: Files) -> Provers:
     from gelslim_cad.export.mesh import mesh_for, print_mesh
-    from gelslim_cad.export.print_files import NamedMesh, stl_bytes, threemf_bytes
+    from gelslim_cad.export.print_files import stl_bytes, threemf_bytes
     from gelslim_cad.proof.mesh import prove_3mf, prove_stl
 
-    mesh, rung = mesh_for(part.solid, VOLUME_TOLERANCE)
+    mesh, _ = mesh_for(part.solid, VOLUME_TOLERANCE)
     placed = print_mesh(mesh, part.print_rotation_deg)
     stem = f"{'mould' if 'mould' in part.tags else 'print'}/{part.name}"
-    named = NamedMesh(part.name, placed, part.material, part.colour)
-    files[f"{stem}.stl"] = stl_bytes(placed)
-    files[f"{stem}.3mf"] = threemf_bytes(named)
-    purposes[f"{stem}.stl"] = f"print orientation, mm, {rung.triangles} triangles"
-    purposes[f"{stem}.3mf"] = "print orientation, with unit and colour"
+    files[f"{stem}.stl"] = (
+        stl_bytes(placed),
+        f"print orientation, mm, {len(mesh.faces)} triangles",
+    )
+    files[f"{stem}.3mf"] = (
+        threemf_bytes(part.name, placed, part.material, part.colour),
+        "print orientation, with unit and colour",
+    )
     volume = float(part.solid.Volume())
     return {
         ".stl": lambda path: prove_stl(path, volume),
-        ".3mf": lambda path: prove_3mf(path, {part.name: volume}),
+        ".3mf": lambda path: prove_3mf(path, part.name, volume),
     }
 
 
-def _outline(
-    part: Part, files: Files, purposes: dict[str, str]
-) -> dict[str, Callable[[Path], Proofs]]:
+def _outline(part: Part, files: Files) -> Provers:
     from gelslim_cad.export.outline import flat_face, outline_dxf_bytes
     from gelslim_cad.proof.outline import prove_dxf
 
-    path = f"laser/{part.name}.dxf"
-    files[path] = outline_dxf_bytes(part.solid)
-    purposes[path] = f"cutting outline, R2010, mm; {part.material}"
+    files[f"laser/{part.name}.dxf"] = (
+        outline_dxf_bytes(part.solid),
+        f"cutting outline, R2010, mm; {part.material}",
+    )
     area = float(flat_face(part.solid).Area())
     return {".dxf": lambda written: prove_dxf(written, area)}
 
@@ -203,7 +201,7 @@ def _on_disk(files: Files, prove: Callable[[Path], Proofs]) -> tuple[dict[str, A
     """Write the files to a scratch folder, read each back and prove it there."""
     results: Proofs = []
     with scratch_folder() as scratch:
-        for path, data in files.items():
+        for path, (data, _) in files.items():
             target = scratch / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from gelslim_cad.export import ExportError
 from gelslim_cad.export.brep import bare_copy
 
-RUNGS = (
+Tolerances = tuple[float, float]
+RUNGS: tuple[Tolerances, ...] = (
     (0.20, 30.0),
     (0.10, 20.0),
     (0.05, 15.0),
@@ -115,46 +116,30 @@ def volume_mm3(mesh: TriangleMesh) -> float:
     return float(np.linalg.det(corners).sum() / 6.0)
 
 
-def area_mm2(mesh: TriangleMesh) -> float:
-    """Total area of the triangles."""
-    a, b, c = np.moveaxis(mesh.vertices_mm[mesh.faces], 1, 0)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0)
-
-
-@dataclass(frozen=True)
-class Tessellation:
-    """The rung that was chosen, its errors relative to the exact solid, and its triangles."""
-
-    linear_mm: float
-    angular_deg: float
-    volume_error: float
-    area_error: float
-    triangles: int
-
-
-def mesh_for(shape: Any, volume_tolerance: float = 1e-3) -> tuple[TriangleMesh, Tessellation]:
+def mesh_for(shape: Any, volume_tolerance: float = 1e-3) -> tuple[TriangleMesh, Tolerances]:
     """Mesh a solid on the coarsest rung from `FIRST` on that is closed and keeps its volume.
+
+    The rung comes with the mesh.
 
     Raises:
         ExportError: the solid has no positive volume, or no rung qualifies; the message says
             whether the mesh leaked or was too coarse.
     """
-    exact, area = float(shape.Volume()), float(shape.Area())
+    exact = float(shape.Volume())
     if not exact > 0:
         raise ExportError(f"tessellation: volume is {exact:g} mm3, must be > 0; solid inside out?")
     reason = ""
-    for linear, angular in RUNGS[FIRST:]:
-        mesh = tessellate(shape, linear, angular)
+    for rung in RUNGS[FIRST:]:
+        mesh = tessellate(shape, *rung)
         error = abs(volume_mm3(mesh) / exact - 1.0)
         bad = bad_edges(mesh)
         if len(bad):
             middle = np.round(mesh.vertices_mm[bad[0]].mean(axis=0), 3)
             reason = f"{len(bad)} edges are not shared by 2 faces, one at {middle.tolist()} mm"
         elif error > volume_tolerance:
-            reason = f"volume is off by {error:.2e} at {linear} mm / {angular} deg"
+            reason = f"volume is off by {error:.2e} at {rung[0]} mm / {rung[1]} deg"
         else:
-            area_error = abs(area_mm2(mesh) / area - 1.0)
-            return mesh, Tessellation(linear, angular, error, area_error, len(mesh.faces))
+            return mesh, rung
     raise ExportError(
         f"tessellation: no rung keeps the volume within {volume_tolerance:g}: {reason}; "
         "move features that only touch along an edge apart or into each other, keep a sphere's "

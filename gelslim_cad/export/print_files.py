@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Sequence
-from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from gelslim_cad.export import ExportError
 from gelslim_cad.export.mesh import TriangleMesh
 
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -32,32 +29,18 @@ HEADER = b"gelslim-cad binary STL, millimetres"
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-@dataclass(frozen=True)
-class NamedMesh:
-    """A mesh with its name, its material's name and its sRGB colour with alpha, 0 to 1."""
-
-    name: str
-    mesh: TriangleMesh
-    material: str
-    colour: tuple[float, float, float, float]
-
-
-def threemf_bytes(items: NamedMesh | Sequence[NamedMesh]) -> bytes:
-    """Write meshes as 3MF in mm, one object and one build item each.
+def threemf_bytes(
+    name: str, mesh: TriangleMesh, material: str, colour: tuple[float, float, float, float]
+) -> bytes:
+    """Write a mesh as 3MF in mm, with its name, its material's name and its sRGB colour.
 
     The archive carries no times; coordinates are written so that float32 survives.
-
-    Raises:
-        ExportError: nothing to write.
     """
-    chosen = [items] if isinstance(items, NamedMesh) else list(items)
-    if not chosen:
-        raise ExportError("3MF: 0 meshes given, at least 1 needed")
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         _add(archive, "[Content_Types].xml", _TYPES)
         _add(archive, "_rels/.rels", _RELATIONS)
-        _add(archive, "3D/3dmodel.model", _model(chosen))
+        _add(archive, "3D/3dmodel.model", _model(name, mesh, material, colour))
     return stream.getvalue()
 
 
@@ -69,32 +52,23 @@ def _add(archive: zipfile.ZipFile, path: str, text: str) -> None:
     archive.writestr(info, text.encode("utf-8"), compresslevel=6)
 
 
-def _model(items: Sequence[NamedMesh]) -> str:
-    bases = "\n".join(
-        f"<base name={quoteattr(i.material)} displaycolor={quoteattr(_hex(i.colour))}/>"
-        for i in items
-    )
-    objects = "\n".join(_object(number, item) for number, item in enumerate(items))
-    build = "\n".join(f'<item objectid="{number + 2}"/>' for number in range(len(items)))
-    return (
-        f'{_XML}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE}">\n<resources>\n'
-        f'<basematerials id="1">\n{bases}\n</basematerials>\n{objects}\n</resources>\n'
-        f"<build>\n{build}\n</build>\n</model>\n"
-    )
-
-
-def _object(number: int, item: NamedMesh) -> str:
+def _model(
+    name: str, mesh: TriangleMesh, material: str, colour: tuple[float, float, float, float]
+) -> str:
     vertices = "\n".join(
-        f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>'
-        for x, y, z in item.mesh.vertices_mm.tolist()
+        f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in mesh.vertices_mm.tolist()
     )
     triangles = "\n".join(
-        f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in item.mesh.faces.tolist()
+        f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist()
     )
     return (
-        f'<object id="{number + 2}" type="model" name={quoteattr(item.name)} pid="1" '
-        f'pindex="{number}">\n<mesh>\n<vertices>\n{vertices}\n</vertices>\n'
-        f"<triangles>\n{triangles}\n</triangles>\n</mesh>\n</object>"
+        f'{_XML}<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE}">\n<resources>\n'
+        f'<basematerials id="1">\n<base name={quoteattr(material)} '
+        f"displaycolor={quoteattr(_hex(colour))}/>\n</basematerials>\n"
+        f'<object id="2" type="model" name={quoteattr(name)} pid="1" pindex="0">\n'
+        f"<mesh>\n<vertices>\n{vertices}\n</vertices>\n"
+        f"<triangles>\n{triangles}\n</triangles>\n</mesh>\n</object>\n</resources>\n"
+        '<build>\n<item objectid="2"/>\n</build>\n</model>\n'
     )
 
 

@@ -49,7 +49,8 @@ def nearest_nodes(
     tree = cKDTree(nodes_mm[:, :2])
     distance, index = tree.query(positions_mm, k=list(range(1, count + 1)))
     tied = distance <= distance[:, :1] + _SAME_MM
-    chosen = np.where(tied, node_ids[index], np.iinfo(np.int64).max).min(axis=1)
+    ids = node_ids.astype(np.int64)
+    chosen = np.where(tied, ids[index], np.iinfo(np.int64).max).min(axis=1)
     return NearestNodes(node_id=chosen, distance_mm=distance[:, 0])
 
 

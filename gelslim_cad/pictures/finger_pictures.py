@@ -45,7 +45,6 @@ def picture_whole(meshes: Sequence[Mesh]) -> bytes:
 
     Raises:
         PictureError: VTK or a system library it needs is missing.
-        ValueError: a mesh is empty or not (n, 3) and (m, 3).
     """
     return _draw(meshes, ISO, explode=0.0)
 
@@ -62,7 +61,7 @@ def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0
     ValueError where the plane misses every part.
     """
     index = "xyz".index(axis)
-    spans = [(mesh[1][:, index].min(), mesh[1][:, index].max()) for mesh in _checked(meshes)]
+    spans = [(mesh[1][:, index].min(), mesh[1][:, index].max()) for mesh in meshes]
     if not any(low < at_mm < high for low, high in spans):
         low, high = min(s[0] for s in spans), max(s[1] for s in spans)
         raise ValueError(
@@ -74,31 +73,14 @@ def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0
 def _draw(
     meshes: Sequence[Mesh], view: View, explode: float, cut: tuple[int, float] | None = None
 ) -> bytes:
-    checked = _checked(meshes)
     window = render_window()
     scene = MeshScene(window, view, cut)
-    for number, (_, vertices, faces, rgba, shift) in enumerate(checked):
+    for number, (_, vertices, faces, rgba, shift) in enumerate(meshes):
         scene.add(vertices + explode * np.asarray(shift), faces, rgba, hatch_up=number % 2 == 0)
     try:
         return _png(scene.image(WIDTH_PX, OVERSAMPLING))
     finally:
         window.Finalize()
-
-
-def _checked(meshes: Sequence[Mesh]) -> list[Mesh]:
-    if not meshes:
-        raise ValueError("no meshes to draw")
-    checked = []
-    for name, vertices, faces, rgba, shift in meshes:
-        points = np.asarray(vertices, dtype=float)
-        cells = np.asarray(faces, dtype=np.int64)
-        for array, label in ((points, "vertices"), (cells, "faces")):
-            if array.ndim != 2 or array.shape[1] != 3 or not len(array):
-                raise ValueError(f"mesh {name!r}: {label} have shape {array.shape}, must be (n, 3)")
-        if not np.isfinite(points).all() or cells.min() < 0 or cells.max() >= len(points):
-            raise ValueError(f"mesh {name!r}: a vertex is not finite or a face names none")
-        checked.append((name, points, cells, rgba, shift))
-    return checked
 
 
 def render_window() -> Any:

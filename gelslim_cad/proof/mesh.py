@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.proof.result import ProofResult, at_most, equal
+from gelslim_cad.proof import ProofResult, at_most, equal, unreadable
 
 VOLUME_LIMIT = 1e-3
 GLB_LIMIT_MM = 0.25
@@ -23,27 +23,25 @@ def prove_stl(path: Path, volume_mm3: float) -> list[ProofResult]:
     try:
         mesh = trimesh.load_mesh(path, file_type="stl")
     except Exception as error:
-        return [_unreadable(path, error)]
+        return unreadable(path, error)
     return _prove_mesh(path.name, mesh, volume_mm3, "")
 
 
-def prove_3mf(path: Path, volumes_mm3: Mapping[str, float]) -> list[ProofResult]:
-    """Reread a 3MF: unit mm; each object by name watertight, volume (mm3) within 0.1 %."""
+def prove_3mf(path: Path, name: str, volume_mm3: float) -> list[ProofResult]:
+    """Reread a 3MF: unit mm; one object of that name, watertight, volume (mm3) within 0.1 %."""
     import trimesh
 
     try:
         scene = trimesh.load_scene(path, file_type="3mf")
     except Exception as error:
-        return [_unreadable(path, error)]
-    file = path.name
-    results = [equal(file, "unit is mm", scene.units == "millimeter", True, str(scene.units))]
-    meshes = _placed(scene)
-    results.append(equal(file, "objects", len(meshes), len(volumes_mm3)))
-    for name, volume in volumes_mm3.items():
-        results.append(equal(file, "name present", name in meshes, True, name))
-        if name in meshes:
-            results += _prove_mesh(file, meshes[name], volume, name)
-    return results
+        return unreadable(path, error)
+    file, meshes = path.name, _placed(scene)
+    results = [
+        equal(file, "unit is mm", scene.units == "millimeter", True, str(scene.units)),
+        equal(file, "objects", len(meshes), 1),
+        equal(file, "name present", name in meshes, True, name),
+    ]
+    return results + (_prove_mesh(file, meshes[name], volume_mm3, name) if name in meshes else [])
 
 
 def prove_glb(path: Path, parts: Sequence[Part]) -> list[ProofResult]:
@@ -55,7 +53,7 @@ def prove_glb(path: Path, parts: Sequence[Part]) -> list[ProofResult]:
     try:
         scene = trimesh.load_scene(path, file_type="glb")
     except Exception as error:
-        return [_unreadable(path, error)]
+        return unreadable(path, error)
     file = path.name
     meshes = _placed(scene)
     results = [equal(file, "meshes", len(meshes), len(parts))]
@@ -89,8 +87,3 @@ def _prove_mesh(file: str, mesh: Any, volume_mm3: float, name: str) -> list[Proo
         equal(file, "winding consistent", bool(mesh.is_winding_consistent), True, name),
         at_most(file, "volume", error, VOLUME_LIMIT, detail),
     ]
-
-
-def _unreadable(path: Path, error: Exception) -> ProofResult:
-    reason = f"{type(error).__name__}: {error}"
-    return equal(path.name, "readable", False, True, reason)

@@ -10,18 +10,10 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.proof.result import ProofResult, at_most
+from gelslim_cad.proof import ProofResult, at_most
 
 TOLERANCE_MM3 = 1e-3
 """A common volume up to this counts as touching: a Boolean leaves slivers on coincident faces."""
-
-
-@dataclass(frozen=True)
-class Common:
-    """Common volume of two solids in mm³, and the method that found it: exact or mesh."""
-
-    volume_mm3: float
-    method: str
 
 
 @dataclass(frozen=True)
@@ -31,30 +23,22 @@ class Interference:
     first: str
     second: str
     volume_mm3: float
-    method: str
 
 
-def interferences(
-    parts: Sequence[Part], *, tolerance_mm3: float = TOLERANCE_MM3
-) -> list[Interference]:
+def interferences(parts: Sequence[Part]) -> list[Interference]:
     """List the pairs of parts whose solids overlap; touching faces do not count.
 
     Pairs whose bounding boxes are apart are skipped.
     """
     found = []
-    for a, b in candidates(parts):
-        common = common_volume(parts[a].solid, parts[b].solid)
-        if not common.volume_mm3 <= tolerance_mm3:  # a volume that is not a number counts too
-            found.append(
-                Interference(parts[a].name, parts[b].name, common.volume_mm3, common.method)
-            )
-    return found
-
-
-def candidates(parts: Sequence[Part]) -> list[tuple[int, int]]:
-    """Pairs of indices whose axis-aligned boxes overlap by more than a touch."""
     boxes = [_box(p.solid) for p in parts]
-    return [(a, b) for a, b in combinations(range(len(parts)), 2) if not boxes[a].IsOut(boxes[b])]
+    for (a, box_a), (b, box_b) in combinations(zip(parts, boxes, strict=True), 2):
+        if box_a.IsOut(box_b):
+            continue
+        volume = common_volume(a.solid, b.solid)
+        if not volume <= TOLERANCE_MM3:  # a volume that is not a number counts too
+            found.append(Interference(a.name, b.name, volume))
+    return found
 
 
 def _box(shape: Any) -> Any:
@@ -66,8 +50,8 @@ def _box(shape: Any) -> Any:
     return box
 
 
-def common_volume(first: Any, second: Any) -> Common:
-    """Common volume of two solids.
+def common_volume(first: Any, second: Any) -> float:
+    """Common volume of two solids in mm³.
 
     A Boolean of the exact solids gives it. Where that fails or gives more than the smaller
     solid's volume, fine meshes of both are intersected instead.
@@ -76,8 +60,8 @@ def common_volume(first: Any, second: Any) -> Common:
     for fuzzy_mm in (0.0, 1e-5):
         volume = _boolean(first, second, fuzzy_mm)
         if volume is not None and -1e-6 * most <= volume <= most * (1 + 1e-6):
-            return Common(max(volume, 0.0), "exact")
-    return Common(_mesh_common(first, second), "mesh")
+            return max(volume, 0.0)
+    return _mesh_common(first, second)
 
 
 def _boolean(first: Any, second: Any, fuzzy_mm: float) -> float | None:
@@ -110,7 +94,6 @@ def _boolean(first: Any, second: Any, fuzzy_mm: float) -> float | None:
 
 def _mesh_common(first: Any, second: Any) -> float:
     import manifold3d
-    import numpy as np
 
     from gelslim_cad.export.mesh import tessellate
 
@@ -127,7 +110,7 @@ def _mesh_common(first: Any, second: Any) -> float:
 CAVITY_LIMIT = 1e-6
 
 
-def prove_mould(cavity: Any, gel: Any, scale: float, *, file: str = "mould") -> list[ProofResult]:
+def prove_mould(cavity: Any, gel: Any, scale: float) -> list[ProofResult]:
     """Check that a cavity is the gel scaled by `scale` (1 / (1 - shrinkage)), to 1e-6.
 
     Compared are volume, area and the principal moments of inertia, relative to the gel's times
@@ -140,9 +123,9 @@ def prove_mould(cavity: Any, gel: Any, scale: float, *, file: str = "mould") -> 
     inertia = max(_relative(c, g) for c, g in zip(_moments(cavity), moments, strict=True))
     shown = f"scale {scale:.9g}"
     return [
-        at_most(file, "cavity volume = gel x scale^3", volume, CAVITY_LIMIT, shown),
-        at_most(file, "cavity area = gel x scale^2", area, CAVITY_LIMIT, shown),
-        at_most(file, "cavity inertia = gel x scale^5", inertia, CAVITY_LIMIT, shown),
+        at_most("mould", "cavity volume = gel x scale^3", volume, CAVITY_LIMIT, shown),
+        at_most("mould", "cavity area = gel x scale^2", area, CAVITY_LIMIT, shown),
+        at_most("mould", "cavity inertia = gel x scale^5", inertia, CAVITY_LIMIT, shown),
     ]
 
 

@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.proof.result import ProofResult, at_most, equal
+from gelslim_cad.proof import ProofResult, at_most, equal
 
 VOLUME_LIMIT = 1e-4
 
 
 @dataclass(frozen=True)
 class ReadPart:
-    """A named product of a STEP file with its shape (`cadquery.Shape`, mm) and sRGB colour."""
+    """A named product of a STEP file with its shape (`cadquery.Shape`, mm)."""
 
     name: str
     shape: Any
-    colour: tuple[float, float, float, float] | None
 
 
 def read_step(path: Path) -> list[ReadPart]:
@@ -38,13 +37,11 @@ def read_step(path: Path) -> list[ReadPart]:
     with _millimetres():
         reader = STEPCAFControl_Reader()
         reader.SetNameMode(True)
-        reader.SetColorMode(True)
         if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
             return []
         reader.Transfer(document)
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
-    return [part for label in _free(shapes) for part in _leaves(label, shapes, colours)]
+    return [part for label in _free(shapes) for part in _leaves(label, shapes)]
 
 
 def prove_step(path: Path, parts: Part | Sequence[Part]) -> list[ProofResult]:
@@ -95,7 +92,7 @@ def _free(shapes: Any) -> list[Any]:
     return [found.Value(i) for i in range(1, found.Length() + 1)]
 
 
-def _leaves(label: Any, shapes: Any, colours: Any) -> list[ReadPart]:
+def _leaves(label: Any, shapes: Any) -> list[ReadPart]:
     import cadquery as cq
     from OCP.TDF import TDF_Label, TDF_LabelSequence
 
@@ -103,14 +100,14 @@ def _leaves(label: Any, shapes: Any, colours: Any) -> list[ReadPart]:
         found = TDF_LabelSequence()
         shapes.GetComponents_s(label, found)
         components = [found.Value(i) for i in range(1, found.Length() + 1)]
-        return [leaf for c in components for leaf in _leaves(c, shapes, colours)]
+        return [leaf for c in components for leaf in _leaves(c, shapes)]
     product = TDF_Label()
     if not shapes.GetReferredShape_s(label, product):
         product = label
     elif shapes.IsAssembly_s(product):
-        return _leaves(product, shapes, colours)
+        return _leaves(product, shapes)
     shape = cq.Shape.cast(shapes.GetShape_s(label))
-    return [ReadPart(_name(product), shape, _colour(product, colours))]
+    return [ReadPart(_name(product), shape)]
 
 
 def _name(label: Any) -> str:
@@ -119,14 +116,3 @@ def _name(label: Any) -> str:
     attribute = TDataStd_Name()
     found = label.FindAttribute(TDataStd_Name.GetID_s(), attribute)
     return str(attribute.Get().ToExtString()) if found else ""
-
-
-def _colour(label: Any, colours: Any) -> tuple[float, float, float, float] | None:
-    from OCP.Quantity import Quantity_ColorRGBA, Quantity_TypeOfColor
-    from OCP.XCAFDoc import XCAFDoc_ColorType
-
-    found = Quantity_ColorRGBA()
-    if not colours.GetColor_s(label, XCAFDoc_ColorType.XCAFDoc_ColorSurf, found):
-        return None
-    red, green, blue = found.GetRGB().Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
-    return float(red), float(green), float(blue), float(found.Alpha())

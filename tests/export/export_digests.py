@@ -12,7 +12,7 @@ from gelslim_cad.export.brep import shape_digest
 from gelslim_cad.export.glb import glb_bytes
 from gelslim_cad.export.mesh import mesh_for
 from gelslim_cad.export.outline import outline_dxf_bytes
-from gelslim_cad.export.print_files import NamedMesh, stl_bytes, threemf_bytes
+from gelslim_cad.export.print_files import stl_bytes, threemf_bytes
 from gelslim_cad.export.step import step_bytes
 
 NAMES = ("busy", "dimple", "plate", "window")
@@ -29,7 +29,7 @@ def digests(order: tuple[str, ...]) -> dict[str, str]:
         found[f"step {name}"] = sha(step_bytes(part))
         mesh = mesh_for(part.solid)[0]
         found[f"stl {name}"] = sha(stl_bytes(mesh))
-        found[f"3mf {name}"] = sha(threemf_bytes(NamedMesh(name, mesh, part.material, part.colour)))
+        found[f"3mf {name}"] = sha(threemf_bytes(name, mesh, part.material, part.colour))
     sorted_parts = [parts[name] for name in sorted(parts)]
     found["step assembly"] = sha(step_bytes(sorted_parts))
     found["glb"] = sha(glb_bytes(sorted_parts))

@@ -170,5 +170,6 @@ def test_nearest_nodes_agree_with_brute_force_and_break_ties_by_id(grid, nodes):
     first = [int(np.flatnonzero(a <= low + 1e-9)[0]) for a, low in zip(apart, least, strict=True)]
     np.testing.assert_array_equal(nodes.node_id - 100, first)
     square = np.array([(1.0, 1), (1, -1), (-1, 1), (-1, -1)])
-    middle = nearest_nodes(np.zeros((1, 2)), square, np.array([9, 4, 7, 5]))
-    assert middle.node_id.tolist() == [4]
+    for kind in (np.int32, np.int64):
+        middle = nearest_nodes(np.zeros((1, 2)), square, np.array([9, 4, 7, 5], dtype=kind))
+        assert middle.node_id.tolist() == [4]

@@ -103,15 +103,7 @@ def test_exploding_moves_parts_apart():
     assert apart[1] / apart[0] > 1.5 * closed[1] / closed[0]
 
 
-def test_what_cannot_be_drawn_is_refused():
-    with pytest.raises(ValueError, match="mesh"):
-        pictures.picture_whole([])
-    with pytest.raises(ValueError, match=r"'part'.*\(0,\)"):
-        pictures.picture_whole([("part", np.zeros(0), np.zeros((1, 3)), (1, 1, 1, 1), (0, 0, 0))])
-    with pytest.raises(ValueError, match="'part'"):
-        pictures.picture_whole(
-            [("part", np.zeros((3, 3)), np.array([[0, 1, 3]]), (1, 1, 1, 1), (0, 0, 0))]
-        )
+def test_a_section_beside_the_parts_is_refused():
     with pytest.raises(ValueError, match=r"90\.0 mm.* -15\.00 to 15\.00 mm"):
         pictures.picture_section([mesh(hollow())], "y", 90.0)
 

@@ -100,9 +100,9 @@ def _write(stages: Any, plan: Any, solids: int, enter: Callable[[str], None]) ->
             continue
         enter(f"unit {unit.name}")
         written = run(unit)
-        for path, data in written.files.items():
+        for path, (data, purpose) in written.files.items():
             contents[path] = data
-            files[path] = entry(data, written.purposes[path], unit.name)
+            files[path] = entry(data, purpose, unit.name)
         proofs += written.proofs
     bad = [p for p in proofs if not p["ok"]]
     if bad:
