@@ -136,12 +136,13 @@ def _in_lattice(
 def _bracket(
     lines: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Interval of each value between sorted lines, its fraction there, and whether it is inside."""
-    tolerance = 1e-9 * (lines[-1] - lines[0])
+    """Interval of each value between sorted lines, its fraction there, and whether it is inside.
+
+    A value outside by rounding only is left to the triangles and the hull, which agree there.
+    """
     cell = np.clip(np.searchsorted(lines, values, side="right") - 1, 0, len(lines) - 2)
-    fraction = np.clip((values - lines[cell]) / (lines[cell + 1] - lines[cell]), 0.0, 1.0)
-    inside = (values >= lines[0] - tolerance) & (values <= lines[-1] + tolerance)
-    return cell, fraction, inside
+    fraction = (values - lines[cell]) / (lines[cell + 1] - lines[cell])
+    return cell, fraction, (values >= lines[0]) & (values <= lines[-1])
 
 
 def _in_triangles(

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+import shapely
+from scipy.interpolate import LinearNDInterpolator
 
 from ifem_export.errors import InterpolationError
-from ifem_export.markers.interpolation import marker_to_node
+from ifem_export.markers.interpolation import checked_markers, marker_to_node
 
 
 def lattice(nx=7, ny=5, pitch=(1.3, 1.1)):
@@ -69,6 +71,61 @@ def test_outside_nodes_take_the_nearest_point_of_the_hull():
     assert found == pytest.approx(np.array([[3.9, 0.4], [-3.9, -2.2], [1.0, 2.2]]), abs=1e-12)
 
 
+def reference(markers, nodes, values):
+    """Linear in Delaunay triangles, and the value of the nearest point of the hull outside."""
+    hull = shapely.MultiPoint(markers).convex_hull
+    ways = shapely.shortest_line(hull, shapely.points(nodes))
+    at = np.array([way.coords[0] for way in ways])
+    # A point on the rim moves inwards by rounding, so that it is in a triangle.
+    middle = markers.mean(axis=0)
+    return LinearNDInterpolator(markers, values)(middle + (at - middle) * (1 - 1e-12))
+
+
+def test_scattered_markers_are_interpolated_linearly_and_extended_to_the_nearest_point():
+    rng = np.random.default_rng(8)
+    markers, nodes = rng.uniform(-3, 3, (40, 2)) * [1.5, 1.0], rng.uniform(-9, 9, (300, 2))
+    values = rng.normal(size=(40, 2))
+    found = marker_to_node(markers, nodes) @ values
+    assert found == pytest.approx(reference(markers, nodes, values), abs=1e-9)
+
+
+def test_cells_are_bilinear_where_they_are_complete_and_linear_elsewhere():
+    sites, nodes = lattice(), inner_nodes(9)
+    markers = np.delete(sites, [8, 17, 24], axis=0)
+    values = np.random.default_rng(10).normal(size=len(markers))
+    found = marker_to_node(markers, nodes) @ values
+    expected = reference(markers, nodes, values)
+    by_site = {tuple(np.round(m, 9)): v for m, v in zip(markers, values, strict=True)}
+    complete = np.zeros(len(nodes), dtype=bool)
+    for k, (x, y) in enumerate(nodes):
+        left, low = np.floor(x / 1.3 + 1e-12) * 1.3, np.floor(y / 1.1 + 1e-12) * 1.1
+        s, t = (x - left) / 1.3, (y - low) / 1.1
+        corners = [(left, low), (left + 1.3, low), (left, low + 1.1), (left + 1.3, low + 1.1)]
+        at = [by_site.get(tuple(np.round(c, 9))) for c in corners]
+        complete[k] = None not in at
+        if complete[k]:
+            expected[k] = np.dot(at, [(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t])
+    assert 100 < complete.sum() < 350
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(("count", "is_lattice"), [(9, True), (8, False)])
+def test_a_lattice_has_at_most_four_sites_per_marker(count, is_lattice):
+    """Six by six lines: four times nine markers, and more than four times eight."""
+    markers = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (5, 4)][:count]
+    operator = marker_to_node(markers, [[0.5, 0.25]])
+    assert operator.nnz == (4 if is_lattice else 3)
+
+
+@pytest.mark.parametrize("noise", [1e-12, 1e-10])
+def test_a_lattice_with_rounding_errors_is_still_one(noise):
+    rng = np.random.default_rng(11)
+    markers = lattice() + rng.uniform(-noise, noise, lattice().shape)
+    nodes = inner_nodes(12)
+    found = marker_to_node(markers, nodes) @ lattice().prod(axis=1)
+    assert found == pytest.approx(nodes.prod(axis=1), abs=1e-8)
+
+
 def test_mirrored_lattice_gives_mirrored_weights():
     markers, nodes = lattice(), inner_nodes(6)
     straight = marker_to_node(markers, nodes).toarray()
@@ -90,3 +147,14 @@ def test_markers_that_determine_no_field_are_refused(markers, value):
     with pytest.raises(InterpolationError) as caught:
         marker_to_node(markers, [[0.0, 0.0]])
     assert (caught.value.field, caught.value.value) == ("markers_mm", value)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_markers_coincide_and_lie_on_a_line_within_a_billionth_of_their_extent(scale):
+    corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
+    assert len(checked_markers(scale * np.array([*corners, (1.0, 4e-9)]))) == 4
+    assert len(checked_markers(scale * np.array([*corners[:2], (0.5, 1e-8)]))) == 3
+    for markers in ([*corners, (1.0, 4e-10)], [*corners[:2], (0.5, 4e-10)]):
+        with pytest.raises(InterpolationError) as caught:
+            checked_markers(scale * np.array(markers))
+        assert caught.value.field == "markers_mm"
