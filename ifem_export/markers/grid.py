@@ -64,11 +64,11 @@ class MarkerGrid:
         for name in ("row", "column", "kind", "omitted"):
             object.__setattr__(self, name, _frozen(getattr(self, name), np.int64, name))
         _check_arrays(self)
-        gap = self.smallest_gap_mm
+        overlap = -self.smallest_gap_mm
         _require(
-            gap >= -1e-9,
+            overlap <= 1e-9,
             "pitch_mm",
-            f"marker dots overlap by {-gap:.4g} mm: the pitch is {self.pitch_mm:g} mm and the "
+            f"marker dots overlap by {overlap:.4g} mm: the pitch is {self.pitch_mm:g} mm and the "
             f"largest dot {self.diameter_mm.max():g} mm; use a larger pitch or smaller dots",
             self.pitch_mm,
         )
