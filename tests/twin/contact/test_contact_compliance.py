@@ -85,6 +85,39 @@ def test_images_are_not_solved_for(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(np.flatnonzero(kept._made)) == set(corners)
 
 
+def test_columns_are_solved_once_in_whole_batches_of_neighbours(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A batch is filled up with the nearest numbers, on a symmetric pad with originals only."""
+    monkeypatch.setattr(module, "BATCH", 4)
+    batches: list[list[int]] = []
+    solve = RowFactor.solve
+
+    def watched(self: RowFactor, loads: Array) -> Array:
+        nodes = (np.flatnonzero(loads.any(axis=1)) - (len(loads) - 3 * kept.nodes)) // 3
+        batches.append(sorted(set(nodes.tolist())))
+        assert loads.shape[1] == 3 * 4
+        assert loads.sum() == 3 * len(batches[-1])
+        return solve(self, loads)
+
+    monkeypatch.setattr(RowFactor, "solve", watched)
+    lopsided, symmetric = pads()["lopsided"][0], pads()["square"][0]
+    kept = SurfaceCompliance(lopsided)
+    kept.require(np.array([20]))
+    kept.require(np.array([19, 22, 18]))
+    kept.require(np.array([20, 23]))
+    assert batches == [[18, 19, 20, 21], [22, 23, 24, 25]]
+    batches.clear()
+    kept = SurfaceCompliance(symmetric)
+    kept.require(np.array([0]))
+    kept.require(np.arange(kept.nodes))
+    originals = sorted(node for batch in batches for node in batch)
+    assert [len(batch) for batch in batches] == [4, 4, 2]
+    assert len(set(originals)) == 10
+    images = np.stack([s.image for s in symmetries(symmetric.mesh)])
+    assert sorted(set(images.min(axis=0))) == originals
+
+
 def test_file_is_taken_up_and_renewed(tmp_path: Path) -> None:
     pad = small_pad(0.49, 6, 2, 6.0)
     first = SurfaceCompliance(pad, tmp_path)
