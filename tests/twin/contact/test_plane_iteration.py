@@ -115,7 +115,7 @@ def test_averaged_normals_are_the_mean_of_all_so_far() -> None:
     rule, values = AveragedNormals(), [3.0, 5.0, -2.0, 8.0]
     mean, way = values[0], np.zeros((2, 3))
     for k, value in enumerate(values[1:], 2):
-        share = rule.share(way)
+        share = rule(way)
         assert share.shape == (2,)
         mean += share[0] * (value - mean)
         assert mean == pytest.approx(np.mean(values[:k]))
@@ -126,7 +126,7 @@ def test_bisected_normals_halve_where_they_turn_back_and_grow_below_that() -> No
     rule, ahead = BisectedNormals(), np.array([0.0, 1.0, 0.0])
     shares = []
     for sign in (1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0):
-        shares.append(rule.share(np.stack([ahead, sign * ahead])).copy())
+        shares.append(rule(np.stack([ahead, sign * ahead])).copy())
     steady, turned = np.array(shares).T
     np.testing.assert_allclose(steady, [0.625, 0.78125, 0.9765625, 1, 1, 1, 1])
     half = 0.78125 / 2
