@@ -61,17 +61,10 @@ def element_forces(
         for g in range(8):
             for lane in range(LANES):
                 mean[lane] += 0.125 * dilatation[g, lane]
-        least = np.inf
-        for g in range(8):
-            for lane in range(LANES):
-                least = min(least, dilatation[g, lane])
+        for lane in range(used):
+            for g in range(8):
                 if not floor < dilatation[g, lane] < np.inf:
-                    least = -np.inf
-        if not least > floor:
-            for lane in range(used):
-                for g in range(8):
-                    if not floor < dilatation[g, lane] < np.inf:
-                        return first + lane
+                    return first + lane
         for g in range(8):
             for lane in range(LANES):
                 iso[g, lane] = (1.0 + dilatation[g, lane]) ** (-2.0 / 3.0)

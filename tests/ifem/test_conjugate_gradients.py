@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 
 from ifem_export.errors import IfemError
+from ifem_export.operators import solver as solvers
 from ifem_export.operators.solver import (
     ConjugateGradients,
     ConvergenceError,
@@ -238,6 +239,23 @@ def test_the_factor_replaces_gradients_for_good_after_a_failure() -> None:
     assert both.solve(load(), 1e-9).residual <= 1e-9
     assert "factor" in both.__dict__
     assert both.solve(load(), 0.6).iterations == 1
+
+
+@pytest.mark.parametrize("most", [N - 1, N])
+def test_a_matrix_too_large_to_factor_is_refused(
+    monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    monkeypatch.setattr(solvers, "MOST_FACTORED", most)
+    matrix = definite(30.0)
+    both = GradientsThenFactor(
+        ConjugateGradients(sparse.csr_array(matrix), Halved(matrix), 2, most_iterations=4)
+    )
+    if most == N:
+        assert both.solve(load(), 1e-9).residual <= 1e-9
+        return
+    with pytest.raises(ConvergenceError) as caught:
+        both.solve(load(), 1e-9)
+    assert caught.value.iterations == 4
 
 
 @pytest.mark.parametrize(("b", "value"), [(np.ones(N + 1), N + 1), (np.full(N, np.nan), None)])

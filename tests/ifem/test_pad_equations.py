@@ -31,7 +31,13 @@ from ifem_export.operators.layered_operator import (
     surface_stiffness,
 )
 from ifem_export.operators.pad_system import PadSystem, checked_field, node_weight
-from ifem_export.operators.solver import SparseFactor, inner_solver
+from ifem_export.operators.solver import (
+    ConjugateGradients,
+    GradientsThenFactor,
+    SparseFactor,
+    inner_solver,
+    pad_solver,
+)
 
 GEL = Material(0.147, 0.3223, 1070.0)
 OUTLINE = Polygon([(-2.6, -1.9), (2.6, -1.9), (2.6, 0.4), (0.3, 0.4), (0.3, 1.9), (-2.6, 1.9)])
@@ -244,6 +250,29 @@ def test_condensed_operators_are_dense_linear_algebra(weighting: str) -> None:
     dense = DenseOperator(system).matrix
     assert np.array_equal(dense, dense.T)
     assert dense == pytest.approx(schur, abs=1e-7)
+
+
+def test_size_and_method_decide_the_solver() -> None:
+    """Below 2000 unknowns a factor; cut cells may need one after all."""
+    cells = np.ones((17, 15, 4), dtype=bool)
+    large, cut = (
+        PadMesh.from_occupancy(cells, (0.5, 0.6, 0.5), (0.0, 0.0, -2.0), fill)
+        for fill in (None, np.full(cells.shape, 0.5))
+    )
+    for mesh, method, whole, inside in (
+        (flat(), "auto", SparseFactor, SparseFactor),
+        (flat(), "direct", SparseFactor, SparseFactor),
+        (flat(), "pcg", ConjugateGradients, ConjugateGradients),
+        (large, "auto", ConjugateGradients, ConjugateGradients),
+        (large, "direct", SparseFactor, SparseFactor),
+        (large, "pcg", ConjugateGradients, ConjugateGradients),
+        (cut, "auto", ConjugateGradients, GradientsThenFactor),
+        (cut, "direct", SparseFactor, SparseFactor),
+        (cut, "pcg", ConjugateGradients, ConjugateGradients),
+    ):
+        system = PadSystem(mesh, element(mesh))
+        assert type(pad_solver(system, method)) is whole
+        assert type(inner_solver(system, method)) is inside
 
 
 def test_fields_that_do_not_fit_are_refused() -> None:

@@ -1,0 +1,71 @@
+"""The choice among measured surface operators, on made-up ladders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from gelslim_core.budget.budget import Budget
+from ifem_export.errors import IfemError
+from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder, chosen_rung
+
+
+def rung(name: str, error: float, n_bytes: int, edge: float | None = None) -> MeasuredRung:
+    return MeasuredRung("pcg", {name: 1}, error, 0.1234567, 0.2, 12.3456, 1.0, 2.5, n_bytes, edge)
+
+
+def made(*rungs: MeasuredRung) -> OperatorLadder:
+    return OperatorLadder(rungs, "made up", 4, "bbar", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [
+        ((0.2, 0.03, 0.01), "b"),
+        ((0.2, 0.031, 0.01), "c"),
+        ((0.2, 0.109, 0.1), "b"),
+        ((0.2, 0.111, 0.1), "c"),
+        ((0.02, 0.01, 0.001), "a"),
+    ],
+)
+def test_the_default_has_the_least_work_among_small_errors(
+    errors: tuple[float, ...], expected: str
+) -> None:
+    names = zip("abc", errors, (10, 20, 30), strict=True)
+    rungs = [rung(*entry) for entry in names]
+    assert made(*rungs[::-1]).balanced().label == f"pcg ({expected} 1)"
+
+
+def test_the_remark_names_the_least_work_that_keeps_the_edge() -> None:
+    rungs = (rung("a", 0.02, 10, 0.15), rung("b", 0.2, 20, 0.04), rung("c", 0.01, 30, 0.05))
+    (remark,) = made(*rungs).choose(Budget(0.06)).remarks
+    assert "pcg (a 1)" in remark
+    assert "pcg (c 1)" in remark
+    assert "pcg (b 1)" not in remark
+    (remark,) = made(*rungs).choose(Budget(0.03)).remarks
+    assert "pcg (b 1)" in remark
+    assert "4 %" in remark
+    assert made(*rungs).choose(Budget(0.2)).remarks == ()
+    unknown = made(*(replace(r, error_edge=None) for r in rungs))
+    assert unknown.choose(Budget(0.03)).remarks == ()
+
+
+def test_a_budget_chooses_and_a_name_finds() -> None:
+    ladder = made(rung("a", 0.2, 10), rung("b", 0.01, 20))
+    assert chosen_rung(None, "pcg (a 1)") is None
+    assert chosen_rung(ladder, "pcg (c 1)") is None
+    assert chosen_rung(ladder, "pcg (a 1)") == ladder.rungs[0]
+    assert chosen_rung(ladder, "pcg (a 1)", Budget()) == ladder.rungs[0]
+    assert chosen_rung(ladder, "pcg (a 1)", Budget(0.02)) == ladder.rungs[1]
+    with pytest.raises(IfemError) as caught:
+        chosen_rung(None, "pcg (a 1)", Budget(0.02))
+    assert caught.value.field == "ladder"
+
+
+def test_an_untimed_ladder_is_rounded() -> None:
+    found = made(rung("a", 0.12345678, 10)).untimed().rungs[0]
+    assert (found.error_field, found.error_operator, found.error_edge) == (0.123457, 0.123457, None)
+    assert (found.noise_node_n_per_mm, found.milliseconds) == (12.35, None)
+    again = made(rung("a", 0.1, 10), rung("b", 0.1, 20)).timed({"pcg (b 1)": 9.0})
+    assert [r.time_ms for r in again.rungs] == [2.5, 9.0]
