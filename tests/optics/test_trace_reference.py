@@ -58,9 +58,16 @@ def uneven(
     )
 
 
+def first(profile: GuideProfile, name: str) -> GuideProfile:
+    """The profile with one edge before all others."""
+    edges = sorted(profile.edges, key=lambda edge: edge.name != name)
+    return GuideProfile(tuple(edges))
+
+
 def crowned() -> LightScene:
     guide = CurvedGuide(12, 2, 1.5, 2, math.radians(80), foot_thickness_mm=2.4)
-    return uneven(curved_profile(guide, GelSection(9, 1.5, 0.9)), (-4.5, 9.0))
+    profile = curved_profile(guide, GelSection(9, 1.5, 0.9))
+    return uneven(first(profile, "foot_right"), (-4.5, 9.0))
 
 
 def dented() -> LightScene:
@@ -177,6 +184,19 @@ def test_light_in_the_air_beside_the_gel_enters_its_end_or_passes(name: str, sid
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     rows = np.column_stack([point, way, np.ones(count), np.zeros(count)])
     agree(scene, source, rows, "air")
+
+
+@pytest.mark.parametrize("name", ["crowned", "dented"])
+def test_light_outside_ends_at_the_leds_and_on_the_back_of_the_coat(name: str) -> None:
+    scene, source = SCENES[name](), LedRow("foot_left", (1.0,))
+    rng = np.random.default_rng(20)
+    rows = []
+    for edge, away in (("foot_right", -1.0), ("gel_face", 1.0), ("window_bottom", -1.0)):
+        for part in rng.uniform(0.1, 0.9, 8):
+            y, z = scene.profile.edge(edge).curve.at(part)
+            way = np.array([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), -away])
+            rows.append([0.5, y, z + away, *(way / np.linalg.norm(way)), 1.0, 0.0])
+    agree(scene, source, np.array(rows), "air")
 
 
 def test_rays_beside_the_foot_have_missed_it_with_what_it_did_not_reflect() -> None:
