@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.tracking.matching import MatchMode, match
+from gelslim_force.tracking.matching import match
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import RenderedFrame
 from gelslim_twin.render.image_sensor import SensorNoise
@@ -22,6 +22,7 @@ from gelslim_twin.render.look import Look
 from gelslim_twin.render.shading import Shading
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 Image = NDArray[np.uint8]
 LOOKS = {
     "clean": Look(shading=Shading()),
@@ -160,21 +161,24 @@ def matching(rig: Rig, quick: bool) -> list[dict[str, Any]]:
     """Share of wrong and of tracked markers by peak displacement, in one shot from rest."""
     trials = 10 if quick else 60
     reference = rest_lattice(rig)
-    modes: tuple[MatchMode, ...] = ("nearest", "robust")
+    modes: dict[str, Callable[[Array], IntArray]] = {
+        "nearest": lambda points: nearest_dots(reference, points),
+        "robust": lambda points: match(reference, points).dots,
+    }
     rows = []
     for peak in PEAKS_PITCH:
         rng = np.random.default_rng(SEED)
         shots = [shot(rig, reference, peak, rng) for _ in range(trials)]
-        for mode in modes:
+        for mode, find in modes.items():
             wrong = tracked = 0
             for points, truth in shots:
-                tracks = match(reference, points, mode=mode)
-                seen = tracks.tracked
-                wrong += int((truth[tracks.dots[seen]] != np.flatnonzero(seen)).sum())
+                dots = find(points)
+                seen = dots >= 0
+                wrong += int((truth[dots[seen]] != np.flatnonzero(seen)).sum())
                 tracked += int(seen.sum())
 
-            def once(k: int, mode: MatchMode = mode, shots: Any = shots) -> None:
-                match(reference, shots[k % len(shots)][0], mode=mode)
+            def once(k: int, find: Any = find, shots: Any = shots) -> None:
+                find(shots[k % len(shots)][0])
 
             rows.append(
                 {
@@ -186,6 +190,13 @@ def matching(rig: Rig, quick: bool) -> list[dict[str, Any]]:
                 }
             )
     return rows
+
+
+def nearest_dots(reference: ReferenceLattice, points_px: Array) -> IntArray:
+    """(n,) nearest dot of each marker, as in the paper; two markers may take the same one."""
+    from gelslim_force.tracking.matching_kernel import nearest
+
+    return np.array([nearest(points_px, x, y)[0] for x, y in reference.positions_px])
 
 
 def rest_lattice(rig: Rig) -> ReferenceLattice:

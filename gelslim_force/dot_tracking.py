@@ -14,7 +14,7 @@ from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.lattice.dot_size import DotEstimate, estimate_settings
 from gelslim_force.lattice.growth import LatticeError, grow_lattice
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.tracking.tracker import Tracker, TrackerSettings
+from gelslim_force.tracking.tracker import Tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +71,9 @@ def _found(image: NDArray[np.uint8], settings: DetectorSettings) -> DotEstimate:
 class DotTracking:
     """Follows the dots of one picture at rest through frames, in order."""
 
-    def __init__(self, rest: DotsAtRest, settings: TrackerSettings | None = None) -> None:
+    def __init__(self, rest: DotsAtRest) -> None:
         self.rest = rest
-        self._tracker = Tracker(
-            Detector(rest.settings), rest.reference, rest.dots, settings=settings
-        )
+        self._tracker = Tracker(Detector(rest.settings), rest.reference, rest.dots)
 
     def follow(self, image: NDArray[np.uint8] | None, index: int, time_s: float) -> FrameResult:
         """Return the tracks of the next frame; no content of a frame raises an error.

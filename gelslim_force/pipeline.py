@@ -8,6 +8,7 @@ reported in its result, and the pipeline goes on with the next one.
 from __future__ import annotations
 
 import copy
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +21,6 @@ from gelslim_force.contact.normal_source import NormalReading, NormalSource
 from gelslim_force.forces.estimator import ContactForces, ForceEstimator
 from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_force.forces.frame_result import ForceField, FrameResult
-from gelslim_force.forces.stage_clock import FrameClock
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.frames.frame import Frame
 from gelslim_force.motion.marker_motion import MarkerView
@@ -307,6 +307,20 @@ class ForcePipeline:
         if self._kept_gains is None or self._kept_gains[0] != lost:
             self._kept_gains = lost, self._wrench.gains(interpolation)
         return self._kept_gains[1]
+
+
+class FrameClock:
+    """Measures the stages of one frame in ms, one after the other."""
+
+    def __init__(self) -> None:
+        self.stages: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def stage(self, name: str) -> None:
+        """End a stage, which began at the end of the stage before."""
+        now = time.perf_counter()
+        self.stages[name] = self.stages.get(name, 0.0) + (now - self._last) * 1000
+        self._last = now
 
 
 def _findings(field: ForceField, reading: NormalReading | None) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -10,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.forces.stage_clock import StageSummary, StageTimes
 from gelslim_force.frames.frame import Frame
 from gelslim_force.pipeline import ForcePipeline
 
 Progress = Callable[[str, int, int], None]
+TOTAL = "total"
+"""Name of the sum of a frame's stages."""
+_TIMED_FRAMES = 4096
+"""Frames at the end of a run over which the median times are taken: memory does not grow."""
 
 
 class Sink(Protocol):
@@ -35,12 +39,17 @@ class RunSummary:
     least_coverage: float = 1.0
     largest_force_n: float = 0.0
     last: FrameResult | None = None
-    stages: tuple[StageTimes, ...] = ()
+    stage_ms: dict[str, deque[float]] = field(default_factory=dict)
+    """Times of the last frames by stage."""
 
     def add(self, result: FrameResult) -> None:
         """Add a frame."""
         self.frames += 1
         self.last = result
+        for name, value in result.stage_ms.items():
+            self._times(name).append(value)
+        if result.stage_ms:
+            self._times(TOTAL).append(sum(result.stage_ms.values()))
         for problem in result.problems:
             kind = "".join("#" if c.isdigit() else c for c in problem)
             self.problems[kind] = self.problems.get(kind, 0) + 1
@@ -50,6 +59,14 @@ class RunSummary:
             self.with_forces += 1
             size = float(np.sqrt(np.nansum(result.wrench.force_n**2)))
             self.largest_force_n = max(self.largest_force_n, size)
+
+    def median_ms(self) -> dict[str, float]:
+        """Median time by stage, in the order in which they first ran, and of their sum, `total`."""
+        names = sorted(self.stage_ms, key=lambda name: name == TOTAL)
+        return {name: float(np.median(self.stage_ms[name])) for name in names}
+
+    def _times(self, stage: str) -> deque[float]:
+        return self.stage_ms.setdefault(stage, deque(maxlen=_TIMED_FRAMES))
 
 
 def run_frames(
@@ -80,17 +97,14 @@ def run_frames(
         FrameSourceError: The source fails.
     """
     report = progress or (lambda text, done, total: None)
-    clock = StageSummary()
     summary = RunSummary()
     for frame in frames:
         if frame.image is None:
             result = pipeline.unreadable(frame.problem, time_s=frame.time_s)
         else:
             result = pipeline.process(frame.image, time_s=frame.time_s)
-        clock.add(result.stage_ms)
         summary.add(result)
         for sink in sinks:
             sink.take(frame.image, result)
         report("frames", summary.frames, count or summary.frames + 1)
-    summary.stages = clock.times()
     return summary

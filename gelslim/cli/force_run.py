@@ -182,7 +182,7 @@ def answer_json(
             "least_coverage": summary.least_coverage,
             "last_wrench": None if wrench is None else plain(wrench.vector),
             "last_sigma": None if wrench is None else plain(wrench.standard_deviation),
-            "stages_ms": {t.stage: t.median_ms for t in summary.stages},
+            "stages_ms": summary.median_ms(),
             "pictures": pictures,
         }
     )
@@ -193,22 +193,13 @@ def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures:
     say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")
     wrench = summary.last.wrench if summary.last is not None else None
     if wrench is not None:
-        names = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-        units = ("N",) * 3 + ("N mm",) * 3
-        parts = [
-            f"{n} unknown" if v != v else f"{n} {v:+.3f} ± {s:.3f} {u}"
-            for n, v, s, u in zip(
-                names, wrench.vector, wrench.standard_deviation, units, strict=True
-            )
-        ]
-        say("Last frame: " + ", ".join(parts) + ".")
+        say(f"Last frame: {wrench}.")
     for problem, count in sorted(summary.problems.items(), key=lambda item: -item[1])[:5]:
         say(f"{count} frames: {problem}.", style="yellow")
-    total = next((t for t in summary.stages if t.stage == "total"), None)
-    if total is not None:
-        stages = ", ".join(
-            f"{t.stage} {t.median_ms:.1f}" for t in summary.stages if t.stage != "total"
-        )
-        say(f"Median {total.median_ms:.1f} ms per frame ({stages}).")
+    times = summary.median_ms()
+    if times:
+        total = times.pop("total")
+        stages = ", ".join(f"{name} {value:.1f}" for name, value in times.items())
+        say(f"Median {total:.1f} ms per frame ({stages}).")
     say(f"Run in {folder}/" + (f", {len(pictures)} pictures in {folder}/pictures/" if pictures
                                else ""))  # fmt: skip

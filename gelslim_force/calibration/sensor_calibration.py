@@ -14,7 +14,7 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import Detections
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.tracking.tracker import Tracker, TrackerSettings
+from gelslim_force.tracking.tracker import Tracker
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from ifem_export.markers.grid import MarkerGrid
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-_REACH_SITES = 2
-"""Lattice sites within which a marker needs another one to be tracked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,18 +100,12 @@ class Calibration:
     def reference(self) -> ReferenceLattice:
         """The markers to track; a marker without any neighbour is left out."""
         sites = np.column_stack([self.grid.row, self.grid.column])[self.markers]
-        distance = np.abs(sites[:, None, :] - sites[None, :, :]).max(axis=2)
-        keep = (distance <= _REACH_SITES).sum(axis=1) > 1
-        return ReferenceLattice(
-            sites=sites[keep], positions_px=self.reference_px[keep], markers=self.markers[keep]
-        )
+        return ReferenceLattice.connected(sites, self.reference_px, self.markers)
 
-    def tracker(self, settings: TrackerSettings | None = None) -> Tracker:
+    def tracker(self) -> Tracker:
         """Return a tracker of this sensor's markers, at rest."""
         index = np.searchsorted(self.markers, self.reference.markers)
-        return Tracker(
-            Detector(self.detector), self.reference, self.dots.take(index), self.grid, settings
-        )
+        return Tracker(Detector(self.detector), self.reference, self.dots.take(index), self.grid)
 
     def require_bundle(self, bundle: Bundle) -> None:
         """Raise CalibrationError for a bundle of another geometry."""

@@ -22,7 +22,7 @@ _VIDEO_ATTEMPTS = 10
 _MAX_FRAMES = 10**8
 _CAMERA_ATTEMPTS = 30
 """Failed reads in succession after which a camera is taken to be disconnected."""
-_FRAME_WIDTH, _FRAME_HEIGHT, _FPS, _FRAME_COUNT = 3, 4, 5, 7
+_FPS, _FRAME_COUNT = 5, 7
 """OpenCV's numbers of these properties."""
 
 
@@ -136,12 +136,11 @@ class LiveCamera(FrameSource):
     def __init__(
         self,
         device: int | str = 0,
-        size_px: tuple[int, int] | None = None,
         frames_per_s: float | None = None,
         capture: Callable[[int | str], Capture] = open_capture,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Open a camera and request a size (width, height) and a rate.
+        """Open a camera and request a rate.
 
         `device` is a number, a file such as /dev/video0 or the address of a stream.
         Raises FrameSourceError if the camera does not open.
@@ -153,13 +152,10 @@ class LiveCamera(FrameSource):
             raise FrameSourceError(
                 f"camera {device}: does not open; is it plugged in, and free of other programs?"
             )
-        if size_px is not None:
-            self._capture.set(_FRAME_WIDTH, size_px[0])
-            self._capture.set(_FRAME_HEIGHT, size_px[1])
         if frames_per_s is not None:
             self._capture.set(_FPS, frames_per_s)
         self.frames_per_s = _known_rate(self._capture.get(_FPS)) or frames_per_s
-        self._shape = None if size_px is None else (size_px[1], size_px[0], 3)
+        self._shape: tuple[int, ...] | None = None
         self._closed = self._reading = False
 
     def __iter__(self) -> Iterator[Frame]:

@@ -53,9 +53,9 @@ def _source(
     text = os.fspath(source)
     if text.startswith(_CAMERA):
         device = text.removeprefix(_CAMERA) or "0"
-        return LiveCamera(int(device) if device.isdecimal() else device, None, frames_per_s)
+        return LiveCamera(int(device) if device.isdecimal() else device, frames_per_s)
     if text.startswith(_STREAMS):
-        return LiveCamera(text, None, frames_per_s)
+        return LiveCamera(text, frames_per_s)
     path = Path(text)
     if path.is_dir():
         return PictureFolder(path, frames_per_s)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gelslim_force.detection.detections import Detections
 from gelslim_force.lattice.growth import Lattice
-from gelslim_force.lattice.registration import Registration
-from ifem_export.markers.grid import MarkerGrid
 
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 _REACH = 2
 
 
@@ -90,22 +90,14 @@ class ReferenceLattice:
         return np.where(known, pitch, np.median(pitch[known]))
 
     @classmethod
-    def from_registration(cls, registration: Registration, grid: MarkerGrid) -> ReferenceLattice:
-        """Return the markers of the grid that were found."""
-        found = np.flatnonzero(registration.found)
-        sites = np.column_stack([grid.row, grid.column])[found]
-        return _connected(sites, registration.centres_px[found], found)
-
-    @classmethod
     def from_lattice(cls, lattice: Lattice, detections: Detections) -> ReferenceLattice:
         """Return the dots of a lattice whose print is not known."""
         positions = detections.centres_px[lattice.dots]
-        return _connected(lattice.sites, positions, np.arange(len(positions)))
+        return cls.connected(lattice.sites, positions, np.arange(len(positions)))
 
-
-def _connected(sites: ArrayLike, positions: ArrayLike, markers: ArrayLike) -> ReferenceLattice:
-    """Leave out markers without a neighbour."""
-    at, where, ids = np.asarray(sites), np.asarray(positions), np.asarray(markers)
-    gap = np.abs(at[:, None, :] - at[None, :, :]).max(axis=2)
-    keep = ((gap <= _REACH).sum(axis=1)) > 1
-    return ReferenceLattice(sites=at[keep], positions_px=where[keep], markers=ids[keep])
+    @classmethod
+    def connected(cls, sites: IntArray, positions_px: Array, markers: IntArray) -> ReferenceLattice:
+        """Return the markers that have a neighbour; a marker without one cannot be tracked."""
+        gap = np.abs(sites[:, None, :] - sites[None, :, :]).max(axis=2)
+        keep = (gap <= _REACH).sum(axis=1) > 1
+        return cls(sites=sites[keep], positions_px=positions_px[keep], markers=markers[keep])

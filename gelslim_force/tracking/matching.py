@@ -1,6 +1,6 @@
-"""Which dot of a frame is which marker: the nearest one as in the paper, or a robust matching.
+"""Which dot of a frame is which marker, by a robust matching.
 
-The robust matching first matches markers and dots that are mutual nearest neighbours. A match is
+It first matches markers and dots that are mutual nearest neighbours. A match is
 trusted if the affine motion of its neighbours predicts it. Markers that are wrong by a whole pitch
 agree among themselves, so only one patch of markers with smooth motion is kept, and the matching
 grows from there: each marker is searched where the motion of its neighbours predicts it. If the
@@ -10,8 +10,6 @@ most dots are explained corrects this.
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +17,6 @@ from gelslim_force.frames.read_only import read_only
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
-MatchMode = Literal["robust", "nearest"]
 _TOLERANCE = 0.45
 _AGREEMENT = 0.15
 _SMOOTHNESS = (0.15, 0.08, 0.04)
@@ -41,7 +38,6 @@ def match(
     reference: ReferenceLattice,
     points_px: NDArray[np.float64],
     expected_px: NDArray[np.float64] | None = None,
-    mode: MatchMode = "robust",
 ) -> Tracks:
     """Match the markers to the dots of a frame.
 
@@ -50,10 +46,9 @@ def match(
         points_px: (m, 2) positions of the dots.
         expected_px: (n, 2) predicted positions, NaN where there is none; the positions at rest
             by default.
-        mode: The robust matching, or the nearest dot of each marker.
 
     Raises:
-        ValueError: An array of another shape, a position that is not finite, or another mode.
+        ValueError: An array of another shape, or a position that is not finite.
     """
     points = read_only(np.asarray(points_px, dtype=float))
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
@@ -63,29 +58,10 @@ def match(
     )
     if expected.shape != (len(reference), 2):
         raise ValueError(f"expected positions {expected.shape} must be ({len(reference)}, 2)")
-    expected = read_only(expected)
-    if mode == "nearest":
-        return _nearest(reference, points, expected)
-    if mode == "robust":
-        return _robust(reference, points, expected)
-    raise ValueError(f"matching mode {mode!r}: must be 'robust' or 'nearest'")
+    return _matched(reference, points, read_only(expected))
 
 
-def _nearest(
-    reference: ReferenceLattice, points: NDArray[np.float64], expected: NDArray[np.float64]
-) -> Tracks:
-    """Each marker takes the nearest dot, as in the paper; two markers may take the same one."""
-    from gelslim_force.tracking import matching_kernel as mk
-
-    dots = np.full(len(reference), -1, dtype=np.int64)
-    for i, (x, y) in enumerate(expected):
-        if np.isfinite(x + y):
-            dots[i] = mk.nearest(points, x, y)[0]
-    status = np.where(dots >= 0, MarkerStatus.TRACKED, MarkerStatus.LOST).astype(np.int64)
-    return _tracks(reference, points, dots, status, np.full((len(reference), 2), np.nan))
-
-
-def _robust(
+def _matched(
     reference: ReferenceLattice, points: NDArray[np.float64], expected: NDArray[np.float64]
 ) -> Tracks:
     from gelslim_force.tracking import matching_kernel as mk

@@ -18,7 +18,7 @@ from gelslim_force.detection.detection import Detector, as_planes
 from gelslim_force.detection.detections import Detections
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.lattice.registration import Registration, register
+from gelslim_force.lattice.registration import register
 from gelslim_force.tracking.matching import match
 from gelslim_force.tracking.tracks import Tracks
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
@@ -26,26 +26,14 @@ from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 _SAME_PX = 1.0
 _MIN_COVERAGE = 0.25
 """Share of the markers that a full search must find before the next frame starts from it."""
+_LEAST_COVERAGE = 0.97
+"""Share of the markers of the last full search that a search near predictions must find."""
+_FULL_EVERY = 30
+"""Number of frames after which the whole frame is searched in any case."""
 _AREA_STEP = 0.45
 """Change of the logarithm of a dot's area that shows another kind of dot: a factor of 1.6."""
 Route = Literal["near", "full", "registered"]
 """How markers were found: near predictions, in the whole frame, or by registration."""
-
-
-@dataclass(frozen=True)
-class TrackerSettings:
-    """When the tracker searches the whole frame. Raises ValueError for impossible values."""
-
-    least_coverage: float = 0.97
-    """Share of the markers of the last full search that a search near predictions must find."""
-    full_every: int = 30
-    """Number of frames after which the whole frame is searched in any case."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.least_coverage <= 1.0:
-            raise ValueError(f"least_coverage = {self.least_coverage:g}: must be in 0 ... 1")
-        if self.full_every < 1:
-            raise ValueError(f"full_every = {self.full_every}: must be at least 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +60,6 @@ class Tracker:
         reference: ReferenceLattice,
         reference_dots: Detections,
         grid: MarkerGrid | None = None,
-        settings: TrackerSettings | None = None,
     ) -> None:
         """`reference_dots` are the dots of the reference, in its order."""
         if len(reference_dots) != len(reference):
@@ -81,27 +68,12 @@ class Tracker:
                 "give one for each, in the same order"
             )
         self._detector, self._reference, self._grid = detector, reference, grid
-        self._settings = settings or TrackerSettings()
         self._area = reference_dots.area_px
         self._large = np.zeros(len(reference), dtype=bool)
         if grid is not None:
             self._large = grid.kind[reference.markers] == ANCHOR_LARGE
         self._rest_moments = reference_dots.moments_px2
         self.reset()
-
-    @classmethod
-    def from_registration(
-        cls,
-        detector: Detector,
-        registration: Registration,
-        detections: Detections,
-        grid: MarkerGrid,
-        settings: TrackerSettings | None = None,
-    ) -> Tracker:
-        """Return a tracker for the markers registered in a frame without contact."""
-        reference = ReferenceLattice.from_registration(registration, grid)
-        dots = detections.take(registration.dots[reference.markers])
-        return cls(detector, reference, dots, grid, settings)
 
     @property
     def reference(self) -> ReferenceLattice:
@@ -114,20 +86,20 @@ class Tracker:
         self._velocity = np.zeros_like(self._positions)
         self._moments = self._rest_moments.copy()
         self._usual = 0
-        self._age = self._settings.full_every
+        self._age = _FULL_EVERY
 
     def update(self, image: NDArray[np.uint8]) -> TrackedFrame:
         """Return the markers of the next frame. Raises ValueError if the array is no picture."""
         as_planes(image)
         expected = self._positions + self._velocity
         result = None
-        if self._age < self._settings.full_every:
+        if self._age < _FULL_EVERY:
             result = self._near(image, expected)
         if result is None:
             result = self._full(image, expected)
             # A frame with hardly any markers does not tell where they are in the next one.
             blind = result.tracks.coverage < _MIN_COVERAGE
-            self._age = self._settings.full_every if blind else 0
+            self._age = _FULL_EVERY if blind else 0
             self._usual = int(result.tracks.tracked.sum())
         self._age += 1
         self._remember(result)
@@ -141,7 +113,7 @@ class Tracker:
         tracks = match(self._reference, dots.centres_px, expected)
         if tracks.tracked.sum() < self._usual:
             dots, tracks = self._search_lost(image, dots, tracks, expected)
-        if tracks.tracked.sum() < self._settings.least_coverage * self._usual:
+        if tracks.tracked.sum() < _LEAST_COVERAGE * self._usual:
             return None
         return TrackedFrame(tracks, dots, "near", False)
 

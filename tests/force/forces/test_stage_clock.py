@@ -1,4 +1,4 @@
-"""Stage times over a run against NumPy on all values."""
+"""Stage times of a frame, and their medians over a run against NumPy on all values."""
 
 from __future__ import annotations
 
@@ -7,45 +7,39 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from gelslim_force.forces.stage_clock import TOTAL, FrameClock, StageSummary, StageTimes
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.pipeline import FrameClock
+from gelslim_force.run import TOTAL, RunSummary
 
 
-def summary(times_ms: np.ndarray, window: int) -> StageSummary:
+def summary(times_ms: np.ndarray) -> RunSummary:
     """Of frames whose columns are detect and match."""
-    made = StageSummary(window)
-    for detect, match in times_ms:
-        made.add({"detect": detect, "match": match})
+    made = RunSummary()
+    for k, (detect, match) in enumerate(times_ms):
+        made.add(FrameResult(k, float(k), stage_ms={"detect": detect, "match": match}))
     return made
 
 
-def test_summary_equals_numpy() -> None:
+def test_medians_equal_numpy() -> None:
     times = np.random.default_rng(4).gamma(3.0, 0.7, (500, 2))
-    stages = summary(times, window=1000).times()
+    found = summary(times).median_ms()
     truth = {"detect": times[:, 0], "match": times[:, 1], TOTAL: times.sum(axis=1)}
-    assert [s.stage for s in stages] == list(truth)
-    for found, given in zip(stages, truth.values(), strict=True):
-        assert found.frames == 500
-        np.testing.assert_allclose(
-            [found.mean_ms, found.largest_ms, found.median_ms, found.p95_ms, found.p99_ms],
-            [given.mean(), given.max(), *np.percentile(given, [50, 95, 99])],
-            rtol=1e-9,
-        )
+    assert list(found) == list(truth)
+    for name, given in truth.items():
+        assert found[name] == pytest.approx(np.median(given), rel=1e-12)
 
 
-def test_percentiles_are_of_the_window_and_extremes_of_the_run() -> None:
+def test_medians_are_of_the_last_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gelslim_force.run._TIMED_FRAMES", 64)
     times = np.ones((300, 2))
-    times[0] = 50.0
     times[200:, 1] = 2.0
-    match = summary(times, window=64).times()[1]
-    assert match.median_ms == pytest.approx(2.0)
-    assert match.p99_ms == pytest.approx(2.0)
-    assert match.largest_ms == pytest.approx(50.0)
-    assert match.mean_ms == pytest.approx(times[:, 1].mean())
+    assert summary(times).median_ms() == {"detect": 1.0, "match": 2.0, TOTAL: 3.0}
 
 
-def test_memory_does_not_grow() -> None:
-    made = StageSummary(window=256)
-    frame = {"detect": 1.0, "match": 2.0}
+def test_memory_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gelslim_force.run._TIMED_FRAMES", 256)
+    frame = FrameResult(0, 0.0, stage_ms={"detect": 1.0, "match": 2.0})
+    made = RunSummary()
     for _ in range(300):
         made.add(frame)
     tracemalloc.start()
@@ -54,20 +48,16 @@ def test_memory_does_not_grow() -> None:
         made.add(frame)
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
-    assert grown < 4096
-    assert made.times()[-1].frames == 20_300
+    assert grown < 8192
+    assert made.frames == 20_300
 
 
-def test_times_given_and_a_window_that_is_empty() -> None:
-    made = StageSummary()
-    made.add({})
-    assert made.times() == ()
-    made.add({"detect": 1.25, "match": 0.5})
-    detect, _, total = made.times()
-    assert detect == StageTimes("detect", 1, 1.25, 1.25, 1.25, 1.25, 1.25)
-    assert (total.stage, total.median_ms) == (TOTAL, 1.75)
-    with pytest.raises(ValueError, match="window = 0"):
-        StageSummary(window=0)
+def test_a_run_without_times_has_no_medians() -> None:
+    made = RunSummary()
+    made.add(FrameResult(0, 0.0))
+    assert made.median_ms() == {}
+    made.add(FrameResult(1, 1.0, stage_ms={"detect": 1.25, "match": 0.5}))
+    assert made.median_ms() == {"detect": 1.25, "match": 0.5, TOTAL: 1.75}
 
 
 def test_stages_of_one_frame_add_up_to_its_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -138,13 +138,10 @@ def test_a_failed_read_is_skipped_and_a_lost_camera_ends_the_frames():
     assert capture.released == 1
 
 
-def test_a_camera_is_asked_for_its_size_and_refused_when_it_does_not_open():
+def test_a_camera_is_asked_for_its_rate_and_refused_when_it_does_not_open():
     capture = FakeCapture([(48, 64)])
-    camera = LiveCamera(2, (640, 480), 90.0, capture=lambda device: capture)
-    assert capture.asked == {3: 640, 4: 480, 5: 90.0}
-    first = next(iter(camera))
-    assert first.image is None
-    assert "640 x 480" in first.problem
+    LiveCamera(2, 90.0, capture=lambda device: capture)
+    assert capture.asked == {5: 90.0}
     with pytest.raises(FrameSourceError, match="camera 7"):
         LiveCamera(7, capture=lambda device: FakeCapture([], opened=False))
 

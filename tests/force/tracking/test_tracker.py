@@ -8,8 +8,9 @@ from synthetic import Look, grid_of_dots, render
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import Detections
 from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.lattice.registration import register
-from gelslim_force.tracking.tracker import Tracker, TrackerSettings
+from gelslim_force.tracking.tracker import Tracker
 from gelslim_force.tracking.tracks import MarkerStatus
 
 GRID = grid_of_dots()
@@ -23,11 +24,21 @@ def rest():
     return render(GRID, CAMERA, Look(noise=5))
 
 
-def tracker_for(frame, settings=None):
+class FullSearch(Tracker):
+    """Searches the whole of every frame."""
+
+    def _near(self, image, expected):
+        return None
+
+
+def tracker_for(frame, kind=Tracker):
     detector = Detector(DetectorSettings.for_diameters(frame.diameter_px))
     dots = detector.detect(frame.image)
     registration = register(dots, GRID, frame.image.shape)
-    return Tracker.from_registration(detector, registration, dots, GRID, settings)
+    found = np.flatnonzero(registration.found)
+    sites = np.column_stack([GRID.row, GRID.column])[found]
+    reference = ReferenceLattice.connected(sites, registration.centres_px[found], found)
+    return kind(detector, reference, dots.take(registration.dots[reference.markers]), GRID)
 
 
 def press(amount_pitch):
@@ -66,7 +77,7 @@ def test_a_press_is_followed_on_the_fast_path(rest):
 
 
 def test_the_fast_path_gives_what_the_full_search_gives(rest):
-    fast, full = tracker_for(rest), tracker_for(rest, TrackerSettings(full_every=1))
+    fast, full = tracker_for(rest), tracker_for(rest, FullSearch)
     for k in range(5):
         image = frame_at(0.1 * k, seed=k + 2).image
         a, b = fast.update(image), full.update(image)
@@ -165,9 +176,10 @@ def test_black_frames_white_frames_and_another_scene_are_survived(rest):
 
 
 @pytest.mark.parametrize("step", [(1, 0), (0, -1)])
-def test_the_anchors_show_a_shift_of_all_markers_by_a_pitch(rest, step):
+def test_the_anchors_show_a_shift_of_all_markers_by_a_pitch(rest, step, monkeypatch):
     """Between two frames the print moves by a pitch: nothing but the anchors looks different."""
-    tracker = tracker_for(rest, TrackerSettings(full_every=5))
+    monkeypatch.setattr("gelslim_force.tracking.tracker._FULL_EVERY", 5)
+    tracker = tracker_for(rest)
     tracker.update(rest.image)
     moved = np.tile(np.array(step) * PITCH_MM, (len(GRID), 1))
     for k in range(7):
@@ -219,11 +231,7 @@ def test_a_long_stream_keeps_no_more_than_its_last_frame(rest):
     assert not any(isinstance(v, list | dict) and len(v) > 10 for v in vars(tracker).values())
 
 
-def test_settings_and_dots_are_checked(rest):
-    with pytest.raises(ValueError, match="least_coverage"):
-        TrackerSettings(least_coverage=1.2)
-    with pytest.raises(ValueError, match="full_every"):
-        TrackerSettings(full_every=0)
+def test_dots_are_checked(rest):
     tracker = tracker_for(rest)
     none = Detections(
         np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
