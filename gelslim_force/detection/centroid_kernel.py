@@ -29,28 +29,21 @@ COMPILED: dict[str, Any] = {
 _FITS = 2
 """Number of windows for which the light is fitted; later windows have hardly moved."""
 _MARGIN_PX = 3
-_DOUBLE_EXTENT = 1.05
-"""Factor on the length of a double dot, because an ellipse is narrower at its ends."""
 _CONVERGED_PX2 = 4e-6
 _CONVERGED_SHAPE = 0.04
 """Relative change of the second moments of a converged window."""
 
 
 @njit(**COMPILED)
-def _ellipse(mxx: Any, mxy: Any, myy: Any, factor: Any, margin: Any, double: Any) -> Any:
+def _ellipse(mxx: Any, mxy: Any, myy: Any, factor: Any, margin: Any) -> Any:
     """Ellipse a u^2 + 2 b u v + c v^2 <= 1 of semi-axes factor * axis + margin, and its half box.
 
-    Returns (a, b, c, box_x, box_y). A filled ellipse has the second moment axis^2 / 4. Two discs of
-    radius r at the distance d from their middle (`double`) have r^2 / 4 and r^2 / 4 + d^2 and end
-    at r + d; the ellipse with these moments would reach into the next dots.
+    Returns (a, b, c, box_x, box_y). A filled ellipse has the second moment axis^2 / 4.
     """
     middle = 0.5 * (mxx + myy)
     spread = math.sqrt(0.25 * (mxx - myy) ** 2 + mxy * mxy)
-    thin = 2.0 * math.sqrt(max(middle - spread, 0.05))
-    extent = 2.0 * math.sqrt(middle + spread)
-    if double:
-        extent = _DOUBLE_EXTENT * (thin + math.sqrt(2.0 * spread))
-    long, short = factor * extent + margin, factor * thin + margin
+    long = factor * 2.0 * math.sqrt(middle + spread) + margin
+    short = factor * 2.0 * math.sqrt(max(middle - spread, 0.05)) + margin
     cos2, sin2 = 1.0, 0.0
     if spread > 0:
         cos2, sin2 = 0.5 * (mxx - myy) / spread, mxy / spread
@@ -237,14 +230,7 @@ def _window_sums(dark: Any, x0: Any, y0: Any, window: Any, low: Any, high: Any, 
 
 @njit(**COMPILED)
 def _measure_one(
-    image: Any,
-    start: Any,
-    moment: Any,
-    low: Any,
-    high: Any,
-    most: Any,
-    double: Any,
-    out: Any,
+    image: Any, start: Any, moment: Any, low: Any, high: Any, most: Any, out: Any
 ) -> Any:
     """Write one dot and return whether it was found."""
     height, width, _ = image.shape
@@ -257,8 +243,8 @@ def _measure_one(
     contrast = 0.0
     px, py = x0, y0
     for step in range(most):
-        window = _ellipse(mxx, mxy, myy, 1.1, 1.5, double)
-        outer = _ellipse(mxx, mxy, myy, 1.7, 3.5, double)
+        window = _ellipse(mxx, mxy, myy, 1.1, 1.5)
+        outer = _ellipse(mxx, mxy, myy, 1.7, 3.5)
         if (
             max(0, math.floor(x0 - outer[3])) < left
             or max(0, math.floor(y0 - outer[4])) < top
@@ -276,7 +262,7 @@ def _measure_one(
             if step >= _FITS:
                 _darken(patch, px - left, py - top, plane, dark)
         if step < _FITS:
-            inner = _ellipse(mxx, mxy, myy, 1.35, 1.5, double)
+            inner = _ellipse(mxx, mxy, myy, 1.35, 1.5)
             plane[0] += plane[1] * (x0 - px) + plane[2] * (y0 - py)
             px, py = x0, y0
             rounds = 2 if step == 0 else 1
@@ -319,23 +305,16 @@ def _measure_one(
 
 @njit(**COMPILED)
 def measure(
-    image: Any,
-    starts: Any,
-    moments: Any,
-    low: Any,
-    high: Any,
-    most: Any,
-    double: Any,
-    out: Any,
+    image: Any, starts: Any, moments: Any, low: Any, high: Any, most: Any, out: Any
 ) -> None:
     """Write the dots (n, 10) found from `starts` (n, 2) px with `moments` (n, 3) px².
 
     `image` is (h, w, c) uint8; `low` and `high` are the shares of a dot's darkness between which
-    the weight rises; the window is shifted `most` times at most; `double` dots are pairs of discs.
-    A dot that is not found has area 0.
+    the weight rises; the window is shifted `most` times at most. A dot that is not found has
+    area 0.
     """
     for i in range(starts.shape[0]):
         out[i] = 0.0
         out[i, CX], out[i, CY] = starts[i, 0], starts[i, 1]
-        if not _measure_one(image, starts[i], moments[i], low, high, most, double, out[i]):
+        if not _measure_one(image, starts[i], moments[i], low, high, most, out[i]):
             out[i, AREA] = 0.0

@@ -228,8 +228,9 @@ def _measured(
     from gelslim_force.detection import centroid_kernel
 
     dots = np.zeros((len(starts), 10))
-    weights, double = (settings.weight_from, settings.weight_to), settings.shape == "double"
-    centroid_kernel.measure(planes, starts, moments, *weights, _MAX_STEPS, double, dots)
+    centroid_kernel.measure(
+        planes, starts, moments, settings.weight_from, settings.weight_to, _MAX_STEPS, dots
+    )
     return dots
 
 

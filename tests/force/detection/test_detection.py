@@ -134,27 +134,6 @@ def test_the_fast_path_gives_what_the_full_search_gives(look, limit_px):
     assert np.allclose(fast.area_px, full.area_px, rtol=0.1)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize(
-    ("aside_mm", "lens_offset_px"), [(0.0, (0.0, 0.0)), (-0.6, (6.0, 4.0)), (0.3, (6.0, -4.0))]
-)
-def test_a_large_double_dot_has_one_centre(seed, aside_mm, lens_offset_px):
-    """The window of a double anchor held a part of its neighbour: its centre depended on the start
-    of the search by up to 0.3 px."""
-    camera = finger_view(aside_mm=aside_mm, lens_offset_px=lens_offset_px)
-    frame = render(GRID, camera, Look(noise=8, double=True, seed=seed))
-    detector = detector_for(frame, double=True)
-    full = detector.detect(frame.image)
-    rng = np.random.default_rng(3)
-    turn = rng.uniform(0, 2 * np.pi, len(full))
-    off = 0.5 * np.sqrt(full.area_px / np.pi) * rng.uniform(0, 1, len(full))
-    near = full.centres_px + np.column_stack([off * np.cos(turn), off * np.sin(turn)])
-    fast = detector.detect_near(frame.image, near, full.moments_px2)
-    assert np.hypot(*(fast.centres_px - full.centres_px).T).max() < 0.05
-    gap, _ = cKDTree(full.centres_px).query(frame.centres_px)
-    assert gap.max() < 0.2
-
-
 def test_the_fast_path_finds_nothing_where_there_is_nothing():
     frame = render(GRID, look=Look(noise=8, missing=0.2))
     detector = detector_for(frame)
