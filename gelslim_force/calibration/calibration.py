@@ -38,7 +38,6 @@ def calibrate(
     bundle: Bundle,
     image: NDArray[np.uint8],
     *,
-    detector: Detector | None = None,
     tolerance: CameraTolerance | None = None,
     allow_contact: bool = False,
 ) -> Calibration:
@@ -47,7 +46,6 @@ def calibrate(
     Args:
         bundle: The sensor's design, with markers and camera.
         image: (h, w) or (h, w, 3) uint8, without contact.
-        detector: Finds the dots; by default set for the sizes that the design's camera sees.
         tolerance: Standard deviations of the built camera about its design.
         allow_contact: Accept a region in which neighbouring dots are displaced together, for
             prints that are warped there.
@@ -63,8 +61,8 @@ def calibrate(
     """
     grid, design = bundle_grid(bundle), bundle_camera(bundle)
     checks.require_size(image, design)
-    detector = detector or Detector(expected_dots(design, grid))
-    dots = detector.detect(image)
+    settings = expected_dots(design, grid)
+    dots = Detector(settings).detect(image)
     expected = checks.markers_in_view(design, grid)
     checks.require_dots(dots, expected)
     registration = _registered(dots, grid, image, design)
@@ -98,7 +96,7 @@ def calibrate(
         dots=chosen,
         residual_px=fit.residual_px,
         rest_mm=rest,
-        detector=detector.settings,
+        detector=settings,
         geometry_hash=bundle.geometry_hash,
         deviation=deviation,
         diagnosis=diagnosis_lines(deviation, grid, found, missing, aside, in_view),

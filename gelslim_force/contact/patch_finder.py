@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.patch import ContactPatch, rim_share, strip_covariance, strip_patch
-from gelslim_force.contact.patch_region import PatchSettings, changed_region
+from gelslim_force.contact.patch_region import LARGEST_CHANGE, changed_region
 from gelslim_force.contact.patch_shading import (
     REFRESH_FRAMES,
     STEADY_CHANGE,
@@ -43,6 +43,14 @@ Mask = NDArray[np.bool_]
 _MOST_PASSES = 3
 _EDGE_MARGIN = 1.5
 """Distance from the pad's edge, over its size, below which a patch may be cut by the edge."""
+_WINDOW, _MOST_BINS = 2.2, 1200
+"""Radius of the fit to the shading, over the size of the patch, and its largest number of bins."""
+_BLUR_PX = 2.0
+"""Approximate blur of the picture."""
+_LEAST_EXPLAINED = 0.5
+"""Share of the change that a fit to the shading must explain; otherwise the outline is kept."""
+_SHADING_ERROR = 0.01
+"""Relative error of a size from the shading: the law of the slope outside it is not exact."""
 _HIDDEN_RIM_ERROR = 0.05
 """Relative error of the size of a patch whose rim is hidden completely."""
 
@@ -51,16 +59,13 @@ class PatchFinder:
     """Finds contact patches in the frames of one camera, relative to one reference picture.
 
     Args:
-        camera: The sensor's camera. None for pictures of an unknown sensor: `mm_per_px` then gives
-            the scale, and the picture's middle is the origin.
+        camera: The sensor's camera.
         reference: (h, w, 3) or (h, w) uint8 picture without contact.
         markers_px: (m, 2) markers in the reference.
         marker_radius_px: One radius for all markers, or (m,). Pixels within 1.5 times the radius
             are left out.
         surface_mm: (c, 2 or 3) surface nodes of the pad; only bins near one of them count.
         indenter: Determines the shape of the patch, which is a disc if None.
-        mm_per_px: Scale for an unknown sensor.
-        settings: How certain a patch must be.
 
     Raises:
         ValueError: The reference cannot be used.
@@ -68,17 +73,14 @@ class PatchFinder:
 
     def __init__(
         self,
-        camera: VirtualCamera | None,
+        camera: VirtualCamera,
         reference: NDArray[np.uint8],
         markers_px: ArrayLike,
         *,
         marker_radius_px: ArrayLike = 6.0,
         surface_mm: ArrayLike | None = None,
         indenter: Indenter | None = None,
-        mm_per_px: float = 1.0,
-        settings: PatchSettings | None = None,
     ) -> None:
-        self.settings = settings or PatchSettings()
         self.indenter = indenter
         self._last: Followed | None = None
         self._found_bin: tuple[Array, tuple[int, int]] | None = None
@@ -88,7 +90,7 @@ class PatchFinder:
         bin_px = max(2, round(picture.shape[1] / 160)) if picture.ndim >= 2 else 2
         self._radius = np.ascontiguousarray(radius * 1.5 + 1.0)
         self._light = ShadingReference(picture, markers, self._radius, bin_px)
-        bins = bin_positions(self._light, camera, mm_per_px)
+        bins = bin_positions(self._light, camera)
         self._x, self._y, self._parallax, self._growth = bins
         self._bin_mm = bin_sizes(self._x, self._y)
         self._light.on_pad &= np.isfinite(self._x)
@@ -131,7 +133,7 @@ class PatchFinder:
             ValueError: The frame has another shape than the reference.
         """
         light = self.change(image, markers_px)
-        region, contrast = changed_region(light, self.settings)
+        region, contrast = changed_region(light)
         if region is None:
             self._last = None
             return None
@@ -144,9 +146,7 @@ class PatchFinder:
         return _finished(patch, share, contrast)
 
     def _outline(self, region: Mask) -> ContactPatch | None:
-        found = region_patch(
-            region, self._light.on_pad, self._x, self._y, self.indenter, self.settings
-        )
+        found = region_patch(region, self._light.on_pad, self._x, self._y, self.indenter)
         if found is None:
             return None
         parallax, growth = self._sight(found.centre_mm)
@@ -217,7 +217,7 @@ class PatchFinder:
                 break
             larger = [start_values(patch, scale, 1.5) for scale in (1.0, 1.3)]
             starts = [found[1].values, *larger]
-        if found is None or found[1].explained < self.settings.least_explained:
+        if found is None or found[1].explained < _LEAST_EXPLAINED:
             return None
         return found
 
@@ -250,9 +250,8 @@ class PatchFinder:
     ) -> ContactPatch:
         size = float(fit.values[2])
         extra = np.zeros((4, 4))
-        share = self.settings.shading_error
-        extra[2, 2] = (share * size) ** 2 + (0.05 * bin_mm) ** 2
-        extra[:2, :2] = np.eye(2) * ((0.6 * share * size) ** 2 + (0.05 * bin_mm) ** 2)
+        extra[2, 2] = (_SHADING_ERROR * size) ** 2 + (0.05 * bin_mm) ** 2
+        extra[:2, :2] = np.eye(2) * ((0.6 * _SHADING_ERROR * size) ** 2 + (0.05 * bin_mm) ** 2)
         if self._strip:
             offset, turn = float(fit.values[0]), float(fit.values[1])
             patch = strip_patch(offset, size, turn, start.centre_mm)
@@ -271,12 +270,11 @@ class PatchFinder:
         )  # fmt: skip
 
     def _window(self, start: ContactPatch, light: ShadingChange) -> Window | None:
-        s = self.settings
         valid = np.flatnonzero(light.valid)
         apart = start.outside_mm(self._x.ravel()[valid], self._y.ravel()[valid])
-        near = valid[apart < (s.window - 1) * start.size_mm]
+        near = valid[apart < (_WINDOW - 1) * start.size_mm]
         rows, columns = np.divmod(near, light.valid.shape[1])
-        skip = 1 + len(rows) // s.most_bins
+        skip = 1 + len(rows) // _MOST_BINS
         kept = (rows + columns) % skip == 0
         rows, columns = rows[kept], columns[kept]
         if len(rows) < 40:
@@ -285,14 +283,13 @@ class PatchFinder:
         number[rows, columns] = np.arange(len(rows))
         partner = number[rows + 1, columns - 1]
         have = partner >= 0
-        most = s.largest_change
         return Window(
             self._x[rows, columns],
             self._y[rows, columns],
             self._parallax[rows, columns],
             (
-                most
-                * np.tanh(light.change[:, rows, columns].astype(float) / most)
+                LARGEST_CHANGE
+                * np.tanh(light.change[:, rows, columns].astype(float) / LARGEST_CHANGE)
                 / np.median(light.noise[:, rows, columns], axis=1)[:, None]
             ).T,
             self._local_bin(start),
@@ -306,7 +303,7 @@ class PatchFinder:
         return 1 / known if known else 0.0
 
     def _law(self, bin_mm: float) -> SlopeLaw:
-        blur_mm = float(np.hypot(bin_mm / 2, self.settings.blur_px / self._light.bin_px * bin_mm))
+        blur_mm = float(np.hypot(bin_mm / 2, _BLUR_PX / self._light.bin_px * bin_mm))
         return SlopeLaw(self._strip, self._curvature, blur_mm)
 
     @property

@@ -2,85 +2,49 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelslim_force.contact.shading_change import ShadingChange
 
-
-@dataclass(frozen=True)
-class PatchSettings:
-    """How certain a contact patch must be.
-
-    Attributes:
-        least_change: Logarithmic change of light below which nothing is a patch.
-        largest_change: Change above which the light no longer follows the slope; larger changes
-            are compressed.
-        least_power: Smallest squared change over the noise, averaged over 3 x 3 bins.
-        least_bins: Smallest number of bins of a patch.
-        outline_level: Share of the patch's own change at which its outline is drawn.
-        window: Radius of the fit to the shading, over the size of the patch.
-        most_bins: Largest number of bins of the fit.
-        blur_px: Approximate blur of the picture.
-        least_explained: Smallest share of the change that a fit to the shading must explain;
-            otherwise the outline is kept.
-        outline_error: Relative error of a size from the outline alone: the light also changes
-            outside the patch.
-        shading_error: Relative error of a size from the shading: the law of the slope outside the
-            patch is not exact.
-
-    Raises:
-        ValueError: A value is not above 0.
-    """
-
-    least_change: float = 0.02
-    largest_change: float = 0.6
-    least_power: float = 6.0
-    least_bins: int = 12
-    outline_level: float = 0.4
-    window: float = 2.2
-    most_bins: int = 1200
-    blur_px: float = 2.0
-    least_explained: float = 0.5
-    outline_error: float = 0.15
-    shading_error: float = 0.01
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"patch settings: {name} = {value!r} must be above 0")
-
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+LARGEST_CHANGE = 0.6
+"""Logarithmic change of light above which the light no longer follows the slope; larger changes
+are compressed."""
+_LEAST_CHANGE = 0.02
+"""Change of light below which nothing is a patch."""
+_LEAST_POWER = 6.0
+"""Smallest squared change over the noise, averaged over 3 x 3 bins."""
+_LEAST_BINS = 12
+_OUTLINE_LEVEL = 0.4
+"""Share of the patch's own change at which its outline is drawn."""
 _CLEAR = 2.0
 """Change over the noise from which a bin's own change counts."""
 _LEAST_VALID = 2
 """Smallest number of valid bins among the 3 x 3 around a bin."""
 
 
-def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask | None, float]:
+def changed_region(light: ShadingChange) -> tuple[Mask | None, float]:
     """The largest group of bins whose shading changed (None without one), and its contrast."""
-    s = settings
     change = light.change.astype(np.float32, copy=False)
     valid = light.valid.astype(np.float32)
     over_noise = np.square(change / light.noise)
     power = over_noise.mean(axis=0)
     # Changes that may be noise do not count, or dark bins would outweigh a patch.
     clear = np.abs(change) * (over_noise > _CLEAR**2)
-    size = np.float32(s.largest_change) * np.tanh(clear.max(axis=0) / np.float32(s.largest_change))
+    most = np.float32(LARGEST_CHANGE)
+    size = most * np.tanh(clear.max(axis=0) / most)
     around = _around(np.stack([valid, power * valid, size * valid]))
     power, size = around[1:] / np.maximum(around[0], 1)
-    changed = (power > s.least_power) & (size > s.least_change) & (around[0] >= _LEAST_VALID)
-    if changed.sum() < s.least_bins:
+    changed = (power > _LEAST_POWER) & (size > _LEAST_CHANGE) & (around[0] >= _LEAST_VALID)
+    if changed.sum() < _LEAST_BINS:
         return None, 0.0
     # Faint changes far away (a lamp, the shadow of a hand) do not belong to the patch.
     sizes = size[changed]
     rank = round(0.98 * (len(sizes) - 1))
-    level = s.outline_level * float(np.partition(sizes, rank)[rank])
+    level = _OUTLINE_LEVEL * float(np.partition(sizes, rank)[rank])
     outlined = changed & (size >= level)
     box = _box(outlined, 3)
     strong, size = outlined[box], size[box]
@@ -90,7 +54,7 @@ def changed_region(light: ShadingChange, settings: PatchSettings) -> tuple[Mask 
         return None, 0.0
     score = ndimage.sum_labels(np.where(strong, size**3, 0.0), labels, np.arange(1, count + 1))
     strong = _joined(labels, score) & strong
-    if strong.sum() < s.least_bins:
+    if strong.sum() < _LEAST_BINS:
         return None, 0.0
     region = np.zeros_like(outlined)
     region[box] = strong

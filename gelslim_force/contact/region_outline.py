@@ -11,10 +11,11 @@ from scipy.optimize import least_squares
 
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.patch import ContactPatch, flat_patch, strip_covariance, strip_patch
-from gelslim_force.contact.patch_region import PatchSettings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_OUTLINE_ERROR = 0.15
+"""Relative error of a size from the outline alone: the light also changes outside the patch."""
 _FEWEST = 6
 """Smallest number of points of an outline that determine its shape."""
 
@@ -25,7 +26,6 @@ def region_patch(
     x_mm: Array,
     y_mm: Array,
     indenter: Indenter | None,
-    settings: PatchSettings,
 ) -> ContactPatch | None:
     """Fit a patch to the outline of a region, where the edge of the pad does not cut it.
 
@@ -35,7 +35,6 @@ def region_patch(
         x_mm: (rows, columns) positions of the bins on the gel.
         y_mm: (rows, columns) likewise.
         indenter: Determines the shape of the patch, which is a disc if None.
-        settings: Give the error of a size from an outline.
 
     Returns:
         The patch with its covariance; None where the outline does not determine it.
@@ -67,7 +66,7 @@ def region_patch(
         return None
     if not (np.isfinite(half) and half < 1.2 * np.ptp(inside, axis=0).max()):
         return None
-    spread = (settings.outline_error * float(half)) ** 2
+    spread = (_OUTLINE_ERROR * float(half)) ** 2
     covariance[2, 2] += spread
     covariance[:2, :2] += np.eye(2) * spread / 4
     return replace(patch, covariance=covariance, method="outline")

@@ -196,7 +196,7 @@ def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def bin_positions(
-    light: ShadingReference, camera: VirtualCamera | None, mm_per_px: float
+    light: ShadingReference, camera: VirtualCamera
 ) -> tuple[Array, Array, Array, Array]:
     """Where the bins are on the gel.
 
@@ -204,11 +204,6 @@ def bin_positions(
     of sight per mm of height, and the relative change of lengths per mm of height.
     """
     pixels = light.centres_px()
-    if camera is None:
-        height, width = light.image.shape[:2]
-        points = (pixels - [(width - 1) / 2, (height - 1) / 2]) * mm_per_px
-        x, y = (points[:, k].reshape(light.shape) for k in (0, 1))
-        return x, y, np.zeros((*light.shape, 2)), np.zeros(light.shape)
     expected = (camera.image_height_px, camera.image_width_px)
     if light.image.shape[:2] != expected:
         raise ValueError(

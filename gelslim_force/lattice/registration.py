@@ -73,7 +73,6 @@ def register(
     camera: VirtualCamera | None = None,
     *,
     pose_tolerance_pitch: float = 0.3,
-    least_margin: float = LEAST_MARGIN,
 ) -> Registration:
     """Return which dot is which marker.
 
@@ -84,7 +83,6 @@ def register(
         camera: Its prediction counts as much as two anchors at most, because the print on a gel
             may be misplaced by a pitch. Without anchors the prediction decides alone.
         pose_tolerance_pitch: Standard deviation of the prediction, in pitches.
-        least_margin: Log-likelihood by which the best motion must exceed the second best.
 
     Raises:
         LatticeError: No lattice is found, or two motions explain it equally well.
@@ -101,8 +99,8 @@ def register(
         )
     (best, motion), runner_up = scores[0], scores[1]
     margin = best - runner_up[0]
-    if margin < least_margin:
-        raise LatticeError(_refusal(margin, least_margin, motion, runner_up[1], grid, camera))
+    if margin < LEAST_MARGIN:
+        raise LatticeError(_refusal(margin, motion, runner_up[1], grid, camera))
     result = _assigned(lattice, detections, grid, motion, margin, offset)
     if result.coverage < 0.5 and len(lattice.dots) > 2 * result.found.sum():
         raise LatticeError(
@@ -254,7 +252,6 @@ def _assigned(
 
 def _refusal(
     margin: float,
-    least: float,
     best: Motion,
     second: Motion,
     grid: MarkerGrid,
@@ -273,5 +270,5 @@ def _refusal(
             remedy += " or give the camera"
     return (
         f"cannot tell which dot is which: {other} explains the frame nearly as well "
-        f"(log-likelihood margin {margin:.2f}, needed {least:g}); {remedy}"
+        f"(log-likelihood margin {margin:.2f}, needed {LEAST_MARGIN:g}); {remedy}"
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gelslim_force.forces.frame_result import FrameResult
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
+_ARROW_PX, _ARROW_MM, _MOST_GAIN = 24.0, 1.6, 10.0
 
 
 @dataclass(frozen=True)
@@ -69,33 +70,31 @@ def extent(result: FrameResult) -> Extent:
     return Extent(motion, shear, max(pressure, 0.0), force, torque)
 
 
-def scale_for(
-    largest: Extent, arrow_px: float = 24.0, arrow_mm: float = 1.6, most_gain: float = 10.0
-) -> ArrowScale:
+def scale_for(largest: Extent) -> ArrowScale:
     """Return round scales (1, 2 or 5 times a power of ten) for the largest values of a run.
 
-    The largest arrows become about `arrow_px` and `arrow_mm` long. The limit `most_gain` prevents
-    that the noise of a run without contact looks like motion; the forces have the lower limits
-    0.1 kPa, 10 mN and 0.1 N mm for the same reason.
+    The largest arrows become about 24 px and 1.6 mm long. The limit of the gain prevents that the
+    noise of a run without contact looks like motion; the forces have the lower limits 0.1 kPa,
+    10 mN and 0.1 N mm for the same reason.
     """
-    gain = most_gain
+    gain = _MOST_GAIN
     if largest.motion_px > 0:
-        gain = min(most_gain, round_step(arrow_px / largest.motion_px))
+        gain = min(_MOST_GAIN, round_step(_ARROW_PX / largest.motion_px))
     return ArrowScale(
         motion_gain=gain,
-        traction_mm_per_mpa=round_step(arrow_mm / max(largest.shear_mpa, 1e-4)),
+        traction_mm_per_mpa=round_step(_ARROW_MM / max(largest.shear_mpa, 1e-4)),
         pressure_mpa=_rounded_up(max(largest.pressure_mpa, 1e-4)),
         force_bar_n=_rounded_up(max(largest.force_n, 0.01)),
         torque_bar_nmm=_rounded_up(max(largest.torque_nmm, 0.1)),
     )
 
 
-def scale_of_run(results: Iterable[FrameResult], arrow_px: float = 24.0) -> ArrowScale:
+def scale_of_run(results: Iterable[FrameResult]) -> ArrowScale:
     """Return the scale for all frames of a run, such as those of `RecordedRun.results()`."""
     largest = Extent()
     for result in results:
         largest = largest.joined(extent(result))
-    return scale_for(largest, arrow_px)
+    return scale_for(largest)
 
 
 class LiveScale:
@@ -105,16 +104,15 @@ class LiveScale:
     not flicker; the legend shows the present scale.
     """
 
-    def __init__(self, expected: Extent, arrow_px: float = 24.0) -> None:
-        self._arrow_px, self._largest = arrow_px, expected
-        self._scale = scale_for(expected, arrow_px)
+    def __init__(self, expected: Extent) -> None:
+        self._largest, self._scale = expected, scale_for(expected)
 
     def scale(self, result: FrameResult) -> ArrowScale:
         """Return the scale for the next frame."""
         seen = extent(result)
         if self._largest.outgrown_by(seen):
             self._largest = self._largest.joined(seen)
-            self._scale = scale_for(self._largest, self._arrow_px)
+            self._scale = scale_for(self._largest)
         return self._scale
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import Delaunay, QhullError
 
+from gelslim_core import optional_library
 from gelslim_core.errors import disk_error
 from gelslim_core.files.replaced_file import replace_file
 from gelslim_force.forces.frame_result import ForceField, FrameResult
@@ -43,25 +43,8 @@ Projection = Callable[[Array], Array]
 """From points (n, 3) in mm to positions (n, 2) in px, such as `VirtualCamera.project`."""
 _COARSE = 4
 _STEP_MM = 0.05
-
-
-@dataclass(frozen=True)
-class OverlaySettings:
-    """What is drawn. Raises ValueError for impossible values."""
-
-    markers: bool = True
-    motion: bool = True
-    column: bool = True
-    zoom: int | None = None
-    """Enlargement of the picture; None enlarges it until it is at least 640 px high."""
-    cell_mm: float = 1.1
-    """Side of the square whose nodes share one force arrow."""
-
-    def __post_init__(self) -> None:
-        if self.zoom is not None and not 1 <= self.zoom <= 8:
-            raise ValueError(f"zoom = {self.zoom}: must be in 1 ... 8")
-        if not self.cell_mm > 0:
-            raise ValueError(f"cell_mm = {self.cell_mm}: must be > 0")
+_CELL_MM = 1.1
+"""Side of the square whose nodes share one force arrow."""
 
 
 class Overlay:
@@ -76,7 +59,6 @@ class Overlay:
         shape: tuple[int, int],
         project: Projection | None = None,
         reference_px: NDArray[np.float64] | None = None,
-        settings: OverlaySettings | None = None,
     ) -> None:
         """Prepare to draw frames of one sensor.
 
@@ -85,11 +67,9 @@ class Overlay:
             project: The camera's projection; without it no forces are drawn in the picture.
             reference_px: (m, 2) positions of the markers at rest, where lost markers are drawn.
                 Without it a marker is drawn once it has been seen.
-            settings: What is drawn.
         """
         self._shape, self._project = shape, project
-        self._settings = settings or OverlaySettings()
-        self.zoom = self._settings.zoom or int(np.clip(-(-LEAST_HEIGHT_PX // shape[0]), 1, 8))
+        self.zoom = int(np.clip(-(-LEAST_HEIGHT_PX // shape[0]), 1, 8))
         self._rest = None if reference_px is None else np.array(reference_px, dtype=float)
         self._view: SurfaceView | None = None
 
@@ -97,8 +77,6 @@ class Overlay:
     def size_px(self) -> tuple[int, int]:
         """(h, w) of the pictures drawn."""
         height, width = self._shape[0] * self.zoom, self._shape[1] * self.zoom
-        if not self._settings.column:
-            return height, width
         return max(height, LEAST_HEIGHT_PX), width + WIDTH_PX
 
     def draw(
@@ -131,8 +109,7 @@ class Overlay:
             self._draw_markers(canvas, result.tracks, scale)
         if field is not None and view is not None:
             self._draw_centre(canvas, view.position_px(field.centre_of_pressure_mm))
-        picture = canvas.picture()
-        return self._with_column(picture, result, scale) if self._settings.column else picture
+        return self._with_column(canvas.picture(), result, scale)
 
     def _ground(self, image: NDArray[np.uint8] | None) -> NDArray[np.float32]:
         """The frame, darker and with less colour."""
@@ -149,7 +126,7 @@ class Overlay:
         same = view is not None and np.array_equal(view.points_mm, field.points_mm)
         if view is None or not same:
             assert self._project is not None
-            view = SurfaceView(field.points_mm, self._project, self._shape, self._settings.cell_mm)
+            view = SurfaceView(field.points_mm, self._project, self._shape)
             self._view = view
         return view
 
@@ -188,12 +165,9 @@ class Overlay:
             status = MarkerStatus(int(tracks.status[k]))
             if not np.isfinite(position).all():
                 continue
-            arrows = self._settings.motion and status == MarkerStatus.TRACKED
-            if arrows and np.isfinite(moved[k]).all():
+            if status == MarkerStatus.TRACKED and np.isfinite(moved[k]).all():
                 self._arrow(canvas, position, scale.motion_gain * moved[k], YELLOW)
-            if self._settings.markers:
-                x, y = self._at(position)
-                status_mark(canvas, x, y, status, size)
+            status_mark(canvas, *self._at(position), status, size)
 
     def _rest_of(self, tracks: Tracks) -> NDArray[np.float64]:
         """Positions at rest (m, 2), kept for the markers that are lost in this frame."""
@@ -260,14 +234,12 @@ class SurfaceView:
     The camera's projection is evaluated once, so that a frame needs only a few matrix products.
     """
 
-    def __init__(
-        self, points_mm: Array, project: Projection, shape: tuple[int, int], cell_mm: float
-    ) -> None:
-        """Project the nodes into a picture of `shape` (h, w); one arrow per cell of `cell_mm`."""
+    def __init__(self, points_mm: Array, project: Projection, shape: tuple[int, int]) -> None:
+        """Project the nodes into a picture of `shape` (h, w)."""
         self.points_mm = points_mm
         self._project = project
         self.shape = shape
-        self._gather, centres = _cells(points_mm, cell_mm)
+        self._gather, centres = _cells(points_mm, _CELL_MM)
         self.cells_px = project(centres)
         """(k, 2) positions at which the arrows start."""
         steps = [np.array([_STEP_MM, 0, 0]), np.array([0, _STEP_MM, 0])]
@@ -285,7 +257,10 @@ class SurfaceView:
         """Interpolate values (c,) at the nodes linearly to a picture (h, w), 0 outside the pad."""
         height, width = _coarse(self.shape)
         coarse = (self._spread @ values).reshape(height, width)
-        return _enlarged(coarse, self.shape)
+        cv = optional_library.load("cv2", "drawing pictures")
+        size = (width * _COARSE, height * _COARSE)
+        large = cv.resize(coarse, size, interpolation=cv.INTER_LINEAR)
+        return np.asarray(large[: self.shape[0], : self.shape[1]])
 
     def position_px(self, point_mm: Array) -> Array:
         """Return the position (2,) of a point (2,) on the surface; NaN for NaN."""
@@ -326,14 +301,3 @@ def _spreading(nodes_px: Array, shape: tuple[int, int]) -> sparse.csr_array:
     weights = np.column_stack([two, 1 - two.sum(axis=1)])
     corners = net.simplices[triangle[inside]]
     return sparse.csr_array((weights.ravel(), (np.repeat(inside, 3), corners.ravel())), shape=size)
-
-
-def _enlarged(coarse: Array, shape: tuple[int, int]) -> Array:
-    """Interpolate linearly between coarse pixels, whose centres are at i + 1/2."""
-    for axis, count in enumerate(shape):
-        at = np.clip((np.arange(count) + 0.5) / _COARSE - 0.5, 0, coarse.shape[axis] - 1)
-        low = np.minimum(at.astype(int), max(coarse.shape[axis] - 2, 0))
-        high = np.minimum(low + 1, coarse.shape[axis] - 1)
-        part = (at - low).reshape((-1, 1) if axis == 0 else (1, -1))
-        coarse = coarse.take(low, axis) * (1 - part) + coarse.take(high, axis) * part
-    return coarse

@@ -12,7 +12,6 @@ from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded
 
 from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
 from gelslim_force.contact.patch_finder import PatchFinder
-from gelslim_force.contact.patch_region import PatchSettings
 from gelslim_force.contact.patch_shading import REFRESH_FRAMES
 from gelslim_force.contact.region_outline import circle_start, fit_circle, fit_strip
 from gelslim_force.frames.read_only import read_only
@@ -390,7 +389,5 @@ def test_unfit_pictures_are_refused():
         PatchFinder(CAMERA, np.zeros_like(frame.image), frame.centres_px)
     with pytest.raises(ValueError, match="320 x 240"):
         PatchFinder(CAMERA, frame.image[:240, :320], frame.centres_px)
-    with pytest.raises(ValueError, match="least_change"):
-        PatchSettings(least_change=0.0)
     assert finder().find(np.zeros_like(frame.image)) is None
     assert finder().find(np.full_like(frame.image, 255)) is None

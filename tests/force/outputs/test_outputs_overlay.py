@@ -26,7 +26,7 @@ from gelslim_force.outputs.arrow_scale import (
     scale_of_run,
 )
 from gelslim_force.outputs.legend import LEAST_HEIGHT_PX, ORANGE, RED, WIDTH_PX, YELLOW, value_text
-from gelslim_force.outputs.overlay import Overlay, OverlaySettings, SurfaceView, write_overlay
+from gelslim_force.outputs.overlay import Overlay, SurfaceView, write_overlay
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 BLACK = np.zeros((480, 640, 3), dtype=np.uint8)
@@ -47,16 +47,16 @@ def one_marker(position: tuple[float, float], motion: tuple[float, float]) -> Fr
 
 
 def test_a_motion_arrow_spans_gain_times_motion() -> None:
-    overlay = Overlay((480, 640), settings=OverlaySettings(column=False, markers=False, zoom=2))
+    overlay = Overlay((480, 640))
     picture = overlay.draw(BLACK, one_marker((200.0, 150.0), (30.0, -20.0)), SCALE)
-    yellow = coloured(picture, YELLOW)
+    yellow = coloured(picture[:, :-WIDTH_PX], YELLOW)
     # From (200, 150) by gain 2: to (260, 110); pixel p of the frame is at 2 p + 1/2.
     start, tip = yellow[yellow[:, 0].argmin()], yellow[yellow[:, 0].argmax()]
     np.testing.assert_allclose(start, [400.5, 300.5], atol=3)
     np.testing.assert_allclose(tip, [520.5, 220.5], atol=3)
 
 
-def test_a_force_arrow_follows_the_camera() -> None:
+def test_a_force_arrow_follows_the_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     """One node alone carries shear; its arrow ends where the camera sees its end on the gel."""
     camera = finger_view()
     field = samples.force_field(0.0, (0.0, 0.0))
@@ -65,10 +65,9 @@ def test_a_force_arrow_follows_the_camera() -> None:
     traction[node, :2] = [0.06, 0.09]
     field = dataclasses.replace(field, traction_mpa=traction)
     result = FrameResult(index=0, time_s=0.0, field=field)
-    overlay = Overlay(
-        (480, 640), camera.project, settings=OverlaySettings(column=False, cell_mm=0.3)
-    )
-    red = coloured(overlay.draw(BLACK, result, SCALE), RED)
+    monkeypatch.setattr("gelslim_force.outputs.overlay._CELL_MM", 0.3)
+    overlay = Overlay((480, 640), camera.project)
+    red = coloured(overlay.draw(BLACK, result, SCALE)[:, :-WIDTH_PX], RED)
     ends = np.array([field.points_mm[node], field.points_mm[node] + 20.0 * traction[node]])
     seen = camera.project(ends) * overlay.zoom + (overlay.zoom - 1) / 2
     along = (seen[1] - seen[0]) / np.linalg.norm(seen[1] - seen[0])
@@ -78,9 +77,10 @@ def test_a_force_arrow_follows_the_camera() -> None:
     np.testing.assert_allclose(red[reach.argmax()], seen[1], atol=6)
 
 
-def test_arrow_and_shade_against_the_camera_and_scipy() -> None:
+def test_arrow_and_shade_against_the_camera_and_scipy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gelslim_force.outputs.overlay._CELL_MM", 0.3)
     camera = finger_view()
-    view = SurfaceView(samples.NODES_MM, camera.project, (480, 640), cell_mm=0.3)
+    view = SurfaceView(samples.NODES_MM, camera.project, (480, 640))
     rng = np.random.default_rng(2)
     traction = rng.normal(0, 1, samples.NODES_MM.shape)
     step = 1e-3 * traction * [1, 1, 0]
@@ -107,7 +107,7 @@ def test_arrows_cover_what_the_field_needs() -> None:
 
 
 def test_unknown_normal_draws_shear_without_shade() -> None:
-    overlay = Overlay((480, 640), finger_view().project, settings=OverlaySettings(motion=False))
+    overlay = Overlay((480, 640), finger_view().project)
     shaded = overlay.draw(np.full_like(BLACK, 120), samples.frame(1), SCALE)
     plain = overlay.draw(np.full_like(BLACK, 120), samples.frame(1, normal_known=False), SCALE)
     grey = (np.ptp(plain[:, :1280].astype(int), axis=2) < 6).sum()
@@ -117,27 +117,28 @@ def test_unknown_normal_draws_shear_without_shade() -> None:
 
 
 def test_no_contact_draws_no_arrows() -> None:
-    overlay = Overlay((480, 640), finger_view().project, settings=OverlaySettings(column=False))
+    overlay = Overlay((480, 640), finger_view().project)
     result = samples.frame(0, depth_mm=0.0, shear_mm=(0.0, 0.0))
-    picture = overlay.draw(BLACK, result, scale_of_run([result]))
+    picture = overlay.draw(BLACK, result, scale_of_run([result]))[:, :-WIDTH_PX]
     assert len(coloured(picture, YELLOW)) == 0
     assert len(coloured(picture, RED)) == 0
 
 
 def test_lost_markers_stay_where_they_were_seen() -> None:
-    overlay = Overlay((480, 640), settings=OverlaySettings(column=False, zoom=1))
+    overlay = Overlay((480, 640))
     seen = one_marker((100.0, 80.0), (0.0, 0.0))
     nowhere = np.full((1, 2), np.nan)
     lost = Tracks(nowhere, nowhere, np.array([int(MarkerStatus.LOST)]), np.array([-1]))
     later = dataclasses.replace(seen, index=1, tracks=lost)
-    assert not overlay.draw(BLACK, later, SCALE).any()
+    assert not overlay.draw(BLACK, later, SCALE)[:, :-WIDTH_PX].any()
     overlay.draw(BLACK, seen, SCALE)
-    bright = np.argwhere(overlay.draw(BLACK, later, SCALE).max(axis=2) > 100)
-    np.testing.assert_allclose(bright.mean(axis=0), [80, 100], atol=1)
+    picture = overlay.draw(BLACK, later, SCALE)[:, :-WIDTH_PX]
+    bright = np.argwhere(picture.max(axis=2) > 100)
+    np.testing.assert_allclose(bright.mean(axis=0), [160.5, 200.5], atol=1)
 
 
 def test_a_frame_that_could_not_be_read_has_its_problem_in_the_column() -> None:
-    overlay = Overlay((200, 300), settings=OverlaySettings())
+    overlay = Overlay((200, 300))
     picture = overlay.draw(None, samples.unreadable(5), SCALE)
     assert picture.shape == (*overlay.size_px, 3) == (800, 1200 + WIDTH_PX, 3)
     assert len(coloured(picture, ORANGE)) > 100
@@ -147,16 +148,16 @@ def test_a_frame_that_could_not_be_read_has_its_problem_in_the_column() -> None:
 
 
 def test_grey_frames_and_low_ones() -> None:
-    overlay = Overlay((100, 120), settings=OverlaySettings(zoom=1))
-    picture = overlay.draw(np.full((100, 120), 200, np.uint8), samples.unreadable(0), SCALE)
-    assert picture.shape == (LEAST_HEIGHT_PX, 120 + WIDTH_PX, 3)
+    overlay = Overlay((60, 120))
+    picture = overlay.draw(np.full((60, 120), 200, np.uint8), samples.unreadable(0), SCALE)
+    assert picture.shape == (LEAST_HEIGHT_PX, 8 * 120 + WIDTH_PX, 3)
     np.testing.assert_array_equal(picture[50, 60], [160, 160, 160])
 
 
 def test_the_given_frame_is_left_alone() -> None:
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8)
     before = image.copy()
-    overlay = Overlay((480, 640), finger_view().project, settings=OverlaySettings(zoom=1))
+    overlay = Overlay((480, 640), finger_view().project)
     overlay.draw(image, samples.frame(1), SCALE)
     np.testing.assert_array_equal(image, before)
 
@@ -187,7 +188,7 @@ def test_live_scale_steps_once_and_does_not_flicker() -> None:
 
 def test_files(tmp_path: Path) -> None:
     pillow = pytest.importorskip("PIL.Image")
-    overlay = Overlay((480, 640), settings=OverlaySettings(zoom=1))
+    overlay = Overlay((480, 640))
     picture = overlay.draw(BLACK, samples.frame(1), SCALE)
     path = tmp_path / "ein Bild, größer.png"
     write_overlay(path, picture)
@@ -203,16 +204,10 @@ def test_files(tmp_path: Path) -> None:
 
 def test_without_libraries_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cv2", None)
-    overlay = Overlay((480, 640), settings=OverlaySettings(zoom=1))
+    overlay = Overlay((480, 640))
     with pytest.raises(MissingLibraryError) as refused:
         overlay.draw(BLACK, samples.frame(1), SCALE)
     assert (refused.value.name, refused.value.extra) == ("cv2", "vision")
-
-
-@pytest.mark.parametrize("bad", [{"zoom": 9}, {"cell_mm": 0.0}])
-def test_impossible_settings_are_refused(bad: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=next(iter(bad))):
-        OverlaySettings(**bad)  # type: ignore[arg-type]
 
 
 def test_words_of_the_scales_are_of_what_is_drawn() -> None:

@@ -11,6 +11,7 @@ import pytest
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
+from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 
 FRAMES = Path(
     os.environ.get("GELSLIM_REAL_FRAMES", Path(__file__).parents[4] / "shared" / "real_frames")
@@ -29,7 +30,7 @@ SEEN = {
 
 
 def test_every_press_of_a_real_sensor_is_found_where_it_is():
-    """Markers known, scale and camera not; the ball's size is not known either."""
+    """Markers known, camera and ball not: it is taken to look straight down at 1 px/mm."""
     image = pytest.importorskip("PIL.Image")
     folder = FRAMES / "gelslim3"
     if not folder.is_dir():
@@ -42,7 +43,19 @@ def test_every_press_of_a_real_sensor_is_found_where_it_is():
     detector = Detector(DetectorSettings(shape="double"))
     dots = detector.detect(reference)
     radius = 1.6 * np.sqrt(dots.area_px / np.pi)
-    finder = PatchFinder(None, reference, dots.centres_px, marker_radius_px=radius)
+    height, width = reference.shape[:2]
+    camera = VirtualCamera(
+        position_mm=np.array([0.0, 0.0, -1000.0]),
+        right=np.array([1.0, 0.0, 0.0]),
+        down=np.array([0.0, 1.0, 0.0]),
+        forward=np.array([0.0, 0.0, 1.0]),
+        focal_px=1000.0,
+        image_width_px=width,
+        image_height_px=height,
+        window_bottom_z_mm=-1.0,
+        layers=(Layer(1.0, 1.0),),
+    )
+    finder = PatchFinder(camera, reference, dots.centres_px, marker_radius_px=radius)
     assert finder.find(reference) is None
     middle = (np.array(reference.shape[1::-1]) - 1) / 2
     for name, (x, y, half) in SEEN.items():
