@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
 from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue, project
 from ifem_export.inverse.contact_inverse import MARGIN, masked_force, smoothing
+from ifem_export.operators.convolved_operator import ComplianceProducts
+from ifem_export.operators.layered_operator import layered_operator, surface_compliance
 
 START = np.array([0.3, 0.2, -1.0])
 
@@ -150,6 +154,54 @@ def test_fit_by_an_operator_is_the_accelerated_projected_gradient(
     assert found.converged == (change <= 1e-5) == (most == 3000)
     residual = block @ force.reshape(-1) - u.reshape(-1)
     assert found.misfit == pytest.approx(np.linalg.norm(residual) / np.linalg.norm(u), rel=1e-7)
+
+
+class Convolved:
+    """The surface of a pad whose opposite sides are joined, where the products are exact."""
+
+    def __init__(self) -> None:
+        element = hex8_stiffness((0.5, 0.7, 0.4), Material(0.147, 0.4, 1.0), "bbar")
+        columns = np.argwhere(np.ones((4, 6), dtype=bool))
+        self.compliance = layered_operator(element, 2, columns, (0, 0), surface_compliance)
+        self.compliance_products = ComplianceProducts(self.compliance)
+
+    def displacement(self, force: np.ndarray) -> np.ndarray:
+        return self.compliance(force[None])[0]
+
+
+@pytest.mark.parametrize("friction", [0.3, np.inf])
+@pytest.mark.parametrize("most", [1, 6, 40, 3000])
+def test_fit_by_products_takes_the_slope_anew_in_every_round(friction: float, most: int) -> None:
+    operator, rng = Convolved(), np.random.default_rng(8)
+    columns = [operator.displacement(e.reshape(-1, 3)).reshape(-1) for e in np.eye(72)]
+    mask = np.arange(24) % 5 < 2
+    block = np.array(columns).T[:, np.repeat(mask, 3)]
+    gram = block.T @ block
+    u = operator.displacement(rng.normal(size=(24, 3)) - [0.0, 0.0, 1.0])
+    start, tolerance = rng.normal(size=(24, 3)), 1e-5
+    step = 1.0 / (MARGIN * largest_eigenvalue(gram))
+    found = masked_force(
+        operator, u, mask, friction=friction, start_n=start, most_steps=most, tolerance=tolerance
+    )
+    force, steps = nearest(start[mask], friction), 0
+    while True:
+        before = force
+        slope = block.T @ (block @ before.reshape(-1) - u.reshape(-1))
+
+        def slope_of(force: np.ndarray, slope=slope, before=before) -> np.ndarray:
+            return (slope + gram @ (force - before).reshape(-1)).reshape(-1, 3)
+
+        force, change, taken = gradients(slope_of, before, friction, step, tolerance, most - steps)
+        steps += taken
+        moved = np.linalg.norm(force - before) / np.linalg.norm(force)
+        if steps >= most or taken <= 1 or moved <= 10 * tolerance:
+            break
+    assert (found.steps, found.converged) == (steps, change <= tolerance)
+    assert found.force_n[mask] == pytest.approx(force, abs=1e-6 * np.abs(force).max())
+    assert not found.force_n[~mask].any()
+    assert found.change == pytest.approx(change, rel=1e-3)
+    residual = block @ force.reshape(-1) - u.reshape(-1)
+    assert found.misfit == pytest.approx(np.linalg.norm(residual) / np.linalg.norm(u), rel=1e-6)
 
 
 def test_the_step_size_takes_few_operator_calls() -> None:
