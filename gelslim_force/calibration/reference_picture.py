@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.calibration.error import CalibrationError
+from gelslim_force.frames.frame import FrameSourceError
+from gelslim_force.frames.frame_array import read_frame_array
 from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
 
 MOST_PICTURES = 100
@@ -37,51 +39,27 @@ def read_reference(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
             raise CalibrationError(
                 "file", f"{place}: no pictures in it ({', '.join(PICTURE_ENDINGS)})"
             )
-        return _mean([_frames(f) for f in files[:MOST_PICTURES]], place)
+        return _mean([p for f in files[:MOST_PICTURES] for p in _pictures(f)], place)
     if not place.is_file():
         raise CalibrationError("file", f"{place}: no such file; give a picture without contact")
-    return _mean([_frames(place)], place)
+    return _mean(_pictures(place), place)
 
 
-def _frames(file: Path) -> NDArray[np.uint8]:
-    """Pictures (n, h, w) or (n, h, w, 3) of one file."""
-    frames = _array(file) if file.suffix.lower() == ".npy" else _picture(file)
-    if frames.dtype != np.uint8 or frames.ndim not in (2, 3, 4) or 0 in frames.shape:
-        raise CalibrationError(
-            "file",
-            f"{file}: an array of {frames.dtype} {frames.shape} is not a picture; give uint8 "
-            "(h, w), (h, w, 3) or (n, h, w, 3)",
-        )
-    single = frames.ndim == 2 or (frames.ndim == 3 and frames.shape[2] <= 4)
-    return frames[None] if single else frames[:MOST_PICTURES]
-
-
-def _array(file: Path) -> NDArray[Any]:
+def _pictures(file: Path) -> list[NDArray[np.uint8]]:
+    """The pictures of one file."""
     try:
-        return np.asarray(np.load(file, allow_pickle=False, mmap_mode="r"))
-    except (OSError, ValueError, EOFError) as error:
-        raise CalibrationError(
-            "file", f"{file} is not a NumPy array that can be read: {error}"
-        ) from error
-
-
-def _picture(file: Path) -> NDArray[np.uint8]:
-    try:
-        return read_picture(file)
-    except PictureError as error:
+        if file.suffix.lower() != ".npy":
+            return [read_picture(file)]
+        frames = islice(read_frame_array(file), MOST_PICTURES)
+        return [frame.image for frame in frames if frame.image is not None]
+    except (PictureError, FrameSourceError) as error:
         raise CalibrationError("file", f"{file}: {error}") from error
 
 
-def _mean(stacks: list[NDArray[np.uint8]], place: Path) -> NDArray[np.uint8]:
-    shapes = {s.shape[1:] for s in stacks}
+def _mean(pictures: list[NDArray[np.uint8]], place: Path) -> NDArray[np.uint8]:
+    shapes = {picture.shape for picture in pictures}
     if len(shapes) > 1:
         raise CalibrationError(
             "file", f"{place}: pictures of different sizes, {sorted(shapes, key=str)}"
         )
-    total = np.zeros(stacks[0].shape[1:])
-    count = 0
-    for stack in stacks:
-        for frame in stack:
-            total += frame
-            count += 1
-    return np.rint(total / count).astype(np.uint8)
+    return np.rint(np.mean(pictures, axis=0)).astype(np.uint8)

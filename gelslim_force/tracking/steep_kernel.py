@@ -17,9 +17,9 @@ from numba import njit
 
 from gelslim_core.kernel_cache import drop_stale
 from gelslim_force.detection.darkness_kernel import COMPILED
-from gelslim_force.tracking.local_motion_kernel import local_position
+from gelslim_force.tracking.matching_kernel import local_position
 
-drop_stale(["steep_kernel"], ["local_motion_kernel"], Path(__file__).parent)
+drop_stale(["steep_kernel"], ["matching_kernel"], Path(__file__).parent)
 
 _DIRECT = 4
 """The first four neighbours are one site away along an axis."""
