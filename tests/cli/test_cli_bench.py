@@ -176,7 +176,7 @@ def test_a_full_disk_and_a_damaged_bundle_are_told(
         patch.setattr(machine_times.os, "replace", full)
         assert main(["bench", str(sensor / "bundle"), "--no-simulation"]) == 2
     said = capsys.readouterr()
-    assert "times.json" in said.err
+    assert "operators-" in said.err
     assert "Traceback" not in said.err
     path = sensor / "bundle" / "ladder.json"
     path.write_text(path.read_text().replace("paper", "papet"))
