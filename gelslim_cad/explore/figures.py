@@ -9,7 +9,7 @@ import numpy as np
 
 from gelslim_cad.checks import RULES
 from gelslim_cad.explore.judge import REFUSED
-from gelslim_cad.explore.pareto import THICKNESS, TRADES, Goal, front
+from gelslim_cad.explore.pareto import THICKNESS, TRADES, Figure, front
 from gelslim_cad.explore.space import Axis, shown
 from gelslim_cad.explore.study import Exploration
 from gelslim_core.figure import as_png, new_figure
@@ -31,7 +31,7 @@ MOST_PANELS = 9
 
 def pareto_png(found: Exploration) -> bytes:
     """Thickness against keystone, blur and, where known, brightness and force error."""
-    goals = [g for g in TRADES if g.column in found.columns]
+    goals = [g for g in TRADES if g.name in found.columns]
     across = 2
     down = -(-len(goals) // across)
     figure, panels = new_figure(11, 4.1 * down, columns=across, rows=down)
@@ -48,8 +48,8 @@ def pareto_png(found: Exploration) -> bytes:
     return as_png(figure)
 
 
-def _trade(panel: Axes, found: Exploration, goal: Goal) -> None:
-    x, y = found.columns[THICKNESS.column], found.columns[goal.column]
+def _trade(panel: Axes, found: Exploration, goal: Figure) -> None:
+    x, y = found.columns[THICKNESS.name], found.columns[goal.name]
     for status, look in (("infeasible", {"color": GREY, "s": 6}), ("feasible", {"s": 12})):
         rows = [k for k in found.rows_where(status) if y[k] is not None]
         if not rows:
@@ -76,7 +76,7 @@ def _trade(panel: Axes, found: Exploration, goal: Goal) -> None:
         panel.set_title("no feasible design", fontsize=9)
     unit = f" in {goal.unit}" if goal.unit else ""
     panel.set_xlabel("finger thickness in mm")
-    panel.set_ylabel(f"{goal.words}{unit}, {goal.better} is better")
+    panel.set_ylabel(f"{goal.words}{unit}, {goal.wish} is better")
     panel.grid(alpha=0.3)
 
 

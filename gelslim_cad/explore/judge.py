@@ -70,17 +70,7 @@ def judge(
         d = _derived(spec, fixed, columns, len(kept))
         for k, entry in enumerate(_judged(d, len(places), (*SHOWN, *also))):
             table[legal[places[k]]] = entry
-    names = (
-        "status",
-        "binding",
-        "thickness_by",
-        "failed",
-        "reason",
-        *SHOWN,
-        *also,
-        *LIGHT_NAMES,
-        *PAD_NAMES,
-    )
+    names = (*VERDICT, *SHOWN, *also, *LIGHT_NAMES, *PAD_NAMES)
     return {n: [entry.get(n) for entry in table] for n in dict.fromkeys(names)}
 
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gelslim_cad.explore.judge import judge
-from gelslim_cad.explore.pareto import Goal
+from gelslim_cad.explore.pareto import EXPOSURE, FORCE_ERROR, THICKNESS, Figure
 from gelslim_cad.explore.space import Axis, ExploreError, Space, Value
 from gelslim_cad.explore.study import Exploration, Progress, Request, explore
 from gelslim_cad.explore.task import Engine
@@ -20,11 +20,7 @@ from gelslim_cad.spec import Spec
 from gelslim_core.yaml.fields import field_at
 
 Aim = Literal["thin", "bright", "accurate"]
-GOALS: dict[Aim, Goal] = {
-    "thin": Goal("finger.thickness_mm", "finger thickness", "mm"),
-    "bright": Goal("light.exposure_ms", "exposure", "ms"),
-    "accurate": Goal("force.error", "expected force error"),
-}
+GOALS: dict[Aim, Figure] = {"thin": THICKNESS, "bright": EXPOSURE, "accurate": FORCE_ERROR}
 """What each aim minimises. The brightest design has the shortest exposure time."""
 BETWEEN = 2
 """New values between a value and its neighbour in a round of refinement."""
@@ -53,7 +49,7 @@ class Neighbour:
 class Optimum:
     """The best design: its row of the table, its values, what a step further along would do."""
 
-    goal: Goal
+    goal: Figure
     values: Mapping[str, Value]
     row: Mapping[str, Any]
     neighbours: tuple[Neighbour, ...]
@@ -82,6 +78,7 @@ def optimise(
     """
     goal = GOALS[aim]
     asked = replace(request, light=aim == "bright", force_error=aim == "accurate")
+    search = _Search(asked, goal, folder, engine)
     designs = feasible = 0
     best: tuple[Value, ...] = ()
     for k in range(rounds + 1):
@@ -93,20 +90,20 @@ def optimise(
         if k == rounds or finer == found.space:
             break
         asked = replace(asked, space=finer)
-    best, row = _at_borders(asked, best, _row(found, best), goal, folder, engine, request.space)
+    best, row = search.at_borders(best, _row(found, best))
     given = request.space.axes
     return Optimum(
         goal,
-        {a.path: v for a, v in zip(given, best, strict=True)},
+        search.named(best),
         row,
-        _neighbours(asked, best, goal, folder, engine, request.space),
+        search.neighbours(best),
         tuple(a.path for a, v in zip(given, best, strict=True) if _ended(a, v)),
         designs,
         feasible,
     )
 
 
-def _best(found: Exploration, goal: Goal) -> tuple[Value, ...]:
+def _best(found: Exploration, goal: Figure) -> tuple[Value, ...]:
     rows = found.rows_where("feasible")
     if not rows:
         names = [b for b in found.columns["binding"] if b]
@@ -115,7 +112,7 @@ def _best(found: Exploration, goal: Goal) -> tuple[Value, ...]:
             f"none of the {found.space.count} designs is feasible; most often stopped by {often}. "
             "Vary another field, or further"
         )
-    column = found.columns[goal.column]
+    column = found.columns[goal.name]
     return found.space.row(min(rows, key=lambda k: (column[k], k)))
 
 
@@ -124,35 +121,70 @@ def _row(found: Exploration, design: tuple[Value, ...]) -> dict[str, Any]:
     return {n: column[place] for n, column in found.columns.items()}
 
 
-def _at_borders(
-    request: Request,
-    best: tuple[Value, ...],
-    row: dict[str, Any],
-    goal: Goal,
-    folder: Path,
-    engine: Engine,
-    given: Space,
-) -> tuple[tuple[Value, ...], dict[str, Any]]:
-    """The best design moved along each field up to the rule that ends it, where that is better.
+@dataclass(frozen=True)
+class _Search:
+    """What to explore around the best design, over the space that was given."""
 
-    Finer steps only come near a border: the thinnest gel allowed lies between two of them.
-    """
-    for k, axis in enumerate(given.axes):
-        if not _real(given.spec, axis):
-            continue
-        for j, beyond in enumerate(_beside(axis, best[k])):
-            values = {a.path: v for a, v in zip(given.axes, best, strict=True)}
-            last = border(given.spec, values, axis.path, beyond)
-            if last is None or last.value == best[k]:
+    request: Request
+    goal: Figure
+    folder: Path
+    engine: Engine
+
+    @property
+    def given(self) -> Space:
+        return self.request.space
+
+    def named(self, design: Sequence[Value]) -> dict[str, Value]:
+        """The values of a design by path."""
+        return {a.path: v for a, v in zip(self.given.axes, design, strict=True)}
+
+    def tried(self, name: str, best: Sequence[Value], k: int, values: list[Value]) -> Exploration:
+        """The best design with other values of its field number k."""
+        axes = tuple(
+            Axis(a.path, tuple(values) if j == k else (best[j],))
+            for j, a in enumerate(self.given.axes)
+        )
+        asked = replace(self.request, space=Space(self.given.spec, axes))
+        return explore(asked, self.folder / name, self.engine)
+
+    def at_borders(
+        self, best: tuple[Value, ...], row: dict[str, Any]
+    ) -> tuple[tuple[Value, ...], dict[str, Any]]:
+        """The best design moved along each field up to the rule that ends it, if that is better.
+
+        Finer steps only come near a border: the thinnest gel allowed lies between two of them.
+        """
+        for k, axis in enumerate(self.given.axes):
+            if not _real(self.given.spec, axis):
                 continue
-            moved = (*best[:k], last.value, *best[k + 1 :])
-            axes = tuple(Axis(a.path, (v,)) for a, v in zip(given.axes, moved, strict=True))
-            asked = replace(request, space=Space(given.spec, axes))
-            tried = explore(asked, folder / f"border-{k}-{j}", engine)
-            here = tried.columns[goal.column][0]
-            if tried.rows_where("feasible") and here < row[goal.column]:
-                best, row = moved, _row(tried, moved)
-    return best, row
+            for j, beyond in enumerate(_beside(axis, best[k])):
+                last = border(self.given.spec, self.named(best), axis.path, beyond)
+                if last is None or last.value == best[k]:
+                    continue
+                tried = self.tried(f"border-{k}-{j}", best, k, [last.value])
+                here = tried.columns[self.goal.name][0]
+                if tried.rows_where("feasible") and here < row[self.goal.name]:
+                    best = (*best[:k], last.value, *best[k + 1 :])
+                    row = _row(tried, best)
+        return best, row
+
+    def neighbours(self, best: Sequence[Value]) -> tuple[Neighbour, ...]:
+        """One step of the given grid to both sides along each field, the others at their best."""
+        found = []
+        for k, axis in enumerate(self.given.axes):
+            others = [v for v in _beside(axis, best[k]) if v != best[k]]
+            if not others:
+                continue
+            tried = self.tried(f"beside-{k}", best, k, others)
+            for i, value in enumerate(others):
+                cells = (tried.columns[n][i] for n in ("status", "binding", self.goal.name))
+                beside = Neighbour(axis.path, value, *cells)
+                if _real(self.given.spec, axis):
+                    last = border(self.given.spec, self.named(best), axis.path, value)
+                    if last is not None:
+                        beside = replace(beside, holds_to=last.value, stops=last.stops)
+                found.append(beside)
+        return tuple(found)
 
 
 def _real(spec: Spec, axis: Axis) -> bool:
@@ -182,37 +214,6 @@ def _ended(axis: Axis, value: Value) -> bool:
     if not axis.numeric or len(axis.values) < 2:
         return False
     return value in (min(axis.values), max(axis.values))  # type: ignore[type-var]
-
-
-def _neighbours(
-    request: Request,
-    best: Sequence[Value],
-    goal: Goal,
-    folder: Path,
-    engine: Engine,
-    given: Space,
-) -> tuple[Neighbour, ...]:
-    """One step of the given grid to both sides along each field, the others at their best."""
-    found = []
-    for k, axis in enumerate(given.axes):
-        others = [v for v in _beside(axis, best[k]) if v != best[k]]
-        if not others:
-            continue
-        axes = [
-            Axis(a.path, tuple(others) if j == k else (best[j],)) for j, a in enumerate(given.axes)
-        ]
-        asked = replace(request, space=Space(given.spec, tuple(axes)))
-        tried = explore(asked, folder / f"beside-{k}", engine)
-        for i, value in enumerate(others):
-            cells = (tried.columns[n][i] for n in ("status", "binding", goal.column))
-            beside = Neighbour(axis.path, value, *cells)
-            values = {a.path: v for a, v in zip(given.axes, best, strict=True)}
-            if _real(given.spec, axis):
-                last = border(given.spec, values, axis.path, value)
-                if last is not None:
-                    beside = replace(beside, holds_to=last.value, stops=last.stops)
-            found.append(beside)
-    return tuple(found)
 
 
 def _beside(axis: Axis, value: Value) -> list[Value]:

@@ -6,46 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns, trace
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX, Patch, PatchError, patch_error
+from gelslim_cad.explore.pareto import FIGURES, Figure
 from gelslim_cad.spec import Spec
 
 SAME = 5e-4
 """Relative change below which a figure is the same: the solver stops near its limits."""
 KEPT = 64
 """Number of traced guides and measured patches that are cached for similar fingers."""
-Wanted = Literal["less", "more", "one", ""]
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A number by which fingers are compared, and which way it is better."""
-
-    name: str
-    words: str
-    unit: str
-    better: Wanted
-
-
-FIGURES = (
-    Figure("finger.thickness_mm", "finger thickness", "mm", "less"),
-    Figure("finger.length_mm", "finger length", "mm", "less"),
-    Figure("finger.width_mm", "finger width", "mm", "less"),
-    Figure("gel.area_mm2", "gel length × width", "mm²", "more"),
-    Figure("view.keystone", "keystone", "", "one"),
-    Figure("view.far_blur_mm", "blur at the far edge", "mm", "less"),
-    Figure("marker.px", "marker at the far edge, shorter side", "px", "more"),
-    Figure("light.irradiance_uw_mm2", "brightness on the coat", "µW/mm²", "more"),
-    Figure("light.exposure_ms", "exposure", "ms", "less"),
-    Figure("light.frame_rate_hz", "frame rate", "Hz", "more"),
-    Figure("force.error", "expected force error", "", "less"),
-    Figure("gel.stiffness_n_mm", "gel stiffness against a bump", "N/mm", ""),
-)
-"""Brightness is of the darker colour, exposure and frame rate of the slower."""
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from explore_samples import MINI20, mini20, space
 from gelslim_cad.checks import check, margins_batch
 from gelslim_cad.dimensions import derive, derive_batch
 from gelslim_cad.explore.optimum import optimise
-from gelslim_cad.explore.pareto import TRADES, front
-from gelslim_cad.explore.price import FIGURES, Price
+from gelslim_cad.explore.pareto import FIGURES, TRADES, front
+from gelslim_cad.explore.price import Price
 from gelslim_cad.explore.space import ExploreError
 from gelslim_cad.explore.study import Request
 from gelslim_cad.explore.task import Engine
@@ -74,20 +74,17 @@ def test_the_saved_spec_keeps_comments_and_is_the_design(tmp_path: Path) -> None
     assert {c.id for c in check(derive(spec)) if c.status == "fail"} == set()
 
 
-@pytest.mark.parametrize("larger", [False, True])
-def test_the_front_is_that_of_brute_force(larger: bool) -> None:
+def test_the_front_is_that_of_brute_force() -> None:
     rng = np.random.default_rng(4)
     x, y = np.round(rng.uniform(1, 9, (2, 300)), 1)
-    goal = -y if larger else y
     expected = {
         k
         for k in range(300)
         if not any(
-            x[j] <= x[k] and goal[j] <= goal[k] and (x[j] < x[k] or goal[j] < goal[k])
-            for j in range(300)
+            x[j] <= x[k] and y[j] <= y[k] and (x[j] < x[k] or y[j] < y[k]) for j in range(300)
         )
     }
-    found = front(list(x), list(y), larger=larger)
+    found = front(list(x), list(y))
     assert set(found) == expected
     assert list(x[found]) == sorted(x[found])
 
@@ -99,10 +96,10 @@ def test_differences_below_the_solvers_accuracy_make_no_front() -> None:
 
 def test_a_keystone_below_one_is_a_keystone_too() -> None:
     """Far markers larger than near ones once counted as better than a view square on."""
-    goal = next(g for g in TRADES if g.column == "view.keystone")
+    goal = next(g for g in TRADES if g.name == "view.keystone")
     assert goal.costs([0.8, 1.0, 1.25]) == pytest.approx([1.25, 1.0, 1.25])
     assert front([15.0, 16.0, 17.0], goal.costs([1.0, 0.96, 0.95])) == [0]
-    bright = next(g for g in TRADES if g.larger)
+    bright = next(g for g in TRADES if g.better == "more")
     assert front([1.0, 2.0, 3.0], bright.costs([5.0, 4.0, 6.0])) == [0, 2]
     keystone = next(f for f in FIGURES if f.name == "view.keystone")
     assert Price(keystone, 1.02, 0.9).verdict == "worse"

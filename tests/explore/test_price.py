@@ -14,7 +14,8 @@ from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
 from gelslim_cad.explore.brightness import RAYS
 from gelslim_cad.explore.force_error import Patch, patch_error
-from gelslim_cad.explore.price import FIGURES, Price, measured, prices
+from gelslim_cad.explore.pareto import FIGURES
+from gelslim_cad.explore.price import Price, measured, prices
 from gelslim_cad.explore.space import ExploreError, changed
 from gelslim_cad.explore.thinner import LIMIT_RULE, Offer, thinner
 from gelslim_cad.light.exposure import exposure

@@ -123,9 +123,9 @@ def _record(found: Exploration) -> dict[str, object]:
 
     rows = found.rows_where("feasible")
     fronts = {}
-    for goal in (g for g in TRADES if g.column in found.columns):
-        x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
-        fronts[goal.column] = [rows[k] for k in front(x, goal.costs(y))]
+    for goal in (g for g in TRADES if g.name in found.columns):
+        x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.name, goal.name))
+        fronts[goal.name] = [rows[k] for k in front(x, goal.costs(y))]
     return {
         "format": "gelslim-explore/1",
         "name": found.space.spec.name,
@@ -172,17 +172,17 @@ def _report(found: Exploration) -> None:
         return
     best_designs = table("best feasible design", figures=("", "thickness"))
     best_designs.add_column("with")
-    for goal in (THICKNESS, *(g for g in TRADES if g.column in found.columns)):
-        x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.column, goal.column))
+    for goal in (THICKNESS, *(g for g in TRADES if g.name in found.columns)):
+        x, y = ([found.columns[c][k] for k in rows] for c in (THICKNESS.name, goal.name))
         best = rows[front(goal.costs(y), x)[0]]
         chosen = (
             f"{a.path.removeprefix('design.')} {shown(found.columns[a.path][best])}"
             for a in found.space.axes
         )
         best_designs.add_row(
-            f"{'most' if goal.larger else 'least'} {goal.words}",
-            number(found.columns[goal.column][best], goal.unit),
-            number(found.columns[THICKNESS.column][best], "mm"),
+            f"{'most' if goal.better == 'more' else 'least'} {goal.words}",
+            number(found.columns[goal.name][best], goal.unit),
+            number(found.columns[THICKNESS.name][best], "mm"),
             ", ".join(chosen),
         )
     console().print(best_designs)

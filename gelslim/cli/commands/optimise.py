@@ -143,7 +143,7 @@ def _record(best: Optimum, words: tuple[str, ...]) -> dict[str, Any]:
 def _report(name: str, best: Optimum, words: tuple[str, ...]) -> None:
     from gelslim_cad.explore.space import shown
 
-    value = best.row[best.goal.column]
+    value = best.row[best.goal.name]
     say(
         f"{name}: least {best.goal.words} {number(value, best.goal.unit)} "
         f"({best.feasible} of {best.designs} designs tried are feasible)",

@@ -75,7 +75,7 @@ def _record(name: str, offer: Offer) -> dict[str, Any]:
 
 
 def _report(name: str, path: str, offer: Offer) -> None:
-    from gelslim_cad.explore.price import FIGURES
+    from gelslim_cad.explore.pareto import FIGURES
 
     aim = "" if offer.to_mm is None else f", {offer.to_mm:g} mm asked for"
     say(f"{name} is {offer.present_mm:.2f} mm thick{aim}.", style="bold")
