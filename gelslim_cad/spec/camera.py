@@ -6,6 +6,7 @@ import math
 
 from pydantic import Field, model_validator
 
+from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
 
@@ -16,16 +17,12 @@ class Camera(Block):
     """Camera parameters as in a data sheet. The wider image axis lies across the finger."""
 
     name: str = Field(default="camera", max_length=80, description="Camera name, for the BOM")
-    image_width_px: int = Field(ge=64, le=10000, description="Image width (across the finger)")
-    image_height_px: int = Field(ge=64, le=10000, description="Image height (along the finger)")
-    sensor_width_mm: float = Field(
-        gt=0.3, le=40, description="Width of the sensor area that the image covers"
-    )
-    sensor_height_mm: float = Field(
-        gt=0.3, le=40, description="Height of the sensor area that the image covers"
-    )
-    focal_length_mm: float = Field(ge=0.3, le=50, description="Focal length of the lens")
-    f_number: float = Field(ge=0.7, le=64, description="Focal ratio N")
+    image_width_px: int = between(64, 10000, "Image width (across the finger)")
+    image_height_px: int = between(64, 10000, "Image height (along the finger)")
+    sensor_width_mm: float = above(0.3, 40, "Width of the sensor area that the image covers")
+    sensor_height_mm: float = above(0.3, 40, "Height of the sensor area that the image covers")
+    focal_length_mm: float = between(0.3, 50, "Focal length of the lens")
+    f_number: float = between(0.7, 64, "Focal ratio N")
     horizontal_fov_deg: float | None = Field(
         default=None,
         gt=1,
@@ -38,49 +35,36 @@ class Camera(Block):
         lt=170,
         description="Vertical field of view; derived from sensor and focal length when left out",
     )
-    focus_nearest_mm: float = Field(
-        default=1000.0, gt=0, le=1e6, description="Nearest distance in focus as delivered"
+    focus_nearest_mm: float = above(
+        0, 1e6, "Nearest distance in focus as delivered", default=1000.0
     )
-    lens_travel_mm: float = Field(
-        default=0.6,
-        ge=0,
-        le=20,
-        description="How far the lens can be unscrewed from its delivered position",
+    lens_travel_mm: float = between(
+        0, 20, "How far the lens can be unscrewed from its delivered position", default=0.6
     )
-    circle_of_confusion_px: float = Field(
-        default=1.5, gt=0, le=50, description="Blur diameter on the sensor still counted as sharp"
+    circle_of_confusion_px: float = above(
+        0, 50, "Blur diameter on the sensor still counted as sharp", default=1.5
     )
-    module_width_mm: float = Field(
-        default=8.5, ge=1, le=80, description="Housing size across the finger"
+    module_width_mm: float = between(1, 80, "Housing size across the finger", default=8.5)
+    module_height_mm: float = between(
+        1, 80, "Housing size across the finger's thickness", default=8.5
     )
-    module_height_mm: float = Field(
-        default=8.5, ge=1, le=80, description="Housing size across the finger's thickness"
+    module_depth_mm: float = between(
+        0.5, 80, "Housing depth along the optical axis, no lens", default=4.0
     )
-    module_depth_mm: float = Field(
-        default=4.0, ge=0.5, le=80, description="Housing depth along the optical axis, no lens"
+    lens_diameter_mm: float = between(0.5, 60, "Outer diameter of the lens barrel", default=6.0)
+    lens_height_mm: float = between(
+        0, 60, "How far the lens stands proud of the housing", default=1.5
     )
-    lens_diameter_mm: float = Field(
-        default=6.0, ge=0.5, le=60, description="Outer diameter of the lens barrel"
+    cable_width_mm: float = above(0, 60, "Width of the flat cable", default=6.0)
+    cable_bend_radius_mm: float = between(0, 50, "Smallest bend radius of the cable", default=3.0)
+    frame_rate_hz: float = above(0, 5000, "Highest frame rate at this image size", default=90.0)
+    quantum_efficiency: float = above(
+        0, 1, "Electrons per photon, colour filter included", default=0.3
     )
-    lens_height_mm: float = Field(
-        default=1.5, ge=0, le=60, description="How far the lens stands proud of the housing"
+    full_well_e_um2: float = above(
+        0, 1e5, "Full well per µm² of sensor, in electrons", default=2200.0
     )
-    cable_width_mm: float = Field(default=6.0, gt=0, le=60, description="Width of the flat cable")
-    cable_bend_radius_mm: float = Field(
-        default=3.0, ge=0, le=50, description="Smallest bend radius of the cable"
-    )
-    frame_rate_hz: float = Field(
-        default=90.0, gt=0, le=5000, description="Highest frame rate at this image size"
-    )
-    quantum_efficiency: float = Field(
-        default=0.3, gt=0, le=1, description="Electrons per photon, colour filter included"
-    )
-    full_well_e_um2: float = Field(
-        default=2200.0, gt=0, le=1e5, description="Full well per µm² of sensor, in electrons"
-    )
-    lens_transmission: float = Field(
-        default=0.9, gt=0, le=1, description="Part of the light that the lens passes"
-    )
+    lens_transmission: float = above(0, 1, "Part of the light that the lens passes", default=0.9)
 
     @model_validator(mode="after")
     def _consistent(self) -> Camera:

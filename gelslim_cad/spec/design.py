@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
 
@@ -14,16 +15,14 @@ from gelslim_core.yaml.errors import FieldError
 class Gel(Block):
     """The soft pad."""
 
-    length_mm: float = Field(ge=5, le=120, description="Gel size along the finger")
-    width_mm: float = Field(ge=5, le=120, description="Gel size across the finger")
+    length_mm: float = between(5, 120, "Gel size along the finger")
+    width_mm: float = between(5, 120, "Gel size across the finger")
     thickness_mm: float = Field(
         default=2.0, gt=0, ge=0.3, le=15, description="Gel thickness at its edge"
     )
-    corner_radius_mm: float = Field(
-        default=2.0, ge=0, le=60, description="Corner radius of the gel outline"
-    )
-    crown_height_mm: float = Field(
-        default=0.0, ge=0, le=5, description="Extra height at the centre of a crowned gel; 0 = flat"
+    corner_radius_mm: float = between(0, 60, "Corner radius of the gel outline", default=2.0)
+    crown_height_mm: float = between(
+        0, 5, "Extra height at the centre of a crowned gel; 0 = flat", default=0.0
     )
 
     @model_validator(mode="after")
@@ -42,57 +41,45 @@ class Gel(Block):
 class LightGuide(Block):
     """The acrylic window with its two 90° bends and legs."""
 
-    thickness_mm: float = Field(
-        default=2.5, ge=0.5, le=10, description="Acrylic thickness t of window, bends and legs"
+    thickness_mm: float = between(
+        0.5, 10, "Acrylic thickness t of window, bends and legs", default=2.5
     )
     bend_radius_ratio: Annotated[float, Field(ge=0.1, le=20)] | Literal["auto"] = Field(
         default=2.1,
         description="Inner bend radius over thickness, R/t; auto: the brightest that "
         "envelope.max_width_mm leaves room for",
     )
-    leg_length_mm: float = Field(
-        default=1.0, ge=0.2, le=30, description="Straight leg between bend and LED"
-    )
-    side_margin_mm: float = Field(
-        default=0.5, ge=0, le=10, description="Flat window beyond the gel on each side"
-    )
-    end_support_mm: float = Field(
-        default=1.5, ge=0.5, le=10, description="Window length clamped at each end"
-    )
+    leg_length_mm: float = between(0.2, 30, "Straight leg between bend and LED", default=1.0)
+    side_margin_mm: float = between(0, 10, "Flat window beyond the gel on each side", default=0.5)
+    end_support_mm: float = between(0.5, 10, "Window length clamped at each end", default=1.5)
 
 
 class Leds(Block):
     """Two strips under the legs: red at -y (left in the image), green at +y."""
 
     model: str = Field(default="LUXEON CZ", max_length=80, description="LED type, for the BOM")
-    package_mm: float = Field(default=2.0, ge=0.3, le=10, description="Package edge length")
-    height_mm: float = Field(default=0.7, ge=0.1, le=10, description="Package height")
-    max_pitch_mm: float = Field(
-        default=5.0, ge=0.5, le=50, description="Largest distance between neighbouring LEDs"
+    package_mm: float = between(0.3, 10, "Package edge length", default=2.0)
+    height_mm: float = between(0.1, 10, "Package height", default=0.7)
+    max_pitch_mm: float = between(
+        0.5, 50, "Largest distance between neighbouring LEDs", default=5.0
     )
-    min_gap_mm: float = Field(
-        default=0.5, ge=0, le=50, description="Smallest gap between neighbouring packages"
+    min_gap_mm: float = between(0, 50, "Smallest gap between neighbouring packages", default=0.5)
+    max_count: int = between(1, 200, "Most LEDs per side", default=12)
+    placement_tolerance_mm: float = between(
+        0, 2, "Placement error of an LED on its board", default=0.15
     )
-    max_count: int = Field(default=12, ge=1, le=200, description="Most LEDs per side")
-    placement_tolerance_mm: float = Field(
-        default=0.15, ge=0, le=2, description="Placement error of an LED on its board"
+    board_thickness_mm: float = between(0.2, 5, "LED board thickness", default=0.8)
+    radiant_flux_mw: float = above(
+        0, 10000, "Radiant flux of one LED at its drive current", default=20.0
     )
-    board_thickness_mm: float = Field(default=0.8, ge=0.2, le=5, description="LED board thickness")
-    radiant_flux_mw: float = Field(
-        default=20.0, gt=0, le=10000, description="Radiant flux of one LED at its drive current"
-    )
-    red_wavelength_nm: float = Field(
-        default=625.0, ge=560, le=760, description="Wavelength of the red LEDs"
-    )
-    green_wavelength_nm: float = Field(
-        default=525.0, ge=480, le=580, description="Wavelength of the green LEDs"
-    )
+    red_wavelength_nm: float = between(560, 760, "Wavelength of the red LEDs", default=625.0)
+    green_wavelength_nm: float = between(480, 580, "Wavelength of the green LEDs", default=525.0)
     emission: Literal["lambertian", "dome", "table"] = Field(
         default="lambertian",
         description="How the LED's light spreads: bare die, lens dome, or a data-sheet table",
     )
-    dome_half_angle_deg: float = Field(
-        default=60.0, ge=1, le=90, description="Half angle beyond which a dome sends no light"
+    dome_half_angle_deg: float = between(
+        1, 90, "Half angle beyond which a dome sends no light", default=60.0
     )
     emission_angle_deg: tuple[float, ...] = Field(
         default=(),
@@ -133,19 +120,16 @@ class Leds(Block):
 class Markers(Block):
     """The regular grid printed on the gel's outer surface."""
 
-    pitch_mm: float = Field(default=1.2, ge=0.2, le=10, description="Marker spacing")
-    diameter_mm: float = Field(default=0.5, ge=0.05, le=5, description="Marker diameter")
-    rows: int | None = Field(
-        default=None,
-        ge=5,
-        le=200,
-        description="Lattice rows along the finger; left out: fill the gel",
+    pitch_mm: float = between(0.2, 10, "Marker spacing", default=1.2)
+    diameter_mm: float = between(0.05, 5, "Marker diameter", default=0.5)
+    rows: int | None = between(
+        5, 200, "Lattice rows along the finger; left out: fill the gel", default=None
     )
-    columns: int | None = Field(
-        default=None, ge=5, le=200, description="Lattice columns across; left out: fill the gel"
+    columns: int | None = between(
+        5, 200, "Lattice columns across; left out: fill the gel", default=None
     )
-    edge_margin_mm: float = Field(
-        default=0.5, ge=0, le=20, description="Gel left free between outermost dots and the edge"
+    edge_margin_mm: float = between(
+        0, 20, "Gel left free between outermost dots and the edge", default=0.5
     )
     anchors: Literal["odd_sized", "omitted", "none"] = Field(
         default="odd_sized",
@@ -156,66 +140,58 @@ class Markers(Block):
 class Mirror(Block):
     """The front-surface fold mirror."""
 
-    thickness_mm: float = Field(default=1.0, ge=0.2, le=6, description="Mirror thickness")
-    border_mm: float = Field(
-        default=0.8, ge=0, le=5, description="Mirror beyond the outermost ray on every side"
-    )
+    thickness_mm: float = between(0.2, 6, "Mirror thickness", default=1.0)
+    border_mm: float = between(0, 5, "Mirror beyond the outermost ray on every side", default=0.8)
 
 
 class Optics(Block):
     """What the camera's picture must be worth."""
 
-    blur_per_diameter: float = Field(
+    blur_per_diameter: float = above(
+        0,
+        2,
+        "Largest blur on the gel, in marker diameters (1/3 is sharp, 1/2 the limit)",
         default=1 / 3,
-        gt=0,
-        le=2,
-        description="Largest blur on the gel, in marker diameters (1/3 is sharp, 1/2 the limit)",
     )
-    min_px_per_marker: float = Field(
-        default=6.0, ge=1, le=200, description="Pixels across the smallest imaged marker, at least"
+    min_px_per_marker: float = between(
+        1, 200, "Pixels across the smallest imaged marker, at least", default=6.0
     )
-    max_keystone: float = Field(
-        default=2.0, ge=1.05, le=5, description="Largest ratio of far to near viewing distance"
+    max_keystone: float = between(
+        1.05, 5, "Largest ratio of far to near viewing distance", default=2.0
     )
-    image_margin: float = Field(
-        default=0.015, ge=0, le=0.3, description="Part of the half field of view kept free"
-    )
-    clearance_mm: float = Field(
-        default=0.3, ge=0, le=5, description="Free space around the view and between optical parts"
+    image_margin: float = between(0, 0.3, "Part of the half field of view kept free", default=0.015)
+    clearance_mm: float = between(
+        0, 5, "Free space around the view and between optical parts", default=0.3
     )
 
 
 class Housing(Block):
     """Walls, fits and fasteners of the printed parts."""
 
-    side_wall_mm: float = Field(default=1.5, ge=0.4, le=10, description="Side wall thickness")
-    back_wall_mm: float = Field(default=1.2, ge=0.4, le=10, description="Back cover thickness")
-    tip_wall_mm: float = Field(
-        default=5.0, ge=2, le=30, description="Length of the tip block that holds the bezel screws"
+    side_wall_mm: float = between(0.4, 10, "Side wall thickness", default=1.5)
+    back_wall_mm: float = between(0.4, 10, "Back cover thickness", default=1.2)
+    tip_wall_mm: float = between(
+        2, 30, "Length of the tip block that holds the bezel screws", default=5.0
     )
-    baffle_mm: float = Field(
-        default=0.8, ge=0.3, le=5, description="Light baffle between LED channel and camera view"
+    baffle_mm: float = between(
+        0.3, 5, "Light baffle between LED channel and camera view", default=0.8
     )
-    ledge_mm: float = Field(
-        default=1.5, ge=0.5, le=10, description="Thickness of the ledge that carries the window"
+    ledge_mm: float = between(
+        0.5, 10, "Thickness of the ledge that carries the window", default=1.5
     )
-    fit_clearance_mm: float = Field(
-        default=0.2, ge=0.02, le=2, description="Gap between parts that slide into each other"
+    fit_clearance_mm: float = between(
+        0.02, 2, "Gap between parts that slide into each other", default=0.2
     )
-    gel_proud_mm: float = Field(
-        default=0.6, ge=0, le=10, description="How far the gel stands above the bezel"
-    )
-    shim_thickness_mm: float = Field(
-        default=1.0, ge=0.2, le=5, description="Free thickness of the elastic shims"
-    )
-    precompression_mm: float = Field(
-        default=0.45, ge=0, le=4, description="How much the bezel compresses the optical stack"
+    gel_proud_mm: float = between(0, 10, "How far the gel stands above the bezel", default=0.6)
+    shim_thickness_mm: float = between(0.2, 5, "Free thickness of the elastic shims", default=1.0)
+    precompression_mm: float = between(
+        0, 4, "How much the bezel compresses the optical stack", default=0.45
     )
     screw: Literal["M1.6", "M2", "M2.5"] = Field(
         default="M2", description="Countersunk screw that holds bezel and cover"
     )
-    corner_radius_mm: float = Field(
-        default=3.0, ge=0, le=20, description="Corner radius of the finger seen from above"
+    corner_radius_mm: float = between(
+        0, 20, "Corner radius of the finger seen from above", default=3.0
     )
 
 
@@ -224,35 +200,27 @@ class Mount(Block):
 
     gripper: str = Field(default="generic", max_length=80, description="Gripper, for the BOM")
     bolt: Literal["M2", "M2.5", "M3", "M4"] = Field(default="M3", description="Cross bolt")
-    tongue_length_mm: float = Field(
-        default=10.0, ge=5, le=60, description="Tongue length inside the finger"
+    tongue_length_mm: float = between(5, 60, "Tongue length inside the finger", default=10.0)
+    tongue_thickness_mm: float = between(
+        2, 30, "Tongue thickness across the finger's thickness", default=5.0
     )
-    tongue_thickness_mm: float = Field(
-        default=5.0, ge=2, le=30, description="Tongue thickness across the finger's thickness"
-    )
-    flange_thickness_mm: float = Field(
-        default=5.0, ge=2, le=30, description="Thickness of the flange against the gripper"
+    flange_thickness_mm: float = between(
+        2, 30, "Thickness of the flange against the gripper", default=5.0
     )
     flange_bolt: Literal["M3", "M4", "M5", "M6"] = Field(
         default="M4", description="Bolt from flange to gripper"
     )
-    flange_bolt_spacing_mm: float = Field(
-        default=20.0, ge=5, le=200, description="Distance of the two gripper bolts"
+    flange_bolt_spacing_mm: float = between(
+        5, 200, "Distance of the two gripper bolts", default=20.0
     )
 
 
 class Envelope(Block):
     """Limits the finger must keep, each optional."""
 
-    max_thickness_mm: float | None = Field(
-        default=None, gt=0, le=300, description="Thickest finger allowed"
-    )
-    max_width_mm: float | None = Field(
-        default=None, gt=0, le=300, description="Widest finger allowed"
-    )
-    max_length_mm: float | None = Field(
-        default=None, gt=0, le=600, description="Longest finger allowed"
-    )
+    max_thickness_mm: float | None = above(0, 300, "Thickest finger allowed", default=None)
+    max_width_mm: float | None = above(0, 300, "Widest finger allowed", default=None)
+    max_length_mm: float | None = above(0, 600, "Longest finger allowed", default=None)
 
 
 class Design(Block):

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from gelslim_cad.spec.camera import Camera
 from gelslim_cad.spec.design import Design
+from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block, require_folder_name
 from gelslim_core.yaml.errors import FieldError
 
@@ -22,33 +23,28 @@ class GelMaterial(Block):
     """Platinum-cure silicone of the pad."""
 
     name: str = Field(default="XP-565 silicone", max_length=80, description="Gel, for the BOM")
-    youngs_modulus_mpa: float = Field(default=0.147, gt=0, le=2000, description="Young's modulus E")
+    youngs_modulus_mpa: float = above(0, 2000, "Young's modulus E", default=0.147)
     poissons_ratio: float = Field(default=0.3223, ge=0, lt=0.5, description="Poisson's ratio")
-    youngs_modulus_tolerance_ratio: float = Field(
-        default=0.1,
-        gt=0,
-        le=1,
-        description="Standard deviation of Young's modulus between batches, as a part of it",
+    youngs_modulus_tolerance_ratio: float = above(
+        0, 1, "Standard deviation of Young's modulus between batches, as a part of it", default=0.1
     )
-    poissons_ratio_tolerance: float = Field(
-        default=0.02, gt=0, le=0.2, description="Standard deviation of Poisson's ratio"
+    poissons_ratio_tolerance: float = above(
+        0, 0.2, "Standard deviation of Poisson's ratio", default=0.02
     )
-    density_kg_m3: float = Field(default=1020.0, ge=200, le=4000, description="Density")
-    refractive_index: float = Field(default=1.41, ge=1, le=2, description="Refractive index")
-    coat_reflectance: float = Field(
-        default=0.5, ge=0, le=0.98, description="Part of the light that the painted coat scatters"
+    density_kg_m3: float = between(200, 4000, "Density", default=1020.0)
+    refractive_index: float = between(1, 2, "Refractive index", default=1.41)
+    coat_reflectance: float = between(
+        0, 0.98, "Part of the light that the painted coat scatters", default=0.5
     )
-    mix_ratio_a: float = Field(default=15.0, gt=0, le=1000, description="Parts A by mass")
-    mix_ratio_b: float = Field(default=1.0, gt=0, le=1000, description="Parts B by mass")
+    mix_ratio_a: float = above(0, 1000, "Parts A by mass", default=15.0)
+    mix_ratio_b: float = above(0, 1000, "Parts B by mass", default=1.0)
 
 
 class AcrylicMaterial(Block):
     """PMMA of the light guide."""
 
-    refractive_index: float = Field(default=1.4906, gt=1, le=2, description="Refractive index")
-    absorption_per_m: float = Field(
-        default=2.0, ge=0, le=200, description="Absorption coefficient per metre"
-    )
+    refractive_index: float = above(1, 2, "Refractive index", default=1.4906)
+    absorption_per_m: float = between(0, 200, "Absorption coefficient per metre", default=2.0)
 
 
 class Material(Block):
@@ -79,20 +75,20 @@ class Manufacturing(Block):
     print_process: PrintProcess = Field(
         default="sla", description="Process of the printed finger parts"
     )
-    print_tolerance_mm: float = Field(
-        default=0.1, ge=0.005, le=1, description="Accuracy of the printed parts, plus or minus"
+    print_tolerance_mm: float = between(
+        0.005, 1, "Accuracy of the printed parts, plus or minus", default=0.1
     )
-    max_overhang_deg: float = Field(
-        default=45.0, ge=0, le=90, description="Steepest unsupported overhang from the vertical"
+    max_overhang_deg: float = between(
+        0, 90, "Steepest unsupported overhang from the vertical", default=45.0
     )
     mould_process: Literal["acrylic", "sla", "fdm", "aluminium"] = Field(
         default="acrylic", description="What the gel mould is made of"
     )
-    gel_shrinkage_percent: float = Field(
-        default=0.1, ge=0, le=10, description="Linear shrinkage of the gel while curing"
+    gel_shrinkage_percent: float = between(
+        0, 10, "Linear shrinkage of the gel while curing", default=0.1
     )
-    gel_thickness_tolerance_mm: float = Field(
-        default=0.05, gt=0, le=1, description="Standard deviation of the cast gel's thickness"
+    gel_thickness_tolerance_mm: float = above(
+        0, 1, "Standard deviation of the cast gel's thickness", default=0.05
     )
     marking_process: MarkingProcess = Field(
         default="laser_opened_paint", description="How the markers get onto the gel"
@@ -103,8 +99,8 @@ class Manufacturing(Block):
         max_length=50,
         description="Acrylic thicknesses on sale",
     )
-    acrylic_tolerance_ratio: float = Field(
-        default=0.1, ge=0, le=0.5, description="How far stock acrylic may differ from nominal"
+    acrylic_tolerance_ratio: float = between(
+        0, 0.5, "How far stock acrylic may differ from nominal", default=0.1
     )
     mirror_stock_mm: tuple[Positive, ...] = Field(
         default=(0.7, 1.0, 1.5, 2.0, 3.0),
@@ -118,11 +114,8 @@ class Manufacturing(Block):
 class Mesh(Block):
     """Cells of the pad mesh: by pitch (a divisor of the marker pitch) or by counts."""
 
-    nodes_per_marker_pitch: int = Field(
-        default=2,
-        ge=1,
-        le=20,
-        description="Mesh cells per marker pitch; nodes meet markers",
+    nodes_per_marker_pitch: int = between(
+        1, 20, "Mesh cells per marker pitch; nodes meet markers", default=2
     )
     cells_along: Count | None = Field(
         default=None, description="Cells along the finger, instead of nodes_per_marker_pitch"
@@ -130,11 +123,8 @@ class Mesh(Block):
     cells_across: Count | None = Field(
         default=None, description="Cells across the finger, instead of nodes_per_marker_pitch"
     )
-    layers: int = Field(
-        default=4,
-        ge=1,
-        le=32,
-        description="Cell layers through the thickness; one is the paper's form",
+    layers: int = between(
+        1, 32, "Cell layers through the thickness; one is the paper's form", default=4
     )
     element: Literal["full", "bbar", "incompatible"] = Field(
         default="bbar",
@@ -146,11 +136,8 @@ class Mesh(Block):
         description="Cells that the gel's outline or crown cuts: kept or dropped whole by their "
         "centre, or scaled by the share of their volume that the gel fills",
     )
-    least_fill: float = Field(
-        default=0.01,
-        gt=0,
-        le=1,
-        description="Share of its volume below which volume_fraction drops a cell",
+    least_fill: float = above(
+        0, 1, "Share of its volume below which volume_fraction drops a cell", default=0.01
     )
 
     @model_validator(mode="after")
