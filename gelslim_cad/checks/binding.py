@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.checks.relaxation import Relaxation, given, growing_changes, relaxations
-from gelslim_cad.dimensions import Dimensions, derive_batch
+from gelslim_cad.checks.relaxation import Relaxation, derive_each, growing_changes, relaxations
+from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.spec import Spec
 
 ACTIVE = 0.004
@@ -53,18 +53,7 @@ def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
 
 def _try(spec: Spec, sets: Sequence[tuple[Relaxation, ...]]) -> tuple[Any, Any]:
     """Thickness and feasibility of the spec under each set of relaxations, in one batch."""
-    paths = {s.path for chosen in sets for s in chosen}
-    columns = {
-        path: np.array(
-            [
-                next((s.value for s in chosen if s.path == path), given(spec, path))
-                for chosen in sets
-            ],
-            dtype=float,
-        )
-        for path in sorted(paths)
-    }
-    batch = derive_batch(spec, columns)
+    batch = derive_each(spec, [{s.path: s.value for s in chosen} for chosen in sets])
     return batch["finger.thickness_mm"], batch.feasible()
 
 

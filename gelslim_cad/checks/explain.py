@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -13,7 +12,7 @@ from gelslim_cad.dimensions.bend import chosen_here
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension, unit_of
 from gelslim_cad.spec import Spec
-from gelslim_cad.spec.reader import LoadedSpec
+from gelslim_cad.spec.reader import LoadedSpec, suggestion
 from gelslim_core.errors import GelslimError
 from gelslim_core.yaml.fields import field_at
 
@@ -62,7 +61,8 @@ def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
         if path in d.given:
             return replace(tracer.node(path), note=_used_by(d, path))
     known = dict.fromkeys((*d.values, *d.given, *RULES))
-    raise UnknownNameError(_unknown(name, tuple(known)))
+    hint = suggestion(name, known, "`gelslim derive` lists all dimensions")
+    raise UnknownNameError(f"no dimension, rule or spec field is called {name}; {hint}")
 
 
 class _Tracer:
@@ -150,13 +150,3 @@ def _active_limits(fold: Fold) -> str:
         return "no fold keeps every limit; missed: " + ", ".join(missed)
     active = [n for n, v in fold.violations.items() if float(v.flat[0]) > -ACTIVE]
     return "limits at work: " + (", ".join(active) or "none")
-
-
-def _unknown(name: str, known: tuple[str, ...]) -> str:
-    close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
-    last = name.rsplit(".", 1)[-1]
-    close += [k for k in known if k.rsplit(".", 1)[-1] == last and k not in close][:3]
-    hint = (
-        f"did you mean {' or '.join(close)}?" if close else "`gelslim derive` lists all dimensions"
-    )
-    return f"no dimension, rule or spec field is called {name}; {hint}"

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from gelslim_cad.dimensions import DimensionsBatch, derive_batch
 from gelslim_cad.spec import Spec
 
 
@@ -142,3 +145,13 @@ def given(spec: Spec, path: str) -> Any:
     for name in path.split("."):
         value = getattr(value, name)
     return value
+
+
+def derive_each(spec: Spec, designs: Sequence[Mapping[str, float]]) -> DimensionsBatch:
+    """Dimensions of the spec with each set of fields changed, by path, in one batch."""
+    paths = sorted({path for changes in designs for path in changes})
+    columns = {
+        path: np.array([changes.get(path, given(spec, path)) for changes in designs], dtype=float)
+        for path in paths
+    }
+    return derive_batch(spec, columns)

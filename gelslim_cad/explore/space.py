@@ -5,7 +5,6 @@ A field and its values come from text such as `camera.f_number=2,2.9,4`.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from gelslim_cad.spec import Spec
+from gelslim_cad.spec.reader import suggestion
 from gelslim_core.errors import GelslimError
 from gelslim_core.yaml.fields import Field, field_table
 
@@ -71,10 +71,7 @@ def _field(name: str, text: str) -> Field:
     if inside:
         listed = ", ".join(inside[:MOST_TOLD]) + (", ..." if len(inside) > MOST_TOLD else "")
         raise ExploreError(f"--vary {text}: {name} is a block; vary one of its fields: {listed}")
-    close = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
-    last = name.rsplit(".", 1)[-1]
-    close += [p for p in known if p.rsplit(".", 1)[-1] == last and p not in close][:3]
-    hint = f"did you mean {' or '.join(close)}?" if close else "`gelslim schema` lists all fields"
+    hint = suggestion(name, known, "`gelslim schema` lists all fields")
     raise ExploreError(f"--vary {text}: the spec has no field {name}; {hint}")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,6 +19,7 @@ from gelslim_cad.explore.judge import SHOWN, VERDICT
 from gelslim_cad.explore.space import ExploreError, Space
 from gelslim_cad.explore.task import Engine, Task, unpacked
 from gelslim_cad.geometry.lookup import NamedValues
+from gelslim_cad.spec.reader import suggestion
 from gelslim_core.files.replaced_file import is_part, replace_file, sweep
 
 Progress = Callable[[str, int, int], None]
@@ -58,12 +58,11 @@ class Request:
 
 def _column(name: str) -> str:
     """A dimension or spec field by its full name; the `design.` may be left out, as of an axis."""
-    names = {e.name for e in REGISTRY.values() if not e.internal} | set(PATHS.values())
+    names = [*(e.name for e in REGISTRY.values() if not e.internal), *PATHS.values()]
     for full in (name, f"design.{name}"):
         if full in names:
             return full
-    close = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
-    hint = f"did you mean {' or '.join(close)}?" if close else "`gelslim derive` lists dimensions"
+    hint = suggestion(name, names, "`gelslim derive` lists dimensions")
     raise ExploreError(f"no dimension or spec field is called {name}; {hint}")
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.checks import margins_batch
-from gelslim_cad.checks.relaxation import given, relaxations
-from gelslim_cad.dimensions import derive_batch
+from gelslim_cad.checks.relaxation import derive_each, given, relaxations
 from gelslim_cad.explore.brightness import RAYS
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX
 from gelslim_cad.explore.price import Measured, Price, measured, prices
@@ -135,11 +134,7 @@ def _judged(
     places = [(path, v) for path, values in tried.items() for v in values]
     if not places:
         return {}
-    columns = {
-        path: np.array([v if path == p else float(given(spec, path)) for p, v in places])
-        for path in tried
-    }
-    d = derive_batch(spec, columns)
+    d = derive_each(spec, [{path: v} for path, v in places])
     holds = np.all([m >= 0 for n, m in margins_batch(d).items() if n != LIMIT_RULE], axis=0)
     owner = np.array([p for p, _ in places])
     thickness = np.asarray(d["finger.thickness_mm"], dtype=float)

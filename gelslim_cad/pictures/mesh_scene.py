@@ -220,27 +220,23 @@ class MeshScene:
         self._lines(contour, INK, 3.4, 1.0)
 
     def _actor(self, source: Any, rgba: tuple[float, ...], smooth: bool) -> None:
-        from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
-
-        mapper = vtkPolyDataMapper()
-        mapper.SetInputConnection(source.GetOutputPort())
-        mapper.ScalarVisibilityOff()
+        mapper, look = self._added(source, rgba)
         mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        actor = vtkActor()
-        actor.SetMapper(mapper)
-        look = actor.GetProperty()
-        look.SetColor(*rgba[:3])
-        look.SetOpacity(rgba[3])
         look.SetAmbient(0.34)
         look.SetDiffuse(0.72)
         look.SetSpecular(0.16)
         look.SetSpecularPower(28.0)
         look.SetInterpolationToGouraud() if smooth else look.LightingOff()
-        self._renderer.AddActor(actor)
 
     def _lines(
         self, source: Any, colour: tuple[float, ...], width_px: float, opacity: float
     ) -> None:
+        _, look = self._added(source, (*colour, opacity))
+        look.SetLineWidth(width_px)
+        look.LightingOff()
+
+    def _added(self, source: Any, rgba: tuple[float, ...]) -> tuple[Any, Any]:
+        """Mapper and properties of a new actor, which shows what `source` gives."""
         from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
         mapper = vtkPolyDataMapper()
@@ -249,11 +245,10 @@ class MeshScene:
         actor = vtkActor()
         actor.SetMapper(mapper)
         look = actor.GetProperty()
-        look.SetColor(*colour)
-        look.SetOpacity(opacity)
-        look.SetLineWidth(width_px)
-        look.LightingOff()
+        look.SetColor(*rgba[:3])
+        look.SetOpacity(rgba[3])
         self._renderer.AddActor(actor)
+        return mapper, look
 
     def _light(self) -> None:
         from vtkmodules.vtkRenderingCore import vtkLight

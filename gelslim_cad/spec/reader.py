@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,3 +69,15 @@ def read_spec(path: str | os.PathLike[str]) -> LoadedSpec:
     return LoadedSpec(
         loaded.model, loaded.source_map, loaded.sha256, loaded.text, loaded.path, loaded.defaulted
     )
+
+
+def suggestion(name: str, known: Iterable[str], otherwise: str) -> str:
+    """Which of the known dotted names may be meant; `otherwise` where none is close.
+
+    Close are similar names, and names of other blocks with the same last part.
+    """
+    names = tuple(known)
+    close = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    last = name.rsplit(".", 1)[-1]
+    close += [k for k in names if k.rsplit(".", 1)[-1] == last and k not in close][:3]
+    return f"did you mean {' or '.join(close)}?" if close else otherwise
