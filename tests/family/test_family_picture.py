@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gelslim.cli import main
+from gelslim_cad import family
 from gelslim_cad.dimensions import derive
 from gelslim_cad.family import (
     EDGE,
@@ -22,7 +23,6 @@ from gelslim_cad.family import (
     _upright,
     dots,
     family_png,
-    picture,
 )
 from gelslim_cad.spec.reader import read_spec
 from gelslim_core.optional_library import install_command
@@ -37,7 +37,7 @@ FACES = np.array(
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(picture, "WIDTH_PX", 700)
+    monkeypatch.setattr(family, "WIDTH_PX", 700)
 
 
 def block(name: str, length: float, width: float, thickness: float) -> Member:
