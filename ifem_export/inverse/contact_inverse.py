@@ -109,7 +109,7 @@ class _Fit:
             force[nodes] = contact_force.reshape(-1, 3)
             residual = self.operator.displacement(force) - self.displacement_mm
             small = _relative_change(contact_force, before) <= LAST_ROUND * self.tolerance
-            if steps >= self.most_steps or small or taken <= 1:
+            if steps >= self.most_steps or small:
                 return self.result(force, residual, change, steps)
 
 

@@ -140,7 +140,7 @@ def _bracket(
 
     A value outside by rounding only is left to the triangles and the hull, which agree there.
     """
-    cell = np.clip(np.searchsorted(lines, values, side="right") - 1, 0, len(lines) - 2)
+    cell = np.minimum(np.searchsorted(lines, values, side="right") - 1, len(lines) - 2)
     fraction = (values - lines[cell]) / (lines[cell + 1] - lines[cell])
     return cell, fraction, (values >= lines[0]) & (values <= lines[-1])
 

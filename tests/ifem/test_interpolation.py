@@ -117,12 +117,12 @@ def test_a_lattice_has_at_most_four_sites_per_marker(count, is_lattice):
     assert operator.nnz == (4 if is_lattice else 3)
 
 
-@pytest.mark.parametrize("noise", [1e-12, 1e-10])
-def test_a_lattice_with_rounding_errors_is_still_one(noise):
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_lattice_with_rounding_errors_is_still_one(scale):
     rng = np.random.default_rng(11)
-    markers = lattice() + rng.uniform(-noise, noise, lattice().shape)
+    markers = scale * (lattice() + rng.uniform(-1e-10, 1e-10, lattice().shape))
     nodes = inner_nodes(12)
-    found = marker_to_node(markers, nodes) @ lattice().prod(axis=1)
+    found = marker_to_node(markers, scale * nodes) @ lattice().prod(axis=1)
     assert found == pytest.approx(nodes.prod(axis=1), abs=1e-8)
 
 
@@ -151,10 +151,10 @@ def test_markers_that_determine_no_field_are_refused(markers, value):
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_markers_coincide_and_lie_on_a_line_within_a_billionth_of_their_extent(scale):
-    corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
-    assert len(checked_markers(scale * np.array([*corners, (1.0, 4e-9)]))) == 4
-    assert len(checked_markers(scale * np.array([*corners[:2], (0.5, 1e-8)]))) == 3
+    corners, shift = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], (0.4, 0.7)
+    assert len(checked_markers(scale * np.add(shift, [*corners, (1.0, 4e-9)]))) == 4
+    assert len(checked_markers(scale * np.add(shift, [*corners[:2], (0.5, 1e-8)]))) == 3
     for markers in ([*corners, (1.0, 4e-10)], [*corners[:2], (0.5, 4e-10)]):
         with pytest.raises(InterpolationError) as caught:
-            checked_markers(scale * np.array(markers))
+            checked_markers(scale * np.add(shift, markers))
         assert caught.value.field == "markers_mm"
