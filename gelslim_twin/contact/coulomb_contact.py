@@ -288,7 +288,7 @@ def lcp_forces(normal: Array, height: Array, guess: NDArray[np.bool_]) -> tuple[
     """
     active, reachable = guess & np.isfinite(height), np.isfinite(height)
     # Rounding must not change the status of a node whose force or gap is zero.
-    narrow = ROUNDING * float(np.abs(height[reachable]).max(initial=0.0))
+    narrow = ROUNDING * float(np.abs(height[reachable]).max())
     fewest, tries = len(height) + 1, BLOCK_TRIES
     for factors in range(1, 20 * len(height) + 200):
         force = np.zeros(len(height))

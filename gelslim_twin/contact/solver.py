@@ -127,7 +127,7 @@ class ContactSolver:
         if before is not None and self.settings.friction > 0 and touched.any():
             places = (self.points_mm + last.displacement_mm)[touched]
             dragged = np.hypot(*(self.tool.carried(before, pose, places) - places)[:, :2].T).max()
-            count = min(MOST_SUBSTEPS, max(1, math.ceil(dragged / self._longest - 1e-9)))
+            count = min(MOST_SUBSTEPS, math.ceil(dragged / self._longest - 1e-9))
         return iter((pose,)) if before is None else even_steps(before, pose, count)
 
     def step(
@@ -187,7 +187,7 @@ class ContactSolver:
         # Other nodes stick for the part of the step in which they are in contact.
         heights = [clearance_mm(self.tool, p, places) for p in (before, pose)]
         share = np.where(np.isfinite(heights[0]), 0.0, 0.5)
-        closing = np.isfinite(heights[0]) & np.isfinite(heights[1]) & (heights[1] < 0)
+        closing = np.isfinite(heights[0]) & (heights[1] < 0)
         first = np.maximum(heights[0][closing], 0.0)
         share[closing] = heights[1][closing] / (heights[1][closing] - first)
         share[touched] = 1.0

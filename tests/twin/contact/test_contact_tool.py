@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.tool import Tool, clearance_mm, rotation, tool_surface
+from gelslim_twin.contact.tool import Tool, ToolSurface, clearance_mm, rotation, tool_surface
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -156,6 +156,33 @@ def test_planes_are_those_of_the_tool_along_the_vertical(name: str, tilt: float)
     near = met + 1e-3 * frames[:, :, 0]
     flat = np.abs(clearance_mm(tool, pose, near)) < 3e-5
     assert flat.mean() > 0.9
+
+
+def test_normals_are_turned_by_a_share_of_the_way() -> None:
+    points = np.zeros((3, 3))
+    old = ToolSurface(points, np.tile([0.6, 0.0, 0.8], (3, 1)))
+    new = ToolSurface(points + 1.0, np.tile([0.0, 0.28, 0.96], (3, 1)))
+    turned = new.turned(old, np.array([0.0, 0.25, 1.0]))
+    mixed = 0.75 * old.normal[1] + 0.25 * new.normal[1]
+    expected = [old.normal[0], mixed / np.sqrt(mixed @ mixed), new.normal[2]]
+    np.testing.assert_allclose(turned.normal, expected, atol=1e-15)
+    np.testing.assert_array_equal(turned.met_mm, new.met_mm)
+    kept = new.only(np.array([True, False, True]))
+    assert list(kept.is_met) == [True, False, True]
+    np.testing.assert_array_equal(kept.at(np.array([2, 0])).met_mm, np.ones((2, 3)))
+
+
+def test_the_lowest_of_several_shapes_counts() -> None:
+    """Each about its own place and raised by its own height."""
+    tool = Tool.of(
+        [Sphere(shape="sphere", radius_mm=3, x_mm=1.0, y_mm=-0.5, raised_mm=0.3),
+         FlatPunch(shape="flat_punch", radius_mm=1, x_mm=2.0, raised_mm=0.4)], Path(),
+    )  # fmt: skip
+    x, y = np.array([1.0, 1.4, 2.0, 3.6]), np.array([-0.5, -0.2, 0.5, 0.0])
+    ball = 0.3 + 3 - np.sqrt(9 - (x - 1.0) ** 2 - (y + 0.5) ** 2)
+    punch = np.where(np.hypot(x - 2.0, y) <= 1, 0.4, np.inf)
+    np.testing.assert_allclose(tool.local(x, y), np.minimum(ball, punch), atol=1e-12)
+    assert list(punch < ball) == [False, False, True, False]
 
 
 def test_carried_points_keep_their_place_on_the_tool() -> None:
