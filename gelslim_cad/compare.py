@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from gelslim_cad.build.fingerprint import combined
-from gelslim_cad.build.work import Unit
+from gelslim_cad.build.work import Unit, described
 from gelslim_cad.checks import Check, check
 from gelslim_cad.dimensions import Dimensions, definition, derive
 from gelslim_cad.dimensions.registry import unit_of
@@ -250,8 +250,7 @@ def part_changes(first: LoadedSpec, second: LoadedSpec) -> PartChanges:
 
 def _key(part: Part) -> str:
     """Digest of solid and description; the solid's rounded, as its last bits vary by run."""
-    description = replace(part, solid=None, tags=frozenset())
-    return combined(shape_digest(part.solid), repr(description), *sorted(part.tags))
+    return combined(shape_digest(part.solid), described(part))
 
 
 def _inputs(unit: Unit) -> tuple[Any, ...]:

@@ -50,20 +50,12 @@ class PackedPart:
 
     def key(self) -> str:
         """Key of shape and description."""
-        p = self.part
-        description = (
-            p.name,
-            p.material,
-            p.process,
-            p.colour,
-            p.quantity,
-            p.explode_mm,
-            p.print_rotation_deg,
-            p.note,
-            p.in_assembly,
-            sorted(p.tags),
-        )
-        return combined(self.shape, repr(description))
+        return combined(self.shape, described(self.part))
+
+
+def described(part: Part) -> str:
+    """All fields of a part but its solid."""
+    return repr(replace(part, solid=None, tags=frozenset())) + repr(sorted(part.tags))
 
 
 @dataclass(frozen=True)

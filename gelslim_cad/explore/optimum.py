@@ -15,8 +15,8 @@ from gelslim_cad.explore.judge import judge
 from gelslim_cad.explore.pareto import EXPOSURE, FORCE_ERROR, THICKNESS, Figure
 from gelslim_cad.explore.space import Axis, ExploreError, Space, Value
 from gelslim_cad.explore.study import Exploration, Progress, Request, explore
-from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec import Spec
+from gelslim_core.jobs import Engine
 from gelslim_core.yaml.fields import field_at
 
 Aim = Literal["thin", "bright", "accurate"]

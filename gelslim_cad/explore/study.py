@@ -17,10 +17,11 @@ from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX, Patch, PatchError
 from gelslim_cad.explore.judge import SHOWN, VERDICT
 from gelslim_cad.explore.space import ExploreError, Space
-from gelslim_cad.explore.task import Engine, Task, unpacked
+from gelslim_cad.explore.task import Task, run_tasks, unpacked
 from gelslim_cad.geometry.lookup import NamedValues
 from gelslim_cad.spec.reader import suggestion
 from gelslim_core.files.replaced_file import is_part, replace_file, sweep
+from gelslim_core.jobs import Engine
 
 Progress = Callable[[str, int, int], None]
 SCENES = 16
@@ -125,7 +126,7 @@ class _Run:
         self.taken_over += len(found)
         todo = [t for t in tasks if t not in found]
         self.tell(what, len(found), len(tasks))
-        for task, result in self.engine.run(todo):
+        for task, result in run_tasks(self.engine, todo):
             self.store.write(task, result)
             # As read back, so that a resumed run has the very same values.
             found[task] = json.loads(json.dumps(result))

@@ -16,8 +16,7 @@ from gelslim_cad.explore.force_error import Patch, patch_error
 from gelslim_cad.explore.judge import judge
 from gelslim_cad.explore.space import Axis, ExploreError
 from gelslim_cad.spec import Spec
-from gelslim_core.jobs import Engine as WorkEngine
-from gelslim_core.jobs import EngineError
+from gelslim_core.jobs import Engine, EngineError
 
 Kind = Literal["designs", "light", "force"]
 
@@ -75,30 +74,23 @@ def unpacked(packed: dict[str, Any], count: int) -> list[Any]:
     return list(packed["each"])
 
 
-@dataclass(frozen=True)
-class Engine:
-    """`jobs` processes here, or the workers behind the Dask scheduler at `scheduler`."""
+def run_tasks(engine: Engine, tasks: Sequence[Task]) -> Iterator[tuple[Task, dict[str, Any]]]:
+    """Each task with its result, in the order they finish.
 
-    jobs: int = 1
-    scheduler: str = ""
-
-    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, dict[str, Any]]]:
-        """Each task with its result, in the order they finish.
-
-        Raises ExploreError where no cluster answers, its workers have other code, or a task kills
-        its workers, and what a task raises.
-        """
-        here = code_hash()
-        try:
-            for number, (code, result) in WorkEngine(self.jobs, self.scheduler).run(signed, tasks):
-                if code != here:
-                    raise ExploreError(
-                        f"--scheduler {self.scheduler}: a worker has another version of "
-                        "gelslim-cad or of its libraries than this machine; install the same there"
-                    )
-                yield tasks[number], result
-        except EngineError as error:
-            raise ExploreError(f"{error}; what was finished is kept: run again") from error
+    Raises ExploreError where no cluster answers, its workers have other code, or a task kills
+    its workers, and what a task raises.
+    """
+    here = code_hash()
+    try:
+        for number, (code, result) in engine.run(signed, tasks):
+            if code != here:
+                raise ExploreError(
+                    f"--scheduler {engine.scheduler}: a worker has another version of "
+                    "gelslim-cad or of its libraries than this machine; install the same there"
+                )
+            yield tasks[number], result
+    except EngineError as error:
+        raise ExploreError(f"{error}; what was finished is kept: run again") from error
 
 
 def signed(task: Task) -> tuple[str, dict[str, Any]]:

@@ -16,6 +16,8 @@ from gelslim_cad.export import ExportError
 GAP_MM = 1e-5
 """Ends closer than this count as one point; OCCT's own tolerance is 1e-7 mm."""
 
+CHORD_MM = 0.002
+"""Largest distance between a chord and its curve."""
 DECIMALS = 8
 
 Vector = NDArray[np.float64]
@@ -75,15 +77,15 @@ def frame_of(normal: Sequence[float] | Vector) -> Frame:
     return Frame(u, np.cross(n, u), n)
 
 
-def contours_of(wires: Sequence[Any], frame: Frame, chord_mm: float = 0.002) -> list[Contour]:
+def contours_of(wires: Sequence[Any], frame: Frame) -> list[Contour]:
     """Draw closed wires (`cadquery.Wire`) in a frame, always sorted in the same order.
 
-    Lines and circular arcs stay exact; other curves become chords within `chord_mm`.
+    Lines and circular arcs stay exact; other curves become chords within `CHORD_MM`.
 
     Raises:
         ExportError: a wire is open or leaves the plane.
     """
-    drawn = [_contour(wire, frame, chord_mm) for wire in wires]
+    drawn = [_contour(wire, frame) for wire in wires]
     return sorted(drawn, key=_sort_key)
 
 
@@ -93,13 +95,13 @@ def _sort_key(contour: Contour) -> tuple[Any, ...]:
     return (0, *((round(x, 5), round(y, 5)) for x, y, _ in contour.segments))
 
 
-def _contour(wire: Any, frame: Frame, chord_mm: float) -> Contour:
+def _contour(wire: Any, frame: Frame) -> Contour:
     from OCP.BRepTools import BRepTools_WireExplorer
 
     pieces: list[_Piece] = []
     explorer = BRepTools_WireExplorer(wire.wrapped)
     while explorer.More():
-        pieces += _pieces(explorer.Current(), frame, chord_mm)
+        pieces += _pieces(explorer.Current(), frame)
         explorer.Next()
     if not pieces:
         raise ExportError("outline: a wire has no edges; give closed wires")
@@ -116,7 +118,7 @@ class _Piece:
     sweep: float = 0.0
 
 
-def _pieces(edge: Any, frame: Frame, chord_mm: float) -> list[_Piece]:
+def _pieces(edge: Any, frame: Frame) -> list[_Piece]:
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.GCPnts import GCPnts_TangentialDeflection
     from OCP.GeomAbs import GeomAbs_CurveType
@@ -135,7 +137,7 @@ def _pieces(edge: Any, frame: Frame, chord_mm: float) -> list[_Piece]:
     if kind == GeomAbs_CurveType.GeomAbs_Line:
         points = [curve.Value(first), curve.Value(last)]
     else:
-        run = GCPnts_TangentialDeflection(curve, 0.1, chord_mm)
+        run = GCPnts_TangentialDeflection(curve, 0.1, CHORD_MM)
         points = [run.Value(i) for i in range(1, run.NbPoints() + 1)]
     flat = [frame.flat(p) for p in (reversed(points) if backwards else points)]
     return [_Piece(a, b) for a, b in pairwise(flat)]

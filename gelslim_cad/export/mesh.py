@@ -152,18 +152,9 @@ def rotation(angles_deg: tuple[float, float, float]) -> NDArray[np.float64]:
 
     Multiples of 90 degrees come out exact, so that a flat face stays flat on the plate.
     """
-    radians = np.radians(angles_deg)
-    cx, cy, cz = (_exact(c) for c in np.cos(radians))
-    sx, sy, sz = (_exact(s) for s in np.sin(radians))
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return np.asarray(about_z @ about_y @ about_x, dtype=np.float64)
+    from scipy.spatial.transform import Rotation
 
-
-def _exact(value: float) -> float:
-    nearest = float(np.round(value))
-    return nearest if abs(value - nearest) < 1e-15 else float(value)
+    return Rotation.from_euler("xyz", angles_deg, degrees=True).as_matrix().round(15) + 0.0
 
 
 def print_mesh(mesh: TriangleMesh, angles_deg: tuple[float, float, float]) -> TriangleMesh:

@@ -17,16 +17,15 @@ _CUT_COLOUR, _ENGRAVE_COLOUR = 1, 5
 _MILLIMETRES = 4
 
 
-def outline_dxf_bytes(shape: Any, *, chord_mm: float = 0.002) -> bytes:
+def outline_dxf_bytes(shape: Any) -> bytes:
     """Draw a flat part 1:1 as closed outlines on layer CUT; layer ENGRAVE is left empty.
 
     Lines and arcs become closed LWPOLYLINEs with bulges, circles become CIRCLEs, and other curves
-    become chords within `chord_mm`. The drawing keeps the part's coordinates; `contour.frame_of`
+    become chords within 0.002 mm. The drawing keeps the part's coordinates; `contour.frame_of`
     says which axes show.
 
     Args:
         shape: A solid of constant thickness or one planar `cadquery.Face`.
-        chord_mm: Largest distance between a chord and its curve.
 
     Raises:
         ExportError: The solid is not flat, or the face is not planar.
@@ -37,7 +36,7 @@ def outline_dxf_bytes(shape: Any, *, chord_mm: float = 0.002) -> bytes:
     document = _new_document()
     document.layers.add("CUT", color=_CUT_COLOUR)
     space, where = document.modelspace(), {"layer": "CUT"}
-    for contour in contours_of(face.Wires(), frame_of(_normal(face)), chord_mm):
+    for contour in contours_of(face.Wires(), frame_of(_normal(face))):
         if isinstance(contour, Circle):
             space.add_circle((contour.x_mm, contour.y_mm), contour.radius_mm, dxfattribs=where)
         else:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelslim_cad.markers.layout import check_inside, decimal
 from gelslim_cad.markers.outline import Outline, arc_centre
-from gelslim_cad.markers.stencil import StencilSheet
+from gelslim_cad.markers.stencil import PIN_MM, StencilSheet
 from gelslim_core import __version__
 from ifem_export.markers.grid import MarkerGrid
 
@@ -46,7 +46,7 @@ def render_gerber_profile(outline: Outline) -> bytes:
 def render_gerber_alignment(sheet: StencilSheet) -> bytes:
     """Return the stencil's alignment holes as flashes, to add to the stencil order."""
     holes = sheet.alignment_mm
-    return _flashes("Other,Alignment", holes, np.full(len(holes), sheet.alignment_diameter_mm))
+    return _flashes("Other,Alignment", holes, np.full(len(holes), PIN_MM))
 
 
 def _flashes(

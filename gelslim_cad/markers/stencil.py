@@ -15,7 +15,7 @@ from ifem_export.markers.grid import MarkerGrid
 _CORNER_MM = 2.0
 _WALL_MM = 2.0
 _BORDER_MM = 12.0
-_PIN_MM = 3.0
+PIN_MM = 3.0
 """Diameter of the dowel pins, which leave more than `_WALL_MM` of the border on each side."""
 
 
@@ -31,7 +31,6 @@ class StencilSheet:
     """(m,) diameters of the dot holes."""
     alignment_mm: NDArray[np.float64]
     """(4, 2) centres of the alignment holes; no turn or flip maps the four onto themselves."""
-    alignment_diameter_mm: float
     arrow_mm: NDArray[np.float64]
     """(7, 2) arrow that points to the tip."""
 
@@ -53,7 +52,7 @@ def lay_out_stencil(grid: MarkerGrid, gel: Outline) -> StencilSheet:
         [
             (x0 - reach, y0 - reach),
             (x1 + reach, y0 - reach),
-            (x1 + reach - 2 * _PIN_MM, y1 + reach),
+            (x1 + reach - 2 * PIN_MM, y1 + reach),
             (x0 - reach, y1 + reach),
         ]
     )
@@ -64,7 +63,6 @@ def lay_out_stencil(grid: MarkerGrid, gel: Outline) -> StencilSheet:
         holes_mm=grid.positions_mm,
         hole_diameter_mm=grid.diameter_mm,
         alignment_mm=pins,
-        alignment_diameter_mm=_PIN_MM,
         arrow_mm=tip_arrow((x1 + _WALL_MM, float(middle[1])), length, 0.45 * length),
     )
 
@@ -78,7 +76,7 @@ def render_stencil(sheet: StencilSheet) -> bytes:
     for layer in ("HOLES", "ALIGNMENT", "SHEET", "ENGRAVE"):
         drawing.add_layer(layer)
     drawing.add_circles("HOLES", sheet.holes_mm, sheet.hole_diameter_mm)
-    pins = np.full(len(sheet.alignment_mm), sheet.alignment_diameter_mm)
+    pins = np.full(len(sheet.alignment_mm), PIN_MM)
     drawing.add_circles("ALIGNMENT", sheet.alignment_mm, pins)
     drawing.add_outline("SHEET", sheet.sheet)
     drawing.add_outline("ENGRAVE", sheet.gel)

@@ -12,7 +12,7 @@ from gelslim_cad.dimensions import derive
 from gelslim_cad.explore.optimum import border, optimise
 from gelslim_cad.explore.space import changed
 from gelslim_cad.explore.study import Request
-from gelslim_cad.explore.task import Engine
+from gelslim_core.jobs import Engine
 
 
 def failed(**values: float) -> set[str]:

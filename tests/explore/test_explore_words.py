@@ -16,9 +16,9 @@ from gelslim_cad.explore.judge import judge
 from gelslim_cad.explore.space import ExploreError, parse_axis, shown
 from gelslim_cad.explore.study import Request, explore
 from gelslim_cad.explore.table import csv_bytes, parquet_bytes
-from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.spec.starter import spec_text
+from gelslim_core.jobs import Engine
 
 
 def test_yes_and_no_vary(tmp_path: Path) -> None:

@@ -15,9 +15,9 @@ from gelslim_cad.explore.pareto import FIGURES, TRADES, front
 from gelslim_cad.explore.price import Price
 from gelslim_cad.explore.space import ExploreError
 from gelslim_cad.explore.study import Request
-from gelslim_cad.explore.task import Engine
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.spec.starter import spec_text
+from gelslim_core.jobs import Engine
 
 
 def test_the_thinnest_is_no_thicker_than_brute_force(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from gelslim_cad.explore import study
 from gelslim_cad.explore.space import ExploreError
 from gelslim_cad.explore.study import Request, explore
 from gelslim_cad.explore.table import csv_bytes, parquet_bytes
-from gelslim_cad.explore.task import Engine
+from gelslim_core.jobs import Engine
 from gelslim_core.optional_library import MissingLibraryError
 
 RAYS = 1 << 11

@@ -112,8 +112,7 @@ def _best(
     from gelslim_cad.explore.optimum import optimise as run
     from gelslim_cad.explore.space import ExploreError, Space, parse_axis
     from gelslim_cad.explore.study import Request
-    from gelslim_cad.explore.task import Engine
-    from gelslim_core.jobs import processors
+    from gelslim_core.jobs import Engine, processors
 
     try:
         space = Space.of(spec, [parse_axis(v) for v in vary])

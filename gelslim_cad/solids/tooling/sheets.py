@@ -19,7 +19,7 @@ from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
-from gelslim_cad.markers.stencil import StencilSheet
+from gelslim_cad.markers.stencil import PIN_MM, StencilSheet
 from gelslim_cad.solids.shapes import SolidError, prism, rounded_polygon, single
 from gelslim_cad.solids.tooling.mould import plate_stock
 from ifem_export.markers.grid import MarkerGrid
@@ -64,7 +64,7 @@ def cutting_template(d: Dimensions, sheet: StencilSheet) -> Part:
         ],
         ROUND_MM,
     )
-    pins = [(x, y, sheet.alignment_diameter_mm) for x, y in sheet.alignment_mm.tolist()]
+    pins = [(x, y, PIN_MM) for x, y in sheet.alignment_mm.tolist()]
     middle = far - TAB_HOLE_MM / 2 - 4.0
     hang = [(0.0, y0 - middle, TAB_HOLE_MM), (0.0, y1 + middle, TAB_HOLE_MM)]
     tip = (shape.length_mm / 2 + x1) / 2 + ARROW_MM / 2
@@ -80,7 +80,7 @@ def cutting_template(d: Dimensions, sheet: StencilSheet) -> Part:
         colour=ACRYLIC,
         in_assembly=False,
         note="cut the gel along the opening with a new scalpel, blade flat against the wall; the "
-        f"{sheet.alignment_diameter_mm:g} mm pins register it with the marker stencil",
+        f"{PIN_MM:g} mm pins register it with the marker stencil",
         tags=frozenset({"tooling"}),
     )
 
@@ -108,7 +108,7 @@ def stencil(sheet: StencilSheet, grid: MarkerGrid) -> Part:
     problem = stencil_problem(grid)
     if problem:
         raise SolidError(f"marker_stencil: {problem}")
-    pins = [(x, y, sheet.alignment_diameter_mm) for x, y in sheet.alignment_mm.tolist()]
+    pins = [(x, y, PIN_MM) for x, y in sheet.alignment_mm.tolist()]
     dots = zip(*sheet.holes_mm.T.tolist(), sheet.hole_diameter_mm.tolist(), strict=True)
     return Part(
         name="marker_stencil",
