@@ -15,6 +15,7 @@ from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_body import SPRINGS, GelBody
 from gelslim_twin.contact.gel_state import ContactStatus
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
+from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool, clearance_mm
 from gelslim_twin.scene.indenter import Sphere
@@ -163,3 +164,24 @@ def test_springs_leave_the_solution_as_it_is() -> None:
     size = np.linalg.norm(found[0].force_n)
     assert np.linalg.norm(found[0].force_n - found[1].force_n) < 2e-3 * size
     assert found[1].solver["iterations"] <= 8
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_both_methods_find_the_same_contact(layers: int, friction: float) -> None:
+    """Iterations on the surface, taken over by Newton's method with the inner nodes of the gel."""
+    pad = small_pad(0.49, 8, layers, 8.0)
+    solver = ContactSolver(SurfaceCompliance(pad), BALL, ContactSettings(1e-4, friction))
+    both = NonlinearContact(solver, tolerance=1e-3)
+    poses = tuple(Pose(time_s=k, depth_mm=0.3 * k) for k in range(5))
+    states = list(both.states(poses))
+    newton = NewtonContact(solver, GelBody(pad), 1e-4)
+    alone = newton.released()
+    for k in range(1, 5):
+        alone = newton.step(alone, poses[k - 1], poses[k])
+        size = np.linalg.norm(alone.force_n)
+        assert np.linalg.norm(states[k].force_n - alone.force_n) < 0.01 * size
+        far = np.abs(states[k].displacement_mm - alone.displacement_mm).max()
+        assert far < 0.01 * poses[k].depth_mm
+    held = both.law.force(states[1].displacement_mm)
+    assert np.linalg.norm(held - states[1].force_n) < 0.01 * np.linalg.norm(held)
