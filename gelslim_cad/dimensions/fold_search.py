@@ -119,6 +119,14 @@ def _score(
     return score(missed, depth, ratio, smallest(c.corners_x_mm))
 
 
+def repeats(axis: Any, k: int) -> Any:
+    """Whether an increasing axis has the value before once more: a grid that the box cuts off.
+
+    Only the first of equal candidates can be the first best.
+    """
+    return k > 0 and axis[k] == axis[k - 1]
+
+
 def _best_of_grid(
     p: Any, mids: Any, spreads: Any, mirrors: Any, cos: Any, sin: Any, known: Any, found: Any
 ) -> None:
@@ -129,8 +137,7 @@ def _best_of_grid(
     best = np.inf
     for i in range(len(mids)):
         for j in range(len(spreads)):
-            # Where the box cuts a grid off, values repeat; only the first can be the first best.
-            if (i > 0 and mids[i] == mids[i - 1]) or (j > 0 and spreads[j] == spreads[j - 1]):
+            if repeats(mids, i) or repeats(spreads, j):
                 continue
             s = sight(p, mids[i], spreads[j])
             missed = _positive_sum(field_missed(p, s))
@@ -162,7 +169,7 @@ def _smaller_number(a: Any, b: Any) -> Any:
 
 for shared in (module.SHARED for module in SOURCES):
     let_compile(shared)
-let_compile((_positive_sum, _parts, _worse, _least_score, _score, _best_of_grid))
+let_compile((_positive_sum, _parts, _worse, _least_score, _score, repeats, _best_of_grid))
 
 
 def _compile(source: int) -> Callable[..., None]:

@@ -210,20 +210,17 @@ def trace_block(
                 elif top >= depth - 1 and 0.0 < into < w:
                     into = 0.0 if uniform(path, bounce, 0) < back else w
                 reflected = w - into
-                if into > 0.0:
-                    if e >= 0 and facts[e, PRESENCE] == 1:
-                        sums[ENTERED_GEL] += (
-                            into if beyond == gel else (-into if now == gel else 0.0)
-                        )
-                    gone = beyond == AIR and (
-                        e == END or (e == GEL_END and (plane == box[0] or plane == box[1]))
-                    )
-                    if gone:
-                        sums[ENDS if e == END else GEL_ENDS] += into
-                        into = 0.0
-                    elif e >= 0 and facts[e, EXIT] == 1 and beyond == AIR:
-                        sums[returned + facts[e, OWNER]] += into
-                        into = 0.0
+                if e >= 0 and facts[e, PRESENCE] == 1:
+                    sums[ENTERED_GEL] += into if beyond == gel else (-into if now == gel else 0.0)
+                gone = beyond == AIR and (
+                    e == END or (e == GEL_END and (plane == box[0] or plane == box[1]))
+                )
+                if gone:
+                    sums[ENDS if e == END else GEL_ENDS] += into
+                    into = 0.0
+                elif e >= 0 and facts[e, EXIT] == 1 and beyond == AIR:
+                    sums[returned + facts[e, OWNER]] += into
+                    into = 0.0
                 if into > 0.0:
                     ratio = index[now] / index[beyond]
                     turn = behind - ratio * cosine

@@ -77,6 +77,14 @@ def test_the_first_best_of_a_grid_is_that_of_the_reference(problem: FoldProblem)
                 np.testing.assert_array_equal(ours, theirs)
 
 
+def test_repeated_values_of_an_axis_are_those_like_the_one_before() -> None:
+    axis = np.array([1.0, 1.0, 2.0, 3.0, 3.0, 3.0])
+    assert [bool(fold_search.repeats(axis, k)) for k in range(6)] == [
+        False, True, False, False, True, True
+    ]  # fmt: skip
+    assert not fold_search.repeats(np.array([2.0, 3.0, 2.0]), 0)
+
+
 def solved(problem: FoldProblem, monkeypatch: pytest.MonkeyPatch, compiled_from: int) -> Fold:
     monkeypatch.setattr(solver, "COMPILED_FROM", compiled_from)
     return solver.solve_fold(problem)

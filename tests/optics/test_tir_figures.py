@@ -125,6 +125,15 @@ def test_light_in_a_wedge_gains_its_taper_and_its_narrowing(na: float) -> None:
     assert turned_back == (math.pi / 2, math.pi / 2)
 
 
+def test_only_walls_that_come_together_steepen_light() -> None:
+    for leg in (Leg("foot", 1.2, 0.0), Leg("foot", 0.9, 0.1), Leg("foot", 1.2, -0.1)):
+        assert not leg.narrows
+        assert steepest_rad(leg, 0.5, N) == (math.asin(0.5 / N),) * 2
+    assert Leg("foot", 1.2, 0.1).narrows
+    # Light that starts across the wedge stays across it.
+    assert steepest_rad(Leg("foot", 1.0001, 0.2), 1.0, 1.01)[0] == math.pi / 2
+
+
 def test_margins_of_flat_walls() -> None:
     critical = math.degrees(math.asin(1.2 / 1.5))
     assert wall_margin_deg(0.3, 1.5, 1.2) == pytest.approx(90 - math.degrees(0.3) - critical)

@@ -168,3 +168,9 @@ def test_nodes_follow_the_markers_that_are_left(surface) -> None:
         lateral[:, :2], surface.view.lateral_motion(surface.view.reference_px + 1.0)
     )
     assert np.isnan(lateral[:, 2]).all()
+
+
+def test_a_gel_at_rest_that_does_not_sink_has_no_apparent_motion(surface) -> None:
+    found = surface.apparent_motion(np.zeros((len(surface.markers), 3)), 0.0)
+    assert found.shape == (surface.interpolation.n_markers, 2)
+    assert not found.any()
