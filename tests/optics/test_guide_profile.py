@@ -9,7 +9,7 @@ import pytest
 from light_cases import transformed
 from matplotlib.path import Path
 
-from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment, facetted_profile
+from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment
 from gelslim_optics.guide.shapes import (
     CurvedGuide,
     GelSection,
@@ -309,26 +309,3 @@ def test_only_concentric_arcs_of_equal_sweep_are_a_bend() -> None:
         Arc((2.0, 1.0), 3.5, 1.3, sweep), outer
     ).edges))  # fmt: skip
     assert backwards.bends() == (bend,)
-
-
-def test_chords_are_equal_and_end_on_the_arc() -> None:
-    profile = SHAPES["crowned"]
-    rough = facetted_profile(profile, 7.0, 3.5)
-    for name in ("inner_bend_left", "outer_bend_right"):
-        arc = profile.edge(name).curve
-        chords = [e.curve for e in rough.edges if e.name == name]
-        # 90° in steps of at most 7°.
-        assert len(chords) == 13
-        assert chords[0].start == pytest.approx(arc.start)
-        assert chords[-1].end == pytest.approx(arc.end)
-        for chord in chords:
-            assert math.dist(chord.start, arc.centre) == pytest.approx(arc.radius_mm)
-            half = math.radians(90 / 13 / 2)
-            assert chord.length_mm == pytest.approx(2 * arc.radius_mm * math.sin(half))
-    # The face of the gel is no wall of the guide.
-    assert rough.edge("gel_face").curve == profile.edge("gel_face").curve
-    for facet, margin in ((90.1, 99.0), (-1.0, 9.0), (7.0, 3.4)):
-        with pytest.raises(ValueError, match="facet"):
-            facetted_profile(profile, facet, margin)
-    assert facetted_profile(profile, 7.0, 0.0, allow=True).edges == rough.edges
-    assert len(facetted_profile(profile, 90.0, 45.0).edges) == len(profile.edges)
