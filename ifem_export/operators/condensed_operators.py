@@ -37,7 +37,7 @@ class _WithCompliance:
     def displacement(self, force_n: ArrayLike) -> Array:
         """Surface part of the solution of K_ff u = f for forces (c, 3) on the surface alone."""
         columns = self.system.columns
-        load = np.zeros(self.system.stiffness.shape[0]).reshape(-1, 3)
+        load = np.zeros((len(self.system.mesh.free), 3))
         load[-columns:] = checked_field(force_n, columns)
         u = self.pad_solver.solve(load, COMPLIANCE_RTOL).x.reshape(-1, 3)
         return np.asarray(u[-columns:])
@@ -71,7 +71,7 @@ class PaperOperator(_WithCompliance):
     def _stencil(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """Type of each node, its neighbours (c where absent) and the blocks of each type."""
         s = self.system
-        masks = s.mesh.numbering.masks[-s.columns :]
+        masks = s.mesh.numbering.masks[s.columns :]
         kinds, types = np.unique(masks, return_inverse=True)
         table = occupancy_table(np.asarray(s.element_matrix))[kinds][:, 9:18]
         rows, columns = s.lattice_positions.T
