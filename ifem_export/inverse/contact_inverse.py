@@ -94,13 +94,13 @@ class _Fit:
         nodes = np.flatnonzero(self.in_contact)
         gram = products.block(nodes)
         step = 1.0 / (MARGIN * largest_eigenvalue(gram))
-        contact_force = np.ascontiguousarray(start[nodes]).reshape(-1)
+        contact_force = np.ascontiguousarray(start[nodes]).ravel()
         force = np.zeros_like(start)
         residual = self.operator.displacement(start) - self.displacement_mm
         steps, change = 0, np.inf
         while True:
             before = contact_force.copy()
-            slope = self.operator.displacement(residual)[nodes].reshape(-1)
+            slope = self.operator.displacement(residual)[nodes].ravel()
             change, taken = descend(
                 gram, slope, contact_force, self.friction, step, self.tolerance,
                 self.most_steps - steps,
@@ -194,7 +194,7 @@ def _projected(force: Array, in_contact: NDArray[np.bool_], friction: float) -> 
     """Projection of the forces in contact onto the cones F_z <= 0, |F_xy| <= friction |F_z|."""
     from ifem_export.inverse.contact_fit_kernel import project
 
-    contact_force = np.ascontiguousarray(force[in_contact]).reshape(-1)
+    contact_force = np.ascontiguousarray(force[in_contact]).ravel()
     project(contact_force, friction)
     projected = np.zeros_like(force)
     projected[in_contact] = contact_force.reshape(-1, 3)

@@ -49,7 +49,8 @@ class _Fill:
     factor: tuple[Array, bool]
 
     def __call__(self, kept: Array) -> Array:
-        return np.asarray(linalg.cho_solve(self.factor, -(self.rows @ kept), check_finite=False))
+        right = -(self.rows @ kept)
+        return np.asarray(linalg.cho_solve(self.factor, right, check_finite=False))
 
     def transposed(self, lost: Array) -> Array:
         """The transpose, (k, m) from (r, m)."""
@@ -240,7 +241,8 @@ def local_roughness(markers_mm: NDArray[np.float64]) -> sparse.csr_array:
     tree = cKDTree(markers_mm)
     nearest = min(NEIGHBOURS + 1, count)
     reach = tree.query(markers_mm, k=nearest)[0][:, -1]
-    around = tree.query_ball_point(markers_mm, reach * _TIE, return_sorted=True)
+    within = reach * _TIE
+    around = tree.query_ball_point(markers_mm, within, return_sorted=True)
     rows, columns, values = [], [], []
     for marker, near in enumerate(around):
         offsets = (markers_mm[near] - markers_mm[marker]) / reach[marker]

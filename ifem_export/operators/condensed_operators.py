@@ -55,7 +55,7 @@ class PaperOperator(_WithCompliance):
 
         u = checked_field(displacement_mm, self.system.columns)
         if self.system.mesh.fill is not None:
-            return np.asarray(self.system.stiffness @ u.reshape(-1)).reshape(-1, 3)
+            return np.asarray(self.system.stiffness @ u.ravel()).reshape(-1, 3)
         force = np.empty_like(u)
         apply_stencil(*self._stencil, np.vstack([u, np.zeros((1, 3))]), force)
         return force
@@ -92,7 +92,7 @@ class CondensedOperator(_WithCompliance):
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """F = K_ss u + K_si u_i, where K_ii u_i = -K_is u."""
-        u = checked_field(displacement_mm, self.system.columns).reshape(-1)
+        u = checked_field(displacement_mm, self.system.columns).ravel()
         inner = self.inner_solver.solve(-(self.system.surface_to_inner @ u), self.rtol).x
         force = self.system.surface @ u + self.system.inner_to_surface @ inner
         return np.asarray(force.reshape(-1, 3))
@@ -136,7 +136,7 @@ class DenseOperator(_WithCompliance):
     def force(self, displacement_mm: ArrayLike) -> Array:
         """One matrix-vector product."""
         u = checked_field(displacement_mm, self.system.columns).astype(np.float32)
-        return np.asarray(self.matrix @ u.reshape(-1), dtype=float).reshape(-1, 3)
+        return np.asarray(self.matrix @ u.ravel(), dtype=float).reshape(-1, 3)
 
     @property
     def n_bytes(self) -> int:

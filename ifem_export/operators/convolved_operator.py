@@ -124,7 +124,7 @@ def missing_resultant(system: PadSystem, stiffness: LayeredOperator) -> Array:
     for axis in range(3):
         uniform = np.zeros((system.columns, 3))
         uniform[:, axis] = 1.0
-        u = uniform.reshape(-1)
+        u = uniform.ravel()
         inner = solver.solve(-(system.surface_to_inner @ u), RESULTANT_RTOL).x
         exact = system.surface @ u + system.inner_to_surface @ inner
         missing[:, axis, :] = exact.reshape(uniform.shape) - stiffness(uniform[None])[0]

@@ -99,7 +99,7 @@ class CrownedSystem(PadSystem):
     def stiffness(self) -> sparse.csr_array:
         """Free-free stiffness (3f, 3f) in N/mm, in the order of the unknowns."""
         all_nodes = mesh_stiffness(self.mesh, self.element_matrix)
-        rows = (3 * self._order[:, None] + np.arange(3)).reshape(-1)
+        rows = (3 * self._order[:, None] + np.arange(3)).ravel()
         free = sparse.csr_array(all_nodes[rows][:, rows])
         share, at, other = self._shares
         if not share.any():

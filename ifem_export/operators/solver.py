@@ -146,7 +146,7 @@ class ConjugateGradients:
         return float(np.linalg.norm(right - self.matrix @ x))
 
     def _precondition(self, r: Array) -> Array:
-        return self.preconditioner(r.reshape(self.layers, -1, 3)).reshape(-1)
+        return self.preconditioner(r.reshape(self.layers, -1, 3)).ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +267,7 @@ def _iterate(
 
 
 def _checked(b: ArrayLike, n: int) -> Array:
-    right = np.asarray(b, dtype=float).reshape(-1)
+    right = np.asarray(b, dtype=float).ravel()
     if right.shape != (n,):
         raise IfemError(
             f"the right-hand side has {right.size} values: must have {n}",

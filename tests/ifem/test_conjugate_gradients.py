@@ -103,9 +103,12 @@ def test_a_start_that_suffices_takes_one_product() -> None:
     found = solver(matrix).solve(load(), 0.5001)
     assert (found.iterations, matrix.products) == (0, 1)
     assert found.residual == pytest.approx(0.5)
+    exact = ConjugateGradients(matrix, lambda field: 2.0 * Halved(matrix.matrix)(field), 2)
+    assert exact.solve(load(), 1e-12).iterations == 0
+    assert matrix.products == 2
     none = solver(matrix).solve(np.zeros(N))
     assert (none.residual, none.iterations, none.x.tolist()) == (0.0, 0, [0.0] * N)
-    assert matrix.products == 1
+    assert matrix.products == 2
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])

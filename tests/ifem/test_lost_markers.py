@@ -74,6 +74,14 @@ def square(form: np.ndarray) -> MarkerInterpolation:
     return MarkerInterpolation(SETS["few"], np.eye(5), form)
 
 
+def test_the_first_marker_without_a_value_is_named() -> None:
+    values = np.zeros((5, 2))
+    values[[2, 4], [1, 0]] = np.nan
+    with pytest.raises(InterpolationError) as caught:
+        square(np.eye(5))(values)
+    assert (caught.value.field, caught.value.value) == ("marker", 2)
+
+
 def test_lost_markers_that_the_others_do_not_determine_are_refused() -> None:
     lost = np.array([True, True, False, False, False])
     form = np.diag([1.0, 1e-8, 1.0, 1.0, 1.0])
