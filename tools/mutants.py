@@ -30,6 +30,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 from queue import Queue
 
@@ -246,7 +247,17 @@ def judged(mutant: Mutant, tests: list[str], copy: Path) -> Verdict:
         return Verdict(mutant, killed, "time limit", time.monotonic() - started)
     failed = [w for w in done.stdout.splitlines() if w.startswith(("FAILED", "ERROR"))]
     by = failed[0].split(" ")[1] if failed else ""
+    if by and not passes(by.partition("[")[0], copy):
+        return Verdict(mutant, False, f"{by} fails by itself", time.monotonic() - started)
     return Verdict(mutant, done.returncode != 0, by, time.monotonic() - started)
+
+
+@cache
+def passes(test: str, copy: Path) -> bool:
+    """Whether a test passes in a copy of the tree without a mutant."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
+    done = finished(command, copy)
+    return done is not None and done.returncode == 0
 
 
 def finished(command: list[str], copy: Path) -> subprocess.CompletedProcess[str] | None:

@@ -224,3 +224,17 @@ def test_rays_end_below_the_cut_and_after_the_last_face() -> None:
         result = trace_light(scene, 32, replicates=1, options=options)
         assert result.value("truncated") == pytest.approx(truncated, rel=1e-12)
         assert result.crossings == faces
+
+
+def test_a_black_coat_ends_the_ray_even_without_a_cut() -> None:
+    scene = LightScene(
+        slab(3.0, 2.0, top="paint"),
+        (-1.0, 1.0),
+        (-1.0, 1.0),
+        (EdgeLaunch("foot_right", na=0.0),),
+        media(),
+        COATS,
+    )
+    result = trace_light(scene, 32, replicates=1, options=TraceOptions(cut=0.0))
+    assert result.crossings == 1
+    assert result.value("stopped.top") == 1
