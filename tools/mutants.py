@@ -211,7 +211,7 @@ class ClosestTests:
         self.tests = {p.relative_to(ROOT).as_posix(): imports_of(p) for p in tests}
 
     def of(self, module: str) -> list[str]:
-        """The closest test files first; among equals those of the module's own package."""
+        """The closest test files first; among equals those with its name, then of its package."""
         distance, queue = {module: 0}, deque([module])
         while queue:
             here = queue.popleft()
@@ -224,8 +224,9 @@ class ClosestTests:
             near = [distance[m] for m in used if m in distance]
             if near and "/robustness/" not in test and "/docs/" not in test:
                 of_others = sum(m.partition("/")[0] != module.partition("/")[0] for m in used)
-                ranked.append((min(near), of_others, len(used), test))
-        return [test for _, _, _, test in sorted(ranked)[:MOST_FILES]]
+                other_name = Path(module).stem not in Path(test).stem
+                ranked.append((min(near), other_name, of_others, len(used), test))
+        return [test for *_, test in sorted(ranked)[:MOST_FILES]]
 
 
 def judged(mutant: Mutant, tests: list[str], copy: Path) -> Verdict:

@@ -172,3 +172,10 @@ def test_the_active_set_is_found_in_few_factorisations() -> None:
         again, factors = lcp_forces(normal, height, guess)
         np.testing.assert_allclose(again, push, atol=1e-12)
         assert factors <= most
+
+
+def test_a_touch_of_rounding_has_no_force_and_no_residual() -> None:
+    """A depth of a hundred-trillionth of the other heights decides nothing."""
+    found = solve_contact_forces(coupled(0.5), np.array([-1e-14, 1.0]), np.zeros((2, 2)), 0.0)
+    assert not found.force_n.any()
+    assert (found.residual, list(found.touch)) == (0.0, [FREE, FREE])
