@@ -278,7 +278,7 @@ def test_size_and_method_decide_the_solver() -> None:
 def test_fields_that_do_not_fit_are_refused() -> None:
     field = np.zeros((5, 3))
     assert np.array_equal(checked_field(field, 5), field)
-    field[3, 2] = np.inf
+    field[[3, 4], [2, 0]] = np.inf
     for values, count, name, value in ((field, 5, "node", 3), (field, 4, "shape", (5, 3))):
         with pytest.raises(IfemError) as caught:
             checked_field(values, count)
