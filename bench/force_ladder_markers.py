@@ -162,7 +162,7 @@ def matching(rig: Rig, quick: bool) -> list[dict[str, Any]]:
     trials = 10 if quick else 60
     reference = rest_lattice(rig)
     modes: dict[str, Callable[[Array], IntArray]] = {
-        "nearest": lambda points: nearest_dots(reference, points),
+        "nearest": lambda points: nearest_dots(reference.positions_px, points),
         "robust": lambda points: match(reference, points).dots,
     }
     rows = []
@@ -192,11 +192,9 @@ def matching(rig: Rig, quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
-def nearest_dots(reference: ReferenceLattice, points_px: Array) -> IntArray:
-    """(n,) nearest dot of each marker, as in the paper; two markers may take the same one."""
-    from gelslim_force.tracking.matching_kernel import nearest
-
-    return np.array([nearest(points_px, x, y)[0] for x, y in reference.positions_px])
+def nearest_dots(expected_px: Array, points_px: Array) -> IntArray:
+    """(n,) dot nearest to each position, as in the paper; two markers may take the same one."""
+    return np.asarray(cKDTree(points_px).query(expected_px)[1])
 
 
 def rest_lattice(rig: Rig) -> ReferenceLattice:

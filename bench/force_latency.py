@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
+from force_ladder_markers import nearest_dots
 from force_rig import SEED, Rig, large_rig, shares, small_rig
 from machine import machine
 from numpy.typing import NDArray
@@ -149,7 +150,6 @@ def paper_chain(
     from gelslim_force.detection.detection import Detector
     from gelslim_force.forces.wrench import resultant
     from gelslim_force.motion.marker_motion import MarkerView
-    from gelslim_force.tracking.matching import match
     from ifem_export.markers.interpolation import marker_to_node
 
     reference = calibration.reference
@@ -163,10 +163,9 @@ def paper_chain(
     def run(k: int) -> dict[str, float]:
         marks = [time.perf_counter()]
         dots = detector.detect(frames[k])
-        tracks = match(reference, dots.centres_px, last[0], "nearest")
-        last[0] = tracks.positions_px
+        last[0] = dots.centres_px[nearest_dots(last[0], dots.centres_px)]
         marks.append(time.perf_counter())
-        lateral = view.lateral_motion(tracks.positions_px, to_markers @ normal_mm[k], "printed")
+        lateral = view.lateral_motion(last[0], to_markers @ normal_mm[k], "printed")
         marks.append(time.perf_counter())
         u = np.empty_like(nodes)
         rest = view.rest_mm[:, :2]

@@ -14,7 +14,7 @@ from cli_samples import ROOT, fresh
 from gelslim import doctor
 from gelslim.cli import main
 from gelslim.doctor import RealTime, Timed
-from gelslim_core import extras as extras_module
+from gelslim_core import optional_library
 from gelslim_core.optional_library import EXTRAS, extra_of, install_command, installed
 
 
@@ -50,7 +50,7 @@ def test_a_missing_extra_is_named_with_its_command(
     def without(module: str) -> bool:
         return module not in lacking and installed(module)
 
-    monkeypatch.setattr(extras_module, "installed", without)
+    monkeypatch.setattr(optional_library, "installed", without)
     monkeypatch.setattr(doctor, "installed", without)
     states = {e["name"]: e for e in answered(capsys, "--quick")["extras"]}
     assert states["cad"]["ready"] is False

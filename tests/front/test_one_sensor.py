@@ -36,7 +36,7 @@ def built(spec_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     spec = gelslim.read_spec(spec_file).spec
     written = WRITERS["bundle"]((), spec=spec.model_dump_json())
     folder = tmp_path_factory.mktemp("built")
-    for name, data in written.files.items():
+    for name, (data, _) in written.files.items():
         path = folder / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(data)
