@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import NoneType, UnionType
@@ -98,6 +99,7 @@ def _types(annotation: Any) -> Iterator[Any]:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args()
     import gelslim_cad.checks  # noqa: F401  (registers the rules)
 
     NAMES.write_text(names_text(), encoding="utf-8")
