@@ -22,10 +22,14 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, NoReturn
 
+from gelslim_core.files.held_interrupt import (
+    RETRY_S,
+    must_not_be_interrupted,
+    send_to_main_thread,
+)
+
 PATIENCE_S = 3.0
 """Time after the first signal, or after the work, from which a signal ends the process at once."""
-RETRY_S = 0.02
-"""Time between checks whether an import or a call of llvmlite has ended."""
 SAID = {
     signal.SIGINT: ("interrupted", "Interrupted; every file that is there is whole."),
     signal.SIGTERM: ("terminated", "Terminated; every file that is there is whole."),
@@ -33,9 +37,6 @@ SAID = {
 """Kind of the error in JSON, and the line that people read."""
 SHOWN_AGAIN = b"\r\x1b[2K\x1b[?25h"
 """Clears the line of a progress bar on a terminal and shows the cursor that it has hidden."""
-_IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
-_LLVMLITE = os.sep.join(("", "llvmlite", "binding", ""))
-"""Part of the paths of its modules, which record in Python who must free an object of LLVM."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -91,7 +92,7 @@ class Ending:
                 self._leave(number)
         elif not self._begun:
             self._leave(number)
-        elif _uninterruptible(frame):
+        elif must_not_be_interrupted(frame):
             self._ask_again(number)
         else:
             self._since = time.monotonic()
@@ -155,15 +156,6 @@ def say(number: int) -> None:
         os.write(descriptor, f"{text}\n".encode())
 
 
-def send_to_main_thread(number: int) -> None:
-    """Run the handler of a signal in the main thread, and end its wait where that is possible."""
-    thread = threading.main_thread().ident
-    if hasattr(signal, "pthread_kill") and thread is not None:
-        signal.pthread_kill(thread, number)
-    else:
-        _thread.interrupt_main(signal.Signals(number))
-
-
 def asked_to_end(error: BaseException | None) -> int | None:
     """The signal that caused an error, directly or through its cause or context; else None."""
     seen: set[int] = set()
@@ -192,16 +184,6 @@ def _without_interrupts(before: Callable[..., Any]) -> Callable[..., None]:
 def number_of(error: BaseException) -> int:
     """The signal that a KeyboardInterrupt stands for."""
     return signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT
-
-
-def _uninterruptible(frame: FrameType | None) -> bool:
-    """Whether an import or a call of llvmlite is in progress."""
-    while frame is not None:
-        file = frame.f_code.co_filename
-        if file in _IMPORTS or _LLVMLITE in file:
-            return True
-        frame = frame.f_back
-    return False
 
 
 def _ignore_signals() -> None:

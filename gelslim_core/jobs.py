@@ -5,10 +5,12 @@ Worker processes end with their parent, and at once when the parent is interrupt
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +22,12 @@ from types import FrameType
 from typing import Any, Literal, TypeVar
 
 from gelslim_core.errors import GelslimError
-from gelslim_core.files.held_interrupt import interrupts_held
+from gelslim_core.files.held_interrupt import (
+    RETRY_S,
+    interrupts_held,
+    must_not_be_interrupted,
+    send_to_main_thread,
+)
 from gelslim_core.optional_library import load
 
 Task = TypeVar("Task")
@@ -236,8 +243,32 @@ def _perform(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
 def _terminate(number: int, frame: FrameType | None) -> None:
     if not _is_busy:
         os._exit(TERMINATED)
+    if must_not_be_interrupted(frame):
+        _terminate_soon()
+        return
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise _Terminated
+
+
+def _terminate_soon() -> None:
+    def later() -> None:
+        time.sleep(RETRY_S)
+        send_to_main_thread(signal.SIGTERM)
+
+    # threading.Thread would take locks that the interrupted code may hold.
+    _thread.start_new_thread(later, ())
+
+
+def _unraisable(before: Callable[[Any], Any]) -> Callable[[Any], None]:
+    def hook(raised: Any) -> None:
+        if isinstance(raised.exc_value, _Terminated):
+            # A destructor or compiled code was interrupted and swallowed the exception.
+            signal.signal(signal.SIGTERM, _terminate)
+            _terminate_soon()
+        else:
+            before(raised)
+
+    return hook
 
 
 def begin_worker() -> None:
@@ -249,6 +280,7 @@ def begin_worker() -> None:
     with contextlib.suppress(ValueError):  # raised outside the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, _terminate)
+        sys.unraisablehook = _unraisable(sys.unraisablehook)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     parent = multiprocessing.parent_process()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import _thread
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -9,6 +11,11 @@ from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
 from typing import Any
 
+RETRY_S = 0.02
+"""Time between checks whether an import or a call of llvmlite has ended."""
+_IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
+_LLVMLITE = os.sep.join(("", "llvmlite", "binding", ""))
+"""Part of the paths of its modules, which record in Python who must free an object of LLVM."""
 LetThrough = Callable[[], AbstractContextManager[None]]
 
 
@@ -94,3 +101,26 @@ class _LetThrough:
 
     def __exit__(self, *_: object) -> None:
         self._held.hold()
+
+
+def must_not_be_interrupted(frame: FrameType | None) -> bool:
+    """Whether an import or a call of llvmlite is in progress in a frame or its callers.
+
+    An import that is interrupted could crash or report that a library is missing; an interrupted
+    call of llvmlite would free memory twice.
+    """
+    while frame is not None:
+        file = frame.f_code.co_filename
+        if file in _IMPORTS or _LLVMLITE in file:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def send_to_main_thread(number: int) -> None:
+    """Run the handler of a signal in the main thread, and end its wait where that is possible."""
+    thread = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and thread is not None:
+        signal.pthread_kill(thread, number)
+    else:
+        _thread.interrupt_main(signal.Signals(number))

@@ -319,6 +319,19 @@ def test_workers_close_what_they_have_open(
     assert not (tmp_path / "made_1").exists()
 
 
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_worker_ends_though_a_destructor_swallows_the_signal(method: str, tmp_path: Path) -> None:
+    deaf = "class Deaf:\n    def __del__(self):\n        time.sleep(60)\n"
+    task = TASK.replace("def task", deaf + "def task").replace(
+        "            time.sleep(60)\n", "            Deaf()\n            time.sleep(60)\n"
+    )
+    (tmp_path / "pool_task.py").write_text(task)
+    done = program(tmp_path, POOL.format(method=method))
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+    assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
 def test_a_worker_that_just_starts_says_nothing(tmp_path: Path) -> None:
     """At a terminal the whole group gets the signal, new interpreters too."""
     (tmp_path / "pool_task.py").write_text(TASK)
