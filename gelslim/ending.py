@@ -10,7 +10,6 @@ of the interpreter, because threads of compiled code may still run and would use
 
 from __future__ import annotations
 
-import _thread
 import atexit
 import contextlib
 import os
@@ -25,7 +24,7 @@ from typing import Any, NoReturn
 from gelslim_core.files.held_interrupt import (
     RETRY_S,
     must_not_be_interrupted,
-    send_to_main_thread,
+    repeat_signal,
 )
 
 PATIENCE_S = 3.0
@@ -53,7 +52,8 @@ class Ending:
         self._begun = False
         self._status: int | None = None
         self._since: float | None = None
-        self._retrying = False
+        self._calls = 0
+        self._retrying = -1
         self._leaving = False
 
     def arm(self) -> None:
@@ -87,6 +87,7 @@ class Ending:
         os._exit(status)
 
     def _asked(self, number: int, frame: FrameType | None) -> None:
+        self._calls += 1
         if self._since is not None:
             if time.monotonic() - self._since > PATIENCE_S:
                 self._leave(number)
@@ -113,18 +114,11 @@ class Ending:
         os._exit(status)
 
     def _ask_again(self, number: int, at_once: bool = False) -> None:
-        if self._retrying:
+        calls = self._calls
+        if self._retrying == calls:
             return
-        self._retrying = True
-
-        def later() -> None:
-            if not at_once:
-                time.sleep(RETRY_S)
-            self._retrying = False
-            send_to_main_thread(number)
-
-        # threading.Thread would take locks that the interrupted code may hold.
-        _thread.start_new_thread(later, ())
+        self._retrying = calls
+        repeat_signal(number, lambda: self._calls != calls, 0.0 if at_once else RETRY_S)
 
     def _unraisable(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
         def hook(raised: Any) -> None:

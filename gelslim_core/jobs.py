@@ -5,7 +5,6 @@ Worker processes end with their parent, and at once when the parent is interrupt
 
 from __future__ import annotations
 
-import _thread
 import contextlib
 import multiprocessing
 import os
@@ -26,7 +25,7 @@ from gelslim_core.files.held_interrupt import (
     RETRY_S,
     interrupts_held,
     must_not_be_interrupted,
-    send_to_main_thread,
+    repeat_signal,
 )
 from gelslim_core.optional_library import load
 
@@ -178,6 +177,8 @@ TERMINATED = 128 + signal.SIGTERM
 """Exit status of a worker that SIGTERM ended."""
 _is_busy = False
 """Whether this worker is running a task."""
+_calls = 0
+"""How often this worker has handled SIGTERM."""
 
 
 class _Terminated(BaseException):
@@ -241,6 +242,8 @@ def _perform(fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Any:
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
+    global _calls
+    _calls += 1
     if not _is_busy:
         os._exit(TERMINATED)
     if must_not_be_interrupted(frame):
@@ -251,12 +254,8 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _terminate_soon() -> None:
-    def later() -> None:
-        time.sleep(RETRY_S)
-        send_to_main_thread(signal.SIGTERM)
-
-    # threading.Thread would take locks that the interrupted code may hold.
-    _thread.start_new_thread(later, ())
+    calls = _calls
+    repeat_signal(signal.SIGTERM, lambda: _calls != calls, RETRY_S)
 
 
 def _unraisable(before: Callable[[Any], Any]) -> Callable[[Any], None]:

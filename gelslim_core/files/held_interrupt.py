@@ -6,6 +6,7 @@ import _thread
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
@@ -115,6 +116,27 @@ def must_not_be_interrupted(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
+
+
+def repeat_signal(number: int, until: Callable[[], bool], after_s: float = 0.0) -> None:
+    """From a thread of its own, run the handler of a signal in the main thread.
+
+    A signal directly before a blocking call would not end that call, so it is repeated.
+
+    Args:
+        number: Signal.
+        until: Whether the handler was called.
+        after_s: Time before the first signal.
+    """
+
+    def repeat() -> None:
+        time.sleep(after_s)
+        while not until():
+            send_to_main_thread(number)
+            time.sleep(RETRY_S)
+
+    # threading.Thread would take locks that the interrupted code may hold.
+    _thread.start_new_thread(repeat, ())
 
 
 def send_to_main_thread(number: int) -> None:
