@@ -7,6 +7,7 @@ missing dot leaves a hole; a spurious dot fits no site.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +24,18 @@ _MAX_MISFIT = 0.22
 _MAX_SEEDS = 12
 _ENOUGH = 0.8
 _MIN_DOTS = 12
+_MAX_SKEW = 0.12
+"""Largest sum of two opposite steps, relative to the sum of their lengths."""
+_MIN_SINE = 0.6
+"""Smallest sine of the angle between the axes of a seed."""
+_MAX_CONDITION = 1e4
+"""Largest condition number of the fit that predicts a site."""
 _MAX_RINGS = 200
 _MAX_BRIDGES, _NEARLY_ALL = 6, 0.9
+_AROUND = np.array(
+    [(a, b) for a in range(-_REACH, _REACH + 1) for b in range(-_REACH, _REACH + 1) if a or b]
+)
+"""Row and column offsets (24, 2) of the neighbours from which a site is predicted."""
 
 
 class LatticeError(GelslimError, ValueError):
@@ -85,26 +96,26 @@ def grow_lattice(detections: Detections) -> Lattice:
 def _seeds(points: NDArray[np.float64], tree: cKDTree) -> list[tuple[int, NDArray[np.float64]]]:
     """Dots with two pairs of opposite neighbours, most regular first, and their steps (2, 2)."""
     _, near = tree.query(points, min(9, len(points)))
-    found: list[tuple[float, int, NDArray[np.float64]]] = []
-    for i, neighbours in enumerate(near):
-        steps = points[neighbours[1:]] - points[i]
-        length = np.hypot(*steps.T)
-        pairs: list[tuple[float, float, NDArray[np.float64]]] = []
-        for a in range(len(steps)):
-            for b in range(a + 1, len(steps)):
-                skew = float(np.hypot(*(steps[a] + steps[b]))) / float(length[a] + length[b])
-                if skew < 0.12:
-                    pairs.append((float(length[a] + length[b]), skew, (steps[a] - steps[b]) / 2))
-        pairs.sort(key=lambda pair: pair[0])
-        for second in pairs[1:]:
-            u, v = pairs[0][2], second[2]
-            sine = abs(u[0] * v[1] - u[1] * v[0]) / float(np.hypot(*u) * np.hypot(*v))
-            if sine > 0.6:
-                found.append((pairs[0][1] + second[1], i, np.array([u, v])))
-                break
-    found.sort(key=lambda item: item[0])
-    spread = found[:: max(1, len(found) // (4 * _MAX_SEEDS))]
-    return [(i, basis) for _, i, basis in found[:_MAX_SEEDS] + spread]
+    steps = points[near[:, 1:]] - points[:, None]
+    a, b = np.triu_indices(steps.shape[1], 1)
+    length = np.hypot(steps[..., 0], steps[..., 1])
+    length = length[:, a] + length[:, b]
+    sums = steps[:, a] + steps[:, b]
+    skew = np.hypot(sums[..., 0], sums[..., 1]) / np.maximum(length, 1e-9)
+    half = (steps[:, a] - steps[:, b]) / 2
+    opposite = skew < _MAX_SKEW
+    every = np.arange(len(points))
+    first = np.where(opposite, length, np.inf).argmin(axis=1)
+    u = half[every, first][:, None]
+    across = np.abs(u[..., 0] * half[..., 1] - u[..., 1] * half[..., 0])
+    sizes = np.hypot(u[..., 0], u[..., 1]) * np.hypot(half[..., 0], half[..., 1])
+    crossing = opposite & opposite.any(axis=1)[:, None] & (across > _MIN_SINE * sizes)
+    second = np.where(crossing, length, np.inf).argmin(axis=1)
+    irregular = skew[every, first] + skew[every, second]
+    seeds = np.flatnonzero(crossing.any(axis=1))
+    seeds = seeds[np.argsort(irregular[seeds], kind="stable")]
+    found = [(int(i), half[i, [first[i], second[i]]]) for i in seeds]
+    return found[:_MAX_SEEDS] + found[:: max(1, len(found) // (4 * _MAX_SEEDS))]
 
 
 def _grown(
@@ -150,14 +161,16 @@ def _rings(
     reach = 1
     for _ in range(_MAX_RINGS):
         offers: list[tuple[float, tuple[int, int], int]] = []
-        for site in sorted(_rim(placed, reach) - barren):
-            position, pitch, support = _predicted(points, placed, site)
-            if support < 4:
+        rim = sorted(_rim(placed, reach) - barren)
+        position, pitch, support = _predicted(points, placed, rim)
+        gaps, dots = tree.query(position)
+        for k, site in enumerate(rim):
+            if support[k] < 4:
                 continue
-            gap, dot = tree.query(position)
-            if gap < _TOLERANCE * pitch and int(dot) not in used:
-                offers.append((float(gap / pitch), site, int(dot)))
-            elif support >= 8:
+            gap, dot = float(gaps[k] / pitch[k]), int(dots[k])
+            if gap < _TOLERANCE and dot not in used:
+                offers.append((gap, site, dot))
+            elif support[k] >= 8:
                 barren.add(site)
         added = 0
         for _, site, dot in sorted(offers):
@@ -179,46 +192,52 @@ def _rim(placed: dict[tuple[int, int], int], reach: int) -> set[tuple[int, int]]
     return rim - placed.keys()
 
 
-def _neighbours(placed: dict[tuple[int, int], int], site: tuple[int, int]) -> NDArray[np.int64]:
-    """Row and column offset and dot (n, 3) of the sites up to two rows and columns away."""
-    around = range(-_REACH, _REACH + 1)
-    near = [
-        (a, b, placed[site[0] + a, site[1] + b])
-        for a in around
-        for b in around
-        if (a or b) and (site[0] + a, site[1] + b) in placed
-    ]
-    return np.array(near, dtype=np.int64).reshape(-1, 3)
+def _neighbours(
+    placed: dict[tuple[int, int], int], sites: Sequence[tuple[int, int]]
+) -> NDArray[np.int64]:
+    """Dots (n, 24) up to two rows and columns away from n sites; -1 where there is none."""
+    known = np.array(list(placed), dtype=np.int64)
+    wanted = np.array(sites, dtype=np.int64).reshape(-1, 1, 2) + _AROUND
+    both = np.vstack([known, wanted.reshape(-1, 2)])
+    low, high = both.min(axis=0), both.max(axis=0)
+    table = np.full(high - low + 1, -1, dtype=np.int64)
+    table[tuple((known - low).T)] = list(placed.values())
+    return table[tuple(np.moveaxis(wanted - low, -1, 0))]
 
 
 def _predicted(
-    points: NDArray[np.float64], placed: dict[tuple[int, int], int], site: tuple[int, int]
-) -> tuple[NDArray[np.float64], float, int]:
-    """Position (2,) of a site by an affine fit to its neighbours, local pitch, and their number."""
-    table = _neighbours(placed, site)
-    if len(table) < 4:
-        return np.zeros(2), 1.0, 0
-    design = np.column_stack([np.ones(len(table)), table[:, :2]])
+    points: NDArray[np.float64],
+    placed: dict[tuple[int, int], int],
+    sites: Sequence[tuple[int, int]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Positions (n, 2) of sites by affine fits to their neighbours, and local pitches (n,).
+
+    The third value is the number (n,) of neighbours, 0 where they determine no fit.
+    """
+    dots = _neighbours(placed, sites)
+    design = np.column_stack([np.ones(len(_AROUND)), _AROUND])
     # Near neighbours have a larger weight, because an affine fit ignores perspective.
-    weight = 1.0 / np.hypot(table[:, 0], table[:, 1])
-    normal = design.T @ (design * weight[:, None])
-    if np.linalg.cond(normal) > 1e4:
-        return np.zeros(2), 1.0, 0
-    fit = np.linalg.solve(normal, design.T @ (points[table[:, 2]] * weight[:, None]))
-    pitch = float(min(np.hypot(*fit[1]), np.hypot(*fit[2])))
-    return fit[0], max(pitch, 1e-6), len(table)
+    weight = (dots >= 0) / np.hypot(*_AROUND.T)
+    normal = np.einsum("nk,ki,kj->nij", weight, design, design, optimize=True)
+    right = np.einsum("nk,ki,nkc->nic", weight, design, points[dots], optimize=True)
+    support = (dots >= 0).sum(axis=1)
+    normal[support < 4] = np.zeros((3, 3))
+    fits = np.linalg.cond(normal) <= _MAX_CONDITION
+    normal[~fits] = np.eye(3)
+    fit = np.linalg.solve(normal, right)
+    pitch = np.hypot(fit[:, 1:, 0], fit[:, 1:, 1]).min(axis=1)
+    return fit[:, 0], np.maximum(pitch, 1e-6), np.where(fits, support, 0)
 
 
 def _misfits(
     points: NDArray[np.float64], placed: dict[tuple[int, int], int]
 ) -> dict[tuple[int, int], float]:
     """Distance in pitches of every dot with enough neighbours from their prediction."""
-    gaps = {}
-    for site, dot in placed.items():
-        position, pitch, support = _predicted(points, placed, site)
-        if support >= 4:
-            gaps[site] = float(np.hypot(*(points[dot] - position))) / pitch
-    return gaps
+    sites = list(placed)
+    position, pitch, support = _predicted(points, placed, sites)
+    off = points[list(placed.values())] - position
+    gaps = np.hypot(off[:, 0], off[:, 1]) / pitch
+    return {sites[k]: float(gaps[k]) for k in np.flatnonzero(support >= 4)}
 
 
 def _lattice_of(points: NDArray[np.float64], placed: dict[tuple[int, int], int]) -> Lattice:
@@ -293,12 +312,13 @@ def _quadratic_residual(
     points: NDArray[np.float64], placed: dict[tuple[int, int], int], site: tuple[int, int]
 ) -> float:
     """Distance in px from a quadratic fit to the 5 x 5 neighbours; NaN if they are too few."""
-    table = _neighbours(placed, site)
-    if len(table) < 9:
+    dots = _neighbours(placed, [site])[0]
+    there = dots >= 0
+    if np.count_nonzero(there) < 9:
         return float("nan")
-    a, b = table[:, 0], table[:, 1]
-    design = np.column_stack([np.ones(len(table)), a, b, a * a, a * b, b * b])
-    fit, _, rank, _ = np.linalg.lstsq(design, points[table[:, 2]], rcond=None)
+    a, b = _AROUND[there].T
+    design = np.column_stack([np.ones(len(a)), a, b, a * a, a * b, b * b])
+    fit, _, rank, _ = np.linalg.lstsq(design, points[dots[there]], rcond=None)
     if rank < 6:
         return float("nan")
     return float(np.hypot(*(points[placed[site]] - fit[0])))
