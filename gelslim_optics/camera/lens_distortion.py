@@ -47,9 +47,10 @@ class LensDistortion:
     k3: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
+        for field in fields(self):
+            value = getattr(self, field.name)
             if not np.isfinite(value):
-                raise ValueError(f"distortion coefficient {name} = {value} is not finite")
+                raise ValueError(f"distortion coefficient {field.name} = {value} is not finite")
 
     @cached_property
     def monotone_radius(self) -> float:
@@ -62,6 +63,8 @@ class LensDistortion:
         does.
         """
         slope = -6 * float(np.hypot(self.p1, self.p2))
+        if not (self.k1 or self.k2 or self.k3 or slope):
+            return float(np.inf)
         outward = [7 * self.k3, 0.0, 5 * self.k2, 0.0, 3 * self.k1, slope, 1.0]
         around = [self.k3, 0.0, self.k2, 0.0, self.k1, slope, 1.0]
         roots = np.concatenate([np.roots(outward), np.roots(around)])
