@@ -89,17 +89,24 @@ def coverage(rim: Vector, shape: tuple[int, int]) -> tuple[slice, slice, Vector]
     offset = (np.arange(_SUB) + 0.5) / _SUB - 0.5
     x = (np.arange(low[0], high[0])[:, None] + offset).ravel()
     y = (np.arange(low[1], high[1])[:, None] + offset).ravel()
-    following = np.roll(rim, -1, axis=0)
-    edge = following - rim
-    sign = np.sign(_turning(rim))
-    side = (
-        edge[:, 0, None, None] * (y[None, :, None] - rim[:, 1, None, None])
-        - edge[:, 1, None, None] * (x[None, None, :] - rim[:, 0, None, None])
-    ) * sign
-    inside = np.all(side >= 0, axis=0).astype(float)
+    left, right = _crossings(rim, y)
+    inside = ((x >= left[:, None]) & (x <= right[:, None])).astype(float)
     rows, columns = high[1] - low[1], high[0] - low[0]
     share = inside.reshape(rows, _SUB, columns, _SUB).mean(axis=(1, 3))
     return slice(low[1], high[1]), slice(low[0], high[0]), share
+
+
+def _crossings(rim: Vector, y: Vector) -> tuple[Vector, Vector]:
+    """Where lines of constant y (n,) enter and leave a convex outline; empty ranges outside."""
+    edge = (np.roll(rim, -1, axis=0) - rim) * np.sign(_turning(rim))
+    slanted, falling = edge[:, 1] != 0, edge[:, 1] < 0
+    slope = np.divide(edge[:, 0], edge[:, 1], out=np.zeros(len(rim)), where=slanted)
+    x = rim[:, 0] + slope * (y[:, None] - rim[:, 1])
+    left = np.where(falling, x, -np.inf).max(axis=1)
+    right = np.where(slanted & ~falling, x, np.inf).min(axis=1)
+    level = edge[:, 0] * (y[:, None] - rim[:, 1])
+    right[np.any(~slanted & (level < 0), axis=1)] = -np.inf
+    return left, right
 
 
 def _turning(rim: Vector) -> float:
