@@ -82,6 +82,7 @@ def test_errors_and_counts_stay_within_limits(ladders: dict[str, LadderRecord]) 
         assert rung.count <= most, (name, label)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "rung", "parameters"),
     [

@@ -73,6 +73,7 @@ def forces(sensor: Path, out: Path, *more: str) -> int:
     return main(["force", *given, "-o", str(out), "--pictures", "0", "--json", *more])
 
 
+@pytest.mark.slow
 def test_times_are_kept_beside_and_the_bundle_is_untouched(
     sensor: Path, laddered: Bundle, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -164,6 +165,7 @@ def test_what_is_outside_the_calibration_is_said(
     assert "neo_hookean" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_full_disk_and_a_damaged_bundle_are_told(
     sensor: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

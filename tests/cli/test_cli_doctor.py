@@ -93,6 +93,7 @@ def test_real_time_is_judged_by_the_quickest_operator() -> None:
     assert RealTime((slow,)).advice == ""
 
 
+@pytest.mark.slow
 def test_the_whole_examination_in_a_fresh_process() -> None:
     done = fresh("doctor", "--json")
     assert (done.returncode, done.stderr) == (0, "")

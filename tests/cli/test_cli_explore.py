@@ -80,6 +80,7 @@ def test_without_parquet_and_pictures_the_table_is_still_written(
     ]
 
 
+@pytest.mark.slow
 def test_optimise_saves_a_spec_that_checks(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -127,6 +128,7 @@ def test_a_full_disk_is_told_and_nothing_is_half_written(
     assert main(command) == 0
 
 
+@pytest.mark.slow
 def test_two_runs_on_one_folder_wait_for_each_other(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gelslim", "explore", str(MINI20)]
     command += ["--vary", "gel.length_mm=16:24:0.01", "-o", str(tmp_path / "x"), "-j", "1"]

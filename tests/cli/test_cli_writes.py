@@ -90,6 +90,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(
     assert contents(tmp_path) == {"b.txt": b"old"}
 
 
+@pytest.mark.slow
 def test_markers_are_written_twice_alike(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,6 +6,7 @@ import copy
 import io
 import string
 
+import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from reader_cases import MINIMAL, NAME, load
@@ -172,6 +173,7 @@ def test_a_mutated_spec(mutations):
 
 @settings(FUZZ, max_examples=200)
 @given(st.sampled_from([p for p in PATHS if not isinstance(p[-1], int)]), VALUES)
+@pytest.mark.slow
 def test_one_bad_value_is_blamed_on_its_own_line(path, value):
     """With a single value set, every problem is about that field, its block or its neighbours."""
     tree = copy.deepcopy(FULL)

@@ -26,6 +26,7 @@ from gelslim_twin.simulation.records import COLUMNS, FrameTruth, fields_npz, wre
 
 FORCE, TWIN = DOCS / "force_pipeline.md", DOCS / "digital_twin.md"
 """Their blocks need frames and simulated data, and run in tests of their own."""
+LATER = ("budget.md",)
 PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN)]
 YAML = [(p, k) for p in PAGES for k in range(len(blocks(p, "yaml")))]
 SMALL = """\
@@ -74,7 +75,11 @@ def _recorded_run(folder: Path) -> None:
             recorder.append(frame(k))
 
 
-@pytest.mark.parametrize("page", PYTHON, ids=named)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(p, marks=pytest.mark.slow if p.name in LATER else ()) for p in PYTHON],
+    ids=named,
+)
 def test_python_blocks_run(page: Path, bundle: Path, tmp_path: Path) -> None:
     """In a process of their own: what a page registers must not reach other tests."""
     shutil.copytree(bundle, tmp_path / "out" / "gelslim2-bundle")

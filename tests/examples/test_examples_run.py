@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+SLOW = ("frames_to_forces",)
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 
@@ -14,7 +15,13 @@ def test_there_are_examples() -> None:
     assert {p.stem for p in EXAMPLES} >= {"own_finger", "frames_to_forces", "data_set"}
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(p, id=p.stem, marks=pytest.mark.slow if p.stem in SLOW else ())
+        for p in EXAMPLES
+    ],
+)
 def test_an_example_runs(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

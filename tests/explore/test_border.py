@@ -47,6 +47,7 @@ def test_a_border_of_the_spec_itself_says_why() -> None:
     assert border(mini20(), {path: 0.5}, path, 0.55) is None
 
 
+@pytest.mark.slow
 def test_the_optimum_lies_on_its_border(tmp_path: Path) -> None:
     """A third of a step between two values of the grid was once as near as it came."""
     asked = Request(space("gel.length_mm=18,20", "gel.thickness_mm=1.5:2.5:0.5"))

@@ -19,6 +19,7 @@ from ifem_export.operators.surface_operator import surface_operator
 COARSE = Patch(2.0, 1.2, 1.2, 4, "bbar", 0.3223, 1.2)
 
 
+@pytest.mark.slow
 def test_smaller_cells_err_less_and_wider_markers_pass_less_noise_on() -> None:
     coarse = patch_error(COARSE)
     fine = patch_error(dataclasses.replace(COARSE, cell_x_mm=0.6, cell_y_mm=0.6))

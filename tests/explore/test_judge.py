@@ -21,7 +21,7 @@ from gelslim_core.yaml.fields import field_at, field_table
         ("gel.length_mm=16:28:4", "camera.f_number=2,4", "markers.diameter_mm=0.5,1.3"),
         ("housing.screw=M1.6,M2.5", "light_guide.bend_radius_ratio=auto,1.5",
          "envelope.max_width_mm=none,36"),
-        ("mesh.layers=1,4", "markers.rows=none,12"),
+        pytest.param(("mesh.layers=1,4", "markers.rows=none,12"), marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_each_row_is_what_the_design_alone_gives(vary: tuple[str, ...]) -> None:

@@ -20,6 +20,7 @@ from gelslim_cad.spec.starter import spec_text
 from gelslim_core.jobs import Engine
 
 
+@pytest.mark.slow
 def test_the_thinnest_is_no_thicker_than_brute_force(tmp_path: Path) -> None:
     asked = Request(space("gel.length_mm=16:20:2", "gel.thickness_mm=1.5:3:0.5"))
     best = optimise(asked, "thin", tmp_path / "o", Engine(1), rounds=3)
@@ -44,6 +45,7 @@ def test_the_thinnest_is_no_thicker_than_brute_force(tmp_path: Path) -> None:
     assert (below.status, below.binding) == ("infeasible", "bezel.thickness_mm")
 
 
+@pytest.mark.slow
 def test_brightest_and_most_accurate_lead_their_columns(tmp_path: Path) -> None:
     asked = Request(space("camera.f_number=2.9,4", "markers.pitch_mm=1.2,1.6"), rays=1 << 11)
     bright = optimise(asked, "bright", tmp_path / "b", Engine(1), rounds=0)

@@ -107,6 +107,7 @@ def test_a_finger_that_is_thin_enough_or_broken_has_no_price() -> None:
         thinner(changed(mini20(), {"design.gel.thickness_mm": 1.0}))
 
 
+@pytest.mark.slow
 def test_the_answer_in_words_and_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
     quick = ["--rays", "1024"]
     assert main(["thinner", str(MINI20), *quick]) == 0

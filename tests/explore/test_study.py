@@ -35,6 +35,7 @@ def request(**options: object) -> Request:
     return Request(space(), rays=RAYS, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_processes_give_the_table_of_one(tmp_path: Path, small_chunks: None) -> None:
     asked = request(light=True)
     alone = explore(asked, tmp_path / "one", Engine(1))
@@ -46,6 +47,7 @@ def test_processes_give_the_table_of_one(tmp_path: Path, small_chunks: None) -> 
     assert all(0.05 < v < 0.5 for v in lit)
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_gives_the_table_of_one(tmp_path: Path, small_chunks: None) -> None:
     distributed = pytest.importorskip(
         "distributed", reason="NOT TESTED: the cluster extra (distributed) is not installed"
@@ -74,6 +76,7 @@ def test_a_worker_with_other_code_is_refused(
     assert not list((tmp_path / "far" / "chunks").iterdir())
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_told_and_the_rest_kept(
     tmp_path: Path, small_chunks: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -131,6 +134,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on(tmp_path: Path) -> None:
     vary = ("--vary", "gel.length_mm=16:24:0.02", "--vary", "camera.f_number=2:5:0.5")
     command = [sys.executable, "-m", "gelslim", "explore", str(MINI20), *vary]

@@ -12,6 +12,7 @@ import export_samples as samples
 import numpy as np
 import pytest
 import trimesh
+from sampled import quick
 
 from gelslim_cad.export import ExportError
 from gelslim_cad.export.glb import glb_bytes
@@ -43,7 +44,9 @@ def from_stl(mesh):
     return trimesh.load_mesh(io.BytesIO(stl_bytes(mesh)), file_type="stl")
 
 
-@pytest.mark.parametrize("name", sorted(samples.SHAPES))
+@pytest.mark.parametrize(
+    "name", quick(sorted(samples.SHAPES), sorted(samples.SHAPES)[::2].__contains__)
+)
 def test_stl_is_watertight_and_keeps_the_volume(name):
     shape = samples.SHAPES[name]()
     mesh, _ = mesh_for(shape)

@@ -98,6 +98,7 @@ def test_step_proof_catches_an_invalid_solid(tmp_path):
     assert failed(prove_step(path, broken)) & {"valid solid", "solids"}
 
 
+@pytest.mark.slow
 def test_meshes_as_written(tmp_path, parts):
     meshes = {p.name: mesh_for(p.solid)[0] for p in parts}
     volumes = {p.name: p.solid.Volume() for p in parts}
@@ -196,6 +197,7 @@ def test_a_part_inside_another_interferes():
     assert found.volume_mm3 == pytest.approx(6.0)
 
 
+@pytest.mark.slow
 def test_exact_and_mesh_volumes_agree_on_every_pair(parts):
     from itertools import combinations
 

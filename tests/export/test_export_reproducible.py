@@ -41,6 +41,7 @@ def here() -> dict[str, str]:
     return export_digests.digests(export_digests.NAMES)
 
 
+@pytest.mark.slow
 def test_every_file_is_the_same_in_fresh_processes_and_in_another_order(here):
     backwards = fresh_process(export_digests.NAMES[::-1], "1")
     assert backwards == here
@@ -104,6 +105,7 @@ def volume_in_worker(data: bytes) -> tuple[float, str]:
     return shape.Volume(), shape_digest(shape)
 
 
+@pytest.mark.slow
 def test_shapes_travel_to_a_spawned_worker():
     shape = samples.window()
     context = multiprocessing.get_context("spawn")

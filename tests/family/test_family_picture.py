@@ -86,6 +86,7 @@ def test_the_gel_faces_the_viewer_and_tips_are_up() -> None:
     assert (tip[:, 2] > points[:8][CORNERS[:, 0] == 0][:, 2].max()).all()
 
 
+@pytest.mark.slow
 def test_the_picture_is_the_same_each_time() -> None:
     pytest.importorskip("vtkmodules")
     data = family_png(FAMILY)

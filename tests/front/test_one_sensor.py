@@ -51,6 +51,7 @@ def measured(spec_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_build_and_bundle_write_the_same_but_for_the_times(built: Path, measured: Path) -> None:
     one, other = load_bundle(built), load_bundle(measured)
     assert one.ladder is not None

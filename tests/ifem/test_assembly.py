@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from ifem_oracle import random_occupancy, rigid_modes, triplet_assembly
 from ifem_shapes import disc
+from sampled import quick
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -186,7 +187,7 @@ def test_simple_shear_gives_the_shear_modulus(gel, round_pad, formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("axis", quick([0, 1, 2], lambda axis: axis == 1))
 def test_mirror_image_of_a_crop(gel, formulation, axis):
     occupancy = random_occupancy(7, (4, 3, 3), 0.6)
     mirrored = np.ascontiguousarray(np.flip(occupancy, axis))
@@ -199,7 +200,9 @@ def test_mirror_image_of_a_crop(gel, formulation, axis):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("order", [(1, 0, 2), (2, 1, 0), (1, 2, 0)])
+@pytest.mark.parametrize(
+    "order", quick([(1, 0, 2), (2, 1, 0), (1, 2, 0)], lambda order: order == (1, 2, 0))
+)
 def test_axis_permutation_of_a_crop(gel, formulation, order):
     occupancy = random_occupancy(8, (4, 3, 2), 0.6)
     turned = np.ascontiguousarray(occupancy.transpose(order))

@@ -71,6 +71,7 @@ def test_lumping_mends_the_rim_and_leaves_the_middle_alone() -> None:
     assert after < before / 3
 
 
+@pytest.mark.slow
 def test_a_bundle_chooses_the_lumped_rung_and_applies_it() -> None:
     mesh = pad(RoundedRectangle(18.0, 15.0, 1.0))
     ladder = measure_ladder(mesh, gel(0.3223), "bbar")

@@ -142,6 +142,7 @@ def test_forces_are_those_of_the_constrained_minimum(weighting, nu):
         assert operator.displacement(expected) == pytest.approx(u, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weighting", WEIGHTINGS)
 def test_equations_are_symmetric_and_definite(weighting):
     mesh = domed(weighting, floor=1e-3)
@@ -173,6 +174,7 @@ def forces_of(weighting, cells, layers):
     ).reshape(3, 3)
 
 
+@pytest.mark.slow
 def test_volume_fractions_converge_faster_than_steps():
     expected = forces_of("volume_fraction", 40, 10)
     sizes = [(8, 3), (11, 4), (14, 5), (19, 6)]

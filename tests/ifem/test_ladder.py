@@ -107,6 +107,7 @@ def test_halving_cells_quarters_the_error_of_the_field() -> None:
     assert 1.9 < np.log2(errors[0] / errors[1]) < 2.8
 
 
+@pytest.mark.slow
 def test_more_layers_err_less() -> None:
     errors = [
         next(r.error_field for r in measure_ladder(pad(n), GEL, "bbar").rungs if r.rung == "factor")
@@ -201,6 +202,7 @@ def test_an_error_picks_the_same_operator_and_the_same_bits_whatever_the_clock(
         assert forces[0].tobytes() == forces[1].tobytes()
 
 
+@pytest.mark.slow
 def test_times_are_measured_anew_for_every_rung(ladder: OperatorLadder) -> None:
     times = time_operators(operator_choices(pad()), pad(), GEL, "bbar")
     assert list(times) == [r.label for r in ladder.rungs]

@@ -35,6 +35,7 @@ def error():
     return found
 
 
+@pytest.mark.slow
 def test_the_reference_has_converged():
     pytest.importorskip("skfem")
     for nu in NUS:

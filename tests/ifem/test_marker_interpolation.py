@@ -84,6 +84,7 @@ def test_bending_energy_is_the_integral_of_the_curvatures():
     assert bent == pytest.approx(8 * np.pi * values @ found.roughness @ values, rel=0.03)
 
 
+@pytest.mark.slow
 def test_lost_markers_leave_the_spline_of_the_others():
     lost = some_lost(0.1, 5)
     lost[[0, 20, 21, 22, 200, 201, 202, 221, 222, 223]] = True

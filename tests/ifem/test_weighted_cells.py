@@ -271,6 +271,7 @@ def test_what_cannot_be_meshed_is_refused():
     assert caught.value.field == "mesh"
 
 
+@pytest.mark.slow
 def test_the_written_mesh_shows_the_fractions(tmp_path):
     pyvista = pytest.importorskip("pyvista")
     mesh, _ = meshed(TRIANGLE, weighting="volume_fraction")

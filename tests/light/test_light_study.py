@@ -180,6 +180,7 @@ def test_a_tight_bend_with_leds_against_it_is_darker() -> None:
     assert found.certificate.guided < wide.certificate.guided
 
 
+@pytest.mark.slow
 def test_auto_takes_the_least_bend_that_is_bright_enough() -> None:
     auto = {"design.light_guide.bend_radius_ratio": "auto"}
     free = sized(auto)
@@ -192,6 +193,7 @@ def test_auto_takes_the_least_bend_that_is_bright_enough() -> None:
     assert hopeless["guide.bend_ratio"] == 0.5
 
 
+@pytest.mark.slow
 def test_auto_is_the_brightest_of_its_candidates(finger: Dimensions) -> None:
     values = dict(light_inputs(finger))
     values["design.housing.side_wall_mm"] = finger["design.housing.side_wall_mm"]
@@ -225,6 +227,7 @@ def test_record_is_plain_json_and_says_it_in_words(study: Any) -> None:
     json.dumps(study_record(dark), allow_nan=False)
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_and_reproducible(finger: Dimensions, study: Any) -> None:
     pytest.importorskip("matplotlib")
     import io

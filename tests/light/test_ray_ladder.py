@@ -51,6 +51,7 @@ def errors(finger: Dimensions) -> RayErrors:
     return measure_errors(finger)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", COLOURS)
 def test_errors_hold_against_many_more_rays(
     finger: Dimensions, errors: RayErrors, colour: str
@@ -105,6 +106,7 @@ def light(capsys: pytest.CaptureFixture[str], *more: str) -> tuple[dict, str]:
     return json.loads(said.out), said.err
 
 
+@pytest.mark.slow
 def test_an_error_picks_the_rays_whatever_the_clock_says(
     errors: RayErrors, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -23,6 +23,7 @@ for name, content in sorted(render_marker_files(grid, nodes, outline).items()):
 """
 
 
+@pytest.mark.slow
 def test_two_fresh_processes_write_the_same_bytes():
     def digest(seed, zone):
         env = dict(os.environ, PYTHONHASHSEED=seed, TZ=zone)

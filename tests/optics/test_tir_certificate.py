@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from light_cases import transformed
+from sampled import quick
 from scipy.integrate import dblquad, quad
 from scipy.stats import qmc
 
@@ -60,7 +61,7 @@ def kept(ratio: float, p: np.ndarray, q: np.ndarray, rho: np.ndarray) -> np.ndar
     return good
 
 
-@pytest.mark.parametrize("ratio", [1.0, 2.05, 3.0, 6.0])
+@pytest.mark.parametrize("ratio", quick([1.0, 2.05, 3.0, 6.0], (1.0, 3.0).__contains__))
 @pytest.mark.parametrize("na", [0.5, 1.0])
 def test_guided_shares_are_those_of_marched_rays(ratio: float, na: float) -> None:
     u = qmc.Sobol(3, seed=4).random(2**17)

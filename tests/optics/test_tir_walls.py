@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import tir_march
 from facets import facetted_profile
+from sampled import quick
 from tir_march import ARRIVED, LEAKED, LOST
 
 from gelslim_optics.guide.profile import Edge, GuideProfile, Segment
@@ -106,7 +107,9 @@ def test_narrowing_legs_steepen_light_within_the_bound(foot_mm: float, na: float
 
 
 @pytest.mark.parametrize("plane", [True, False])
-@pytest.mark.parametrize("foot_mm", [1.2, 1.8, 2.1, 2.5, 3.0, 4.0])
+@pytest.mark.parametrize(
+    "foot_mm", quick([1.2, 1.8, 2.1, 2.5, 3.0, 4.0], (1.2, 2.1, 4.0).__contains__)
+)
 def test_shares_of_tapered_guides_are_lower_bounds(foot_mm: float, plane: bool) -> None:
     profile = curved(3.0, foot_thickness_mm=foot_mm)
     for na in (0.0, 0.5, 1.0):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from facets import facetted_profile
 from light_cases import COATS, N_ACRYLIC, bend_scene, lone_bend, loop, media, slab
+from sampled import quick
 
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.scene import LightScene, Surface
@@ -39,7 +40,7 @@ def test_a_closed_pipe_leaks_exactly_nothing(na: float) -> None:
 
 
 @pytest.mark.parametrize("planar", [True, False])
-@pytest.mark.parametrize("na", [0.0, 0.3, 0.5, 0.7, 1.0])
+@pytest.mark.parametrize("na", quick([0.0, 0.3, 0.5, 0.7, 1.0], (0.0, 0.5, 1.0).__contains__))
 def test_the_bend_holds_all_light_above_the_threshold_and_not_below(
     na: float, planar: bool
 ) -> None:

@@ -93,7 +93,7 @@ def test_viewer_draws_every_triangle_and_the_page_is_silent(tmp_path, page):
     assert complaints(done.stderr) == []
 
 
-@pytest.mark.parametrize("size", [(1280, 1000), (500, 900)])
+@pytest.mark.parametrize("size", [(1280, 1000), pytest.param((500, 900), marks=pytest.mark.slow)])
 def test_screenshot_shows_the_coloured_parts(tmp_path, page, size):
     shot = tmp_path / "shot.png"
     browse(tmp_path, page, f"--screenshot={shot}", f"--window-size={size[0]},{size[1] + 600}")
@@ -109,6 +109,7 @@ def test_screenshot_shows_the_coloured_parts(tmp_path, page, size):
     assert blue.sum() > 300
 
 
+@pytest.mark.slow
 def test_hiding_exploding_and_picking(tmp_path, page):
     out = drive(
         tmp_path, page,
@@ -138,6 +139,7 @@ def test_hiding_exploding_and_picking(tmp_path, page):
     assert out["yaw"] == pytest.approx(-82.5)
 
 
+@pytest.mark.slow
 def test_a_lost_graphics_context_comes_back(tmp_path, page):
     out = drive(
         tmp_path, page,
@@ -158,6 +160,7 @@ def test_a_lost_graphics_context_comes_back(tmp_path, page):
     assert out["drawn"] == report_sample.triangles()
 
 
+@pytest.mark.slow
 def test_section_caps_exactly_the_cut_material(tmp_path):
     """A hollow box 40 x 30 x 20 with a cavity 24 x 16 x 8: the cut covers 800 - 192 mm2 of 800."""
     solid = report_sample.block((40, 30, 20), (0, 0, 0)).difference(
@@ -196,6 +199,7 @@ def test_section_caps_exactly_the_cut_material(tmp_path):
     assert out["segments"] >= 8
 
 
+@pytest.mark.slow
 def test_reads_models_of_another_writer(tmp_path):
     """Trimesh writes a parent node, a matrix per node, and leaves the normals to the reader."""
     scene = trimesh.Scene()
@@ -241,6 +245,7 @@ def test_a_broken_model_is_told_and_the_rest_still_works(tmp_path):
     assert "17 dimensions" in done.stdout
 
 
+@pytest.mark.slow
 def test_search_jump_and_filters(tmp_path, page):
     out = drive(
         tmp_path, page,

@@ -70,6 +70,7 @@ def test_pictures_show_many_parts_on_white(drawn):
     assert len({hashlib.sha256(png).digest() for png in drawn}) == 3
 
 
+@pytest.mark.slow
 def test_pictures_are_the_same_in_a_fresh_process(drawn):
     code = (
         "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
@@ -82,7 +83,14 @@ def test_pictures_are_the_same_in_a_fresh_process(drawn):
     assert out.stdout.split() == [hashlib.sha256(png).hexdigest() for png in drawn], out.stderr
 
 
-@pytest.mark.parametrize(("axis", "shape"), [("x", (30, 20)), ("y", (40, 20)), ("z", (40, 30))])
+@pytest.mark.parametrize(
+    ("axis", "shape"),
+    [
+        ("x", (30, 20)),
+        pytest.param("y", (40, 20), marks=pytest.mark.slow),
+        pytest.param("z", (40, 30), marks=pytest.mark.slow),
+    ],
+)
 def test_section_is_to_scale_and_its_cap_has_the_true_area(axis, shape):
     image = pixels(pictures.picture_section([mesh(hollow())], axis, 0.0))
     width, height = extent(image)
@@ -95,6 +103,7 @@ def test_section_is_to_scale_and_its_cap_has_the_true_area(axis, shape):
     assert share == pytest.approx(wall[0] * wall[1] / (shape[0] * shape[1]), rel=0.04)
 
 
+@pytest.mark.slow
 def test_exploding_moves_parts_apart():
     lower = mesh(report_sample.block((20, 20, 4), (0, 0, -2)))
     upper = mesh(report_sample.block((20, 20, 4), (0, 0, 2)), explode=(0, 0, 30.0))

@@ -70,12 +70,14 @@ def judged(command: Command, files: dict[str, str], whole: dict[str, str]) -> No
             assert whole.get(name) == digest, name
 
 
+@pytest.mark.slow
 def test_markers_on_a_disk_that_is_too_small(
     specs: Path, clean_runs: CleanRuns, tmp_path: Path
 ) -> None:
     refuses_full(NAMED["markers"], specs, clean_runs, tmp_path, 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
 def test_a_bundle_too_large_for_the_disk_says_so(tmp_path: Path) -> None:
     code = (

@@ -83,6 +83,7 @@ def old_or_new(command: Command, place: Path, clean: CleanRun, tmp_path: Path, k
         assert set(old) & set(new) <= set(shown)
 
 
+@pytest.mark.slow
 def test_markers_killed_now_and_then(specs: Path, clean_runs: CleanRuns, tmp_path: Path) -> None:
     kill_and_finish(NAMED["markers"], specs, clean_runs(NAMED["markers"]), tmp_path, 2)
 

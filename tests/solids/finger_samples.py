@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.part import Part
@@ -89,3 +91,9 @@ def parts_of(name: str) -> tuple[Part, ...]:
 
 def part(name: str, wanted: str) -> Part:
     return next(p for p in parts_of(name) if p.name == wanted)
+
+
+LATER = ("thin", "wide", "long50", *[n for n in fingers() if n.startswith("random")][1:])
+each_finger = pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in LATER else ()) for n in fingers()]
+)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import cadquery as cq
 import numpy as np
 import pytest
-from finger_samples import fingers, parts_of
+from finger_samples import each_finger, fingers, parts_of
 
 from gelslim_cad.build.solid_checks import blocked_volumes, corner_rays, view_corridor
 from gelslim_cad.geometry.part import Part
-
-each_finger = pytest.mark.parametrize("name", list(fingers()))
 
 
 def obstacle(solid: cq.Shape) -> Part:

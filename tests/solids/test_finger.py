@@ -6,16 +6,13 @@ import math
 
 import cadquery as cq
 import pytest
-from finger_samples import fingers, part, parts_of
+from finger_samples import each_finger, fingers, part, parts_of
 
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof.solids import interferences
 from gelslim_cad.solids.guide import led_positions_mm
 from gelslim_cad.solids.layout import Layout
-
-NAMES = list(fingers())
-each_finger = pytest.mark.parametrize("name", NAMES)
 
 
 def span(parts: list[Part], axis: str) -> tuple[float, float]:

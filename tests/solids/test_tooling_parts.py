@@ -269,7 +269,9 @@ def check_tooling(seed: int) -> None:
             assert part.solid.intersect(cavity).Volume() < 1e-6, part.name
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))]
+)
 def test_random_specs_build_and_mesh(seed: int) -> None:
     check_tooling(seed)
 

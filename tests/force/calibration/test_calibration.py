@@ -122,7 +122,7 @@ def test_poor_builds_and_prints_are_warned_of():
     assert any("warped" in line for line in warped.warnings)
 
 
-@pytest.mark.parametrize("press_n", [0.25, 1.0])
+@pytest.mark.parametrize("press_n", [0.25, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_contact_in_the_reference_is_noticed(press_n):
     frame = seen_by(GRID, BUILD, moved_mm=_pressed(press_n), noise=6)
     with pytest.raises(CalibrationError) as caught:

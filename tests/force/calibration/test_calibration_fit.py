@@ -55,6 +55,7 @@ def test_exact_dots_give_the_exact_camera():
     assert fit.used.all()
 
 
+@pytest.mark.slow
 def test_covariance_agrees_with_the_scatter():
     rng = np.random.default_rng(4)
     distance, pulls, noise = [], [], []

@@ -13,6 +13,7 @@ GRID = grid_of_dots()
 AT = GRID.positions_mm
 
 
+@pytest.mark.slow
 def test_noise_alone_is_hardly_ever_a_bump():
     rng = np.random.default_rng(0)
     fields = [split_residuals(AT, rng.normal(size=AT.shape) * 0.01, 1.1) for _ in range(60)]

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from camera_rig import finger_view
+from sampled import quick
 from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded, sight
 
 from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
@@ -98,7 +99,11 @@ def test_contact_in_other_light_with_moved_markers():
 
 
 @pytest.mark.parametrize(
-    "centre", [(9.8, 1.0), (-10.4, -3.0), (2.0, 9.6), (-2.0, 9.6), (0.0, 9.0), (0.0, -9.6)]
+    "centre",
+    quick(
+        [(9.8, 1.0), (-10.4, -3.0), (2.0, 9.6), (-2.0, 9.6), (0.0, 9.0), (0.0, -9.6)],
+        lambda centre: centre[0] < 0,
+    ),
 )
 def test_patch_cut_by_the_pads_edge(centre):
     """Only a part is on the pad: fitted from that, with a larger error."""

@@ -17,6 +17,7 @@ from ifem_export.operators.surface_operator import surface_operator
 BALL = Sphere(10.0)
 
 
+@pytest.mark.slow
 def test_depth_and_push_of_drawn_presses():
     cells = (44, 42, 4)
     mesh = PadMesh.from_occupancy(

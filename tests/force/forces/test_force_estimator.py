@@ -158,6 +158,7 @@ def test_neo_hookean_equals_linear_for_small_motion_and_differs_for_large(case) 
     assert large[:, 2].sum() < 0.51 * force[:, 2].sum()
 
 
+@pytest.mark.slow
 def test_neo_hookean_inner_nodes_are_in_balance(case) -> None:
     """Against Newton's method with the exact tangent, to the last digit."""
     bundle, _, _, moved = case

@@ -16,12 +16,16 @@ GRID = grid_of_dots()
 @pytest.mark.parametrize(
     ("grid", "look"),
     [
-        (GRID, Look(noise=8)),
+        pytest.param(GRID, Look(noise=8), marks=pytest.mark.slow),
         (GRID, Look(noise=8, double=True)),
         (GRID, Look(noise=4, contrast=0.1)),
         (GRID, Look(noise=8, dirt=20, specular=8)),
-        (GRID, Look(noise=8, colour=False, blur=2)),
-        (build_marker_grid(9, 9, 2.2, 1.2, anchors="odd_sized"), Look(noise=8)),
+        pytest.param(GRID, Look(noise=8, colour=False, blur=2), marks=pytest.mark.slow),
+        pytest.param(
+            build_marker_grid(9, 9, 2.2, 1.2, anchors="odd_sized"),
+            Look(noise=8),
+            marks=pytest.mark.slow,
+        ),
         (build_marker_grid(25, 24, 0.8, 0.3, anchors="odd_sized"), Look(noise=6)),
     ],
     ids=["round", "double", "faint", "dirt", "grey", "large", "small"],
@@ -51,7 +55,9 @@ def test_pictures_without_a_lattice_are_refused(seed):
         estimate_settings(np.zeros((240, 320)))
 
 
-@pytest.mark.parametrize("seed", range(5, 11))
+@pytest.mark.parametrize(
+    "seed", [5, 6, *(pytest.param(k, marks=pytest.mark.slow) for k in range(7, 11))]
+)
 def test_dots_strewn_at_random_are_no_lattice(seed):
     rng = np.random.default_rng(seed)
     image = np.full((300, 400), 180, np.uint8)

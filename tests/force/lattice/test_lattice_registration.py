@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from camera_rig import finger_view
+from sampled import quick
 from synthetic import Look, grid_of_dots, render
 
 from gelslim_force.detection.detection import Detector
@@ -45,7 +46,9 @@ def test_the_anchors_alone_identify_every_dot(anchors, look):
 
 
 @pytest.mark.parametrize("anchors", ["odd_sized", "omitted"])
-@pytest.mark.parametrize("step", [(1, 0), (-1, 0), (0, 1), (0, -2), (2, 1)])
+@pytest.mark.parametrize(
+    "step", quick([(1, 0), (-1, 0), (0, 1), (0, -2), (2, 1)], ((-1, 0), (2, 1)).__contains__)
+)
 def test_a_print_whole_pitches_off_is_resolved_by_its_anchors(anchors, step):
     """The frame looks the same but for the anchors and the rim; the camera says otherwise."""
     grid = grid_of_dots(anchors)

@@ -101,6 +101,7 @@ def test_the_documented_lines_run(place, reference) -> None:
     assert isinstance(wrenches[-1], gelslim_force.Wrench)
 
 
+@pytest.mark.slow
 def test_another_normal_source_shares_what_was_prepared(place, reference) -> None:
     first = open_sensor(place / "bundle", reference=reference)
     first.process(stream(4)[2].image)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from contact_pads import small_pad
 from numpy.typing import NDArray
+from sampled import quick
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import ContactError
@@ -50,7 +51,7 @@ def worst(found: list[Array], true: list[Array]) -> float:
     )
 
 
-@pytest.mark.parametrize("poisson", [0.32, 0.49])
+@pytest.mark.parametrize("poisson", quick([0.32, 0.49], lambda poisson: poisson > 0.4))
 @pytest.mark.parametrize("name", SHAPES)
 def test_rungs_keep_what_they_say_and_finer_is_better(name: str, poisson: float) -> None:
     """At every pose of a press with shear and tilt, history included; against 1e-6."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from sampled import quick
 
 from gelslim_twin.contact.profile import stl_profile
 from gelslim_twin.scene.indenter import Stl
@@ -58,7 +59,9 @@ def lowest(mesh, x: Array, y: Array) -> Array:  # type: ignore[no-untyped-def]
     return found
 
 
-@pytest.mark.parametrize("down", ["-z", "z", "-x", "x", "-y", "y"])
+@pytest.mark.parametrize(
+    "down", quick(["-z", "z", "-x", "x", "-y", "y"], ("-z", "x", "-y").__contains__)
+)
 @pytest.mark.parametrize("name", sorted(bodies()))
 def test_heights_are_where_rays_first_hit(name: str, down: str, tmp_path: Path) -> None:
     """On the grid's points to rounding; a direction is turned to -z before."""

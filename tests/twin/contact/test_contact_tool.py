@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from sampled import quick
 from tool_height import tool_height_mm
 
 from gelslim_twin.contact.tool import Tool, ToolSurface, clearance_mm, rotation, tool_surface
@@ -62,7 +63,7 @@ def first_inside(tool: Tool, pose: Pose, x: float, y: float) -> float:
 
 
 @pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("tilt", [0.0, 4.0, 25.0])
+@pytest.mark.parametrize("tilt", quick([0.0, 4.0, 25.0], lambda tilt: tilt != 4.0))
 def test_height_by_brute_force(name: str, tilt: float) -> None:
     tool = Tool.of([SHAPES[name]], Path())
     pose = Pose(

@@ -9,6 +9,7 @@ import pytest
 from agreement import Trial
 from contact_pads import small_pad
 from random_contact_scenes import random_contact
+from sampled import quick
 
 from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.nonlinear import NonlinearContact
@@ -124,7 +125,9 @@ def test_large_strain_at_a_wall() -> None:
     assert states[2].force_n[:, 2].sum() < states[1].force_n[:, 2].sum() < 0
 
 
-@pytest.mark.parametrize("seed", [13, 32, 88, 101, 162, 170, 175, 666, 759])
+@pytest.mark.parametrize(
+    "seed", quick([13, 32, 88, 101, 162, 170, 175, 666, 759], lambda seed: seed > 162)
+)
 def test_random_scenes_that_did_not_converge(folder: Path, seed: int) -> None:
     """With and without friction: shapes side by side, rough planes, a rod sheared over its side."""
     finger, scene = random_contact(seed)

@@ -154,6 +154,7 @@ def test_the_command_plans_with_the_budget(tmp_path: Path, capsys) -> None:
     assert "Traceback" not in refusal
 
 
+@pytest.mark.slow
 def test_simulated_bytes_do_not_know_the_machines_times(tmp_path: Path, capsys) -> None:
     small_sensor(tmp_path)
     scene = str(written_scene(tmp_path))

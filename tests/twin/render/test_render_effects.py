@@ -63,6 +63,7 @@ def test_an_effect_shows_and_the_same_twice(name):
     assert not np.array_equal(picture(look), picture(Look()))
 
 
+@pytest.mark.slow
 def test_frames_are_the_same_bytes_in_a_fresh_process():
     code = (
         f"import sys; sys.path[:0] = {FOLDERS!r}\n"

@@ -9,6 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
+from sampled import quick
 from scene_samples import GALLERY, MINIMAL, ROOT, load, problems, random_scene
 
 from gelslim_core.yaml.errors import InputError, Problem
@@ -134,7 +135,7 @@ def test_the_committed_schema_matches_the_models():
     )
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", quick(range(40), lambda seed: seed < 12))
 def test_random_scenes_read_and_fit_the_schema(tmp_path, seed):
     text = random_scene(seed)
     loaded = load(tmp_path, text)

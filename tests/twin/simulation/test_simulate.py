@@ -109,6 +109,7 @@ def test_again_keeps_everything_and_another_scene_is_refused(
     assert digests(simulated) == before
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_to_the_same_bytes(place: Path, simulated: Path) -> None:
     folder = place / "out" / "killed"
     command = [sys.executable, "-m", "gelslim", "simulate", str(place / "scene.yaml"),
@@ -125,6 +126,7 @@ def test_a_killed_run_goes_on_to_the_same_bytes(place: Path, simulated: Path) ->
     assert digests(folder) == digests(simulated)
 
 
+@pytest.mark.slow
 def test_a_data_set_is_the_same_by_one_process_or_two(place: Path) -> None:
     scene = place / "varied.yaml"
     text = (place / "scene.yaml").read_text()

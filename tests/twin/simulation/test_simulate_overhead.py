@@ -56,6 +56,7 @@ def simulated(folder: Path, out: Path, steps: int, monkeypatch: pytest.MonkeyPat
     return calls
 
 
+@pytest.mark.slow
 def test_parameters_and_plans_json_are_not_made_again_per_frame(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -86,6 +86,7 @@ def test_field_errors_of_a_field_known_by_hand() -> None:
     assert turned == pytest.approx(45.0)
 
 
+@pytest.mark.slow
 def test_no_inverse_crime_and_it_is_said(
     found: Validation, sensor: TwinSensor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,6 +102,7 @@ def test_no_inverse_crime_and_it_is_said(
     assert used == pytest.approx(strained)
 
 
+@pytest.mark.slow
 def test_every_frame_of_every_chain_is_scored(found: Validation) -> None:
     frames = len(found.experiment.tests) * (2 + 3)
     assert {c.frames for c in found.chains} == {frames}
@@ -110,6 +112,7 @@ def test_every_frame_of_every_chain_is_scored(found: Validation) -> None:
     assert len(record["frames"]) == len(found.scores)
 
 
+@pytest.mark.slow
 def test_ours_beats_the_papers_field_and_finite_strain_finds_the_force(found: Validation) -> None:
     by = {c.name: c for c in found.chains}
     ours, papers = by["ours, contact known"], by["paper, depth known"]
@@ -127,6 +130,7 @@ def test_ours_beats_the_papers_field_and_finite_strain_finds_the_force(found: Va
     assert (np.array(strained.deviation_n[:2]) < 0.8 * np.array(linear.deviation_n[:2])).all()
 
 
+@pytest.mark.slow
 def test_what_is_not_known_is_not_invented(found: Validation) -> None:
     blind = {c.name: c for c in found.chains}["ours, tangential"]
     assert blind.without == (0, 0, blind.frames)
@@ -134,6 +138,7 @@ def test_what_is_not_known_is_not_invented(found: Validation) -> None:
     assert "ours, shape known" not in {s.chain for s in found.others["punch and twist"]}
 
 
+@pytest.mark.slow
 def test_budget_attributes_each_source(found: Validation) -> None:
     by = {s.name: s for s in found.budget}
     assert list(by)[: len(SOURCES)] == [s.name for s in SOURCES]
