@@ -35,7 +35,7 @@ test-cores: $(VENV)/.installed-dev
 	  $(BIN)/pytest -n 2 --dist loadfile $(CORE_TESTS)
 
 test-slow: $(VENV)/.installed-dev
-	$(BIN)/pytest -n 2 --dist loadfile -m slow
+	$(BIN)/pytest -n 2 --dist worksteal -m slow
 
 mutants: $(VENV)/.installed-mutants
 	$(BIN)/python tools/mutants.py
