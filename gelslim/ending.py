@@ -52,8 +52,9 @@ class Ending:
         self._begun = False
         self._status: int | None = None
         self._since: float | None = None
+        # How often the handler was called, and the call after which the signal is being repeated.
         self._calls = 0
-        self._retrying = -1
+        self._repeated_after = -1
         self._leaving = False
 
     def arm(self) -> None:
@@ -115,9 +116,9 @@ class Ending:
 
     def _ask_again(self, number: int, at_once: bool = False) -> None:
         calls = self._calls
-        if self._retrying == calls:
+        if self._repeated_after == calls:
             return
-        self._retrying = calls
+        self._repeated_after = calls
         repeat_signal(number, lambda: self._calls != calls, 0.0 if at_once else RETRY_S)
 
     def _unraisable(self, before: Callable[[Any], Any]) -> Callable[[Any], None]:
