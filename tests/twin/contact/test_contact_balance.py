@@ -174,6 +174,18 @@ def test_first_forces_do_not_matter() -> None:
         np.testing.assert_allclose(one, other, atol=1e-7 * np.abs(one).max())
 
 
+def test_a_force_left_on_a_node_that_never_touches_is_dropped() -> None:
+    """Node 1 has no contact, so node 0 is pressed alone: f = h / C_00, whatever the start."""
+    c = np.kron(np.array([[2.0, 0.5], [0.5, 2.0]]), np.eye(3))
+    height, target = np.array([-0.1, np.inf]), np.zeros((2, 2))
+    start = np.full((2, 3), -0.3)
+    found = solve_contact_forces(
+        c, height, target, 0.5, start, 1e-10, start_mm=(c @ start.reshape(-1)).reshape(2, 3)
+    )
+    np.testing.assert_allclose(found.force_n, [[0.0, 0.0, -0.05], [0.0, 0.0, 0.0]], atol=1e-10)
+    np.testing.assert_allclose(found.motion_mm[:, 2], [-0.1, -0.025], atol=1e-10)
+
+
 def test_mirror_image() -> None:
     """A press on the mirror line gives mirrored forces, whatever the order of the nodes."""
     walk = Walk(SHAPES["ring"], 0.49, 0.5)
@@ -194,6 +206,7 @@ def test_refusals() -> None:
     nothing = solve_contact_forces(c, np.array([0.1]), np.ones((1, 2)), 0.5)
     assert not nothing.force_n.any()
     assert nothing.touch[0] == FREE
+    assert nothing.sweeps == 0
     kept = pickle.loads(pickle.dumps(ContactError("why", 0.1)))
     assert str(kept) == "why"
     assert kept.residual == 0.1

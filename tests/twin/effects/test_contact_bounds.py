@@ -129,3 +129,20 @@ def test_a_tool_that_meets_nothing_leaves_no_error() -> None:
     assert solver_error(c, 1e-2) == Bound()
     assert BOUND["nonlinearity"](c).force_n == 0
     assert moved_mm(c) == 0
+
+
+def test_a_tip_of_few_nodes_costs_the_square_of_its_width_in_nodes() -> None:
+    """From 4 to 7 nodes across: as the pitch squared, so inversely to the surface's nodes."""
+    c = circumstances()
+    area_mm2 = c.sensor.length_mm * c.sensor.width_mm
+    width_mm = c.footprint.width_mm(c.contact.depth_mm)
+
+    def nodes_and_px(across: float) -> tuple[int, float]:
+        nodes = round(area_mm2 * (across / width_mm) ** 2)
+        finer = replace(c, sensor=replace(c.sensor, surface_nodes=nodes))
+        assert finer.contact_nodes < 50
+        return nodes, solver_error(finer, 1e-2).displacement_px
+
+    (few, large_px), (many, small_px) = nodes_and_px(4.0), nodes_and_px(7.0)
+    assert large_px / small_px == pytest.approx(many / few)
+    assert nodes_and_px(1.0)[1] == pytest.approx(nodes_and_px(3.0)[1])
