@@ -66,8 +66,9 @@ def test_by_hand_in_the_three_approximate_models() -> None:
         np.testing.assert_allclose(projection_error_mm(camera, point, -0.5, model), expected)
 
 
-def test_without_layers_that_refract_the_straight_ray_is_exact() -> None:
-    camera = finger_camera(layers=(Layer(2.5, 1.0), Layer(2.0, 1.0)))
+@pytest.mark.parametrize("layers", [(Layer(2.5, 1.0), Layer(2.0, 1.0)), ()])
+def test_without_layers_that_refract_the_straight_ray_is_exact(layers: tuple[Layer, ...]) -> None:
+    camera = finger_camera(layers=layers)
     points = on_pad(40)
     exact = projection_error_mm(camera, points, PRESS)
     # The models take the angle before the press: afterwards it is wider by H / (H + d).

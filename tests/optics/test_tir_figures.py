@@ -265,7 +265,7 @@ def test_a_short_bend_states_its_angle_and_the_one_that_it_needs() -> None:
     assert numbers(first)[0] == math.floor(found.guided * 1000) / 10
     assert numbers(short) == [45.0, about(bend.full_sweep_deg, 3)]
     assert bend.full_sweep_deg > 46
-    long = certified(curved(1.0, bend_rad=math.radians(bend.full_sweep_deg + 1)), 0.8)
+    long = certified(curved(1.0, bend_rad=math.radians(bend.full_sweep_deg + 0.1)), 0.8)
     assert all(b.exact for b in long.bends)
     assert len(long.sentences()) == len(found.sentences()) - 1
     assert numbers(long.sentences()[0])[0] == pytest.approx(100 * long.guided, abs=0.05)

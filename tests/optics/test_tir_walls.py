@@ -94,6 +94,15 @@ def test_from_the_full_sweep_on_every_ray_that_can_leak_does(ratio: float) -> No
     assert passed[1] > 0
 
 
+def test_a_guide_without_an_entry_is_no_proof() -> None:
+    """Nothing speaks against the walls with mirrors, but there is no leg for light to go along."""
+    profile = mirror_profile(MirrorGuide(20, 2, 3))
+    surveyed = survey_walls(profile, profile.bends(), ("no_such_face",))
+    assert surveyed.legs == ()
+    assert len(surveyed.reasons) == 1
+    assert survey_walls(profile, profile.bends(), ENDS).reasons == ()
+
+
 @pytest.mark.parametrize("foot_mm", [2.1, 2.5, 3.0])
 @pytest.mark.parametrize("na", [0.0, 0.2, 0.5])
 def test_narrowing_legs_steepen_light_within_the_bound(foot_mm: float, na: float) -> None:
