@@ -14,7 +14,6 @@ import pytest
 from clean_run import CleanRun, CleanRuns
 from sweep_commands import (
     COMMANDS,
-    NAMED,
     Command,
     digests,
     environment,
@@ -81,11 +80,6 @@ def old_or_new(command: Command, place: Path, clean: CleanRun, tmp_path: Path, k
         for name, digest in shown.items():
             assert digest in (old.get(name), new.get(name)), name
         assert set(old) & set(new) <= set(shown)
-
-
-@pytest.mark.slow
-def test_markers_killed_now_and_then(specs: Path, clean_runs: CleanRuns, tmp_path: Path) -> None:
-    kill_and_finish(NAMED["markers"], specs, clean_runs(NAMED["markers"]), tmp_path, 2)
 
 
 @pytest.mark.slow
