@@ -234,7 +234,7 @@ def view_of_markers(d: Dimensions, grid: MarkerGrid) -> CameraView:
     axes = stretch * grid.diameter_mm[:, None]
     angle = np.degrees(np.arctan2(left[:, 1, 0], left[:, 0, 0]))
     blur_mm = camera.blur_on_gel_mm(points, d["view.aperture_mm"], d["view.focus_mm"])
-    blur_px = blur_mm * camera.focal_px / camera.apparent_distance_mm(points)
+    blur_px = blur_mm * camera.focal_px / camera.apparent_distances_mm(points)[:, 0]
     outline = Outline.rounded_rectangle(
         d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.corner_radius_mm"]
     ).flattened(0.02)

@@ -211,11 +211,24 @@ def _assemble(d: Dimensions) -> str:
 def _focus(d: Dimensions) -> str:
     return (
         "## 7. Focus\n\n"
-        f"Set the camera in `print/focus_jig.stl` and turn the lens until the target, "
-        f"{d['view.focus_mm']:.2f} mm from the front of the lens, is sharp: about "
-        f"{d['view.lens_extension_mm']:.2f} mm out from infinity focus. Expect a blur of "
+        f"{_how_to_focus(d)} Expect a blur of "
         f"{d['view.near_blur_mm']:.3f} mm at the near and {d['view.far_blur_mm']:.3f} mm at the "
         f"far edge of the gel (markers are {d['design.markers.diameter_mm']:g} mm)."
+    )
+
+
+def _how_to_focus(d: Dimensions) -> str:
+    before_mm = d["view.focus_mm"] - d["camera_pose.lens_front_mm"]
+    if d["camera.focusing"] == "fixed":
+        return f"The lens is fixed: it is sharp {before_mm:.2f} mm from its front."
+    turn = (
+        f": about {d['view.lens_extension_mm']:.2f} mm out from infinity focus"
+        if d["camera.focusing"] == "unit"
+        else ""
+    )
+    return (
+        "Set the camera in `print/focus_jig.stl` and turn the lens until the target, "
+        f"{before_mm:.2f} mm from the front of the lens, is sharp{turn}."
     )
 
 

@@ -11,6 +11,8 @@ from gelslim_cad.dimensions.registry import Real
 TOLERANCE = 1e-4
 """Tolerance for limits at which the search places the design."""
 TOLERANCE_OF_FOLD = 1e-6
+MOST_CHANGE_OF_VIEW_PERCENT = 2.0
+"""The scale may differ from the sheet's by as much as the calibration of a built finger allows."""
 
 
 @rule(
@@ -41,22 +43,42 @@ def coverage_across(view_across_use: Real, optics_image_margin: Real) -> Finding
     "focus.travel_mm",
     title="Lens can be focused on the gel",
     parameter="camera.lens_travel_mm",
-    why="a fixed-focus lens must be unscrewed by f²/(s - f) from infinity",
+    why="a lens focused on the distance s stands f²/(s - f) before its place for infinity",
     advice="unscrew the lens that far (a longer thread or a spacer), or use a closer-focusing lens",
 )
-def focus_travel(view_lens_extension_mm: Real, camera_lens_travel_mm: Real) -> Finding:
+def focus_travel(view_lens_travel_mm: Real, camera_lens_travel_mm: Real) -> Finding:
     """Needed against possible lens extension."""
 
     def reason() -> str:
-        needed, there = float(view_lens_extension_mm), float(camera_lens_travel_mm)
+        needed, there = float(view_lens_travel_mm), float(camera_lens_travel_mm)
         return (
             f"to focus on the gel the lens must be unscrewed by {needed:.2f} mm and its thread "
             f"allows {there:.2f} mm, {needed - there:.2f} mm too little"
         )
 
-    return Finding(
-        view_lens_extension_mm, camera_lens_travel_mm, tolerance=TOLERANCE, reason=reason
-    )
+    return Finding(view_lens_travel_mm, camera_lens_travel_mm, tolerance=TOLERANCE, reason=reason)
+
+
+@rule(
+    "focus.view_percent",
+    title="Field of view of the sheet holds at the gel",
+    parameter="camera.field_of_view_at_mm",
+    why="a lens that focuses inside changes its field of view with the distance",
+    advice="give the field of view that the sheet states for the distance of the gel",
+    unit="%",
+)
+def focus_view(
+    camera_focusing: str,
+    camera_focal_length_mm: Real,
+    camera_field_of_view_at_mm: Real | None,
+    view_focus_mm: Real,
+) -> Finding:
+    """Change of scale that a lens moved as a whole would show between the two distances."""
+    at_mm = camera_field_of_view_at_mm
+    if camera_focusing != "internal" or at_mm is None:
+        return Finding(0 * view_focus_mm, MOST_CHANGE_OF_VIEW_PERCENT)
+    per_distance = np.abs(1 / view_focus_mm - 1 / at_mm)
+    return Finding(100 * camera_focal_length_mm * per_distance, MOST_CHANGE_OF_VIEW_PERCENT)
 
 
 @rule(

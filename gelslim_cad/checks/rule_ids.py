@@ -48,6 +48,7 @@ RuleId = Literal[
     "coverage.along",
     "coverage.across",
     "focus.travel_mm",
+    "focus.view_percent",
     "blur.gel",
     "blur.limit",
     "blur.image_px",

@@ -4,9 +4,10 @@ Coordinates x (towards the tip) and z (out of the gel) of the sensor frame. A ca
 by the air angles of the two marginal rays that end on the gel's edges and by the mirror angle;
 everything else follows in closed form, exact refraction included (docs/physics.md).
 
-Every field is an array; candidates broadcast against designs. The functions of `fold_sight`,
-`fold_mirror`, `fold_camera` and `fold_room` are written once for arrays and for single numbers:
-`fold_search` compiles them (each module's `SHARED`) to score one candidate after the other.
+Every field is an array; candidates broadcast against designs. The functions of `fold_focus`,
+`fold_sight`, `fold_mirror`, `fold_camera` and `fold_room` are written once for arrays and for
+single numbers: `fold_search` compiles them (each module's `SHARED`) to score one candidate after
+the other.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from gelslim_cad.dimensions import fold_room as room
 from gelslim_cad.dimensions.fold_camera import Camera, camera, largest, pitch_rad, smallest
+from gelslim_cad.dimensions.fold_focus import Distances, along_scale
 from gelslim_cad.dimensions.fold_mirror import (
     Mirror,
     mirror,
@@ -26,11 +28,11 @@ from gelslim_cad.dimensions.fold_mirror import (
 )
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
 from gelslim_cad.dimensions.fold_sight import (
-    Distances,
     Sight,
     distances,
     field_missed,
     keystone,
+    lens_extension_mm,
     picture_missed,
     sight,
 )
@@ -69,6 +71,14 @@ class Fold:
     ledge_edge_x_mm: Array
     near_distance_mm: Array
     far_distance_mm: Array
+    near_tangential_mm: Array
+    near_sagittal_mm: Array
+    far_tangential_mm: Array
+    far_sagittal_mm: Array
+    along_scale: Array
+    focus_mm: Array
+    image_distance_mm: Array
+    lens_extension_mm: Array
     corner_horizontal_tan: Array
     corner_vertical_tan: Array
     mirror_depth_mm: Array
@@ -96,7 +106,8 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
     d = distances(p, s)
     m = mirror(p, s, np.cos(mirror_rad), np.sin(mirror_rad))
     pitch = pitch_rad(s, mirror_rad)
-    c = camera(p, *reflected(m, s.virtual_x_mm, s.virtual_z_mm), pitch)
+    extension = lens_extension_mm(p, d)
+    c = camera(p, *reflected(m, s.virtual_x_mm, s.virtual_z_mm), pitch, extension)
     bottom = smallest(c.corners_z_mm)
     mirror_depth, camera_depth = mirror_depth_mm(p, m), camera_depth_mm(p, bottom)
     return Fold(
@@ -120,8 +131,16 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         camera_front_x_mm=largest(c.corners_x_mm),
         camera_rear_x_mm=smallest(c.corners_x_mm),
         ledge_edge_x_mm=room.ledge_edge_x_mm(p, s),
-        near_distance_mm=d.near_mm,
-        far_distance_mm=d.far_mm,
+        near_distance_mm=d.near.sagittal_mm,
+        far_distance_mm=d.far.sagittal_mm,
+        near_tangential_mm=d.near_span_mm[0],
+        near_sagittal_mm=d.near_span_mm[1],
+        far_tangential_mm=d.far_span_mm[0],
+        far_sagittal_mm=d.far_span_mm[1],
+        along_scale=np.minimum(along_scale(d.near, d.image_mm), along_scale(d.far, d.image_mm)),
+        focus_mm=d.focus_mm,
+        image_distance_mm=d.image_mm,
+        lens_extension_mm=extension,
         corner_horizontal_tan=s.corner_horizontal_tan,
         corner_vertical_tan=s.corner_vertical_tan,
         mirror_depth_mm=mirror_depth,
@@ -135,7 +154,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
 def _violations(p: FoldProblem, s: Sight, d: Distances, m: Mirror, c: Camera) -> dict[str, Array]:
     """How far each limit is missed, by the limit's name in words."""
     ledge_x = room.ledge_edge_x_mm(p, s)
-    picture = field_missed(p, s)._asdict() | picture_missed(p, s, d)._asdict()
+    picture = field_missed(p, s, d)._asdict() | picture_missed(p, s, d)._asdict()
     in_the_way = {
         "mirror below window": room.mirror_below_window(s, m),
         "camera below window": room.camera_below_window(p, c),

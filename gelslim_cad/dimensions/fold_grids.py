@@ -1,8 +1,10 @@
 """Where the fold search looks: a coarse grid of candidates, then ever smaller ones.
 
-Three unknowns (mean ray angle, used part of the field of view, mirror angle) are searched on a
-coarse grid and then on ever smaller grids around the best candidate of each band of ray angles:
-steep and upright views are separate valleys, joined by infeasible folds.
+Three unknowns (mean ray angle, spread of the rays as a share of the field of view, turn of the view
+at the mirror) are searched on a coarse grid and then on ever smaller grids around the best
+candidate of each band of ray angles: steep and upright views are separate valleys, joined by
+infeasible folds. The best fold often lies where two limits meet, on a ridge along which the turn
+hardly changes; an axis therefore keeps its width as long as its best candidate lies at the rim.
 """
 
 from __future__ import annotations
@@ -14,13 +16,15 @@ import numpy as np
 
 from gelslim_cad.dimensions.fold_problem import Array
 
-LOWER = np.array([np.radians(-12.0), 0.25, np.radians(12.0)])
-UPPER = np.array([np.radians(58.0), 1.0, np.radians(50.0)])
-COARSE = (18, 10, 20)
+LOWER = np.array([np.radians(-12.0), 0.25, np.radians(20.0)])
+UPPER = np.array([np.radians(58.0), 1.0, np.radians(56.0)])
+COARSE = (36, 10, 20)
 FINE = 5
 SHRINK = 0.7
-LEVELS = 26
-STARTS = 6
+LEVELS = 35
+RIM = 0.6
+"""A best candidate beyond this share of the half width lies at the rim of its axis."""
+STARTS = 12
 """Bands into which the coarse grid's mean ray angles are split."""
 
 
@@ -29,7 +33,7 @@ class Best(NamedTuple):
 
     mid_rad: Array
     spread: Array
-    mirror_rad: Array
+    turn_rad: Array
     score: Array
 
 
@@ -44,13 +48,15 @@ def best_candidates(count: int, best_of_grids: BestOfGrids) -> Best:
     rest = [np.broadcast_to(axis, (len(bands), len(axis))) for axis in axes[1:]]
     best = best_of_grids(bands, rest[0], rest[1], np.full(len(bands), np.inf))
     ticks = np.linspace(-1.0, 1.0, FINE)
-    width = (UPPER - LOWER) / (np.array(COARSE) - 1)
+    step = (UPPER - LOWER) / (np.array(COARSE) - 1)
+    width = np.tile(step[:, None], len(bands))
     for _ in range(LEVELS):
+        middle = np.stack(best[:3])
         around = [
-            np.clip(middle[:, None] + ticks * w, lower, upper)
-            for middle, w, lower, upper in zip(best[:3], width, LOWER, UPPER, strict=True)
+            np.clip(m[:, None] + ticks * w[:, None], lower, upper)
+            for m, w, lower, upper in zip(middle, width, LOWER, UPPER, strict=True)
         ]
         best = best_of_grids(around[0], around[1], around[2], best.score)
-        width = width * SHRINK
+        width = width * np.where(np.abs(np.stack(best[:3]) - middle) > RIM * width, 1.0, SHRINK)
     winner = np.argmin(best.score.reshape(STARTS, count), axis=0) * count + np.arange(count)
     return Best(*(values[winner] for values in best))

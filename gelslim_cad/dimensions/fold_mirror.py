@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
+import numpy as np
+
+from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
 from gelslim_cad.dimensions.fold_sight import Sight, far_edge_x_mm
+
+FLATTEST_RAD = float(np.radians(12.0))
+STEEPEST_RAD = float(np.radians(50.0))
+"""Angles between which the search looks for the mirror."""
 
 
 class Mirror(NamedTuple):
@@ -37,6 +43,14 @@ def mirror(p: FoldProblem, s: Sight, cos: Array, sin: Array) -> Mirror:
         lower_z_mm=upper_z - length * sin,
         length_mm=length,
     )
+
+
+def mirror_angle_rad(turn_rad: Array, mid_rad: Array) -> Array:
+    """Angle of the mirror whose normal is `turn_rad` from halfway between mean ray and gel.
+
+    The same turn gives about the same pitch of the camera, whatever the mean ray.
+    """
+    return smaller(larger(turn_rad - mid_rad / 2, FLATTEST_RAD), STEEPEST_RAD)
 
 
 def mirror_half_width_mm(s: Sight, m: Mirror) -> Array:
@@ -71,6 +85,7 @@ def mirror_depth_mm(p: FoldProblem, m: Mirror) -> Array:
 
 SHARED = (
     mirror,
+    mirror_angle_rad,
     mirror_half_width_mm,
     height_over_mm,
     reflected,

@@ -22,10 +22,19 @@ class FoldProblem:
     gel_index: Array
     guide_thickness_mm: Array
     guide_index: Array
-    half_horizontal_tan: Array
-    half_vertical_tan: Array
+    half_across_mm: Array
+    """Half the sensor's width that the picture of the gel may use."""
+    half_along_mm: Array
+    pixel_pitch_mm: Array
     focal_length_mm: Array
-    focal_px: Array
+    fixed_focus_mm: Array
+    """Distance on which a lens that cannot be focused is sharp; 0 for one that can."""
+    fixed_image_mm: Array
+    """Image distance that is the same for every focus; 0 where it follows from the focus."""
+    moving_lens: Array
+    """1 where the whole lens moves to focus, 0 where it stays in its place."""
+    entrance_pupil_mm: Array
+    """Entrance pupil before the housing's front face, the lens focused on infinity."""
     aperture_mm: Array
     lens_travel_mm: Array
     focus_nearest_mm: Array
@@ -57,13 +66,14 @@ class FoldProblem:
         return -(self.guide_thickness_mm + self.gel_total_mm)
 
     @property
-    def half_vertical_rad(self) -> Array:
-        """Half the field of view along the finger that the picture may use."""
-        return np.arctan(self.half_vertical_tan)
+    def widest_along_rad(self) -> Array:
+        """Half the field of view along the finger, the lens focused on infinity."""
+        image_mm = np.where(self.fixed_image_mm > 0, self.fixed_image_mm, self.focal_length_mm)
+        return np.arctan(self.half_along_mm / image_mm)
 
     def records(self) -> NDArray[np.void]:
         """One record (n,) per design, with the same names: what the compiled search reads."""
-        names = [*(f.name for f in fields(self)), "window_z_mm", "half_vertical_rad"]
+        names = [*(f.name for f in fields(self)), "window_z_mm", "widest_along_rad"]
         records = np.empty(len(self), dtype=[(name, float) for name in names])
         for name in names:
             records[name] = np.ravel(getattr(self, name))

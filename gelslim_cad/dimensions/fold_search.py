@@ -18,6 +18,7 @@ from numba.extending import overload
 from gelslim_cad.dimensions import (
     fold,
     fold_camera,
+    fold_focus,
     fold_mirror,
     fold_problem,
     fold_room,
@@ -32,7 +33,12 @@ from gelslim_cad.dimensions.fold import (
 )
 from gelslim_cad.dimensions.fold_camera import camera, pitch_rad, smallest
 from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_candidates
-from gelslim_cad.dimensions.fold_mirror import mirror, mirror_depth_mm, reflected
+from gelslim_cad.dimensions.fold_mirror import (
+    mirror,
+    mirror_angle_rad,
+    mirror_depth_mm,
+    reflected,
+)
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
 from gelslim_cad.dimensions.fold_room import (
     SCALE_MM,
@@ -49,13 +55,14 @@ from gelslim_cad.dimensions.fold_sight import (
     distances,
     field_missed,
     keystone,
+    lens_extension_mm,
     picture_missed,
     sight,
 )
 from gelslim_optics.camera import refraction_kernel, refraction_newton
 from gelslim_optics.camera.refraction_kernel import COMPILED, INLINED, let_compile, source_key
 
-SOURCES = (fold_sight, fold_mirror, fold_camera, fold_room, fold)
+SOURCES = (fold_focus, fold_sight, fold_mirror, fold_camera, fold_room, fold)
 
 
 def search(problem: FoldProblem) -> Best:
@@ -64,12 +71,12 @@ def search(problem: FoldProblem) -> Best:
     return best_candidates(len(problem), partial(best_of_grids, records))
 
 
-def best_of_grids(records: Any, mid: Array, spread: Array, mirror: Array, known: Array) -> Best:
+def best_of_grids(records: Any, mid: Array, spread: Array, turn: Array, known: Array) -> Best:
     """The first best candidate of each grid: axes (n, k), designs and scores to beat (n,)."""
     # A grid in which nothing is better keeps its middle, the candidate that scored `known`.
-    middle = [axis[:, axis.shape[1] // 2] for axis in (mid, spread, mirror)]
+    middle = [axis[:, axis.shape[1] // 2] for axis in (mid, spread, turn)]
     found = np.column_stack([*middle, known])
-    _best_of_grids(records, mid, spread, mirror, np.cos(mirror), np.sin(mirror), known, found)
+    _best_of_grids(records, mid, spread, turn, known, found)
     return Best(*found.T.copy())
 
 
@@ -97,18 +104,18 @@ def _least_score(missed: Any, depth: Any, keystone: Any, rear_x: Any) -> Any:
 
 
 def _score(
-    p: Any, s: Any, missed: Any, ratio: Any, angle: Any, cos: Any, sin: Any, known: Any
+    p: Any, s: Any, d: Any, missed: Any, ratio: Any, angle: Any, cos: Any, sin: Any, known: Any
 ) -> Any:
     """Score of a candidate that misses `missed` in its picture; inf if certainly above `known`."""
     m = mirror(p, s, cos, sin)
     x, z = reflected(m, s.virtual_x_mm, s.virtual_z_mm)
     missed += _parts(mirror_below_window(s, m), mirror_before_camera(p, m, x))
-    # The pinhole lies in the barrel's front: the housing is no higher and no farther ahead.
+    # The entrance pupil lies in the camera: its lowest corner is lower, its rearmost behind it.
     mirror_depth = mirror_depth_mm(p, m)
     shallow = depth_mm(p, mirror_depth, camera_depth_mm(p, z))
     if _least_score(missed, shallow, ratio, x) > known:
         return np.inf
-    c = camera(p, x, z, pitch_rad(s, angle))
+    c = camera(p, x, z, pitch_rad(s, angle), lens_extension_mm(p, d))
     missed += _parts(camera_below_window(p, c), camera_beside_view(p, s, c))
     missed += _parts(camera_clear_of_mirror(p, m, c), 0.0)
     if _worse(missed, known):
@@ -127,9 +134,7 @@ def repeats(axis: Any, k: int) -> Any:
     return k > 0 and axis[k] == axis[k - 1]
 
 
-def _best_of_grid(
-    p: Any, mids: Any, spreads: Any, mirrors: Any, cos: Any, sin: Any, known: Any, found: Any
-) -> None:
+def _best_of_grid(p: Any, mids: Any, spreads: Any, turns: Any, known: Any, found: Any) -> None:
     """Write the first best candidate and its score to `found` (4,).
 
     Equals are scored to the end: the first of them wins, as in `solver`.
@@ -140,20 +145,22 @@ def _best_of_grid(
             if repeats(mids, i) or repeats(spreads, j):
                 continue
             s = sight(p, mids[i], spreads[j])
-            missed = _positive_sum(field_missed(p, s))
+            d = distances(p, s)
+            missed = _positive_sum(field_missed(p, s, d))
             if _worse(missed, min(known, best)):
                 continue
-            d = distances(p, s)
             missed += _positive_sum(picture_missed(p, s, d))
             if _worse(missed, min(known, best)):
                 continue
             ratio = keystone(d)
-            for k in range(len(mirrors)):
+            for k in range(len(turns)):
                 to_beat = min(known, best)
-                value = _score(p, s, missed, ratio, mirrors[k], cos[k], sin[k], to_beat)
+                angle = mirror_angle_rad(turns[k], mids[i])
+                cos, sin = np.cos(angle), np.sin(angle)
+                value = _score(p, s, d, missed, ratio, angle, cos, sin, to_beat)
                 if value < best:
                     best = value
-                    found[0], found[1], found[2] = mids[i], spreads[j], mirrors[k]
+                    found[0], found[1], found[2] = mids[i], spreads[j], turns[k]
                     found[3] = value
 
 
@@ -174,13 +181,10 @@ let_compile((_positive_sum, _parts, _worse, _least_score, _score, repeats, _best
 
 def _compile(source: int) -> Callable[..., None]:
     @njit(**COMPILED)
-    def all_grids(
-        records: Any, mid: Any, spread: Any, mirror: Any, cos: Any, sin: Any, known: Any, found: Any
-    ) -> None:
+    def all_grids(records: Any, mid: Any, spread: Any, turn: Any, known: Any, found: Any) -> None:
         source  # noqa: B018
         for i in range(len(records)):
-            axes = mid[i], spread[i], mirror[i], cos[i], sin[i]
-            _best_of_grid(records[i], *axes, known[i], found[i])
+            _best_of_grid(records[i], mid[i], spread[i], turn[i], known[i], found[i])
 
     return all_grids
 

@@ -6,12 +6,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gelslim_cad.dimensions.fold_focus import (
+    Distances,
+    SeenBorder,
+    across_scale,
+    along_scale,
+    edge_blur_mm,
+    focused,
+    image_distance_mm,
+    seen_point,
+)
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
 from gelslim_optics.camera.refraction_newton import apparent_height, choose, newton_slope
 
 LEAST_AIR_MM = 1.0
 """Candidates with less air are laid out with this much, so that the closed forms hold."""
 WANTED_AIR_MM = 2.0
+TILT_STEPS = 5
+"""Repetitions of tilt and image distance; each leaves less than a thirtieth of the error."""
+VIEW_STEPS = 3
+VIEW_KEPT = 1 - 1e-6
+"""Share of the field of view for which the axis is tilted: more than these steps leave open."""
 
 
 class Sight(NamedTuple):
@@ -27,21 +42,14 @@ class Sight(NamedTuple):
     """Slope of the outermost ray on the near side, corners of the gel included."""
     steepest: Array
     """Slope of the outermost ray on the far side."""
+    near_corner_along: Array
+    """Slope dx/dz of the ray to a near corner."""
     near_corner_across: Array
-    """Slope dy/dz of the ray to a near corner."""
+    """Slope dy/dz of the same ray."""
+    far_corner_along: Array
     far_corner_across: Array
     corner_horizontal_tan: Array
     corner_vertical_tan: Array
-
-
-class Distances(NamedTuple):
-    """How far the gel seems to be from the camera."""
-
-    near_mm: Array
-    """Along the axis, to the near edge."""
-    far_mm: Array
-    height_mm: Array
-    """Along the gel's normal."""
 
 
 class FieldMissed(NamedTuple):
@@ -74,25 +82,30 @@ def far_edge_x_mm(s: Sight, z_mm: Array) -> Array:
 def keystone(d: Distances) -> Array:
     """Ratio of the distances to the two edges, the larger to the smaller."""
     # An axis tilted back makes the far edge the nearer one: limits hold whichever way it leans.
-    return larger(d.near_mm, d.far_mm) / smaller(d.near_mm, d.far_mm)
+    near, far = d.near.sagittal_mm, d.far.sagittal_mm
+    return larger(near, far) / smaller(near, far)
 
 
-def field_missed(p: FoldProblem, s: Sight) -> FieldMissed:
+def field_missed(p: FoldProblem, s: Sight, d: Distances) -> FieldMissed:
     """How far the gel reaches out of the picture."""
     return FieldMissed(
-        field_of_view_along=s.corner_vertical_tan / p.half_vertical_tan - 1,
-        field_of_view_across=s.corner_horizontal_tan / p.half_horizontal_tan - 1,
+        field_of_view_along=s.corner_vertical_tan * d.image_mm / p.half_along_mm - 1,
+        field_of_view_across=s.corner_horizontal_tan * d.image_mm / p.half_across_mm - 1,
     )
 
 
 def picture_missed(p: FoldProblem, s: Sight, d: Distances) -> PictureMissed:
     """How far sharpness, scale and shape of the picture miss their limits."""
-    least, most = smaller(d.near_mm, d.far_mm), larger(d.near_mm, d.far_mm)
-    blur = p.aperture_mm * (most - least) / (2 * least)
-    px = p.focal_px * p.marker_diameter_mm / most * smaller(1.0, d.height_mm / most)
-    travel = _lens_travel_mm(p, d)
+    near_blur = edge_blur_mm(p.aperture_mm, d.near_span_mm, d.focus_mm)
+    far_blur = edge_blur_mm(p.aperture_mm, d.far_span_mm, d.focus_mm)
+    scale = smaller(
+        smaller(across_scale(d.near, d.image_mm), along_scale(d.near, d.image_mm)),
+        smaller(across_scale(d.far, d.image_mm), along_scale(d.far, d.image_mm)),
+    )
+    px = scale * p.marker_diameter_mm / p.pixel_pitch_mm
+    travel = choose(d.focus_mm >= p.focus_nearest_mm, 0.0, lens_extension_mm(p, d))
     return PictureMissed(
-        blur=blur / p.blur_limit_mm - 1,
+        blur=larger(near_blur, far_blur) / p.blur_limit_mm - 1,
         pixels_per_marker=p.min_px_per_marker / px - 1,
         keystone=keystone(d) / p.max_keystone - 1,
         lens_travel=(travel - p.lens_travel_mm) / larger(p.lens_travel_mm, 0.1),
@@ -100,27 +113,54 @@ def picture_missed(p: FoldProblem, s: Sight, d: Distances) -> PictureMissed:
     )
 
 
-def _lens_travel_mm(p: FoldProblem, d: Distances) -> Array:
-    """How far the lens moves out to focus between the near and the far edge."""
-    focus = 2 * d.near_mm * d.far_mm / (d.near_mm + d.far_mm)
-    moved = p.focal_length_mm**2 / larger(focus - p.focal_length_mm, 1e-3)
-    return choose(focus >= p.focus_nearest_mm, 0.0, moved)
+def lens_extension_mm(p: FoldProblem, d: Distances) -> Array:
+    """How far the lens stands before its place for infinity."""
+    return p.moving_lens * (d.image_mm - p.focal_length_mm)
 
 
 def distances(p: FoldProblem, s: Sight) -> Distances:
-    """Apparent distances of the gel's edges."""
-    near, far, tilt = s.near_ray_rad, s.far_ray_rad, s.tilt_rad
-    height = s.air_height_mm + p.guide_thickness_mm / p.guide_index + p.gel_total_mm / p.gel_index
-    return Distances(
-        near_mm=height / np.cos(near) * np.cos(near - tilt),
-        far_mm=height / np.cos(far) * np.cos(far - tilt),
-        height_mm=height,
+    """Apparent distances of the gel's border, and where the camera is focused between them."""
+    border = SeenBorder(
+        near=seen_point(p, np.tan(s.near_ray_rad), 0.0, s.air_height_mm),
+        near_corner=seen_point(p, s.near_corner_along, s.near_corner_across, s.air_height_mm),
+        far=seen_point(p, np.tan(s.far_ray_rad), 0.0, s.air_height_mm),
+        far_corner=seen_point(p, s.far_corner_along, s.far_corner_across, s.air_height_mm),
     )
+    return focused(p, border, np.cos(s.tilt_rad), np.sin(s.tilt_rad))
+
+
+def _half_view_rad(p: FoldProblem, mid_rad: Array, spread: Array) -> Array:
+    """About half the field of view along the finger, the lens focused on the gel.
+
+    Here the axis is the mean ray and refraction is paraxial. This is the unit in which the search
+    measures the spread of the rays, so that 1 uses the whole view; no limit depends on it.
+    """
+    half = p.widest_along_rad
+    for _ in range(VIEW_STEPS):
+        slopes = np.tan(mid_rad + spread * half) - np.tan(mid_rad - spread * half)
+        focus = larger(p.gel_length_mm / (slopes * np.cos(mid_rad)), 2 * p.focal_length_mm)
+        half = np.arctan(p.half_along_mm / image_distance_mm(p, focus))
+    return half
+
+
+def _tilt_rad(
+    p: FoldProblem, start_rad: Array, border: SeenBorder, lowest: Array, highest: Array
+) -> Array:
+    """Smallest tilt at which the view, as wide as its focus lets it be, holds the outermost rays.
+
+    The focus is at the gel, whose distance along the axis depends a little on the tilt.
+    """
+    tilt = larger(0.0, start_rad)
+    for _ in range(TILT_STEPS):
+        image = focused(p, border, np.cos(tilt), np.sin(tilt)).image_mm
+        half = np.arctan(VIEW_KEPT * p.half_along_mm / image)
+        tilt = smaller(larger(0.0, highest - half), lowest + half)
+    return tilt
 
 
 def sight(p: FoldProblem, mid_rad: Array, spread: Array) -> Sight:
     """Virtual camera for a mean ray angle and a spread as a part of the field of view."""
-    half_view = p.half_vertical_rad
+    half_view = _half_view_rad(p, mid_rad, spread)
     near, far = mid_rad - spread * half_view, mid_rad + spread * half_view
     near_slope, far_slope = np.tan(near), np.tan(far)
     near_reach, far_reach = _reach_in_layers_mm(p, near_slope), _reach_in_layers_mm(p, far_slope)
@@ -132,7 +172,13 @@ def sight(p: FoldProblem, mid_rad: Array, spread: Array) -> Sight:
     shallowest = smaller(near_slope, near_along)
     steepest = larger(far_slope, far_along)
     lowest, highest = np.arctan(shallowest), np.arctan(steepest)
-    tilt = smaller(larger(0.0, highest - half_view), lowest + half_view)
+    border = SeenBorder(
+        near=seen_point(p, near_slope, 0.0, air),
+        near_corner=seen_point(p, near_along, near_across, air),
+        far=seen_point(p, far_slope, 0.0, air),
+        far_corner=seen_point(p, far_along, far_across, air),
+    )
+    tilt = _tilt_rad(p, (near + far) / 2, border, lowest, highest)
     cos, sin = np.cos(tilt), np.sin(tilt)
     return Sight(
         near_ray_rad=near,
@@ -143,7 +189,9 @@ def sight(p: FoldProblem, mid_rad: Array, spread: Array) -> Sight:
         virtual_z_mm=p.window_z_mm - air,
         shallowest=shallowest,
         steepest=steepest,
+        near_corner_along=near_along,
         near_corner_across=near_across,
+        far_corner_along=far_along,
         far_corner_across=far_across,
         corner_horizontal_tan=larger(
             near_across / (near_along * sin + cos), far_across / (far_along * sin + cos)
@@ -173,8 +221,10 @@ SHARED = (
     keystone,
     field_missed,
     picture_missed,
+    _half_view_rad,
+    _tilt_rad,
     distances,
-    _lens_travel_mm,
+    lens_extension_mm,
     sight,
     _reach_in_layers_mm,
     _corner_slopes,

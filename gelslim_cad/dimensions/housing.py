@@ -175,7 +175,7 @@ def clamp_rear_x_mm(
     camera_pose_x_mm: Real,
     camera_pose_z_mm: Real,
     camera_pose_pitch_deg: Real,
-    camera_lens_height_mm: Real,
+    camera_pose_face_mm: Real,
     camera_module_depth_mm: Real,
     camera_module_height_mm: Real,
     housing_fit_clearance_mm: Real,
@@ -183,7 +183,7 @@ def clamp_rear_x_mm(
 ) -> Real:
     """Rearmost point of the camera clamp, which is pitched with the camera."""
     pitch = np.radians(camera_pose_pitch_deg)
-    back = camera_lens_height_mm + camera_module_depth_mm + housing_fit_clearance_mm + CLAMP_BAR_MM
+    back = camera_pose_face_mm + camera_module_depth_mm + housing_fit_clearance_mm + CLAMP_BAR_MM
     foot = (cover_top_z_mm - camera_pose_z_mm - back * np.sin(pitch)) / np.cos(pitch)
     ends = (foot, camera_module_height_mm / 2)
     reach = np.minimum(*(b * np.sin(pitch) for b in ends))
@@ -197,15 +197,17 @@ def clamp_front_x_mm(
     camera_pose_x_mm: Real,
     camera_pose_z_mm: Real,
     camera_pose_pitch_deg: Real,
-    camera_lens_height_mm: Real,
+    camera_pose_face_mm: Real,
+    camera_pose_lens_front_mm: Real,
     housing_fit_clearance_mm: Real,
     cover_top_z_mm: Real,
     mirror_lower_z_mm: Real,
 ) -> Real:
     """Foremost point of the camera clamp beside the mirror's seat."""
     pitch = np.radians(camera_pose_pitch_deg)
-    lip = np.minimum(CLAMP_LIP_MM, camera_lens_height_mm - housing_fit_clearance_mm - 0.2)
-    front = housing_fit_clearance_mm + np.maximum(lip, 0.0) - camera_lens_height_mm
+    proud = camera_pose_face_mm + camera_pose_lens_front_mm
+    lip = np.minimum(CLAMP_LIP_MM, proud - housing_fit_clearance_mm - 0.2)
+    front = housing_fit_clearance_mm + np.maximum(lip, 0.0) - camera_pose_face_mm
     ends = (cover_top_z_mm, mirror_lower_z_mm)
     rise = [(z - camera_pose_z_mm + front * np.sin(pitch)) / np.cos(pitch) for z in ends]
     reach = np.maximum(*(r * np.sin(pitch) for r in rise))

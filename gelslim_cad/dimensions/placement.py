@@ -12,13 +12,13 @@ FOLD = "docs/physics.md#camera-and-fold"
 
 @dimension("camera_pose.x_mm", formula="mirror image of the virtual camera", source=FOLD)
 def camera_pose_x_mm(fold_layout: Fold) -> Real:
-    """Pinhole (front of the lens) along the finger."""
+    """Entrance pupil of the lens along the finger."""
     return fold_layout.camera_x_mm
 
 
 @dimension("camera_pose.z_mm", formula="mirror image of the virtual camera", source=FOLD)
 def camera_pose_z_mm(fold_layout: Fold) -> Real:
-    """Pinhole (front of the lens) across the thickness."""
+    """Entrance pupil of the lens across the thickness."""
     return fold_layout.camera_z_mm
 
 
@@ -26,6 +26,18 @@ def camera_pose_z_mm(fold_layout: Fold) -> Real:
 def camera_pose_pitch_deg(mirror_angle_deg: Real, view_tilt_deg: Real) -> Real:
     """Pitch of the camera down towards the mirror."""
     return 90.0 - 2 * mirror_angle_deg - view_tilt_deg
+
+
+@dimension("camera_pose.face_mm", formula="entrance pupil + lens extension", source=FOLD)
+def camera_pose_face_mm(camera_pose_pupil_mm: Real, view_lens_extension_mm: Real) -> Real:
+    """How far the entrance pupil is before the housing's front face, the lens in focus."""
+    return camera_pose_pupil_mm + view_lens_extension_mm
+
+
+@dimension("camera_pose.lens_front_mm", formula="lens height - entrance pupil", source=FOLD)
+def camera_pose_lens_front_mm(camera_lens_height_mm: Real, camera_pose_pupil_mm: Real) -> Real:
+    """How far the lens barrel's front is before the entrance pupil."""
+    return camera_lens_height_mm - camera_pose_pupil_mm
 
 
 @dimension("camera_pose.rear_x_mm", formula="rearmost corner of the housing", source=FOLD)

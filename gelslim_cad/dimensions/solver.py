@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gelslim_cad.dimensions.fold import Fold, fold
 from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_candidates
+from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
 
 CHUNK = 64
@@ -99,30 +100,32 @@ def _solve_chunk(problem: FoldProblem) -> Fold:
 
 
 def best_of_grids(
-    problem: FoldProblem, mid: Array, spread: Array, mirror: Array, _known: Array
+    problem: FoldProblem, mid: Array, spread: Array, turn: Array, _known: Array
 ) -> Best:
     """The first best candidate of each grid: one grid of axes (n, k) per design, all at once.
 
-    Rays depend on the first two axes only: they broadcast against the mirror axis.
+    Rays depend on the first two axes only: they broadcast against the axis of the turn.
     """
     shape = (len(mid), mid.shape[1], spread.shape[1])
     pairs = [
-        np.broadcast_to(mid[:, :, None], shape).reshape(len(mid), -1, 1),
-        np.broadcast_to(spread[:, None, :], shape).reshape(len(mid), -1, 1),
+        np.broadcast_to(axis, shape).reshape(len(mid), -1, 1)
+        for axis in (mid[:, :, None], spread[:, None, :])
     ]
-    scores = fold(problem, pairs[0], pairs[1], mirror[:, None, :]).objective()
+    mirror = mirror_angle_rad(turn[:, None, :], pairs[0])
+    scores = fold(problem, pairs[0], pairs[1], mirror).objective()
     scores = scores.reshape(len(mid), -1)
     winner = np.argmin(scores, axis=1)
-    pair, angle = np.divmod(winner, mirror.shape[1])
+    pair, angle = np.divmod(winner, turn.shape[1])
     row = np.arange(len(mid))
     return Best(
-        pairs[0][row, pair, 0], pairs[1][row, pair, 0], mirror[row, angle], scores[row, winner]
+        pairs[0][row, pair, 0], pairs[1][row, pair, 0], turn[row, angle], scores[row, winner]
     )
 
 
 def _laid_out(problem: FoldProblem, best: Best) -> Fold:
     """The folds of the best candidates, every field (n,)."""
-    return _squeeze(fold(problem, *(axis[:, None, None] for axis in best[:3])))
+    mid, spread, turn = (axis[:, None, None] for axis in best[:3])
+    return _squeeze(fold(problem, mid, spread, mirror_angle_rad(turn, mid)))
 
 
 def _squeeze(solved: Fold) -> Fold:

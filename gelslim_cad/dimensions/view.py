@@ -16,49 +16,6 @@ from gelslim_cad.geometry.names import Name
 FOLD = "docs/physics.md#camera-and-fold"
 
 
-@dimension("view.pixel_pitch_mm", formula="sensor width / image width")
-def view_pixel_pitch_mm(camera_sensor_width_mm: Real, camera_image_width_px: Real) -> Real:
-    """Size of one image pixel on the sensor."""
-    return camera_sensor_width_mm / camera_image_width_px
-
-
-@dimension("view.focal_px", formula="f / pixel pitch", source="pinhole camera")
-def view_focal_px(camera_focal_length_mm: Real, view_pixel_pitch_mm: Real) -> Real:
-    """Focal length in pixels."""
-    return camera_focal_length_mm / view_pixel_pitch_mm
-
-
-@dimension("view.across_fov_deg", formula="min(given, 2 atan(sensor width / 2f))", source=FOLD)
-def view_across_fov_deg(
-    camera_sensor_width_mm: Real,
-    camera_focal_length_mm: Real,
-    camera_horizontal_fov_deg: Real | None,
-) -> Real:
-    """Field of view across the finger."""
-    return _fov_deg(camera_sensor_width_mm, camera_focal_length_mm, camera_horizontal_fov_deg)
-
-
-@dimension("view.along_fov_deg", formula="min(given, 2 atan(sensor height / 2f))", source=FOLD)
-def view_along_fov_deg(
-    camera_sensor_height_mm: Real,
-    camera_focal_length_mm: Real,
-    camera_vertical_fov_deg: Real | None,
-) -> Real:
-    """Field of view along the finger."""
-    return _fov_deg(camera_sensor_height_mm, camera_focal_length_mm, camera_vertical_fov_deg)
-
-
-def _fov_deg(side_mm: Real, focal_mm: Real, given_deg: Real | None) -> Real:
-    implied = np.degrees(2 * np.arctan(side_mm / 2 / focal_mm))
-    return implied if given_deg is None else np.minimum(implied, given_deg)
-
-
-@dimension("view.aperture_mm", formula="f / N", source="thin lens")
-def view_aperture_mm(camera_focal_length_mm: Real, camera_f_number: Real) -> Real:
-    """Diameter of the lens opening."""
-    return camera_focal_length_mm / camera_f_number
-
-
 @dimension("view.blur_limit_mm", formula="blur_per_diameter · marker diameter", source=FOLD)
 def view_blur_limit_mm(optics_blur_per_diameter: Real, markers_diameter_mm: Real) -> Real:
     """Largest blur on the gel that the design allows."""
@@ -72,11 +29,15 @@ PROBLEM: dict[str, Name] = {
     "gel_index": "material.gel.refractive_index",
     "guide_thickness_mm": "design.light_guide.thickness_mm",
     "guide_index": "material.acrylic.refractive_index",
-    "half_horizontal_tan": "view.across_fov_deg",
-    "half_vertical_tan": "view.along_fov_deg",
+    "half_across_mm": "view.sensor_across_mm",
+    "half_along_mm": "view.sensor_along_mm",
     "image_margin": "design.optics.image_margin",
+    "pixel_pitch_mm": "view.pixel_pitch_mm",
     "focal_length_mm": "camera.focal_length_mm",
-    "focal_px": "view.focal_px",
+    "moving_lens": "camera.focusing",
+    "fixed_focus_mm": "view.fixed_focus_mm",
+    "fixed_image_mm": "view.fixed_image_mm",
+    "entrance_pupil_mm": "camera_pose.pupil_mm",
     "aperture_mm": "view.aperture_mm",
     "lens_travel_mm": "camera.lens_travel_mm",
     "focus_nearest_mm": "camera.focus_nearest_mm",
@@ -109,8 +70,9 @@ def fold_layout(values: Mapping[str, Any]) -> Fold:
     """The solved fold of camera and mirror."""
     given = {field: values[name] for field, name in PROBLEM.items()}
     free = 1 - given.pop("image_margin")
-    for side in ("half_horizontal_tan", "half_vertical_tan"):
-        given[side] = np.tan(np.radians(given[side]) / 2) * free
+    for side in ("half_across_mm", "half_along_mm"):
+        given[side] = given[side] / 2 * free
+    given["moving_lens"] = float(given["moving_lens"] == "unit")
     flat = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given.values()))
     columns = dict(zip(given, (v.reshape(-1, 1, 1) for v in flat), strict=True))
     return solve_fold(FoldProblem(**columns))
@@ -152,22 +114,64 @@ def view_virtual_z_mm(fold_layout: Fold) -> Real:
     return fold_layout.virtual_z_mm
 
 
-@dimension("view.near_distance_mm", formula="(h_air + t/n + g/n_g) cos(θ-γ) / cos θ", source=FOLD)
+@dimension(
+    "view.near_distance_mm",
+    formula="(h_air / cos θ + t / (n cos θ_n) + g / (n_g cos θ_g)) cos(θ-γ)",
+    source=FOLD,
+)
 def view_near_distance_mm(fold_layout: Fold) -> Real:
-    """Apparent distance along the axis to the near gel edge, Z near."""
+    """Apparent distance along the axis to the near gel edge, by sagittal rays, Z near."""
     return fold_layout.near_distance_mm
 
 
-@dimension("view.far_distance_mm", formula="(h_air + t/n + g/n_g) cos(θ-γ) / cos θ", source=FOLD)
+@dimension(
+    "view.far_distance_mm",
+    formula="(h_air / cos θ + t / (n cos θ_n) + g / (n_g cos θ_g)) cos(θ-γ)",
+    source=FOLD,
+)
 def view_far_distance_mm(fold_layout: Fold) -> Real:
-    """Apparent distance along the axis to the far gel edge, Z far."""
+    """Apparent distance along the axis to the far gel edge, by sagittal rays, Z far."""
     return fold_layout.far_distance_mm
 
 
-@dimension("view.depth_range_mm", formula="Z far - Z near (L sin γ in air)", source=FOLD)
-def view_depth_range_mm(view_far_distance_mm: Real, view_near_distance_mm: Real) -> Real:
+TANGENTIAL = "(h_air / cos θ + t cos²θ / (n cos³θ_n) + g cos²θ / (n_g cos³θ_g)) cos(axis, ray)"
+SAGITTAL = "(h_air / cos θ + t / (n cos θ_n) + g / (n_g cos θ_g)) cos(axis, ray)"
+
+
+@dimension("view.near_tangential_mm", formula=TANGENTIAL, source=FOLD)
+def view_near_tangential_mm(fold_layout: Fold) -> Real:
+    """Distance along the axis of the nearest image of the near edge, corners included."""
+    return fold_layout.near_tangential_mm
+
+
+@dimension("view.near_sagittal_mm", formula=SAGITTAL, source=FOLD)
+def view_near_sagittal_mm(fold_layout: Fold) -> Real:
+    """Distance along the axis of the farthest image of the near edge, corners included."""
+    return fold_layout.near_sagittal_mm
+
+
+@dimension("view.far_tangential_mm", formula=TANGENTIAL, source=FOLD)
+def view_far_tangential_mm(fold_layout: Fold) -> Real:
+    """Distance along the axis of the nearest image of the far edge, corners included."""
+    return fold_layout.far_tangential_mm
+
+
+@dimension("view.far_sagittal_mm", formula=SAGITTAL, source=FOLD)
+def view_far_sagittal_mm(fold_layout: Fold) -> Real:
+    """Distance along the axis of the farthest image of the far edge, corners included."""
+    return fold_layout.far_sagittal_mm
+
+
+@dimension("view.depth_range_mm", formula="farthest - nearest image of the edges", source=FOLD)
+def view_depth_range_mm(
+    view_far_sagittal_mm: Real,
+    view_near_sagittal_mm: Real,
+    view_far_tangential_mm: Real,
+    view_near_tangential_mm: Real,
+) -> Real:
     """Depth of field the picture needs."""
-    return view_far_distance_mm - view_near_distance_mm
+    most = np.maximum(view_far_sagittal_mm, view_near_sagittal_mm)
+    return most - np.minimum(view_far_tangential_mm, view_near_tangential_mm)
 
 
 @dimension("view.keystone", formula="k = Z far / Z near", source=FOLD)
@@ -176,57 +180,46 @@ def view_keystone(view_far_distance_mm: Real, view_near_distance_mm: Real) -> Re
     return view_far_distance_mm / view_near_distance_mm
 
 
-@dimension("view.focus_mm", formula="s = 2 Zn Zf / (Zn + Zf)", source=FOLD)
-def view_focus_mm(view_near_distance_mm: Real, view_far_distance_mm: Real) -> Real:
-    """Best focus distance: equal blur in the image at both edges."""
-    n, f = view_near_distance_mm, view_far_distance_mm
-    return 2 * n * f / (n + f)
+@dimension(
+    "view.focus_mm",
+    formula="s = 2 Z Z' / (Z + Z'), the least and the largest distance; a fixed lens's own",
+    source=FOLD,
+)
+def view_focus_mm(fold_layout: Fold) -> Real:
+    """Distance in focus: the blur in the image is equal at the nearest and the farthest image."""
+    return fold_layout.focus_mm
 
 
 @dimension(
-    "view.lens_extension_mm",
-    formula="f²/(s - f) from the infinity position; 0 where s is in the delivered range",
-    source="thin lens",
+    "view.near_blur_mm", formula="A |Z - s| / s, by the image that is less sharp", source=FOLD
 )
-def view_lens_extension_mm(
-    view_focus_mm: Real, camera_focal_length_mm: Real, camera_focus_nearest_mm: Real
-) -> Real:
-    """How far the lens must be unscrewed."""
-    moved = camera_focal_length_mm**2 / np.maximum(view_focus_mm - camera_focal_length_mm, 1e-3)
-    return np.where(view_focus_mm >= camera_focus_nearest_mm, 0.0, moved)
-
-
-@dimension("view.near_blur_mm", formula="A (s - Zn) / s", source=FOLD)
 def view_near_blur_mm(
-    view_aperture_mm: Real, view_focus_mm: Real, view_near_distance_mm: Real
+    view_aperture_mm: Real,
+    view_focus_mm: Real,
+    view_near_sagittal_mm: Real,
+    view_near_tangential_mm: Real,
 ) -> Real:
-    """Blur on the gel at the near edge."""
-    return view_aperture_mm * np.abs(view_near_distance_mm - view_focus_mm) / view_focus_mm
-
-
-@dimension("view.far_blur_mm", formula="A (Zf - s) / s", source=FOLD)
-def view_far_blur_mm(
-    view_aperture_mm: Real, view_focus_mm: Real, view_far_distance_mm: Real
-) -> Real:
-    """Blur on the gel at the far edge."""
-    return view_aperture_mm * np.abs(view_far_distance_mm - view_focus_mm) / view_focus_mm
+    """Largest blur on the gel at the near edge, corners included."""
+    off = _farther_off(view_near_sagittal_mm, view_near_tangential_mm, view_focus_mm)
+    return view_aperture_mm * off / view_focus_mm
 
 
 @dimension(
-    "view.image_blur_px", formula="(f²/N) (Zf - s) / (Zf (s - f)) / pixel pitch", source=FOLD
+    "view.far_blur_mm", formula="A |Z - s| / s, by the image that is less sharp", source=FOLD
 )
-def view_image_blur_px(
+def view_far_blur_mm(
     view_aperture_mm: Real,
-    camera_focal_length_mm: Real,
     view_focus_mm: Real,
-    view_far_distance_mm: Real,
-    view_pixel_pitch_mm: Real,
+    view_far_sagittal_mm: Real,
+    view_far_tangential_mm: Real,
 ) -> Real:
-    """Blur diameter in the image at the far edge; at the best focus the near edge has the same."""
-    f, s, z = camera_focal_length_mm, view_focus_mm, view_far_distance_mm
-    return (
-        view_aperture_mm * f * np.abs(z - s) / (z * np.maximum(s - f, 1e-3)) / view_pixel_pitch_mm
-    )
+    """Largest blur on the gel at the far edge, corners included."""
+    off = _farther_off(view_far_sagittal_mm, view_far_tangential_mm, view_focus_mm)
+    return view_aperture_mm * off / view_focus_mm
+
+
+def _farther_off(sagittal_mm: Real, tangential_mm: Real, focus_mm: Real) -> Real:
+    return np.maximum(np.abs(sagittal_mm - focus_mm), np.abs(tangential_mm - focus_mm))
 
 
 @dimension("view.marker_across_px", formula="f_px d / max(Zn, Zf)", source=FOLD)
@@ -243,20 +236,13 @@ def view_marker_across_px(
 
 @dimension(
     "view.marker_along_px",
-    formula="f_px d D / max(Zn, Zf)², D = apparent height above the gel's plane",
+    formula="f_px d cos θ / (Zt cos(θ-γ)) at the edge where it is smaller, Zt tangential",
     source=FOLD,
 )
-def view_marker_along_px(
-    fold_layout: Fold,
-    view_near_distance_mm: Real,
-    view_far_distance_mm: Real,
-    view_marker_across_px: Real,
-) -> Real:
-    """Height in the image of the marker that is farthest from the camera, foreshortened."""
-    height = fold_layout.far_distance_mm * np.cos(fold_layout.far_ray_rad)
-    height = height / np.cos(fold_layout.far_ray_rad - fold_layout.tilt_rad)
-    farthest = np.maximum(view_near_distance_mm, view_far_distance_mm)
-    return view_marker_across_px * np.minimum(1.0, height / farthest)
+def view_marker_along_px(fold_layout: Fold, markers_diameter_mm: Real, view_focal_px: Real) -> Real:
+    """Height in the image of the marker that is most foreshortened."""
+    per_mm = fold_layout.along_scale / fold_layout.image_distance_mm
+    return view_focal_px * markers_diameter_mm * per_mm
 
 
 @dimension("view.across_use", formula="largest image x of the gel / half image", source=FOLD)

@@ -16,20 +16,21 @@ SCREW_DEPTH_MM = 5.0
 
 
 def _placed(d: Dimensions, local: cq.Shape) -> cq.Shape:
-    """Move a shape from the camera's frame (pinhole at 0, looking along +x) into the finger."""
+    """Move a shape from the camera's frame, entrance pupil at 0 and looking along +x."""
     turned = local.rotate(cq.Vector(), cq.Vector(0, 1, 0), d["camera_pose.pitch_deg"])
     return turned.translate(cq.Vector(d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]))
 
 
 def camera(d: Dimensions) -> Part:
     """Camera housing and lens barrel, with the sizes of the data sheet."""
-    face, depth = -d["camera.lens_height_mm"], d["camera.module_depth_mm"]
+    face, depth = -d["camera_pose.face_mm"], d["camera.module_depth_mm"]
+    front = d["camera_pose.lens_front_mm"]
     half_w, half_h = d["camera.module_width_mm"] / 2, d["camera.module_height_mm"] / 2
     shape: cq.Shape = box((face - depth, face), (-half_w, half_w), (-half_h, half_h))
-    if face < 0:
+    if face < front:
         lens = cq.Solid.makeCylinder(
             d["camera.lens_diameter_mm"] / 2,
-            -face + depth / 2,
+            front - face + depth / 2,
             cq.Vector(face - depth / 2, 0, 0),
             cq.Vector(1, 0, 0),
         )
@@ -41,13 +42,13 @@ def camera(d: Dimensions) -> Part:
         process="buy",
         colour=CAMERA,
         explode_mm=(-14, 0, -12),
-        note=f"unscrew the lens by {d['view.lens_extension_mm']:.2f} mm from infinity focus",
+        note=f"unscrew the lens by {d['view.lens_travel_mm']:.2f} mm from infinity focus",
     )
 
 
 def clamp_screw_positions(d: Dimensions) -> list[Point2]:
     """Positions (x, y) of the screws that hold the clamp's cheeks from below."""
-    middle = -d["camera.lens_height_mm"] - d["camera.module_depth_mm"] / 2
+    middle = -d["camera_pose.face_mm"] - d["camera.module_depth_mm"] / 2
     x = _placed(d, cq.Vertex.makeVertex(middle, 0, -d["camera.module_height_mm"] / 2)).Center().x
     y = d["clamp.width_mm"] / 2 - CLAMP_CHEEK_MM / 2
     return [(x, -y), (x, y)]
@@ -57,7 +58,7 @@ def camera_clamp(d: Dimensions) -> Part:
     """U-shaped cradle of two cheeks with front lips and a rear bar, open towards the gel."""
     at = Layout(d)
     fit = d["design.housing.fit_clearance_mm"]
-    face = -d["camera.lens_height_mm"]
+    face = -d["camera_pose.face_mm"]
     rear = face - d["camera.module_depth_mm"] - fit
     inner = d["camera.module_width_mm"] / 2 + fit
     outer = inner + CLAMP_CHEEK_MM
@@ -67,7 +68,7 @@ def camera_clamp(d: Dimensions) -> Part:
         *pair((rear - CLAMP_BAR_MM, face), (inner, outer), (-FAR_MM, high)),
         box((rear - CLAMP_BAR_MM, rear), (-outer, outer), (-FAR_MM, 0)),
     ]
-    lip = min(CLAMP_LIP_MM, -face - fit - 0.2)
+    lip = min(CLAMP_LIP_MM, d["camera_pose.lens_front_mm"] - face - fit - 0.2)
     if lip > 0.4 and lens + fit < inner - 0.4:
         pieces += pair((face - 0.1, face + fit + lip), (inner, outer), (-FAR_MM, lens))
         pieces += pair((face + fit, face + fit + lip), (lens + fit, inner + 0.1), (-FAR_MM, lens))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -11,6 +12,8 @@ from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
 
 FOV_TOLERANCE = 0.05
+NEAREST_FOCUS = 1.5
+"""Nearest distance, in focal lengths, for which a sheet's figure is believed."""
 
 
 class Camera(Block):
@@ -27,13 +30,29 @@ class Camera(Block):
         default=None,
         gt=1,
         lt=170,
-        description="Horizontal field of view; derived from sensor and focal length when left out",
+        description="Horizontal field of view of the data sheet, which holds at infinity unless "
+        "field_of_view_at_mm says otherwise; derived from sensor and focal length when left out",
     )
     vertical_fov_deg: float | None = Field(
         default=None,
         gt=1,
         lt=170,
-        description="Vertical field of view; derived from sensor and focal length when left out",
+        description="Vertical field of view of the data sheet, at the same distance; derived from "
+        "sensor and focal length when left out",
+    )
+    field_of_view_at_mm: float | None = Field(
+        default=None,
+        gt=0,
+        le=1e6,
+        description="Distance at which the field of view holds; infinity when left out",
+    )
+    focusing: Literal["unit", "internal", "fixed"] = Field(
+        default="unit",
+        description="How the lens is focused: `unit` moves the whole lens, as board cameras do; "
+        "`internal` moves a group inside; `fixed` cannot be focused",
+    )
+    focus_distance_mm: float | None = Field(
+        default=None, gt=0, le=1e6, description="Distance in focus of a lens that is fixed"
     )
     focus_nearest_mm: float = above(
         0, 1e6, "Nearest distance in focus as delivered", default=1000.0
@@ -54,6 +73,13 @@ class Camera(Block):
     lens_diameter_mm: float = between(0.5, 60, "Outer diameter of the lens barrel", default=6.0)
     lens_height_mm: float = between(
         0, 60, "How far the lens stands proud of the housing", default=1.5
+    )
+    entrance_pupil_mm: float | None = Field(
+        default=None,
+        ge=-80,
+        le=60,
+        description="Entrance pupil before the front face of the housing, the lens focused on "
+        "infinity; the front of the lens when left out",
     )
     cable_width_mm: float = above(0, 60, "Width of the flat cable", default=6.0)
     cable_bend_radius_mm: float = between(0, 50, "Smallest bend radius of the cable", default=3.0)
@@ -81,18 +107,8 @@ class Camera(Block):
                 "change lens_diameter_mm or module_width_mm",
                 ("module_width_mm",),
             )
-        for axis, side_mm, given in (
-            ("horizontal", self.sensor_width_mm, self.horizontal_fov_deg),
-            ("vertical", self.sensor_height_mm, self.vertical_fov_deg),
-        ):
-            implied = math.degrees(2 * math.atan(side_mm / 2 / self.focal_length_mm))
-            if given is not None and abs(given - implied) > FOV_TOLERANCE * implied:
-                raise FieldError(
-                    f"{axis}_fov_deg",
-                    "disagrees with sensor size and focal length, "
-                    f"which give {implied:.2f} degrees",
-                    "correct one of them or leave the field of view out",
-                )
+        self._check_focusing()
+        self._check_field_of_view()
         square = (self.image_width_px / self.image_height_px) / (
             self.sensor_width_mm / self.sensor_height_mm
         )
@@ -104,3 +120,62 @@ class Camera(Block):
                 "give the area of the sensor that the image covers",
             )
         return self
+
+    def _check_focusing(self) -> None:
+        """Each way to focus has the figures that it needs, and the pupil lies in the camera."""
+        if self.focusing == "internal" and None in (
+            self.horizontal_fov_deg,
+            self.field_of_view_at_mm,
+        ):
+            raise FieldError(
+                "focusing",
+                "is internal, and the scale of such a lens does not follow from its focal length",
+                "give horizontal_fov_deg and the distance at which it holds, field_of_view_at_mm",
+                ("horizontal_fov_deg", "field_of_view_at_mm"),
+            )
+        if (self.focusing == "fixed") != (self.focus_distance_mm is not None):
+            raise FieldError(
+                "focus_distance_mm",
+                "belongs to a lens that cannot be focused, and is needed there",
+                "give focus_distance_mm with focusing: fixed, and only there",
+                ("focusing",),
+            )
+        for name in ("field_of_view_at_mm", "focus_distance_mm"):
+            value = getattr(self, name)
+            if value is not None and value < NEAREST_FOCUS * self.focal_length_mm:
+                raise FieldError(
+                    name,
+                    f"must be at least {NEAREST_FOCUS:g} focal lengths "
+                    f"({NEAREST_FOCUS * self.focal_length_mm:g} mm)",
+                    "give the distance from the lens in mm",
+                    ("focal_length_mm",),
+                )
+        pupil = self.entrance_pupil_mm
+        if pupil is not None and not -self.module_depth_mm <= pupil <= self.lens_height_mm:
+            raise FieldError(
+                "entrance_pupil_mm",
+                f"must lie in the camera, from {-self.module_depth_mm:g} mm (the housing's rear) "
+                f"to {self.lens_height_mm:g} mm (the front of the lens)",
+                "measure it from the front face of the housing, positive towards the object",
+                ("lens_height_mm", "module_depth_mm"),
+            )
+
+    def _check_field_of_view(self) -> None:
+        """The sheet's field of view agrees with sensor and focal length, where it must."""
+        if self.focusing == "internal":
+            return
+        at = self.field_of_view_at_mm
+        f = self.focal_length_mm
+        image_mm = f if at is None else f * at / (at - f)
+        for axis, side_mm, given in (
+            ("horizontal", self.sensor_width_mm, self.horizontal_fov_deg),
+            ("vertical", self.sensor_height_mm, self.vertical_fov_deg),
+        ):
+            implied = math.degrees(2 * math.atan(side_mm / 2 / image_mm))
+            if given is not None and abs(given - implied) > FOV_TOLERANCE * implied:
+                raise FieldError(
+                    f"{axis}_fov_deg",
+                    "disagrees with sensor size and focal length, "
+                    f"which give {implied:.2f} degrees",
+                    "correct one of them or leave the field of view out",
+                )

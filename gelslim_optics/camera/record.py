@@ -10,7 +10,9 @@ import numpy as np
 from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.refraction import Layer
 
-MODEL = "folded pinhole behind flat layers"
+MODEL = "folded pinhole at its image distance, behind flat layers"
+MODEL_AT_INFINITY = "folded pinhole behind flat layers"
+"""Of earlier bundles, whose scale is that of a lens focused on infinity."""
 VECTORS = ("position_mm", "right", "down", "forward")
 LENGTHS = ("focal_px", "window_bottom_z_mm")
 COUNTS = ("image_width_px", "image_height_px")
@@ -21,6 +23,12 @@ def camera_from_record(record: Mapping[str, object]) -> dict[str, Any]:
 
     Raises ValueError for another model, or for values that are missing or of the wrong type.
     """
+    if record.get("model") == MODEL_AT_INFINITY:
+        raise ValueError(
+            "the camera record is of an earlier version, which took the lens to be focused on "
+            "infinity; its scale is wrong by about a tenth. Make the bundle and the calibration "
+            "again: gelslim bundle SPEC, gelslim calibrate BUNDLE REFERENCE"
+        )
     if record.get("model") != MODEL:
         raise ValueError(
             f'the camera record has the model {record.get("model")!r}, must be "{MODEL}"'

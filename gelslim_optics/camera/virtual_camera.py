@@ -264,17 +264,23 @@ class VirtualCamera:
             outside,
         )
 
-    def apparent_distance_mm(self, points_mm: ArrayLike) -> Vector:
-        """Distance (n,) along the axis of the images of points (n, 3) as seen from air.
+    def apparent_distances_mm(self, points_mm: ArrayLike) -> Vector:
+        """Distances (n, 2) along the axis of the two images of points (n, 3), seen from air.
 
-        A layer shortens a length h to h/n for rays near the normal (paraxial).
+        The first image is formed by sagittal rays, side by side across the plane of incidence, the
+        second by tangential rays, within that plane (Coddington's equations at plane faces).
         """
         points = rays.as_points(points_mm)
         d = self.air_directions(points)
+        cos = d[:, 2]
         heights = self.stack.crossed_mm(points[:, 2])
-        apparent = sum(h / n for h, n in zip(heights, self.stack.indices, strict=True))
-        distance: Vector = apparent / d[:, 2] * (d @ self.forward)
-        return distance
+        found = np.zeros((len(points), 2))
+        for height, index in zip(heights, self.stack.indices, strict=True):
+            inside = np.sqrt(1 - (1 - cos**2) / index**2)
+            sagittal = height / (index * inside)
+            found += np.column_stack([sagittal, sagittal * (cos / inside) ** 2])
+        found *= (d @ self.forward)[:, None]
+        return found
 
     def jacobian(self, points_mm: ArrayLike) -> Vector:
         """Derivative (n, 2, 2) in px/mm of `project` by the point's x and y."""
@@ -295,9 +301,12 @@ class VirtualCamera:
         return in_px
 
     def blur_on_gel_mm(self, points_mm: ArrayLike, aperture_mm: float, focus_mm: float) -> Vector:
-        """Blur diameter (n,) on the gel: A |Z - s| / s for an aperture A = f/N focused at s."""
-        distance = self.apparent_distance_mm(points_mm)
-        blur: Vector = aperture_mm * np.abs(distance - focus_mm) / focus_mm
+        """Blur diameter (n,) on the gel, A |Z - s| / s for an aperture A = f/N focused at s.
+
+        It is the disc of the same variance as the ellipse that the two images Z give.
+        """
+        off = np.abs(self.apparent_distances_mm(points_mm) - focus_mm)
+        blur: Vector = aperture_mm * np.sqrt(np.mean(off**2, axis=1)) / focus_mm
         return blur
 
     def to_record(self) -> dict[str, object]:

@@ -50,8 +50,8 @@ class SensorFigures:
         focal_px: Focal length.
         image_width_px: Width of a frame.
         image_height_px: Height of a frame.
-        near_mm: Apparent distance along the axis from the lens to the nearest point of the gel.
-        far_mm: The same for the farthest point.
+        near_mm: Apparent distance along the axis from the lens to the nearest image of the gel.
+        far_mm: The same for the farthest image.
         half_view_px: Largest distance of the gel's image from the principal point.
         tilt_deg: Angle between the camera's axis and the gel's normal.
         oblique_deg: Largest angle in air between a ray to the gel and the gel's normal.

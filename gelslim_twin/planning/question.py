@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
@@ -187,8 +188,8 @@ def figures(
     stack = tuple((float(v["thickness_mm"]), float(v["index"])) for v in camera["layers"])
     lift = sum(h * (1 - 1 / n) for h, n in stack)
     corners = list(product(*((-side / 2, side / 2) for side in size_mm[:2])))
-    seen = [_seen(camera, (x, y, -lift)) for x, y in corners]
-    distances = [z for z, _ in seen]
+    rays = [_ray(camera, (x, y, -lift)) for x, y in corners]
+    images = [_images_mm(ray, stack, lift) for ray in rays]
     return SensorFigures(
         length_mm=size_mm[0],
         width_mm=size_mm[1],
@@ -203,11 +204,11 @@ def figures(
         focal_px=float(camera["focal_px"]),
         image_width_px=int(camera["image_width_px"]),
         image_height_px=int(camera["image_height_px"]),
-        near_mm=min(distances),
-        far_mm=max(distances),
-        half_view_px=max(r for _, r in seen) * float(camera["focal_px"]),
+        near_mm=min(nearer for nearer, _ in images),
+        far_mm=max(farther for _, farther in images),
+        half_view_px=max(ray.off_axis for ray in rays) * float(camera["focal_px"]),
         tilt_deg=math.degrees(math.acos(min(1.0, float(camera["forward"][2])))),
-        oblique_deg=max(_oblique_deg(camera, (x, y, -lift)) for x, y in corners),
+        oblique_deg=max(math.degrees(ray.from_normal_rad) for ray in rays),
         layers_mm=stack,
         aperture_mm=float(camera.get("aperture_mm") or 0.0),
         focus_mm=float(camera.get("focus_mm") or 0.0),
@@ -215,18 +216,38 @@ def figures(
     )
 
 
-def _seen(camera: Mapping[str, Any], point: Vector) -> tuple[float, float]:
-    """Distance in mm along the camera's axis of an apparent point, and its slope from the axis.
+@dataclass(frozen=True)
+class _Ray:
+    """Ray from the camera to a paraxial apparent point.
 
     Refraction makes a point of the outer surface (z = 0) appear nearer to the camera.
     """
+
+    height_mm: float
+    from_normal_rad: float
+    cos_off_axis: float
+
+    @property
+    def off_axis(self) -> float:
+        """Slope from the camera's axis."""
+        return math.sqrt(max(0.0, 1 / self.cos_off_axis**2 - 1))
+
+
+def _ray(camera: Mapping[str, Any], point: Vector) -> _Ray:
     way = [a - b for a, b in zip(point, camera["position_mm"], strict=True)]
     along = sum(a * b for a, b in zip(way, camera["forward"], strict=True))
-    across = math.sqrt(max(0.0, sum(a * a for a in way) - along * along))
-    return along, across / along
+    return _Ray(way[2], math.atan2(math.hypot(*way[:2]), way[2]), along / math.hypot(*way))
 
 
-def _oblique_deg(camera: Mapping[str, Any], point: Vector) -> float:
-    """Angle in air of the ray to an apparent point, from the gel's normal."""
-    x, y, z = (a - b for a, b in zip(point, camera["position_mm"], strict=True))
-    return math.degrees(math.atan2(math.hypot(x, y), z))
+def _images_mm(
+    ray: _Ray, stack: tuple[tuple[float, float], ...], lift_mm: float
+) -> tuple[float, float]:
+    """Distances along the axis of the tangential and the sagittal image (Coddington)."""
+    cos, sin = math.cos(ray.from_normal_rad), math.sin(ray.from_normal_rad)
+    air_mm = ray.height_mm + lift_mm - sum(thickness for thickness, _ in stack)
+    tangential = sagittal = air_mm / cos
+    for thickness, index in stack:
+        cos_within = math.sqrt(1 - (sin / index) ** 2)
+        sagittal += thickness / (index * cos_within)
+        tangential += thickness * cos**2 / (index * cos_within**3)
+    return tangential * ray.cos_off_axis, sagittal * ray.cos_off_axis

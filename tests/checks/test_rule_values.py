@@ -26,8 +26,8 @@ def test_figures_worked_by_hand() -> None:
     assert judged("led.fits_mm").margin == pytest.approx(0.2)
     # M2 countersunk head 3.8 mm in a tip wall of 5 mm.
     assert judged("screw.wall_mm").value == pytest.approx(0.6)
-    # pitch 1.2, largest dot 1.25 * 0.5.
-    assert judged("marker.gap_mm").value == pytest.approx(0.575)
+    # pitch 1.2, largest dot 1.25 * 0.6.
+    assert judged("marker.gap_mm").value == pytest.approx(0.45)
     # Gel 2.0, proud 0.6.
     assert judged("bezel.thickness_mm").value == pytest.approx(1.4)
     assert judged("guide.bend_ratio", {"design.light_guide.bend_radius_ratio": 2.0}).limit == (

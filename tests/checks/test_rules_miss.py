@@ -51,7 +51,7 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
     "marker.diameter_mm": [({"design.markers.diameter_mm": 0.25}, "fail")],
     "marker.gap_mm": [({"design.markers.pitch_mm": 0.9}, "fail")],
     "marker.inside_mm": [
-        ({"design.markers.rows": 17, "design.markers.pitch_mm": 1.215}, "warn"),
+        ({"design.markers.rows": 17, "design.markers.pitch_mm": 1.21}, "warn"),
         ({"=marker_grid.span_x_mm": 20.0}, "fail"),
     ],
     "marker.corner_mm": [({"design.gel.corner_radius_mm": 8.0}, "warn")],
@@ -86,14 +86,18 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
     "coverage.along": [({"=view.along_use": 0.99}, "fail")],
     "coverage.across": [({"=view.across_use": 0.99}, "fail")],
     "focus.travel_mm": [({"camera.lens_travel_mm": 0.1}, "fail")],
+    "focus.view_percent": [
+        ({"camera.focusing": "internal", "camera.horizontal_fov_deg": 50.0,
+          "camera.field_of_view_at_mm": 60.0}, "fail"),
+    ],
     "blur.gel": [
         ({"design.optics.blur_per_diameter": 0.45}, "warn"),
         ({"design.optics.blur_per_diameter": 0.7}, "fail"),
-        ({"=view.near_blur_mm": 0.26}, "fail"),
+        ({"=view.near_blur_mm": 0.31}, "fail"),
     ],
     "blur.limit": [
-        ({"=view.far_blur_mm": 0.2}, "fail"),
-        ({"=view.near_blur_mm": 0.2}, "fail"),
+        ({"=view.far_blur_mm": 0.21}, "fail"),
+        ({"=view.near_blur_mm": 0.21}, "fail"),
     ],
     "blur.image_px": [({}, "warn")],
     "marker.far_px": [(LONG, "fail")],

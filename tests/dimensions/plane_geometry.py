@@ -9,6 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import fields
+from typing import TypeVar
 
 from scipy.optimize import brentq
 
@@ -26,11 +27,18 @@ class Problem:
         raise AttributeError(name)
 
 
-def in_layers_mm(p: Problem, angle_rad: float) -> float:
+Number = TypeVar("Number", float, complex)
+Images = tuple[tuple[float, float], tuple[float, float]]
+STEP = 1e-20
+"""Imaginary part of an angle by which a derivative is exact to rounding."""
+
+
+def in_layers_mm(p: Problem, angle_rad: Number) -> Number:
     """How far a ray of this angle in air goes sideways within guide and gel."""
-    total = 0.0
+    m = cmath if isinstance(angle_rad, complex) else math
+    total = 0.0 * angle_rad
     for height, index in ((p.guide_thickness_mm, p.guide_index), (p.gel_total_mm, p.gel_index)):
-        total += height * math.tan(math.asin(math.sin(angle_rad) / index))
+        total += height * m.tan(m.asin(m.sin(angle_rad) / index))
     return total
 
 
@@ -43,12 +51,15 @@ def met(start: complex, along: complex, other: complex, other_along: complex) ->
 class Layout:
     """One candidate: every length of `Fold`, and the limits that it misses."""
 
-    def __init__(self, p: Problem, mid_rad: float, spread: float, mirror_rad: float) -> None:
+    def __init__(
+        self, p: Problem, rays_rad: tuple[float, float], mirror_rad: float, tilt_rad: float
+    ) -> None:
+        """A layout between two rays to the gel's edges; its axis is tilted as it is told."""
         self.p = p
         self.window_z = -(p.guide_thickness_mm + p.gel_total_mm)
-        self.half_rad = math.atan(p.half_vertical_tan)
-        self.near_rad, self.far_rad = (mid_rad + k * spread * self.half_rad for k in (-1, 1))
+        self.near_rad, self.far_rad = rays_rad
         self.mirror_rad = mirror_rad
+        self.tilt = tilt_rad
         self._place_virtual_camera()
         self._corners_of_the_gel()
         self._mirror()
@@ -75,16 +86,40 @@ class Layout:
         return slope * along / reach, slope * across / reach
 
     def _corners_of_the_gel(self) -> None:
-        near, far = self._ray_to_corner(-1), self._ray_to_corner(1)
+        self.corner_rays = near, far = self._ray_to_corner(-1), self._ray_to_corner(1)
         self.near_across, self.far_across = near[1], far[1]
         self.near_slope = min(math.tan(self.near_rad), near[0])
         self.far_slope = max(math.tan(self.far_rad), far[0])
         low, high = math.atan(self.near_slope), math.atan(self.far_slope)
-        # Upright, unless the far rays are then outside of the picture.
-        self.tilt = min(max(0.0, high - self.half_rad), low + self.half_rad)
         axis = (math.sin(self.tilt), math.cos(self.tilt))
         self.horizontal_tan = max(c[1] / (c[0] * axis[0] + axis[1]) for c in (near, far))
         self.vertical_tan = math.tan(max(high - self.tilt, self.tilt - low))
+
+    def least_tilt_rad(self) -> float:
+        """Upright, unless the far rays are then outside of the picture of a lens focused there."""
+        low, high = math.atan(self.near_slope), math.atan(self.far_slope)
+
+        def too_small(tilt: float) -> float:
+            half = math.atan(self.p.half_along_mm / self.image_mm(self.spans_at_mm(tilt)))
+            return min(max(0.0, high - half), low + half) - tilt
+
+        return brentq(too_small, -math.pi / 2, math.pi / 2, xtol=1e-13)
+
+    def focus_mm(self, spans: Images) -> float:
+        """Where the nearest and the farthest image are equally blurred, relative to distance."""
+        nearest, farthest = (f(f(edge) for edge in spans) for f in (min, max))
+        return self.p.fixed_focus_mm or 1 / ((1 / nearest + 1 / farthest) / 2)
+
+    def image_mm(self, spans: Images) -> float:
+        """1/f = 1/s + 1/v, unless the image stays in its place."""
+        beyond_focal = max(self.focus_mm(spans) - self.p.focal_length_mm, 1e-3)
+        image = self.p.focal_length_mm * self.focus_mm(spans) / beyond_focal
+        return self.p.fixed_image_mm or image
+
+    @property
+    def extension_mm(self) -> float:
+        moved = self.image_mm(self.spans_mm) - self.p.focal_length_mm
+        return moved if self.p.moving_lens else 0.0
 
     def _mirror(self) -> None:
         p = self.p
@@ -110,11 +145,13 @@ class Layout:
         towards_gel = complex(math.sin(self.tilt), math.cos(self.tilt))
         self.ahead = self.reflected(self.virtual + towards_gel) - self.pinhole
         self.above = 1j * self.ahead
-        rear = p.lens_height_mm + p.module_depth_mm
+        front, face = p.entrance_pupil_mm - p.lens_height_mm, p.entrance_pupil_mm
+        face += self.extension_mm
+        self.face, self.front = face, front
         half, radius = p.module_height_mm / 2, p.lens_diameter_mm / 2
         self.corners = [
             self.pinhole + back * -self.ahead + sign * side * self.above
-            for back, side in ((0.0, radius), (p.lens_height_mm, half), (rear, half))
+            for back, side in ((front, radius), (face, half), (face + p.module_depth_mm, half))
             for sign in (1, -1)
         ]
         self.bottom = min(c.imag for c in self.corners)
@@ -122,20 +159,52 @@ class Layout:
         self.depth = max(self.mirror_depth, self.camera_depth, p.guide_stack_mm)
 
     @property
-    def apparent_mm(self) -> tuple[float, float, float]:
-        """Distances along the axis to the images of both edges, and along the normal."""
-        p = self.p
-        height = self.air + p.guide_thickness_mm / p.guide_index + p.gel_total_mm / p.gel_index
-        axis = complex(math.sin(self.tilt), math.cos(self.tilt))
+    def images_mm(self) -> Images:
+        """Distances along the axis to the middle of both edges, by sagittal and tangential rays."""
+        return self._edge_at_mm(self.near_rad, self.tilt), self._edge_at_mm(self.far_rad, self.tilt)
+
+    @property
+    def spans_mm(self) -> Images:
+        return self.spans_at_mm(self.tilt)
+
+    def spans_at_mm(self, tilt_rad: float) -> Images:
+        """The nearest and the farthest image of each edge, its corners included."""
         near, far = (
-            (complex(height * math.tan(a), height) * axis.conjugate()).real
-            for a in (self.near_rad, self.far_rad)
+            (*self._edge_at_mm(angle, tilt_rad), *self._corner_at_mm(corner, tilt_rad))
+            for angle, corner in zip((self.near_rad, self.far_rad), self.corner_rays, strict=True)
         )
-        return near, far, height
+        return (min(near), max(near)), (min(far), max(far))
+
+    def _edge_at_mm(self, angle_rad: float, tilt_rad: float) -> tuple[float, float]:
+        """A fan of rays from the pupil, turned about the normal or widened, sets the distance."""
+        turned, widened = self._seen_along_ray_mm(angle_rad)
+        cos = math.cos(angle_rad - tilt_rad)
+        return turned * cos, widened * cos
+
+    def _corner_at_mm(self, slopes: tuple[float, float], tilt_rad: float) -> tuple[float, float]:
+        turned, widened = self._seen_along_ray_mm(math.atan(math.hypot(*slopes)))
+        ray, axis = (*slopes, 1.0), (math.sin(tilt_rad), 0.0, math.cos(tilt_rad))
+        cos = sum(map(math.prod, zip(ray, axis, strict=True))) / math.hypot(*ray)
+        return turned * cos, widened * cos
+
+    def _seen_along_ray_mm(self, angle_rad: float) -> tuple[float, float]:
+        reach = self._reach_mm(complex(angle_rad, STEP))
+        widened = reach.imag / STEP
+        turned = reach.real / math.sin(angle_rad) if abs(angle_rad) > 1e-9 else widened
+        return turned, widened * math.cos(angle_rad)
+
+    def _reach_mm(self, angle_rad: complex) -> complex:
+        return self.air * cmath.tan(angle_rad) + in_layers_mm(self.p, angle_rad)
+
+    def along_scale(self, angle_rad: float) -> float:
+        """Length in the image of a unit length along the finger."""
+        ray = complex(angle_rad, STEP)
+        image = self.image_mm(self.spans_mm) * cmath.tan(ray - self.tilt)
+        return image.imag / self._reach_mm(ray).imag
 
     @property
     def keystone(self) -> float:
-        near, far, _ = self.apparent_mm
+        (near, _), (far, _) = self.images_mm
         return max(near / far, far / near)
 
     def near_edge_x(self, z: float) -> float:
@@ -170,19 +239,20 @@ class Layout:
 
     def _picture(self) -> dict[str, float]:
         p = self.p
-        near, far, height = self.apparent_mm
-        # Focused so that both edges are equally blurred, relative to their distance.
-        focus = 1 / ((1 / near + 1 / far) / 2)
-        blur = max(p.aperture_mm * abs(d - focus) / focus for d in (near, far))
-        most = max(near, far)
-        px = p.focal_px * p.marker_diameter_mm / most * min(1.0, height / most)
-        travel = 0.0
-        if focus < p.focus_nearest_mm:
-            beyond_focal = max(focus - p.focal_length_mm, 1e-3)
-            travel = p.focal_length_mm**2 / beyond_focal
+        near, far = self.images_mm
+        focus, image = self.focus_mm(self.spans_mm), self.image_mm(self.spans_mm)
+        distances = (d for edge in self.spans_mm for d in edge)
+        blur = max(p.aperture_mm * abs(d - focus) / focus for d in distances)
+        least = min(
+            image / max(near[0], far[0]),
+            self.along_scale(self.near_rad),
+            self.along_scale(self.far_rad),
+        )
+        px = least * p.marker_diameter_mm / p.pixel_pitch_mm
+        travel = self.extension_mm if focus < p.focus_nearest_mm else 0.0
         return {
-            "field of view along": self.vertical_tan / p.half_vertical_tan - 1,
-            "field of view across": self.horizontal_tan / p.half_horizontal_tan - 1,
+            "field of view along": self.vertical_tan / (p.half_along_mm / image) - 1,
+            "field of view across": self.horizontal_tan / (p.half_across_mm / image) - 1,
             "blur": blur / p.blur_limit_mm - 1,
             "pixels per marker": p.min_px_per_marker / px - 1,
             "keystone": self.keystone / p.max_keystone - 1,
@@ -209,8 +279,8 @@ class Layout:
         edge = complex(self.ledge_x - p.ledge_reach_mm, self.ledge_z)
         local = (edge - self.pinhole) / self.ahead
         outside = min(
-            max(local.real + p.lens_height_mm, local.imag - p.module_height_mm / 2),
-            max(local.real, local.imag - p.lens_diameter_mm / 2),
+            max(local.real + self.face, local.imag - p.module_height_mm / 2),
+            max(local.real + self.front, local.imag - p.lens_diameter_mm / 2),
         )
         under = [min((c - edge).real, (c - edge).imag + p.clearance_mm) for c in self.corners]
         return max(p.clearance_mm - outside, *under)

@@ -86,11 +86,74 @@ def test_led_count(length_mm: float, pitch_mm: float, most: int, expected: int) 
 
 
 def test_camera_figures_by_hand() -> None:
+    """A lens focused on s has its image at v, and 3.6288 mm of sensor are 640 px."""
     d = mini20()
-    assert d["view.focal_px"] == pytest.approx(3.6 / (3.6288 / 640))
-    assert d["view.across_fov_deg"] == pytest.approx(53.5, abs=0.05)
-    assert d["view.along_fov_deg"] == pytest.approx(41.41, abs=0.05)
+    image_mm = 1 / (1 / 3.6 - 1 / d["view.focus_mm"])
+    assert d["view.image_distance_mm"] == pytest.approx(image_mm, rel=1e-12)
+    assert d["view.focal_px"] == pytest.approx(image_mm / 3.6288 * 640)
+    assert d["view.across_fov_deg"] == pytest.approx(fov_deg(3.6288, image_mm))
+    assert d["view.along_fov_deg"] == pytest.approx(fov_deg(2.7216, image_mm))
     assert d["view.aperture_mm"] == pytest.approx(3.6 / 2.9)
+    # At infinity the sheet has 53.5 x 41.4 degrees; here the view is narrower by a tenth.
+    assert fov_deg(3.6288, 3.6) == pytest.approx(53.5, abs=0.05)
+    assert 1.11 < fov_deg(3.6288, 3.6) / d["view.across_fov_deg"] < 1.15
+
+
+def fov_deg(side_mm: float, image_mm: float) -> float:
+    return 2 * math.degrees(math.atan(side_mm / 2 / image_mm))
+
+
+INSIDE = {
+    "camera.focusing": "internal",
+    "camera.horizontal_fov_deg": 50.0,
+    "camera.field_of_view_at_mm": 30.0,
+}
+
+
+def test_a_lens_that_focuses_inside_has_the_scale_of_its_sheet_and_stays_in_place() -> None:
+    d = mini20(INSIDE)
+    assert d["view.across_fov_deg"] == pytest.approx(50.0)
+    assert d["view.focal_px"] == pytest.approx(320 / math.tan(math.radians(25)))
+    assert d["view.lens_extension_mm"] == d["view.lens_travel_mm"] == 0
+    assert d["camera_pose.face_mm"] == d["camera.lens_height_mm"]
+
+
+def test_a_fixed_lens_is_sharp_where_it_was_made_to_be() -> None:
+    """Its blur at the two edges is no longer equal, and its sensor stays at the sheet's place."""
+    fixed = {"camera.focusing": "fixed", "camera.focus_distance_mm": 40.0}
+    d = mini20({**fixed, "design.optics.blur_per_diameter": 1.0})
+    assert d["view.focus_mm"] == 40.0
+    assert d["view.image_distance_mm"] == pytest.approx(3.6 * 40 / 36.4)
+    assert d["view.lens_travel_mm"] == 0
+    for edge in ("near", "far"):
+        away = max(abs(d[f"view.{edge}_{fan}_mm"] - 40.0) for fan in ("sagittal", "tangential"))
+        assert d[f"view.{edge}_blur_mm"] == pytest.approx(3.6 / 2.9 * away / 40)
+
+
+def test_the_field_of_view_of_a_sheet_may_hold_for_a_distance() -> None:
+    """The same lens, measured at infinity and at 100 mm: 1/f = 1/100 + 1/v."""
+    near = 1 / (1 / 3.6 - 1 / 100)
+    sheets = [
+        {"camera.horizontal_fov_deg": fov_deg(3.5, 3.6)},
+        {
+            "camera.horizontal_fov_deg": fov_deg(3.5, near),
+            "camera.field_of_view_at_mm": 100.0,
+        },
+    ]
+    first, second = (mini20(changes) for changes in sheets)
+    assert first["view.sensor_across_mm"] == pytest.approx(3.5)
+    assert second["view.sensor_across_mm"] == pytest.approx(3.5)
+    assert second["view.across_fov_deg"] == pytest.approx(first["view.across_fov_deg"])
+
+
+def test_the_lens_moves_out_with_its_pupil_and_its_front() -> None:
+    """The pupil 0.5 mm behind the front: the camera stands back by what lies before the pupil."""
+    front, behind = mini20(), mini20({"camera.entrance_pupil_mm": 1.0})
+    for d, pupil in ((front, 1.5), (behind, 1.0)):
+        assert d["camera_pose.face_mm"] == pytest.approx(pupil + d["view.lens_extension_mm"])
+        assert d["camera_pose.lens_front_mm"] == pytest.approx(1.5 - pupil)
+    barrel = behind["camera_pose.face_mm"] + behind["camera_pose.lens_front_mm"]
+    assert barrel == pytest.approx(1.5 + behind["view.lens_extension_mm"])
 
 
 @pytest.mark.parametrize("name", DESIGN_NAMES)
@@ -136,14 +199,16 @@ def test_the_whole_gel_is_in_the_image_its_near_edge_on_top(name: str) -> None:
     # -y, where the red LEDs are, is on the left.
     left, right = camera.project([(0, -y, 0), (0, y, 0)])
     assert left[0] < right[0]
-    ends = camera.apparent_distance_mm([(-x, 0, 0), (x, 0, 0)])
-    expected = [d["view.near_distance_mm"], d["view.far_distance_mm"]]
-    assert ends == pytest.approx(expected, rel=1e-9)
+    for edge, end in (("near", -x), ("far", x)):
+        seen = camera.apparent_distances_mm([(end, 0, 0), (end, y, 0), (end, -y, 0)])
+        assert seen[0, 0] == pytest.approx(d[f"view.{edge}_distance_mm"], rel=1e-9)
+        assert seen.max() == pytest.approx(d[f"view.{edge}_sagittal_mm"], rel=1e-9)
+        assert seen.min() == pytest.approx(d[f"view.{edge}_tangential_mm"], rel=1e-9)
 
 
-def test_best_focus_blurs_both_edges_alike_in_the_image() -> None:
+def test_best_focus_blurs_the_nearest_and_the_farthest_image_alike() -> None:
     d = mini20()
-    s, near, far = (d[f"view.{k}_mm"] for k in ("focus", "near_distance", "far_distance"))
+    s, near, far = (d[f"view.{k}_mm"] for k in ("focus", "near_tangential", "far_sagittal"))
     assert abs(near - s) / near == pytest.approx(abs(far - s) / far)
     f = d["camera.focal_length_mm"]
     # Thin lens 1/f = 1/s + 1/v; the extension is v - f.

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from plane_geometry import Layout, Problem
 
 from gelslim_cad.dimensions.fold import Fold, fold
-from gelslim_cad.dimensions.fold_grids import COARSE, LOWER, SHRINK, UPPER, Best, best_candidates
+from gelslim_cad.dimensions.fold_grids import (
+    COARSE,
+    LEVELS,
+    LOWER,
+    UPPER,
+    Best,
+    best_candidates,
+)
+from gelslim_cad.dimensions.fold_mirror import FLATTEST_RAD, STEEPEST_RAD
 from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 COUNT = 400
@@ -20,10 +29,14 @@ SPANS = {
     "gel_index": (1.35, 1.6),
     "guide_thickness_mm": (1.0, 6.0),
     "guide_index": (1.4, 1.7),
-    "half_horizontal_tan": (0.3, 1.2),
-    "half_vertical_tan": (0.25, 0.9),
-    "focal_length_mm": (1.5, 40.0),
-    "focal_px": (400.0, 1500.0),
+    "half_across_mm": (0.8, 3.0),
+    "half_along_mm": (0.7, 2.2),
+    "pixel_pitch_mm": (0.002, 0.008),
+    "focal_length_mm": (1.5, 4.0),
+    "fixed_focus_mm": (15.0, 60.0),
+    "fixed_image_mm": (2.0, 5.0),
+    "moving_lens": (0.0, 1.0),
+    "entrance_pupil_mm": (-1.0, 0.5),
     "aperture_mm": (0.3, 2.0),
     "lens_travel_mm": (0.0, 0.6),
     "focus_nearest_mm": (5.0, 80.0),
@@ -49,17 +62,36 @@ def candidates() -> tuple[Fold, list[Layout]]:
     """Random candidates of random designs: our layouts, and the same by plane geometry."""
     rng = np.random.default_rng(31)
     columns = {name: rng.uniform(*span, (COUNT, 1, 1)) for name, span in SPANS.items()}
+    columns["moving_lens"] = np.round(columns["moving_lens"])
+    for name in ("fixed_focus_mm", "fixed_image_mm"):
+        columns[name] = np.where(rng.random((COUNT, 1, 1)) < 0.7, 0.0, columns[name])
     assert set(columns) == {f.name for f in fields(FoldProblem)}
     problem = FoldProblem(**columns)
-    axes = rng.uniform(LOWER, UPPER, (COUNT, 3))
-    ours = fold(problem, *(axis[:, None, None] for axis in axes.T))
-    return ours, [Layout(Problem(problem, i), *axes[i]) for i in range(COUNT)]
+    lower, upper = (*LOWER[:2], FLATTEST_RAD), (*UPPER[:2], STEEPEST_RAD)
+    mid, spread, mirror = rng.uniform(lower, upper, (COUNT, 3)).T[:, :, None, None]
+    ours = fold(problem, mid, spread, mirror)
+    rays = np.column_stack([np.ravel(ours.near_ray_rad), np.ravel(ours.far_ray_rad)])
+    np.testing.assert_allclose(rays.mean(axis=1), np.ravel(mid), rtol=1e-12)
+    given = zip(rays, np.ravel(mirror), np.ravel(ours.tilt_rad), strict=True)
+    return ours, [Layout(Problem(problem, i), *values) for i, values in enumerate(given)]
+
+
+def test_the_axis_is_tilted_as_little_as_the_field_of_view_lets_it(
+    candidates: tuple[Fold, list[Layout]],
+) -> None:
+    ours, layouts = candidates
+    expected = [layout.least_tilt_rad() for layout in layouts]
+    np.testing.assert_allclose(np.ravel(ours.tilt_rad), expected, atol=2e-6)
+    assert 0.2 < np.mean(np.ravel(ours.tilt_rad) == 0) < 0.8
 
 
 LENGTHS = {
     "near_ray_rad": lambda v: v.near_rad,
     "far_ray_rad": lambda v: v.far_rad,
     "tilt_rad": lambda v: v.tilt,
+    "focus_mm": lambda v: v.focus_mm(v.spans_mm),
+    "image_distance_mm": lambda v: v.image_mm(v.spans_mm),
+    "lens_extension_mm": lambda v: v.extension_mm,
     "air_height_mm": lambda v: v.air,
     "virtual_x_mm": lambda v: v.virtual.real,
     "virtual_z_mm": lambda v: v.virtual.imag,
@@ -79,8 +111,13 @@ LENGTHS = {
     "camera_front_x_mm": lambda v: max(c.real for c in v.corners),
     "camera_rear_x_mm": lambda v: min(c.real for c in v.corners),
     "ledge_edge_x_mm": lambda v: v.ledge_x,
-    "near_distance_mm": lambda v: v.apparent_mm[0],
-    "far_distance_mm": lambda v: v.apparent_mm[1],
+    "near_distance_mm": lambda v: v.images_mm[0][0],
+    "far_distance_mm": lambda v: v.images_mm[1][0],
+    "near_tangential_mm": lambda v: v.spans_mm[0][0],
+    "near_sagittal_mm": lambda v: v.spans_mm[0][1],
+    "far_tangential_mm": lambda v: v.spans_mm[1][0],
+    "far_sagittal_mm": lambda v: v.spans_mm[1][1],
+    "along_scale": lambda v: min(v.along_scale(v.near_rad), v.along_scale(v.far_rad)),
     "corner_horizontal_tan": lambda v: v.horizontal_tan,
     "corner_vertical_tan": lambda v: v.vertical_tan,
     "mirror_depth_mm": lambda v: v.mirror_depth,
@@ -120,7 +157,7 @@ def test_the_objective_is_that_of_plane_geometry(candidates: tuple[Fold, list[La
 
 def test_grids_shrink_around_the_best_of_each_band() -> None:
     """Designs whose best candidate is known: the search ends there, whichever band holds it."""
-    targets = np.radians([[-11.0, 0.0, 13.0], [20.0, 0.0, 49.0], [57.5, 0.0, 30.0]])
+    targets = np.radians([[-11.0, 0.0, 21.0], [20.0, 0.0, 55.0], [57.5, 0.0, 30.0]])
     targets[:, 1] = 0.26, 0.6, 0.99
     asked: list[np.ndarray] = []
 
@@ -143,8 +180,10 @@ def test_grids_shrink_around_the_best_of_each_band() -> None:
     best = best_candidates(len(targets), nearest)
     np.testing.assert_allclose(np.column_stack(best[:3]), targets, atol=1e-4)
     assert np.all(best.score < 3e-4)
-    assert len(asked) == 27
+    assert len(asked) == LEVELS + 1
     step = (UPPER - LOWER) / (np.array(COARSE) - 1)
     np.testing.assert_allclose(asked[0], [2 * step[0], *(UPPER - LOWER)[1:]])
-    for level, widest in enumerate(asked[1:]):
-        np.testing.assert_allclose(widest, 2 * step * SHRINK**level, rtol=1e-6)
+    # An axis keeps its width while the best lies at its rim.
+    for wide, narrow in pairwise(asked[1:]):
+        assert np.all(narrow <= wide * (1 + 1e-6))
+    assert np.all(asked[-1][1:] < 1e-3 * asked[1][1:])

@@ -14,6 +14,7 @@ from gelslim_cad.dimensions import Dimensions, derive_batch, fold_search, solver
 from gelslim_cad.dimensions import view as view_module
 from gelslim_cad.dimensions.fold import INFEASIBLE_MM, Fold, fold
 from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
+from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
 from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 SPANS = {
@@ -52,7 +53,8 @@ def test_scores_are_those_of_the_reference(problem: FoldProblem) -> None:
     feasible = 0
     for _ in range(40):
         axes = rng.uniform(LOWER, UPPER, (len(problem), 3)).T[:, :, None]
-        expected = np.ravel(fold(problem, *axes[..., None]).objective())
+        mid, spread, turn = axes[..., None]
+        expected = np.ravel(fold(problem, mid, spread, mirror_angle_rad(turn, mid)).objective())
         unbeaten = np.full(len(problem), np.inf)
         found = fold_search.best_of_grids(problem.records(), *axes, unbeaten).score
         np.testing.assert_allclose(found, expected, rtol=1e-10)

@@ -16,6 +16,7 @@ from gelslim_cad.dimensions import Dimensions, derive, derive_batch
 from gelslim_cad.dimensions import view as view_module
 from gelslim_cad.dimensions.fold import fold
 from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
+from gelslim_cad.dimensions.fold_mirror import FLATTEST_RAD, STEEPEST_RAD
 from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 SPREADS: dict[str, tuple[float, float]] = {
@@ -67,7 +68,7 @@ def test_no_global_optimiser_finds_a_thinner_fold(
     best = min(
         differential_evolution(
             score,
-            list(zip(LOWER, UPPER, strict=True)),
+            [*zip(LOWER[:2], UPPER[:2], strict=True), (FLATTEST_RAD, STEEPEST_RAD)],
             seed=seed,
             popsize=30,
             maxiter=150,

@@ -41,10 +41,10 @@ def test_a_hair_beyond_the_border_the_rule_breaks(
 
 def test_a_border_of_the_spec_itself_says_why() -> None:
     path = "design.markers.diameter_mm"
-    found = border(mini20(), {path: 0.5}, path, 1.3)
+    found = border(mini20(), {path: 0.56}, path, 1.3)
     assert found is not None
     assert found.stops
-    assert border(mini20(), {path: 0.5}, path, 0.55) is None
+    assert border(mini20(), {path: 0.6}, path, 0.56) is None
 
 
 @pytest.mark.slow

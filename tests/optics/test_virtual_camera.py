@@ -109,25 +109,59 @@ def test_apparent_distance_is_exact_for_rays_near_the_normal() -> None:
     window, gel = pose["layers"]
     seen = camera.air_height_mm + window.thickness_mm / window.index + gel.thickness_mm / gel.index
     under = np.array([*camera.position_mm[:2], 0.0])
-    assert camera.apparent_distance_mm(under)[0] == pytest.approx(seen, rel=1e-12)
+    assert camera.apparent_distances_mm(under) == pytest.approx(np.array([[seen, seen]]), rel=1e-12)
     # The transverse scale f/Z there is that of an object at the apparent distance.
     scale = np.linalg.norm(camera.jacobian(under[None])[0, :, 0])
     assert scale == pytest.approx(camera.focal_px / seen, rel=1e-7)
     # A point inside the gel looks nearer by its depth over the index.
     deeper = under - [0, 0, 0.3 * gel.thickness_mm]
-    assert camera.apparent_distance_mm(deeper)[0] == pytest.approx(
+    assert camera.apparent_distances_mm(deeper)[0, 0] == pytest.approx(
         seen - 0.3 * gel.thickness_mm / gel.index, rel=1e-12
     )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_images_are_where_neighbouring_rays_meet(seed: int) -> None:
+    """Rays from a point of the gel, traced into the air by Snell's law and carried back."""
+    camera = VirtualCamera.from_fold(**random_pose(np.random.default_rng(seed)))
+    point = np.array([6.0, -3.0, -0.4])
+    seen = camera.apparent_distances_mm(point)[0]
+    direction = -camera.air_directions(point[None])[0]
+    radial = direction[:2] / np.linalg.norm(direction[:2])
+    sine, turn = np.linalg.norm(direction[:2]), np.arctan2(radial[1], radial[0])
+    heights = camera.stack.crossed_mm(point[None, 2])
+
+    def ray(sine: float, turn: float) -> tuple[np.ndarray, np.ndarray]:
+        """A point of the ray in air, at the camera's height, and its direction."""
+        reach = sum(
+            float(h[0]) * sine / n / np.sqrt(1 - (sine / n) ** 2)
+            for h, n in zip(heights, camera.stack.indices, strict=True)
+        )
+        flat = np.array([np.cos(turn), np.sin(turn)])
+        end = np.append(point[:2] + reach * flat, camera.position_mm[2])
+        return end, np.append(sine * flat, -np.sqrt(1 - sine**2))
+
+    start, along = ray(sine, turn)
+    assert start == pytest.approx(camera.position_mm, abs=1e-9)
+    step = 1e-5
+    for expected, other in zip(seen, (ray(sine, turn + step), ray(sine + step, turn)), strict=True):
+        # Least squares over both lines' parameters; neighbouring rays miss each other by little.
+        pair = np.column_stack([along, -other[1]])
+        back = np.linalg.lstsq(pair, other[0] - start, rcond=None)[0][0]
+        image = start + back * along
+        assert (image - camera.position_mm) @ camera.forward == pytest.approx(expected, rel=2e-3)
 
 
 def test_blur_vanishes_at_the_focus_and_grows_to_both_sides() -> None:
     camera = VirtualCamera.from_fold(**random_pose(np.random.default_rng(8)))
     points = np.column_stack([np.linspace(-8, 8, 9), np.zeros(9), np.zeros(9)])
-    distance = camera.apparent_distance_mm(points)
-    assert camera.blur_on_gel_mm(points, 1.24, distance[4])[4] == pytest.approx(0, abs=1e-12)
-    blur = camera.blur_on_gel_mm(points, 1.24, distance[4])
-    # Similar triangles: the cone from the aperture to its apex in focus, carried on.
-    np.testing.assert_allclose(blur, 1.24 * np.abs(distance / distance[4] - 1), atol=1e-12)
+    distance = camera.apparent_distances_mm(points)
+    focus = distance[4].mean()
+    blur = camera.blur_on_gel_mm(points, 1.24, focus)
+    # Similar triangles: the cones from the aperture to their apexes in focus, carried on.
+    ellipse = 1.24 * np.abs(distance / focus - 1)
+    np.testing.assert_allclose(blur, np.hypot(*ellipse.T) / np.sqrt(2), atol=1e-12)
+    assert blur[4] < 0.1 * min(blur[0], blur[8])
     assert blur[0] > blur[2] > 0
     assert blur[8] > blur[6] > 0
 

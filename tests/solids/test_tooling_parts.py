@@ -170,9 +170,10 @@ def test_jig_holds_module_and_card_at_the_focus(lens: float) -> None:
     d = gelslim2(camera__lens_diameter_mm=lens, camera__lens_height_mm=2.5)
     plan, solid = plan_jig(d), focus_jig(d).solid
     assert plan.lips == (lens == 5.0)
-    axis, proud, depth = plan.axis_z, 2.5, 4.0
-    module = cq.Solid.makeBox(depth, 8.5, 8.5, cq.Vector(-proud - depth, -4.25, axis - 4.25))
-    barrel = cq.Solid.makeCylinder(lens / 2, proud, cq.Vector(-proud, 0, axis), cq.Vector(1, 0, 0))
+    # The entrance pupil is in the front of the lens, which is unscrewed from its 2.5 mm.
+    axis, face, depth = plan.axis_z, 2.5 + d["view.lens_extension_mm"], 4.0
+    module = cq.Solid.makeBox(depth, 8.5, 8.5, cq.Vector(-face - depth, -4.25, axis - 4.25))
+    barrel = cq.Solid.makeCylinder(lens / 2, face, cq.Vector(-face, 0, axis), cq.Vector(1, 0, 0))
     width, height = plan.card_mm
     card = cq.Solid.makeBox(1.0, width, height, cq.Vector(d["view.focus_mm"], -width / 2, 4.0))
     for thing in (module, barrel, card):

@@ -5,7 +5,7 @@
       slot   | |__| |                 | || |           module drops in from above and rests
              | | m  | (lens)- - - - - | || |           against the rear wall;
              | |____|_|               | || |           the card drops into its slot
-             |________|_______________|_||_|           x = 0: pinhole (front of the lens)
+             |________|_______________|_||_|           x = 0: entrance pupil of the lens
              '-----------------------------'           card's front face: x = view.focus_mm
 
 Everything is an upright wall open at the top, so it prints without support and the lens can be
@@ -36,7 +36,7 @@ JIG = (0.25, 0.38, 0.52, 1.0)
 
 @dataclass(frozen=True)
 class JigPlan:
-    """Sizes of the jig in its own frame: pinhole at x = 0, base at z = 0 (mm)."""
+    """Sizes of the jig in its own frame: entrance pupil at x = 0, base at z = 0 (mm)."""
 
     focus: float
     axis_z: float
@@ -70,7 +70,7 @@ def plan_jig(d: Dimensions) -> JigPlan:
     fit = float(d["design.housing.fit_clearance_mm"])
     width, height = d["camera.module_width_mm"], d["camera.module_height_mm"]
     depth = d["camera.module_depth_mm"]
-    lens, proud = float(d["camera.lens_diameter_mm"]), float(d["camera.lens_height_mm"])
+    lens, face = float(d["camera.lens_diameter_mm"]), float(d["camera_pose.face_mm"])
     focus = float(d["view.focus_mm"])
     tangent = [
         math.tan(math.radians(angle_deg) / 2)
@@ -81,7 +81,7 @@ def plan_jig(d: Dimensions) -> JigPlan:
         for t, most in zip(tangent, WINDOW_MOST_MM, strict=True)
     )
     around_lens = lens / 2 + fit + 0.5
-    lip_front = -proud + fit + LIP_MM
+    lip_front = -face + fit + LIP_MM
     # Lips in front of the housing, if it is wider than the lens and the camera does not see them.
     lips = (
         width / 2 - around_lens >= LEAST_GRIP_MM
@@ -92,9 +92,9 @@ def plan_jig(d: Dimensions) -> JigPlan:
     return JigPlan(
         focus=focus,
         axis_z=axis,
-        seat_x=-(proud + depth),
-        pocket_front_x=-proud + fit if lips else -proud,
-        holder_front_x=lip_front if lips else -proud,
+        seat_x=-(face + depth),
+        pocket_front_x=-face + fit if lips else -face,
+        holder_front_x=lip_front if lips else -face,
         pocket_half=width / 2 + fit,
         lens_half=around_lens,
         lens_bottom_z=axis - around_lens,

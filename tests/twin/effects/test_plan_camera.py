@@ -108,8 +108,8 @@ def test_figures_agree_with_the_generators_own(record):
     spec = read_spec(ROOT / "designs" / "gelslim2.yaml").spec
     d = derive(spec)
     found = sensor(dict(camera_record(d)), side=28.0)
-    assert found.near_mm == pytest.approx(d["view.near_distance_mm"], rel=5e-3)
-    assert found.far_mm == pytest.approx(d["view.far_distance_mm"], rel=5e-3)
+    assert found.near_mm == pytest.approx(d["view.near_tangential_mm"], rel=5e-3)
+    assert found.far_mm == pytest.approx(d["view.far_sagittal_mm"], rel=5e-3)
 
 
 def test_the_look_carries_the_scenes_parameters(tmp_path, record):

@@ -172,7 +172,7 @@ def test_blurring_dots_alone_is_blurring_the_whole_picture():
 def test_defocus_grows_away_from_the_focus_as_the_camera_says():
     x = np.linspace(-9, 9, 7)
     places = np.column_stack([x, np.full(7, 2.3), np.zeros(7)])
-    focus = float(CAMERA.apparent_distance_mm(places[3:4])[0])
+    focus = float(CAMERA.apparent_distances_mm(places[3:4]).mean())
     lens = Defocus(1.24, focus)
     field = BlurField.of(CAMERA, 1.24, focus, (22.0, 21.0))
     exact = blur_map(CAMERA, x, [2.3], 1.24, focus)[0] * 20 / 4
