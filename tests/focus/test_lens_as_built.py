@@ -1,0 +1,139 @@
+"""A finger whose lens is where the build guide puts it, seen through an independent thin lens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import root
+from thin_lens import ThinLens
+
+import gelslim
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.spec.reader import read_spec
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.camera_deviation import PARAMETERS
+from gelslim_force.calibration.design import bundle_grid
+from gelslim_force.calibration.sensor_calibration import Calibration
+from ifem_export.bundle.bundle import Bundle
+
+DESIGNS = Path(__file__).parents[2] / "designs"
+NAMES = sorted(path.stem for path in DESIGNS.glob("*.yaml"))
+
+
+def design(name: str) -> Dimensions:
+    return derive(read_spec(DESIGNS / f"{name}.yaml").spec)
+
+
+def calibrated(bundle: Bundle, lens: ThinLens, samples: int) -> Calibration:
+    grid = bundle_grid(bundle)
+    bright = lens.picture(grid.positions_mm[:, :2], grid.diameter_mm, samples)
+    return calibrate(bundle, np.round(60 + 150 * bright).astype(np.uint8))
+
+
+def bundle_of(name: str) -> Bundle:
+    return gelslim.make_bundle(DESIGNS / f"{name}.yaml", measure=False).bundle
+
+
+def seen_by_calibration(bundle: Bundle, lens: ThinLens, samples: int) -> None:
+    """The scale of the picture is the design's, and so is the focal length as far as it is known.
+
+    One picture tells focal length, distance and principal point apart to a quarter of a per cent
+    at best; the scale, which all of them share, is known ten times better.
+    """
+    found = calibrated(bundle, lens, samples)
+    assert len(found.missing) == 0
+    assert found.deviation is not None
+    focal = PARAMETERS.index("focal_percent")
+    assert abs(found.deviation.scale_percent) < 0.2
+    assert abs(found.deviation.values[focal]) < max(0.3, 3 * found.deviation.sigma[focal])
+
+
+def seen_at(lens: ThinLens, point_mm: tuple[float, float], guess_px: NDArray) -> NDArray:
+    """The pixel whose ray through the middle of the lens meets the gel at a point."""
+
+    def off(pixel: NDArray) -> NDArray:
+        return lens.on_gel(pixel[None], np.zeros((1, 2)))[0] - point_mm
+
+    found = root(off, guess_px, method="lm", tol=1e-12)
+    assert np.abs(found.fun).max() < 1e-9
+    return np.asarray(found.x)
+
+
+def corners_are_where_the_rule_has_them(d: Dimensions) -> None:
+    lens = ThinLens.as_built(d, extension_mm=d["view.lens_extension_mm"])
+    x, y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
+    size = np.array(lens.size_px)
+    off = [
+        np.abs(seen_at(lens, (sx * x, sy * y), (size - 1) / 2) - (size - 1) / 2)
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
+    expected = np.array([d["view.across_use"], d["view.along_use"]]) * size / 2
+    corners = np.max(off, axis=0)
+    assert corners[0] == pytest.approx(expected[0], abs=0.1)
+    # Along the finger the middle of an edge may reach farther than its corners.
+    edges = [seen_at(lens, (sx * x, 0.0), (size - 1) / 2)[1] for sx in (-1, 1)]
+    along = max(corners[1], *np.abs(np.array(edges) - (size[1] - 1) / 2))
+    assert along == pytest.approx(expected[1], abs=0.1)
+
+
+def is_blurred_as_the_rule_says(d: Dimensions) -> None:
+    """The largest blur at the near and at the far edge, their middles and corners."""
+    lens = ThinLens.as_built(d, extension_mm=d["view.lens_extension_mm"])
+    x, y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
+    near, far = (
+        max(blur_px(lens, (end, 0.0)), blur_px(lens, (end, y)), blur_px(lens, (end, -y)))
+        for end in (-x, x)
+    )
+    assert max(near, far) == pytest.approx(d["view.image_blur_px"], rel=0.05)
+    # At best focus the nearest and the farthest image are blurred alike.
+    assert near == pytest.approx(far, rel=0.05)
+
+
+def blur_px(lens: ThinLens, point_mm: tuple[float, float]) -> float:
+    """Longest diameter of a point's image, by rays through the rim of the lens."""
+    pixel = seen_at(lens, point_mm, (np.array(lens.size_px) - 1) / 2)
+    turn = np.linspace(0, 2 * np.pi, 72, endpoint=False)
+    rim = np.column_stack([np.cos(turn), np.sin(turn)])
+    around_mm = lens.on_gel(np.broadcast_to(pixel, rim.shape), rim) - point_mm
+    steps_px = [
+        seen_at(lens, (point_mm[0] + dx, point_mm[1] + dy), pixel)
+        - seen_at(lens, (point_mm[0] - dx, point_mm[1] - dy), pixel)
+        for dx, dy in ((0.05, 0.0), (0.0, 0.05))
+    ]
+    around_px = around_mm @ np.array(steps_px) / 0.1
+    return float(np.ptp(around_px @ rim.T, axis=0).max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_corners_of_the_gel_are_where_the_rule_has_them(name: str) -> None:
+    """Coverage by the rule and by the traced lens, to a tenth of a pixel."""
+    corners_are_where_the_rule_has_them(design(name))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_blur_in_the_picture_is_that_of_the_rule(name: str) -> None:
+    is_blurred_as_the_rule_says(design(name))
+
+
+def test_a_picture_of_a_finger_built_to_the_letter_calibrates() -> None:
+    """`view.focal_px` was once f / pitch, and the finger of the build guide was refused."""
+    seen_by_calibration(bundle_of("mini20"), ThinLens.as_built(design("mini20")), samples=24)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_every_design_built_to_the_letter_calibrates(name: str) -> None:
+    seen_by_calibration(bundle_of(name), ThinLens.as_built(design(name)), samples=64)
+
+
+def test_a_lens_left_at_infinity_is_refused() -> None:
+    """Its picture is larger by a tenth, far out of what a built camera may deviate."""
+    from gelslim_force.calibration.error import CalibrationError
+
+    lens = ThinLens.as_built(design("gelslim2"), extension_mm=1e-3)
+    with pytest.raises(CalibrationError):
+        calibrated(bundle_of("gelslim2"), lens, samples=2)

@@ -1,0 +1,140 @@
+"""A thin lens of finite aperture, built as BUILD.md says, traced from the sensor to the gel.
+
+It shares no formula with the product: the lens maps a point of the sensor to its conjugate point
+(1/f = 1/s + 1/v), the mirror and the layers act on single rays by the vector laws of reflection and
+refraction. The camera and the mirror stand where the parts put them, and the lens is turned until
+the target of the build guide is sharp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gelslim_cad.dimensions import Dimensions
+
+Array = NDArray[np.float64]
+GOLDEN = 2.399963229728653
+
+
+@dataclass(frozen=True)
+class ThinLens:
+    """Lens, sensor, mirror and layers of a finger; mm, sensor frame."""
+
+    centre: Array
+    forward: Array
+    right: Array
+    down: Array
+    focal_mm: float
+    sensor_mm: float
+    """Distance of the sensor behind the lens."""
+    aperture_mm: float
+    pitch_mm: float
+    size_px: tuple[int, int]
+    mirror_point: Array
+    mirror_normal: Array
+    layers: tuple[tuple[float, float], ...]
+    """Lower face and refractive index of each layer, the one next to the camera first."""
+
+    @classmethod
+    def as_built(cls, d: Dimensions, extension_mm: float | None = None) -> ThinLens:
+        """The lens of a finger, focused on the target of the build guide, or moved out so far.
+
+        The guide prints the target's distance from the front of the lens to 0.01 mm.
+        """
+        f = d["camera.focal_length_mm"]
+        if extension_mm is None:
+            front_mm = d["camera_pose.lens_front_mm"]
+            target_mm = round(d["view.focus_mm"] - front_mm, 2) + front_mm
+            extension_mm = f * target_mm / (target_mm - f) - f
+        pitch, angle = (np.radians(d[n]) for n in ("camera_pose.pitch_deg", "mirror.angle_deg"))
+        gel = d["stack.gel_total_mm"]
+        acrylic = d["design.light_guide.thickness_mm"]
+        return cls(
+            centre=np.array([d["camera_pose.x_mm"], 0.0, d["camera_pose.z_mm"]]),
+            forward=np.array([np.cos(pitch), 0.0, -np.sin(pitch)]),
+            right=np.array([0.0, 1.0, 0.0]),
+            down=np.array([np.sin(pitch), 0.0, np.cos(pitch)]),
+            focal_mm=f,
+            sensor_mm=f + extension_mm,
+            aperture_mm=f / d["camera.f_number"],
+            pitch_mm=d["camera.sensor_width_mm"] / d["camera.image_width_px"],
+            size_px=(d["camera.image_width_px"], d["camera.image_height_px"]),
+            mirror_point=np.array([d["mirror.lower_x_mm"], 0.0, d["mirror.lower_z_mm"]]),
+            mirror_normal=np.array([-np.sin(angle), 0.0, np.cos(angle)]),
+            layers=(
+                (-(acrylic + gel), d["material.acrylic.refractive_index"]),
+                (-gel, d["material.gel.refractive_index"]),
+            ),
+        )
+
+    def on_gel(self, pixels: ArrayLike, in_pupil: ArrayLike) -> Array:
+        """Where (x, y) rays (n, 2) from pixels, through points of the unit pupil, meet the gel."""
+        uv, pupil = np.asarray(pixels, float), np.asarray(in_pupil, float)
+        middle = (np.asarray(self.size_px) - 1) / 2
+        across, along = ((uv - middle) * self.pitch_mm).T[:, :, None]
+        chief = self.forward * self.sensor_mm + self.right * across + self.down * along
+        distance = self.focal_mm * self.sensor_mm / (self.sensor_mm - self.focal_mm)
+        shift = (self.right * pupil[:, :1] + self.down * pupil[:, 1:]) * self.aperture_mm / 2
+        start = self.centre + shift
+        ray = chief * (distance / self.sensor_mm) - shift
+        ray = ray / np.linalg.norm(ray, axis=1)[:, None]
+        start, ray = self._reflected(start, ray)
+        before = 1.0
+        for lower_z, index in self.layers:
+            start = start + ray * ((lower_z - start[:, 2]) / ray[:, 2])[:, None]
+            ray = _refracted(ray, before / index)
+            before = index
+        end = start + ray * (-start[:, 2] / ray[:, 2])[:, None]
+        return np.asarray(end[:, :2])
+
+    def _reflected(self, start: Array, ray: Array) -> tuple[Array, Array]:
+        away = (self.mirror_point - start) @ self.mirror_normal / (ray @ self.mirror_normal)
+        met = start + ray * away[:, None]
+        return met, ray - 2 * np.outer(ray @ self.mirror_normal, self.mirror_normal)
+
+    def picture(self, dots_mm: ArrayLike, diameter_mm: ArrayLike, samples: int = 32) -> Array:
+        """Picture (h, w) from 0 to 1 of dark dots (k, 2), diameters (k,), on a bright gel.
+
+        Of each pixel an even number of `samples` is traced.
+        """
+        dots = _Dots(np.asarray(dots_mm, float), np.asarray(diameter_mm, float))
+        width, height = self.size_px
+        u, v = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
+        pixels = np.column_stack([u.ravel(), v.ravel()])
+        total = np.zeros(len(pixels))
+        for k in range(samples // 2):
+            radius, turn = np.sqrt((k + 0.5) / (samples // 2)), GOLDEN * k
+            in_pupil = radius * np.array([np.cos(turn), np.sin(turn)])
+            in_pixel = np.array([(0.5 + 0.7548776662 * k) % 1, (0.5 + 0.5698402910 * k) % 1]) - 0.5
+            # In opposite pairs, so that the mean ray goes through the middle of lens and pixel.
+            for sign in (1.0, -1.0):
+                pupil = np.broadcast_to(sign * in_pupil, pixels.shape)
+                total += dots.covers(self.on_gel(pixels + sign * in_pixel, pupil))
+        return np.asarray(1 - total.reshape(height, width) / samples)
+
+
+def _refracted(ray: Array, ratio: float) -> Array:
+    """Rays (n, 3) after a horizontal face, the ratio of the indices before and after it."""
+    bent = ray * ratio
+    bent[:, 2] = np.sqrt(1 - bent[:, 0] ** 2 - bent[:, 1] ** 2)
+    return bent
+
+
+class _Dots:
+    """Dots on a regular lattice, some of its sites empty."""
+
+    def __init__(self, dots_mm: Array, diameter_mm: Array) -> None:
+        self.first = dots_mm.min(axis=0)
+        self.pitch = np.diff(np.unique(np.round(dots_mm[:, 0], 6))).min()
+        sites = np.round((dots_mm - self.first) / self.pitch).astype(int) + 1
+        self.radius = np.full(sites.max(axis=0) + 2, -1.0)
+        self.radius[sites[:, 0], sites[:, 1]] = diameter_mm / 2
+
+    def covers(self, points: Array) -> NDArray[np.bool_]:
+        site = np.round((points - self.first) / self.pitch)
+        off = points - self.first - site * self.pitch
+        x, y = np.clip(site.astype(int) + 1, 0, np.array(self.radius.shape) - 1).T
+        return np.asarray(np.hypot(*off.T) <= self.radius[x, y])
