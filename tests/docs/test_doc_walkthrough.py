@@ -20,7 +20,9 @@ from page_text import DOCS, PAGES, ROOT, blocks, commands, named, text_of
 
 from gelslim_cad.spec.reader import read_spec
 
+SHORT_VALIDATE = ROOT / "tests" / "robustness" / "short_validate.py"
 SMALLER = (
+    ("gelslim validate", f"python {SHORT_VALIDATE} validate"),
     ("--count 1000 -j 8", "--count 2"),
     ("--rays 1048576", "--rays 16384"),
     ("--count 100 -j 2", "--count 2"),
