@@ -40,8 +40,8 @@ def bundle_of(name: str) -> Bundle:
 def seen_by_calibration(bundle: Bundle, lens: ThinLens, samples: int) -> None:
     """The scale of the picture is the design's, and so is the focal length as far as it is known.
 
-    One picture tells focal length, distance and principal point apart to a quarter of a per cent
-    at best; the scale, which all of them share, is known ten times better.
+    From one picture the focal length is known to between 0.1 and 1 %, because the distance of the
+    camera has nearly the same effect. The scale, which both set, is known ten times better.
     """
     found = calibrated(bundle, lens, samples)
     assert len(found.missing) == 0

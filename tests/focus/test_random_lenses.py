@@ -1,4 +1,4 @@
-"""Fifty random legal fingers, built to the letter and seen through an independent thin lens.
+"""Fifty random legal fingers, built as their guides say, through an independent thin lens.
 
 Their gels are flat, as the traced lens takes them to be.
 """
@@ -25,6 +25,7 @@ PARTS, PER_PART = 5, 10
 RAYS = 5_000_000
 """Rays of a picture: from 4 per pixel of a large one to 64 of a small one."""
 REFUSED = {"marker.lattice": ("fail", "warn")}
+"""Statuses of a rule with which a spec is left out; of the other rules only a failure."""
 
 
 def legal(seed: int, count: int) -> list[tuple[Sample, Dimensions]]:
