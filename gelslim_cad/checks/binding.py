@@ -12,7 +12,7 @@ from gelslim_cad.checks.relaxation import Relaxation, derive_each, growing_chang
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.spec import Spec
 
-ACTIVE = 0.004
+ACTIVE, ACTIVE_MM = 0.004, 0.02
 LEAST_SAVING_MM = 0.05
 SENTENCES_AT_MOST = 6
 
@@ -34,7 +34,17 @@ LIMITS = {
     "camera clear of mirror": "the gap between camera and mirror",
     "mirror before camera": "the gap between camera and mirror",
     "camera clear of ledge": "the ledge above the camera",
+    "length": "the length that design.envelope.max_length_mm allows",
+    "mirror between baffles": "the mirror between the baffles",
+    "clamp before seat": "the camera clamp before the mirror's seat",
+    "clamp beside channel": "the camera clamp beside the LED channels",
 }
+GOALS = {
+    "shortest": "Camera and mirror are arranged for the shortest finger",
+    "best_picture": "Camera and mirror are arranged for the most pixels across a marker",
+}
+LARGE_CAMERA_MM = 12.0
+"""From this height on a camera is taken for one on a board."""
 
 
 def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
@@ -44,17 +54,21 @@ def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
         return _infeasible(spec, d, steps)
     tried = _try(spec, [(s,) for s in steps])
     thickness = float(d["finger.thickness_mm"])
-    return (
-        _what_binds(d, thickness),
-        *_savings(steps, tried, thickness),
-        *_too_thick(spec, steps, thickness),
-    )
+    goal = GOALS.get(spec.design.envelope.goal)
+    first = _what_binds(d, thickness) if goal is None else f"{goal}: {thickness:.2f} mm thick."
+    savings = _savings(steps, tried, thickness) if goal is None else ()
+    return first, *savings, *_outside(spec, d, steps)
 
 
 def _try(spec: Spec, sets: Sequence[tuple[Relaxation, ...]]) -> tuple[Any, Any]:
-    """Thickness and feasibility of the spec under each set of relaxations, in one batch."""
-    batch = derive_each(spec, [{s.path: s.value for s in chosen} for chosen in sets])
-    return batch["finger.thickness_mm"], batch.feasible()
+    """Thickness of the spec under each set of relaxations, and whether it is short enough."""
+    values = [{s.path: s.value for s in chosen} for chosen in sets]
+    batch = derive_each(spec, values)
+    given = spec.design.envelope.max_length_mm
+    limit = math.inf if given is None else given
+    longest = np.array([v.get("design.envelope.max_length_mm", limit) for v in values])
+    short = batch["finger.length_mm"] <= longest + 1e-9
+    return batch["finger.thickness_mm"], batch.feasible() & short
 
 
 def _what_binds(d: Dimensions, thickness: float) -> str:
@@ -69,8 +83,9 @@ def _what_binds(d: Dimensions, thickness: float) -> str:
         return text + "."
     active = [
         LIMITS[name]
-        for name, value in d.fold.violations.items()
-        if name in LIMITS and float(np.reshape(value, -1)[0]) > -ACTIVE
+        for limits, slack in ((d.fold.violations, ACTIVE), (d.fold.housing, ACTIVE_MM))
+        for name, value in limits.items()
+        if name in LIMITS and float(np.reshape(value, -1)[0]) > -slack
     ]
     if not active:
         return text + "."
@@ -92,15 +107,21 @@ def _savings(
     )
 
 
-def _too_thick(spec: Spec, steps: tuple[Relaxation, ...], thickness: float) -> tuple[str, ...]:
-    limit = spec.design.envelope.max_thickness_mm
-    if limit is None or thickness <= limit + 1e-9:
+def _outside(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
+    """By how much the finger is outside its envelope, and what would make it fit."""
+    envelope = spec.design.envelope
+    over = [
+        f"design.envelope.max_{side}_mm allows {limit:g} mm; {size - limit:.2f} mm must be saved."
+        for side, size, limit in (
+            ("thickness", float(d["finger.thickness_mm"]), envelope.max_thickness_mm),
+            ("length", float(d["finger.length_mm"]), envelope.max_length_mm),
+        )
+        if limit is not None and size > limit + 1e-9
+    ]
+    if not over:
         return ()
-    start = (
-        f"design.envelope.max_thickness_mm allows {limit:g} mm; "
-        f"{thickness - limit:.2f} mm must be saved."
-    )
-    return (start, *_what_fits(spec, steps, limit))
+    thickness = math.inf if envelope.max_thickness_mm is None else envelope.max_thickness_mm
+    return *over, *_what_fits(spec, steps, thickness)
 
 
 def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
@@ -123,6 +144,9 @@ def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tup
 
 def _what_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> tuple[str, ...]:
     """Changes that make the design feasible and thin enough: one step, one field or two steps."""
+    if smaller := _smaller_camera(spec, limit):
+        return (smaller,)
+    steps = tuple(s for s in steps if not s.path.startswith("design.envelope."))
     series = growing_changes(spec)
     sets = [(s,) for s in steps] + [(s,) for changes in series for s in changes]
     fits = _fitting(spec, sets, limit)
@@ -142,6 +166,34 @@ def _what_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> tuple
     return (
         "No one field alone and no two of the usual steps make it fit: use a smaller gel and "
         "a camera with a wider field of view or a smaller aperture, or allow a thicker finger.",
+    )
+
+
+def _smaller_camera(spec: Spec, limit: float) -> str | None:
+    """The largest camera housing with which a finger fits whose camera stands on a large board."""
+    camera = spec.camera
+    if camera.module_height_mm < LARGE_CAMERA_MM:
+        return None
+    least = max(1.0, camera.lens_diameter_mm)
+    sizes = np.arange(math.floor(2 * camera.module_height_mm) / 2 - 0.5, least - 1e-9, -0.5)
+    sets = [
+        tuple(
+            Relaxation(f"camera.module_{side}_mm", min(size, given), "")
+            for side, given in (
+                ("height", camera.module_height_mm),
+                ("width", camera.module_width_mm),
+            )
+        )
+        for size in map(float, sizes)
+    ]
+    fits = _fitting(spec, sets, limit)
+    if not fits:
+        return None
+    (height, width), thickness = next(iter(fits.items()))
+    return (
+        f"A camera whose housing is at most {width.value:g} x {height.value:g} mm would fit: "
+        f"{thickness:.2f} mm. Take the bare module, or a version on a flex cable, in place of one "
+        f"on a board of {camera.module_width_mm:g} x {camera.module_height_mm:g} mm."
     )
 
 

@@ -55,6 +55,7 @@ def relaxations(spec: Spec) -> tuple[Relaxation, ...]:
             max(0.5, g.gel.thickness_mm - 0.5),
             "a gel 0.5 mm thinner",
         ),
+        *_longer(spec),
         *_thinner_acrylic(spec),
         *_tighter_bend(spec),
         Relaxation(
@@ -98,6 +99,13 @@ def growing_changes(spec: Spec) -> tuple[tuple[Relaxation, ...], ...]:
             [Relaxation("camera.focal_length_mm", v, f"a lens of f = {v:.2g} mm") for v in focal]
         )
     return tuple(_legal(spec, steps) for steps in found)
+
+
+def _longer(spec: Spec) -> Iterable[Relaxation]:
+    longest = spec.design.envelope.max_length_mm
+    if longest is not None:
+        path = "design.envelope.max_length_mm"
+        yield Relaxation(path, min(600.0, longest + 5), "allowing 5 mm more length")
 
 
 def _tighter_bend(spec: Spec) -> Iterable[Relaxation]:

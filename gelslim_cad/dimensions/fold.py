@@ -13,12 +13,20 @@ the other.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from gelslim_cad.dimensions import fold_room as room
 from gelslim_cad.dimensions.fold_camera import Camera, camera, largest, pitch_rad, smallest
-from gelslim_cad.dimensions.fold_focus import Distances, along_scale
+from gelslim_cad.dimensions.fold_focus import Distances, along_scale, distances
+from gelslim_cad.dimensions.fold_goal import besides_depth, beyond_mm, score, tie_mm
+from gelslim_cad.dimensions.fold_housing import (
+    HousingMissed,
+    finger_length_mm,
+    finger_lengths_mm,
+    housing_missed,
+)
 from gelslim_cad.dimensions.fold_mirror import (
     Mirror,
     mirror,
@@ -29,20 +37,33 @@ from gelslim_cad.dimensions.fold_mirror import (
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
 from gelslim_cad.dimensions.fold_sight import (
     Sight,
-    distances,
     field_missed,
     keystone,
+    least_px,
     lens_extension_mm,
+    marker_sides_px,
     picture_missed,
     sight,
 )
-from gelslim_optics.camera.refraction_newton import choose
 
-FEASIBLE = 1e-9
-"""Limits missed by no more than this in all count as kept."""
-INFEASIBLE_MM = 1000.0
-KEYSTONE_WEIGHT_MM = 0.02
-LENGTH_WEIGHT = 0.002
+VIEW_LIMITS = (
+    "field of view along",
+    "field of view across",
+    "blur",
+    "pixels per marker",
+    "keystone",
+    "lens travel",
+    "air gap",
+    "mirror below window",
+    "camera below window",
+    "camera beside view",
+    "camera clear of mirror",
+    "view below ledge",
+    "mirror before camera",
+    "camera clear of ledge",
+)
+"""The limits of the view, in the order of `view_missed`."""
+HOUSING_LIMITS = tuple(name.replace("_", " ") for name in HousingMissed._fields)
 
 
 @dataclass(frozen=True)
@@ -85,31 +106,108 @@ class Fold:
     camera_depth_mm: Array
     depth_mm: Array
     keystone: Array
+    length_mm: Array
+    least_px: Array
     violations: dict[str, Array]
-    """Per constraint, how far it is missed as a part of its scale; <= 0 holds."""
+    """Per limit of the view, how far it is missed as a part of its scale; <= 0 holds."""
+    housing: dict[str, Array]
+    """Per limit of the housing, by how many mm it is missed; <= 0 holds."""
 
     def worst(self) -> Array:
-        """Sum of the missed parts over all constraints; 0 where the candidate is feasible."""
+        """Sum of the missed parts over the limits of the view; 0 where all are kept."""
         total = np.zeros_like(self.depth_mm)
         for value in self.violations.values():
             total = total + np.maximum(value, 0.0)
         return total
 
-    def objective(self) -> Array:
+    def beyond_mm(self) -> Array:
+        """How far the finger is outside what the housing allows; 0 where all limits hold."""
+        return beyond_mm(tuple(self.housing.values()))
+
+    def objective(self, p: FoldProblem) -> Array:
         """What the search makes least."""
-        return score(self.worst(), self.depth_mm, self.keystone, self.camera_rear_x_mm)
+        use = 1 + np.maximum(*(self.violations[name] for name in VIEW_LIMITS[:2]))
+        tie = tie_mm(use, self.keystone)
+        besides = besides_depth(p, self.length_mm, self.least_px, tie)
+        return score(p, self.worst(), self.beyond_mm(), self.depth_mm, besides)
 
 
-def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fold:
+class Layout(NamedTuple):
+    """Camera, mirror and gel of one candidate."""
+
+    sight: Sight
+    distances: Distances
+    mirror: Mirror
+    camera: Camera
+    pitch_rad: Array
+    extension_mm: Array
+    ledge_x_mm: Array
+    mirror_depth_mm: Array
+    camera_depth_mm: Array
+    depth_mm: Array
+
+
+def layout(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Layout:
     """Lay out candidates: mean ray angle, spread as a part of the field of view, mirror angle."""
     s = sight(p, mid_rad, spread)
-    d = distances(p, s)
+    d = distances(p, s.border, np.cos(s.tilt_rad), np.sin(s.tilt_rad))
     m = mirror(p, s, np.cos(mirror_rad), np.sin(mirror_rad))
     pitch = pitch_rad(s, mirror_rad)
     extension = lens_extension_mm(p, d)
-    c = camera(p, *reflected(m, s.virtual_x_mm, s.virtual_z_mm), pitch, extension)
-    bottom = smallest(c.corners_z_mm)
-    mirror_depth, camera_depth = mirror_depth_mm(p, m), camera_depth_mm(p, bottom)
+    x, z = reflected(m, s.virtual_x_mm, s.virtual_z_mm)
+    c = camera(p, x, z, pitch, extension)
+    mirror_depth = mirror_depth_mm(p, m)
+    camera_depth = camera_depth_mm(p, smallest(c.corners_z_mm))
+    return Layout(
+        sight=s,
+        distances=d,
+        mirror=m,
+        camera=c,
+        pitch_rad=pitch,
+        extension_mm=extension,
+        ledge_x_mm=room.ledge_edge_x_mm(p, s),
+        mirror_depth_mm=mirror_depth,
+        camera_depth_mm=camera_depth,
+        depth_mm=depth_mm(p, mirror_depth, camera_depth),
+    )
+
+
+def view_missed(p: FoldProblem, at: Layout) -> tuple[Array, ...]:
+    """How far each of `VIEW_LIMITS` is missed, as a part of its scale; <= 0 holds."""
+    s, m, c = at.sight, at.mirror, at.camera
+    field, picture = field_missed(p, s, at.distances), picture_missed(p, s, at.distances)
+    return (
+        field.field_of_view_along,
+        field.field_of_view_across,
+        picture.blur,
+        picture.pixels_per_marker,
+        picture.keystone,
+        picture.lens_travel,
+        picture.air_gap,
+        room.mirror_below_window(s, m) / room.SCALE_MM,
+        room.camera_below_window(p, c) / room.SCALE_MM,
+        room.camera_beside_view(p, s, c) / room.SCALE_MM,
+        room.camera_clear_of_mirror(p, m, c) / room.SCALE_MM,
+        room.view_below_ledge(p, m, c, at.ledge_x_mm) / room.SCALE_MM,
+        room.mirror_before_camera(p, m, c.x_mm) / room.SCALE_MM,
+        room.camera_clear_of_ledge(p, c, at.ledge_x_mm) / room.SCALE_MM,
+    )
+
+
+def length_mm(p: FoldProblem, at: Layout) -> Array:
+    """Length of the finger."""
+    return finger_length_mm(p, at.mirror, at.camera, at.ledge_x_mm, at.depth_mm)
+
+
+def housing_limits(p: FoldProblem, at: Layout) -> HousingMissed:
+    """By how many mm each of `HOUSING_LIMITS` is missed; <= 0 holds."""
+    return housing_missed(p, at.sight, at.mirror, at.camera, at.ledge_x_mm, at.depth_mm)
+
+
+def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fold:
+    """Candidates with all that is known of them; see `layout`."""
+    at = layout(p, mid_rad, spread, mirror_rad)
+    s, d, m, c = at.sight, at.distances, at.mirror, at.camera
     return Fold(
         near_ray_rad=s.near_ray_rad,
         far_ray_rad=s.far_ray_rad,
@@ -118,7 +216,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         virtual_x_mm=s.virtual_x_mm,
         virtual_z_mm=s.virtual_z_mm,
         mirror_rad=mirror_rad,
-        pitch_rad=pitch,
+        pitch_rad=at.pitch_rad,
         mirror_upper_x_mm=m.upper_x_mm,
         mirror_upper_z_mm=m.upper_z_mm,
         mirror_lower_x_mm=m.lower_x_mm,
@@ -127,10 +225,10 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         camera_x_mm=c.x_mm,
         camera_z_mm=c.z_mm,
         camera_top_z_mm=largest(c.corners_z_mm),
-        camera_bottom_z_mm=bottom,
+        camera_bottom_z_mm=smallest(c.corners_z_mm),
         camera_front_x_mm=largest(c.corners_x_mm),
         camera_rear_x_mm=smallest(c.corners_x_mm),
-        ledge_edge_x_mm=room.ledge_edge_x_mm(p, s),
+        ledge_edge_x_mm=at.ledge_x_mm,
         near_distance_mm=d.near.sagittal_mm,
         far_distance_mm=d.far.sagittal_mm,
         near_tangential_mm=d.near_span_mm[0],
@@ -140,34 +238,18 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         along_scale=np.minimum(along_scale(d.near, d.image_mm), along_scale(d.far, d.image_mm)),
         focus_mm=d.focus_mm,
         image_distance_mm=d.image_mm,
-        lens_extension_mm=extension,
+        lens_extension_mm=at.extension_mm,
         corner_horizontal_tan=s.corner_horizontal_tan,
         corner_vertical_tan=s.corner_vertical_tan,
-        mirror_depth_mm=mirror_depth,
-        camera_depth_mm=camera_depth,
-        depth_mm=depth_mm(p, mirror_depth, camera_depth),
+        mirror_depth_mm=at.mirror_depth_mm,
+        camera_depth_mm=at.camera_depth_mm,
+        depth_mm=at.depth_mm,
         keystone=keystone(d),
-        violations=_violations(p, s, d, m, c),
+        length_mm=length_mm(p, at),
+        least_px=least_px(p, d),
+        violations=dict(zip(VIEW_LIMITS, view_missed(p, at), strict=True)),
+        housing=dict(zip(HOUSING_LIMITS, housing_limits(p, at), strict=True)),
     )
-
-
-def _violations(p: FoldProblem, s: Sight, d: Distances, m: Mirror, c: Camera) -> dict[str, Array]:
-    """How far each limit is missed, by the limit's name in words."""
-    ledge_x = room.ledge_edge_x_mm(p, s)
-    picture = field_missed(p, s, d)._asdict() | picture_missed(p, s, d)._asdict()
-    in_the_way = {
-        "mirror below window": room.mirror_below_window(s, m),
-        "camera below window": room.camera_below_window(p, c),
-        "camera beside view": room.camera_beside_view(p, s, c),
-        "camera clear of mirror": room.camera_clear_of_mirror(p, m, c),
-        "view below ledge": room.view_below_ledge(p, m, c, ledge_x),
-        "mirror before camera": room.mirror_before_camera(p, m, c.x_mm),
-        "camera clear of ledge": room.camera_clear_of_ledge(p, c, ledge_x),
-    }
-    return {
-        **{name.replace("_", " "): missed for name, missed in picture.items()},
-        **{name: missed / room.SCALE_MM for name, missed in in_the_way.items()},
-    }
 
 
 def camera_depth_mm(p: FoldProblem, bottom_z_mm: Array) -> Array:
@@ -180,13 +262,37 @@ def depth_mm(p: FoldProblem, mirror_depth: Array, camera_depth: Array) -> Array:
     return larger(larger(mirror_depth, camera_depth), p.guide_stack_mm)
 
 
-def score(missed: Array, depth: Array, keystone: Array, rear_x_mm: Array) -> Array:
-    """Depth in mm; among equals the smaller keystone, then the shorter finger.
+def measures(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> tuple[Array, ...]:
+    """What the polish follows, in pieces that are smooth.
 
-    Candidates that miss limits rank behind all others, by how far they miss.
+    Depths of the mirror and of three corners of the camera, of which the largest counts; four
+    sizes of a marker, of which the least does; five lengths, of which the largest does; the tie;
+    and how far the limits of view and housing are missed, three parts of the camera for one limit.
     """
-    tie = KEYSTONE_WEIGHT_MM * (keystone - 1) - LENGTH_WEIGHT * rear_x_mm
-    return choose(missed > FEASIBLE, INFEASIBLE_MM * (1 + missed), depth + tie)
+    at = layout(p, mid_rad, spread, mirror_rad)
+    view, housing = view_missed(p, at), housing_limits(p, at)
+    lengths = finger_lengths_mm(p, at.mirror, at.camera, at.ledge_x_mm, at.depth_mm)
+    tie = tie_mm(1 + larger(view[0], view[1]), keystone(at.distances))
+    low = at.camera.corners_z_mm
+    depths = (
+        at.mirror_depth_mm,
+        camera_depth_mm(p, low[1]),
+        camera_depth_mm(p, low[3]),
+        camera_depth_mm(p, low[5]),
+    )
+    pixels = marker_sides_px(p, at.distances)
+    rest = (housing.mirror_between_baffles, housing.clamp_before_seat, housing.clamp_beside_channel)
+    tops = room.camera_parts_below_window(p, at.camera)
+    below = (tops[0] / room.SCALE_MM, tops[1] / room.SCALE_MM, tops[2] / room.SCALE_MM)
+    return depths + pixels + lengths + (tie,) + below + view[:3] + view[4:8] + view[9:] + rest
 
 
-SHARED = (camera_depth_mm, depth_mm, score)
+SHARED = (
+    layout,
+    view_missed,
+    length_mm,
+    housing_limits,
+    camera_depth_mm,
+    depth_mm,
+    measures,
+)

@@ -73,16 +73,16 @@ def lens_front_mm(p: FoldProblem) -> Array:
     return p.lens_height_mm - p.entrance_pupil_mm
 
 
-def largest(values: Corners) -> Array:
-    """The largest of the corners' values."""
+def largest(values: tuple[Array, ...]) -> Array:
+    """The largest of the values."""
     found = values[0]
     for k in range(1, len(values)):
         found = larger(found, values[k])
     return found
 
 
-def smallest(values: Corners) -> Array:
-    """The smallest of the corners' values."""
+def smallest(values: tuple[Array, ...]) -> Array:
+    """The smallest of the values."""
     found = values[0]
     for k in range(1, len(values)):
         found = smaller(found, values[k])

@@ -15,13 +15,13 @@ from gelslim_optics.camera.refraction_newton import choose
 
 
 class SeenPoint(NamedTuple):
-    """A point of the gel: its ray in air, and where it is seen along the ray from the camera."""
+    """A point of the gel: its ray in air, and how deep under the camera its two images are."""
 
     along: Array
     """Slope dx/dz of the ray."""
     cos_ray: Array
-    sagittal_mm: Array
-    tangential_mm: Array
+    sagittal_depth_mm: Array
+    tangential_depth_mm: Array
 
 
 class SeenBorder(NamedTuple):
@@ -92,33 +92,31 @@ def seen_point(p: FoldProblem, along: Array, across: Array | float, air_mm: Arra
     return SeenPoint(
         along=along,
         cos_ray=cos,
-        sagittal_mm=air_mm / cos + guide + gel,
-        tangential_mm=air_mm / cos + (guide / guide_squared + gel / gel_squared) * cos_squared,
+        sagittal_depth_mm=air_mm + (guide + gel) * cos,
+        tangential_depth_mm=(
+            air_mm + (guide / guide_squared + gel / gel_squared) * (cos_squared * cos)
+        ),
     )
 
 
 def _on_axis(point: SeenPoint, cos_tilt: Array, sin_tilt: Array) -> Apparent:
-    """The same images by their distances along an axis of this tilt."""
-    cos_off = (cos_tilt + point.along * sin_tilt) * point.cos_ray
+    """The images of a point by their distances along an axis of this tilt."""
+    per_depth = cos_tilt + point.along * sin_tilt
     return Apparent(
-        sagittal_mm=point.sagittal_mm * cos_off,
-        tangential_mm=point.tangential_mm * cos_off,
+        sagittal_mm=point.sagittal_depth_mm * per_depth,
+        tangential_mm=point.tangential_depth_mm * per_depth,
         cos_ray=point.cos_ray,
-        cos_off_axis=cos_off,
+        cos_off_axis=per_depth * point.cos_ray,
     )
 
 
-def focused(p: FoldProblem, border: SeenBorder, cos_tilt: Array, sin_tilt: Array) -> Distances:
-    """Distances along an axis of this tilt, the largest and the least blur in the image equal."""
-    near = _on_axis(border.near, cos_tilt, sin_tilt)
-    far = _on_axis(border.far, cos_tilt, sin_tilt)
-    near_span = _span_mm(near, _on_axis(border.near_corner, cos_tilt, sin_tilt))
-    far_span = _span_mm(far, _on_axis(border.far_corner, cos_tilt, sin_tilt))
-    least, most = smaller(near_span[0], far_span[0]), larger(near_span[1], far_span[1])
-    focus = choose(p.fixed_focus_mm > 0, p.fixed_focus_mm, 2 * least * most / (least + most))
+def distances(p: FoldProblem, border: SeenBorder, cos_tilt: Array, sin_tilt: Array) -> Distances:
+    """Distances along an axis of this tilt, the lens in focus."""
+    near_span, far_span = _spans_mm(border, cos_tilt, sin_tilt)
+    focus = _focus_mm(p, near_span, far_span)
     return Distances(
-        near=near,
-        far=far,
+        near=_on_axis(border.near, cos_tilt, sin_tilt),
+        far=_on_axis(border.far, cos_tilt, sin_tilt),
         near_span_mm=near_span,
         far_span_mm=far_span,
         focus_mm=focus,
@@ -126,12 +124,30 @@ def focused(p: FoldProblem, border: SeenBorder, cos_tilt: Array, sin_tilt: Array
     )
 
 
-def _span_mm(middle: Apparent, corner: Apparent) -> Span:
-    """The nearest and the farthest image of an edge."""
+def focused_image_mm(p: FoldProblem, border: SeenBorder, cos: Array, sin: Array) -> Array:
+    """Image distance of a lens in focus whose axis has the tilt of this cosine and sine."""
+    near_span, far_span = _spans_mm(border, cos, sin)
+    return image_distance_mm(p, _focus_mm(p, near_span, far_span))
+
+
+def _spans_mm(border: SeenBorder, cos: Array, sin: Array) -> tuple[Span, Span]:
+    """The nearest and the farthest image of each edge along the axis."""
+    near = _edge_span_mm(border.near, border.near_corner, cos, sin)
+    return near, _edge_span_mm(border.far, border.far_corner, cos, sin)
+
+
+def _edge_span_mm(middle: SeenPoint, corner: SeenPoint, cos: Array, sin: Array) -> Span:
+    at_middle, at_corner = cos + middle.along * sin, cos + corner.along * sin
     return (
-        smaller(middle.tangential_mm, corner.tangential_mm),
-        larger(middle.sagittal_mm, corner.sagittal_mm),
+        smaller(middle.tangential_depth_mm * at_middle, corner.tangential_depth_mm * at_corner),
+        larger(middle.sagittal_depth_mm * at_middle, corner.sagittal_depth_mm * at_corner),
     )
+
+
+def _focus_mm(p: FoldProblem, near_mm: Span, far_mm: Span) -> Array:
+    """Distance at which the largest and the least blur in the image are equal."""
+    least, most = smaller(near_mm[0], far_mm[0]), larger(near_mm[1], far_mm[1])
+    return choose(p.fixed_focus_mm > 0, p.fixed_focus_mm, 2 * least * most / (least + most))
 
 
 def image_distance_mm(p: FoldProblem, focus_mm: Array) -> Array:
@@ -147,7 +163,10 @@ SHARED = (
     along_scale,
     seen_point,
     _on_axis,
-    focused,
-    _span_mm,
+    distances,
+    focused_image_mm,
+    _spans_mm,
+    _edge_span_mm,
+    _focus_mm,
     image_distance_mm,
 )

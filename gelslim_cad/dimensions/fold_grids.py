@@ -13,19 +13,24 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gelslim_cad.dimensions.fold_problem import Array
+from gelslim_cad.dimensions.fold_goal import BEYOND_MM, INFEASIBLE_MM
+from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
 
 LOWER = np.array([np.radians(-12.0), 0.25, np.radians(20.0)])
 UPPER = np.array([np.radians(58.0), 1.0, np.radians(56.0)])
 COARSE = (36, 10, 20)
 FINE = 5
 SHRINK = 0.7
-LEVELS = 35
+LEVELS = 8
 RIM = 0.6
 """A best candidate beyond this share of the half width lies at the rim of its axis."""
 STARTS = 12
 """Bands into which the coarse grid's mean ray angles are split."""
+NEAR_DEPTH_MM, NEAR_LENGTH_MM, NEAR_PX, NEAR_BEYOND_MM, NEAR_MISSED = 0.5, 5.0, 1.0, 5.0, 0.1
+"""Bands worth a closer look: by their goal, by what they miss in the housing or, as a part, in the
+view, above the best."""
 
 
 class Best(NamedTuple):
@@ -41,8 +46,8 @@ BestOfGrids = Callable[[Array, Array, Array, Array], Best]
 """From the three axes (n, k) of n grids, and a score (n,) that no grid's best is above."""
 
 
-def best_candidates(count: int, best_of_grids: BestOfGrids) -> Best:
-    """The best candidate of each of `count` designs; grid i is one of design i % `count`."""
+def best_of_bands(count: int, best_of_grids: BestOfGrids) -> Best:
+    """The best candidate of each band; candidate and grid i are of design i % `count`."""
     axes = [np.linspace(lo, hi, n) for lo, hi, n in zip(LOWER, UPPER, COARSE, strict=True)]
     bands = np.repeat(axes[0].reshape(STARTS, -1), count, axis=0)
     rest = [np.broadcast_to(axis, (len(bands), len(axis))) for axis in axes[1:]]
@@ -58,5 +63,17 @@ def best_candidates(count: int, best_of_grids: BestOfGrids) -> Best:
         ]
         best = best_of_grids(around[0], around[1], around[2], best.score)
         width = width * np.where(np.abs(np.stack(best[:3]) - middle) > RIM * width, 1.0, SHRINK)
-    winner = np.argmin(best.score.reshape(STARTS, count), axis=0) * count + np.arange(count)
-    return Best(*(values[winner] for values in best))
+    return best
+
+
+def contenders(problem: FoldProblem, best: Best) -> NDArray[np.intp]:
+    """Bands whose candidate is not far above the best of its design."""
+    least = np.tile(best.score.reshape(STARTS, len(problem)).min(axis=0), STARTS)
+    goal = (
+        NEAR_DEPTH_MM * problem.depth_worth
+        + NEAR_LENGTH_MM * problem.length_worth
+        + NEAR_PX * problem.pixel_worth_mm
+    )
+    near = np.where(least < BEYOND_MM, np.tile(np.ravel(goal), STARTS), NEAR_BEYOND_MM)
+    allowed = least + np.where(least < INFEASIBLE_MM, near, NEAR_MISSED * least)
+    return np.flatnonzero(best.score <= allowed)

@@ -12,6 +12,9 @@ Array = NDArray[np.float64]
 """An array (n, ...) of n designs; one number where the compiled search calls the same function."""
 
 
+NO_LIMIT_MM = 1e4
+
+
 @dataclass(frozen=True)
 class FoldProblem:
     """What the fold must satisfy, each (n, 1, 1) for n designs."""
@@ -52,11 +55,26 @@ class FoldProblem:
     blur_limit_mm: Array
     min_px_per_marker: Array
     max_keystone: Array
+    fit_clearance_mm: Array
+    end_support_mm: Array
+    tip_wall_mm: Array
+    cable_bend_radius_mm: Array
+    mount_length_mm: Array
+    baffle_inner_y_mm: Array
+    clamp_width_mm: Array
+    max_depth_mm: Array
+    """Depth below the window that the envelope allows; NO_LIMIT_MM where it says nothing."""
+    max_length_mm: Array
+    depth_worth: Array
+    """What a millimetre of depth counts in the goal."""
+    length_worth: Array
+    pixel_worth_mm: Array
+    """What a pixel more across the smallest marker counts in the goal."""
 
     def __len__(self) -> int:
         return len(self.gel_length_mm)
 
-    def rows(self, chosen: slice | NDArray[np.intp]) -> FoldProblem:
+    def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> FoldProblem:
         """The designs in `chosen`."""
         return FoldProblem(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})
 

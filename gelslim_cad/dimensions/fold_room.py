@@ -42,7 +42,13 @@ def mirror_before_camera(p: FoldProblem, m: Mirror, camera_x_mm: Array) -> Array
 
 def camera_below_window(p: FoldProblem, c: Camera) -> Array:
     """The camera's highest corner clears the window."""
-    return largest(c.corners_z_mm) - p.window_z_mm + p.clearance_mm
+    return largest(camera_parts_below_window(p, c))
+
+
+def camera_parts_below_window(p: FoldProblem, c: Camera) -> tuple[Array, Array, Array]:
+    """The upper corners of the barrel and of the housing's front and rear clear the window."""
+    z, least = c.corners_z_mm, p.clearance_mm - p.window_z_mm
+    return z[0] + least, z[2] + least, z[4] + least
 
 
 def camera_beside_view(p: FoldProblem, s: Sight, c: Camera) -> Array:
@@ -95,6 +101,7 @@ SHARED = (
     mirror_below_window,
     mirror_before_camera,
     camera_below_window,
+    camera_parts_below_window,
     camera_beside_view,
     camera_clear_of_mirror,
     view_below_ledge,

@@ -14,31 +14,39 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numba.extending import overload
+from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import (
     fold,
     fold_camera,
     fold_focus,
+    fold_goal,
+    fold_housing,
     fold_mirror,
     fold_problem,
     fold_room,
     fold_sight,
 )
-from gelslim_cad.dimensions.fold import (
+from gelslim_cad.dimensions.fold import camera_depth_mm, depth_mm, measures
+from gelslim_cad.dimensions.fold_camera import camera, pitch_rad, smallest
+from gelslim_cad.dimensions.fold_focus import distances
+from gelslim_cad.dimensions.fold_goal import (
     FEASIBLE,
     INFEASIBLE_MM,
-    camera_depth_mm,
-    depth_mm,
+    besides_depth,
+    beyond_mm,
     score,
+    tie_mm,
 )
-from gelslim_cad.dimensions.fold_camera import camera, pitch_rad, smallest
-from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_candidates
+from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_of_bands
+from gelslim_cad.dimensions.fold_housing import housing_missed, tip_x_mm
 from gelslim_cad.dimensions.fold_mirror import (
     mirror,
     mirror_angle_rad,
     mirror_depth_mm,
     reflected,
 )
+from gelslim_cad.dimensions.fold_pieces import MEASURED, Measure
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
 from gelslim_cad.dimensions.fold_room import (
     SCALE_MM,
@@ -52,9 +60,9 @@ from gelslim_cad.dimensions.fold_room import (
     view_below_ledge,
 )
 from gelslim_cad.dimensions.fold_sight import (
-    distances,
     field_missed,
     keystone,
+    least_px,
     lens_extension_mm,
     picture_missed,
     sight,
@@ -62,13 +70,15 @@ from gelslim_cad.dimensions.fold_sight import (
 from gelslim_optics.camera import refraction_kernel, refraction_newton
 from gelslim_optics.camera.refraction_kernel import COMPILED, INLINED, let_compile, source_key
 
-SOURCES = (fold_focus, fold_sight, fold_mirror, fold_camera, fold_room, fold)
+SOURCES = (
+    fold_focus, fold_sight, fold_mirror, fold_camera, fold_room, fold_housing, fold_goal, fold
+)  # fmt: skip
 
 
 def search(problem: FoldProblem) -> Best:
-    """The best candidate (n,) of each design; releases the GIL."""
+    """The best candidate of each band of each design; releases the GIL."""
     records = np.tile(problem.records(), STARTS)
-    return best_candidates(len(problem), partial(best_of_grids, records))
+    return best_of_bands(len(problem), partial(best_of_grids, records))
 
 
 def best_of_grids(records: Any, mid: Array, spread: Array, turn: Array, known: Array) -> Best:
@@ -78,6 +88,18 @@ def best_of_grids(records: Any, mid: Array, spread: Array, turn: Array, known: A
     found = np.column_stack([*middle, known])
     _best_of_grids(records, mid, spread, turn, known, found)
     return Best(*found.T.copy())
+
+
+def measured(problem: FoldProblem) -> Measure:
+    """The measures of candidates of these designs, compiled; releases the GIL."""
+    records = problem.records()
+
+    def measure(design: NDArray[np.intp], place: Array) -> Array:
+        found = np.empty((*place.shape[:2], MEASURED))
+        _measures(records, design, place, found)
+        return found
+
+    return measure
 
 
 def _positive_sum(missed: Any) -> Any:
@@ -98,22 +120,20 @@ def _worse(missed: Any, known: Any) -> Any:
     return missed > FEASIBLE and INFEASIBLE_MM * (1 + missed) > known
 
 
-def _least_score(missed: Any, depth: Any, keystone: Any, rear_x: Any) -> Any:
-    """What a candidate scores at least that misses and needs at least this much."""
-    return min(score(missed, depth, keystone, rear_x), INFEASIBLE_MM * (1 + missed))
+def _score(p: Any, s: Any, d: Any, picture: Any, angle: Any, cos: Any, sin: Any, known: Any) -> Any:
+    """Score of a candidate; inf if certainly above `known`.
 
-
-def _score(
-    p: Any, s: Any, d: Any, missed: Any, ratio: Any, angle: Any, cos: Any, sin: Any, known: Any
-) -> Any:
-    """Score of a candidate that misses `missed` in its picture; inf if certainly above `known`."""
+    `picture` holds what it misses in its picture, its pixels per marker and the tie.
+    """
+    missed, px, tie = picture
     m = mirror(p, s, cos, sin)
     x, z = reflected(m, s.virtual_x_mm, s.virtual_z_mm)
     missed += _parts(mirror_below_window(s, m), mirror_before_camera(p, m, x))
     # The entrance pupil lies in the camera: its lowest corner is lower, its rearmost behind it.
     mirror_depth = mirror_depth_mm(p, m)
     shallow = depth_mm(p, mirror_depth, camera_depth_mm(p, z))
-    if _least_score(missed, shallow, ratio, x) > known:
+    short = tip_x_mm(p, m) - x + p.mount_length_mm
+    if score(p, missed, 0 * shallow, shallow, besides_depth(p, short, px, tie)) > known:
         return np.inf
     c = camera(p, x, z, pitch_rad(s, angle), lens_extension_mm(p, d))
     missed += _parts(camera_below_window(p, c), camera_beside_view(p, s, c))
@@ -123,7 +143,10 @@ def _score(
     ledge_x = ledge_edge_x_mm(p, s)
     missed += _parts(camera_clear_of_ledge(p, c, ledge_x), view_below_ledge(p, m, c, ledge_x))
     depth = depth_mm(p, mirror_depth, camera_depth_mm(p, smallest(c.corners_z_mm)))
-    return score(missed, depth, ratio, smallest(c.corners_x_mm))
+    housing = housing_missed(p, s, m, c, ledge_x, depth)
+    length = housing.length + p.max_length_mm
+    besides = besides_depth(p, length, px, tie)
+    return score(p, missed, beyond_mm(housing), depth, besides)
 
 
 def repeats(axis: Any, k: int) -> Any:
@@ -145,19 +168,21 @@ def _best_of_grid(p: Any, mids: Any, spreads: Any, turns: Any, known: Any, found
             if repeats(mids, i) or repeats(spreads, j):
                 continue
             s = sight(p, mids[i], spreads[j])
-            d = distances(p, s)
-            missed = _positive_sum(field_missed(p, s, d))
+            d = distances(p, s.border, np.cos(s.tilt_rad), np.sin(s.tilt_rad))
+            field = field_missed(p, s, d)
+            missed = _positive_sum(field)
             if _worse(missed, min(known, best)):
                 continue
             missed += _positive_sum(picture_missed(p, s, d))
             if _worse(missed, min(known, best)):
                 continue
-            ratio = keystone(d)
+            use = 1 + larger(field.field_of_view_along, field.field_of_view_across)
+            picture = (missed, least_px(p, d), tie_mm(use, keystone(d)))
             for k in range(len(turns)):
                 to_beat = min(known, best)
                 angle = mirror_angle_rad(turns[k], mids[i])
                 cos, sin = np.cos(angle), np.sin(angle)
-                value = _score(p, s, d, missed, ratio, angle, cos, sin, to_beat)
+                value = _score(p, s, d, picture, angle, cos, sin, to_beat)
                 if value < best:
                     best = value
                     found[0], found[1], found[2] = mids[i], spreads[j], turns[k]
@@ -176,17 +201,29 @@ def _smaller_number(a: Any, b: Any) -> Any:
 
 for shared in (module.SHARED for module in SOURCES):
     let_compile(shared)
-let_compile((_positive_sum, _parts, _worse, _least_score, _score, repeats, _best_of_grid))
+let_compile((_positive_sum, _parts, _worse, _score, repeats, _best_of_grid))
 
 
-def _compile(source: int) -> Callable[..., None]:
+def _compile(source: int) -> tuple[Callable[..., None], Callable[..., None]]:
     @njit(**COMPILED)
     def all_grids(records: Any, mid: Any, spread: Any, turn: Any, known: Any, found: Any) -> None:
         source  # noqa: B018
         for i in range(len(records)):
             _best_of_grid(records[i], mid[i], spread[i], turn[i], known[i], found[i])
 
-    return all_grids
+    @njit(**COMPILED)
+    def all_measures(records: Any, design: Any, place: Any, found: Any) -> None:
+        source  # noqa: B018
+        for i in range(len(design)):
+            for k in range(place.shape[1]):
+                mid, spread, mirror_rad = place[i, k, 0], place[i, k, 1], place[i, k, 2]
+                values = measures(records[design[i]], mid, spread, mirror_rad)
+                for m in range(len(values)):
+                    found[i, k, m] = values[m]
+
+    return all_grids, all_measures
 
 
-_best_of_grids = _compile(source_key(refraction_newton, refraction_kernel, fold_problem, *SOURCES))
+_best_of_grids, _measures = _compile(
+    source_key(refraction_newton, refraction_kernel, fold_problem, *SOURCES)
+)

@@ -12,7 +12,7 @@ from gelslim_cad.dimensions.fold_focus import (
     across_scale,
     along_scale,
     edge_blur_mm,
-    focused,
+    focused_image_mm,
     image_distance_mm,
     seen_point,
 )
@@ -42,12 +42,12 @@ class Sight(NamedTuple):
     """Slope of the outermost ray on the near side, corners of the gel included."""
     steepest: Array
     """Slope of the outermost ray on the far side."""
-    near_corner_along: Array
-    """Slope dx/dz of the ray to a near corner."""
+    view_rad: Array
+    """Angle between the outermost rays."""
     near_corner_across: Array
-    """Slope dy/dz of the same ray."""
-    far_corner_along: Array
+    """Slope dy/dz of the ray to a near corner."""
     far_corner_across: Array
+    border: SeenBorder
     corner_horizontal_tan: Array
     corner_vertical_tan: Array
 
@@ -87,9 +87,11 @@ def keystone(d: Distances) -> Array:
 
 
 def field_missed(p: FoldProblem, s: Sight, d: Distances) -> FieldMissed:
-    """How far the gel reaches out of the picture."""
+    """How far the gel reaches out of the picture, along by what lies beyond half the view."""
+    # The axis is tilted so that the view just holds the gel; here its room shows all the same.
+    beyond = np.tan(s.view_rad - np.arctan(VIEW_KEPT * p.half_along_mm / d.image_mm))
     return FieldMissed(
-        field_of_view_along=s.corner_vertical_tan * d.image_mm / p.half_along_mm - 1,
+        field_of_view_along=beyond * d.image_mm / p.half_along_mm - 1,
         field_of_view_across=s.corner_horizontal_tan * d.image_mm / p.half_across_mm - 1,
     )
 
@@ -98,35 +100,36 @@ def picture_missed(p: FoldProblem, s: Sight, d: Distances) -> PictureMissed:
     """How far sharpness, scale and shape of the picture miss their limits."""
     near_blur = edge_blur_mm(p.aperture_mm, d.near_span_mm, d.focus_mm)
     far_blur = edge_blur_mm(p.aperture_mm, d.far_span_mm, d.focus_mm)
-    scale = smaller(
-        smaller(across_scale(d.near, d.image_mm), along_scale(d.near, d.image_mm)),
-        smaller(across_scale(d.far, d.image_mm), along_scale(d.far, d.image_mm)),
-    )
-    px = scale * p.marker_diameter_mm / p.pixel_pitch_mm
     travel = choose(d.focus_mm >= p.focus_nearest_mm, 0.0, lens_extension_mm(p, d))
     return PictureMissed(
         blur=larger(near_blur, far_blur) / p.blur_limit_mm - 1,
-        pixels_per_marker=p.min_px_per_marker / px - 1,
+        pixels_per_marker=p.min_px_per_marker / least_px(p, d) - 1,
         keystone=keystone(d) / p.max_keystone - 1,
         lens_travel=(travel - p.lens_travel_mm) / larger(p.lens_travel_mm, 0.1),
         air_gap=WANTED_AIR_MM - s.air_height_mm,
     )
 
 
+def least_px(p: FoldProblem, d: Distances) -> Array:
+    """Pixels across a marker where it is imaged smallest."""
+    sides = marker_sides_px(p, d)
+    return smaller(smaller(sides[0], sides[1]), smaller(sides[2], sides[3]))
+
+
+def marker_sides_px(p: FoldProblem, d: Distances) -> tuple[Array, Array, Array, Array]:
+    """Width and height of a marker's image at the near edge, and at the far one."""
+    per_scale = p.marker_diameter_mm / p.pixel_pitch_mm
+    return (
+        across_scale(d.near, d.image_mm) * per_scale,
+        along_scale(d.near, d.image_mm) * per_scale,
+        across_scale(d.far, d.image_mm) * per_scale,
+        along_scale(d.far, d.image_mm) * per_scale,
+    )
+
+
 def lens_extension_mm(p: FoldProblem, d: Distances) -> Array:
     """How far the lens stands before its place for infinity."""
     return p.moving_lens * (d.image_mm - p.focal_length_mm)
-
-
-def distances(p: FoldProblem, s: Sight) -> Distances:
-    """Apparent distances of the gel's border, and where the camera is focused between them."""
-    border = SeenBorder(
-        near=seen_point(p, np.tan(s.near_ray_rad), 0.0, s.air_height_mm),
-        near_corner=seen_point(p, s.near_corner_along, s.near_corner_across, s.air_height_mm),
-        far=seen_point(p, np.tan(s.far_ray_rad), 0.0, s.air_height_mm),
-        far_corner=seen_point(p, s.far_corner_along, s.far_corner_across, s.air_height_mm),
-    )
-    return focused(p, border, np.cos(s.tilt_rad), np.sin(s.tilt_rad))
 
 
 def _half_view_rad(p: FoldProblem, mid_rad: Array, spread: Array) -> Array:
@@ -152,7 +155,7 @@ def _tilt_rad(
     """
     tilt = larger(0.0, start_rad)
     for _ in range(TILT_STEPS):
-        image = focused(p, border, np.cos(tilt), np.sin(tilt)).image_mm
+        image = focused_image_mm(p, border, np.cos(tilt), np.sin(tilt))
         half = np.arctan(VIEW_KEPT * p.half_along_mm / image)
         tilt = smaller(larger(0.0, highest - half), lowest + half)
     return tilt
@@ -189,10 +192,10 @@ def sight(p: FoldProblem, mid_rad: Array, spread: Array) -> Sight:
         virtual_z_mm=p.window_z_mm - air,
         shallowest=shallowest,
         steepest=steepest,
-        near_corner_along=near_along,
+        view_rad=highest - lowest,
         near_corner_across=near_across,
-        far_corner_along=far_along,
         far_corner_across=far_across,
+        border=border,
         corner_horizontal_tan=larger(
             near_across / (near_along * sin + cos), far_across / (far_along * sin + cos)
         ),
@@ -223,7 +226,8 @@ SHARED = (
     picture_missed,
     _half_view_rad,
     _tilt_rad,
-    distances,
+    least_px,
+    marker_sides_px,
     lens_extension_mm,
     sight,
     _reach_in_layers_mm,

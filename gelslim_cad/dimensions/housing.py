@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold_housing import (
+    LEDGE_GAP_MM,
+    SEAT_STOP_MM,
+    clamp_ends_x_mm,
+    lip_front_mm,
+)
+from gelslim_cad.dimensions.fold_housing import (
+    clamp_front_x_mm as foremost_of_clamp_mm,
+)
 from gelslim_cad.dimensions.registry import Real, dimension
 from gelslim_cad.geometry.fasteners import SCREWS
 
 CLAMP_CHEEK_MM = 3.5
-CLAMP_BAR_MM = 1.5
-CLAMP_LIP_MM = 1.2
-SEAT_STOP_MM = 1.0
 COVER_TAB_MM = 4.0
 """Least; a larger screw needs its head and 0.4 mm of cover on both sides."""
 TONGUE_ROOM_MM = 4.0
@@ -60,7 +66,7 @@ def ledge_distal_x_mm(
     fit = housing_fit_clearance_mm
     beside = mirror_upper_z_mm > stack_window_bottom_z_mm - ledge_depth_mm - fit
     clear = np.where(beside, mirror_rear_x_mm + fit, -np.inf)
-    return np.maximum(gel_length_mm / 2 + 0.2, clear)
+    return np.maximum(gel_length_mm / 2 + LEDGE_GAP_MM, clear)
 
 
 @dimension("channel.inner_y_mm", formula="flat width / 2 + R - fit")
@@ -183,11 +189,17 @@ def clamp_rear_x_mm(
 ) -> Real:
     """Rearmost point of the camera clamp, which is pitched with the camera."""
     pitch = np.radians(camera_pose_pitch_deg)
-    back = camera_pose_face_mm + camera_module_depth_mm + housing_fit_clearance_mm + CLAMP_BAR_MM
-    foot = (cover_top_z_mm - camera_pose_z_mm - back * np.sin(pitch)) / np.cos(pitch)
-    ends = (foot, camera_module_height_mm / 2)
-    reach = np.minimum(*(b * np.sin(pitch) for b in ends))
-    return camera_pose_x_mm - back * np.cos(pitch) + reach
+    back = camera_pose_face_mm + camera_module_depth_mm + housing_fit_clearance_mm
+    ends = clamp_ends_x_mm(
+        camera_pose_x_mm,
+        camera_pose_z_mm,
+        np.cos(pitch),
+        np.sin(pitch),
+        back,
+        camera_module_height_mm / 2,
+        cover_top_z_mm,
+    )
+    return np.minimum(*ends)
 
 
 @dimension(
@@ -206,12 +218,15 @@ def clamp_front_x_mm(
     """Foremost point of the camera clamp beside the mirror's seat."""
     pitch = np.radians(camera_pose_pitch_deg)
     proud = camera_pose_face_mm + camera_pose_lens_front_mm
-    lip = np.minimum(CLAMP_LIP_MM, proud - housing_fit_clearance_mm - 0.2)
-    front = housing_fit_clearance_mm + np.maximum(lip, 0.0) - camera_pose_face_mm
-    ends = (cover_top_z_mm, mirror_lower_z_mm)
-    rise = [(z - camera_pose_z_mm + front * np.sin(pitch)) / np.cos(pitch) for z in ends]
-    reach = np.maximum(*(r * np.sin(pitch) for r in rise))
-    return camera_pose_x_mm + front * np.cos(pitch) + reach
+    return foremost_of_clamp_mm(
+        camera_pose_x_mm,
+        camera_pose_z_mm,
+        np.cos(pitch),
+        np.sin(pitch),
+        lip_front_mm(camera_pose_face_mm, proud, housing_fit_clearance_mm),
+        cover_top_z_mm,
+        mirror_lower_z_mm,
+    )
 
 
 @dimension("mirror.seat_x_mm", formula="mirror's lower end - stop")

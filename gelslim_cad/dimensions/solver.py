@@ -13,14 +13,17 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import fields
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions.fold import Fold, fold
-from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_candidates
+from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_of_bands
 from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
+from gelslim_cad.dimensions.fold_pieces import measured_by_arrays
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold_wishes import closest
 
 CHUNK = 64
 COMPILED_FROM = 200
@@ -66,18 +69,20 @@ def solve_fold(problem: FoldProblem) -> Fold:
 def _solve_compiled(problem: FoldProblem) -> Fold:
     from concurrent.futures import ThreadPoolExecutor
 
-    from gelslim_cad.dimensions.fold_search import search
+    from gelslim_cad.dimensions.fold_search import measured, search
+
+    def best_of(piece: FoldProblem) -> Array:
+        return closest(piece, search(piece), measured)
 
     kinds, same = _distinct(problem)
     pieces = [kinds.rows(slice(start, start + PIECE)) for start in range(0, len(kinds), PIECE)]
     jobs = min(_JOBS.get() or _processors(), len(pieces))
     if jobs == 1:
-        found = [search(piece) for piece in pieces]
+        found = [best_of(piece) for piece in pieces]
     else:
         with ThreadPoolExecutor(jobs) as pool:
-            found = list(pool.map(search, pieces))
-    best = Best(*(np.concatenate(values)[same] for values in zip(*found, strict=True)))
-    return _laid_out(problem, best)
+            found = list(pool.map(best_of, pieces))
+    return _laid_out(problem, np.concatenate(found)[same])
 
 
 def _distinct(problem: FoldProblem) -> tuple[FoldProblem, NDArray[np.intp]]:
@@ -96,7 +101,8 @@ def _processors() -> int:
 
 def _solve_chunk(problem: FoldProblem) -> Fold:
     repeated = problem.rows(np.tile(np.arange(len(problem)), STARTS))
-    return _laid_out(problem, best_candidates(len(problem), partial(best_of_grids, repeated)))
+    bands = best_of_bands(len(problem), partial(best_of_grids, repeated))
+    return _laid_out(problem, closest(problem, bands, measured_by_arrays))
 
 
 def best_of_grids(
@@ -112,7 +118,7 @@ def best_of_grids(
         for axis in (mid[:, :, None], spread[:, None, :])
     ]
     mirror = mirror_angle_rad(turn[:, None, :], pairs[0])
-    scores = fold(problem, pairs[0], pairs[1], mirror).objective()
+    scores = fold(problem, pairs[0], pairs[1], mirror).objective(problem)
     scores = scores.reshape(len(mid), -1)
     winner = np.argmin(scores, axis=1)
     pair, angle = np.divmod(winner, turn.shape[1])
@@ -122,29 +128,24 @@ def best_of_grids(
     )
 
 
-def _laid_out(problem: FoldProblem, best: Best) -> Fold:
-    """The folds of the best candidates, every field (n,)."""
-    mid, spread, turn = (axis[:, None, None] for axis in best[:3])
-    return _squeeze(fold(problem, mid, spread, mirror_angle_rad(turn, mid)))
+def _laid_out(problem: FoldProblem, best: Array) -> Fold:
+    """The folds of the best candidates (n, 3), every field (n,)."""
+    return _squeeze(fold(problem, *(best[:, k, None, None] for k in range(3))))
 
 
 def _squeeze(solved: Fold) -> Fold:
-    values = {
-        f.name: np.broadcast_to(getattr(solved, f.name), solved.depth_mm.shape)[:, 0, 0]
-        for f in fields(Fold)
-        if f.name != "violations"
-    }
-    shape = solved.depth_mm.shape
-    missed = {k: np.broadcast_to(v, shape)[:, 0, 0] for k, v in solved.violations.items()}
-    return Fold(**values, violations=missed)
+    def flat(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: flat(missed) for name, missed in value.items()}
+        return np.broadcast_to(value, solved.depth_mm.shape)[:, 0, 0]
+
+    return Fold(**{f.name: flat(getattr(solved, f.name)) for f in fields(Fold)})
 
 
 def _concatenate(parts: list[Fold]) -> Fold:
-    values = {
-        f.name: np.concatenate([getattr(part, f.name) for part in parts])
-        for f in fields(Fold)
-        if f.name != "violations"
-    }
-    names = parts[0].violations
-    missed = {k: np.concatenate([part.violations[k] for part in parts]) for k in names}
-    return Fold(**values, violations=missed)
+    def joined(values: list[Any]) -> Any:
+        if isinstance(values[0], dict):
+            return {name: joined([value[name] for value in values]) for name in values[0]}
+        return np.concatenate(values)
+
+    return Fold(**{f.name: joined([getattr(part, f.name) for part in parts]) for f in fields(Fold)})

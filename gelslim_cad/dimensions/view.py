@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.dimensions.fold import Fold
-from gelslim_cad.dimensions.fold_problem import FoldProblem
+from gelslim_cad.dimensions.fold_problem import NO_LIMIT_MM, FoldProblem
 from gelslim_cad.dimensions.registry import Real, dimension
 from gelslim_cad.dimensions.solver import solve_fold
 from gelslim_cad.geometry.names import Name
@@ -55,6 +55,19 @@ PROBLEM: dict[str, Name] = {
     "blur_limit_mm": "view.blur_limit_mm",
     "min_px_per_marker": "design.optics.min_px_per_marker",
     "max_keystone": "design.optics.max_keystone",
+    "fit_clearance_mm": "design.housing.fit_clearance_mm",
+    "end_support_mm": "design.light_guide.end_support_mm",
+    "tip_wall_mm": "design.housing.tip_wall_mm",
+    "cable_bend_radius_mm": "camera.cable_bend_radius_mm",
+    "mount_length_mm": "mount.length_mm",
+    "baffle_inner_y_mm": "baffle.inner_y_mm",
+    "clamp_width_mm": "clamp.width_mm",
+    "max_depth_mm": "design.envelope.max_thickness_mm",
+    "back_wall_mm": "design.housing.back_wall_mm",
+    "max_length_mm": "design.envelope.max_length_mm",
+    "goal": "design.envelope.goal",
+    "length_worth": "design.envelope.length_worth",
+    "pixel_worth_mm": "design.envelope.pixel_worth_mm",
 }
 """From which value each field of the fold's problem comes; margin and angles give the tangents."""
 
@@ -73,9 +86,30 @@ def fold_layout(values: Mapping[str, Any]) -> Fold:
     for side in ("half_across_mm", "half_along_mm"):
         given[side] = given[side] / 2 * free
     given["moving_lens"] = float(given["moving_lens"] == "unit")
+    given |= _worths(given.pop("goal"), given["length_worth"], given["pixel_worth_mm"])
+    taken_mm = given.pop("back_wall_mm") + given["guide_thickness_mm"] + given["gel_total_mm"]
+    given["max_depth_mm"] = _limit_mm(given["max_depth_mm"]) - taken_mm
+    given["max_length_mm"] = _limit_mm(given["max_length_mm"])
     flat = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given.values()))
     columns = dict(zip(given, (v.reshape(-1, 1, 1) for v in flat), strict=True))
     return solve_fold(FoldProblem(**columns))
+
+
+def _limit_mm(given_mm: Real | None) -> Real:
+    return NO_LIMIT_MM if given_mm is None else given_mm
+
+
+def _worths(goal: str, length_worth: Real, pixel_worth_mm: Real) -> dict[str, Real]:
+    """What depth, length and pixels count: one of them alone, or thickness with weights."""
+    if goal == "shortest":
+        return {"depth_worth": 0.0, "length_worth": 1.0, "pixel_worth_mm": 0.0}
+    if goal == "best_picture":
+        return {"depth_worth": 0.0, "length_worth": 0.0, "pixel_worth_mm": 1.0}
+    return {
+        "depth_worth": 1.0,
+        "length_worth": length_worth,
+        "pixel_worth_mm": pixel_worth_mm,
+    }
 
 
 @dimension("view.near_ray_deg", formula="solved", source=FOLD)

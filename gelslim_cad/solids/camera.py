@@ -5,7 +5,8 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.dimensions.housing import CLAMP_BAR_MM, CLAMP_CHEEK_MM, CLAMP_LIP_MM
+from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM, CLAMP_LIP_MM, LIP_GAP_MM
+from gelslim_cad.dimensions.housing import CLAMP_CHEEK_MM
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import CAMERA, CLAMP, PRINTED
@@ -68,7 +69,7 @@ def camera_clamp(d: Dimensions) -> Part:
         *pair((rear - CLAMP_BAR_MM, face), (inner, outer), (-FAR_MM, high)),
         box((rear - CLAMP_BAR_MM, rear), (-outer, outer), (-FAR_MM, 0)),
     ]
-    lip = min(CLAMP_LIP_MM, d["camera_pose.lens_front_mm"] - face - fit - 0.2)
+    lip = min(CLAMP_LIP_MM, d["camera_pose.lens_front_mm"] - face - fit - LIP_GAP_MM)
     if lip > 0.4 and lens + fit < inner - 0.4:
         pieces += pair((face - 0.1, face + fit + lip), (inner, outer), (-FAR_MM, lens))
         pieces += pair((face + fit, face + fit + lip), (lens + fit, inner + 0.1), (-FAR_MM, lens))

@@ -221,6 +221,29 @@ class Envelope(Block):
     max_thickness_mm: float | None = above(0, 300, "Thickest finger allowed", default=None)
     max_width_mm: float | None = above(0, 300, "Widest finger allowed", default=None)
     max_length_mm: float | None = above(0, 600, "Longest finger allowed", default=None)
+    goal: Literal["thinnest", "shortest", "best_picture"] = Field(
+        default="thinnest",
+        description="What camera and mirror are arranged for, within these limits: the thinnest "
+        "finger, the shortest, or the most pixels across the smallest marker",
+    )
+    length_worth: float = between(
+        0, 10, "Thickness that a millimetre of length is worth, goal: thinnest", default=0.0
+    )
+    pixel_worth_mm: float = between(
+        0, 10, "Thickness that a pixel more per marker is worth, goal: thinnest", default=0.0
+    )
+
+    @model_validator(mode="after")
+    def _weights_have_their_goal(self) -> Envelope:
+        for name in ("length_worth", "pixel_worth_mm"):
+            if getattr(self, name) > 0 and self.goal != "thinnest":
+                raise FieldError(
+                    name,
+                    f"is weighed against thickness, and the goal is {self.goal}",
+                    "leave it out, or choose goal: thinnest",
+                    ("goal",),
+                )
+        return self
 
 
 class Design(Block):

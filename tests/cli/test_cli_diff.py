@@ -54,7 +54,7 @@ def test_a_rule_that_breaks_comes_first(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["diff", str(MINI20), str(longer), "--no-parts"]) == 0
     shown = capsys.readouterr().out
     rules = shown.split("design rules")[1].splitlines()
-    worse = [k for k, line in enumerate(rules) if "gets worse" in line]
+    worse = [k for k, line in enumerate(rules) if "→ fail" in line]
     assert worse == list(range(1, 1 + len(worse)))
     assert any("marker.far_px" in rules[k] and "pass → fail" in rules[k] for k in worse)
     back = {c.id: c.verdict for c in compare(read_spec(longer).spec, read_spec(MINI20).spec).rules}

@@ -251,7 +251,7 @@ class Layout:
         px = least * p.marker_diameter_mm / p.pixel_pitch_mm
         travel = self.extension_mm if focus < p.focus_nearest_mm else 0.0
         return {
-            "field of view along": self.vertical_tan / (p.half_along_mm / image) - 1,
+            "field of view along": self._beyond_half_view(image) - 1,
             "field of view across": self.horizontal_tan / (p.half_across_mm / image) - 1,
             "blur": blur / p.blur_limit_mm - 1,
             "pixels per marker": p.min_px_per_marker / px - 1,
@@ -259,6 +259,12 @@ class Layout:
             "lens travel": (travel - p.lens_travel_mm) / max(p.lens_travel_mm, 0.1),
             "air gap": 2.0 - self.air,
         }
+
+    def _beyond_half_view(self, image: float) -> float:
+        """Image of the far rim of a view whose near rim is the picture's, by half the picture."""
+        rays = [math.atan(v) for v in (self.near_slope, self.far_slope)]
+        half = math.atan((1 - 1e-6) * self.p.half_along_mm / image)
+        return math.tan(rays[1] - rays[0] - half) * image / self.p.half_along_mm
 
     def _camera_in_mirror(self) -> float:
         gap = self.p.clearance_mm
@@ -288,8 +294,63 @@ class Layout:
     def worst(self) -> float:
         return sum(max(value, 0.0) for value in self.missed().values())
 
+    def _on_camera(self, before_face: float, z: float) -> complex:
+        """The point at a height on the plane so far before the housing's front face."""
+        start = self.pinhole + (before_face - self.face) * self.ahead
+        return start + met(start, self.above, complex(0.0, z), 1.0 + 0.0j) * self.above
+
+    @property
+    def length_mm(self) -> float:
+        """From the tip to the end of the mount block."""
+        p, fit = self.p, self.p.fit_clearance_mm
+        start = self.upper + p.mirror_border_mm * self.up_the_mirror
+        mirror_rear = (start - 1j * self.up_the_mirror * p.mirror_thickness_mm).real
+        ledge = p.gel_length_mm / 2 + 0.2
+        if p.clearance_mm < p.ledge_depth_mm + fit:
+            ledge = max(ledge, mirror_rear + fit)
+        tip = max(ledge + p.end_support_mm, mirror_rear) + fit + p.tip_wall_mm
+        bar = -(p.module_depth_mm + fit + 1.5)
+        foot = self._on_camera(bar, self.window_z - self.depth)
+        top = self.pinhole + (bar - self.face) * self.ahead + p.module_height_mm / 2 * self.above
+        rear = min(foot.real, top.real, *(c.real for c in self.corners))
+        bezel = self.ledge_x - p.end_support_mm - fit - p.tip_wall_mm
+        chamber = min(rear - p.cable_bend_radius_mm - fit, bezel - 1.0)
+        return tip - chamber + p.mount_length_mm
+
+    def beyond(self) -> dict[str, float]:
+        """Every limit of the housing, in mm."""
+        p, fit = self.p, self.p.fit_clearance_mm
+        half_width = p.mirror_border_mm + max(
+            self.near_across * (self.lower - self.virtual).imag,
+            self.far_across * (self.upper - self.virtual).imag,
+        )
+        lips = fit + max(min(1.2, self.face - self.front - fit - 0.2), 0.0)
+        ends = (self.window_z - self.depth, self.glass_end.imag)
+        foremost = max(self._on_camera(lips, z).real for z in ends)
+        channel = self.ledge_x - p.end_support_mm - fit - 1.2
+        beside = max(
+            p.baffle_inner_y_mm - p.clamp_width_mm / 2, channel - max(c.real for c in self.corners)
+        )
+        return {
+            "thickness": self.depth - p.max_depth_mm,
+            "length": self.length_mm - p.max_length_mm,
+            "mirror between baffles": half_width + 2 * fit - p.baffle_inner_y_mm,
+            "clamp before seat": foremost + fit + 1.0 - self.glass_end.real,
+            "clamp beside channel": 0.15 - beside,
+        }
+
     def objective(self) -> float:
-        rear = min(c.real for c in self.corners)
         if self.worst() > 1e-9:
-            return 1000 * (1 + self.worst())
-        return self.depth + 0.02 * (self.keystone - 1) - 0.002 * rear
+            return 1e6 * (1 + self.worst())
+        thickness, length, *clashes = self.beyond().values()
+        if (beyond := max(thickness, length, *(1000 * clash for clash in clashes))) > 1e-9:
+            return 1e5 + beyond
+        return self.goal()
+
+    def goal(self) -> float:
+        p, missed = self.p, self.missed()
+        use = 1 + max(missed["field of view along"], missed["field of view across"])
+        px = p.min_px_per_marker / (1 + missed["pixels per marker"])
+        wanted = p.depth_worth * self.depth + p.length_worth * self.length_mm
+        tie = 1e-4 * self.length_mm - 2e-3 * use + 1e-3 * self.keystone
+        return wanted - p.pixel_worth_mm * px + tie

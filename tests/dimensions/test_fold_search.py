@@ -12,9 +12,12 @@ from fold_samples import shipped
 
 from gelslim_cad.dimensions import Dimensions, derive_batch, fold_search, solver
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import INFEASIBLE_MM, Fold, fold
+from gelslim_cad.dimensions.fold import Fold, fold
+from gelslim_cad.dimensions.fold_goal import BEYOND_MM, INFEASIBLE_MM
 from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
 from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
+from gelslim_cad.dimensions.fold_pieces import measured_by_arrays
+from gelslim_cad.dimensions.fold_polish import LEAST, MOST
 from gelslim_cad.dimensions.fold_problem import FoldProblem
 
 SPANS = {
@@ -50,16 +53,28 @@ def problem() -> FoldProblem:
 
 def test_scores_are_those_of_the_reference(problem: FoldProblem) -> None:
     rng = np.random.default_rng(8)
-    feasible = 0
+    kept = seen = 0
     for _ in range(40):
         axes = rng.uniform(LOWER, UPPER, (len(problem), 3)).T[:, :, None]
         mid, spread, turn = axes[..., None]
-        expected = np.ravel(fold(problem, mid, spread, mirror_angle_rad(turn, mid)).objective())
+        laid = fold(problem, mid, spread, mirror_angle_rad(turn, mid))
+        expected = np.ravel(laid.objective(problem))
         unbeaten = np.full(len(problem), np.inf)
         found = fold_search.best_of_grids(problem.records(), *axes, unbeaten).score
         np.testing.assert_allclose(found, expected, rtol=1e-10)
-        feasible += int((expected < INFEASIBLE_MM).sum())
-    assert feasible > 20
+        kept += int((expected < BEYOND_MM).sum())
+        seen += int((expected < INFEASIBLE_MM).sum())
+    assert 2 < kept < seen - 10
+
+
+def test_measures_are_those_of_the_reference(problem: FoldProblem) -> None:
+    rng = np.random.default_rng(12)
+    design = rng.integers(len(problem), size=200)
+    place = rng.uniform(LEAST, MOST, (200, 3, 3))
+    expected = measured_by_arrays(problem)(design, place)
+    np.testing.assert_allclose(
+        fold_search.measured(problem)(design, place), expected, rtol=1e-9, atol=1e-9
+    )
 
 
 def test_the_first_best_of_a_grid_is_that_of_the_reference(problem: FoldProblem) -> None:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from gelslim_cad.compare import Change, Comparison, PartChanges, RuleChange
 
+LEAST_WIDTH = 22
+"""Of the names of rules; longer ones are folded."""
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
 FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
 WIDE = 100
@@ -106,6 +108,7 @@ def _report(first: str, second: str, found: Comparison) -> None:
     _changes("dimensions that follow", found.dimensions)
     if found.rules:
         rows = table("design rules", figures=("before", "after", "limit", "margin"))
+        rows.columns[0].min_width, rows.columns[0].overflow = LEAST_WIDTH, "fold"
         rows.add_column("", no_wrap=True)
         order = list(STYLE)
         shown = [c for c in found.rules if _shows(c)]
@@ -117,9 +120,10 @@ def _report(first: str, second: str, found: Comparison) -> None:
                 number(a.value, a.unit),
                 _limit(b.limit, a.limit),
                 "" if a.margin is None else number(a.margin),
-                Text(f"{b.status} → {a.status}" if b.status != a.status else a.status)
-                if not STYLE[c.verdict]
-                else Text(f"{b.status} → {a.status}, {c.verdict}", style=STYLE[c.verdict]),
+                Text(
+                    f"{b.status} → {a.status}" if b.status != a.status else a.status,
+                    style=STYLE[c.verdict],
+                ),
             )
         console().print(rows)
         _note_unshown(len(found.rules) - len(shown))
