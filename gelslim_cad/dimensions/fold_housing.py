@@ -55,7 +55,7 @@ def finger_lengths_mm(
     """Lengths that the camera's rear corners, its clamp's foot and top, and the bezel need."""
     fit, outside = p.fit_clearance_mm, tip_x_mm(p, m) + p.mount_length_mm
     behind = outside + p.cable_bend_radius_mm + fit
-    back, cover_z = c.face_mm + p.module_depth_mm + fit, p.window_z_mm - depth
+    back, cover_z = c.face_mm + p.module_depth_mm + p.clamp_play_mm, p.window_z_mm - depth
     foot, top = clamp_ends_x_mm(c.x_mm, c.z_mm, c.cos, c.sin, back, p.module_height_mm / 2, cover_z)
     bezel_x = ledge_x_mm - p.end_support_mm - fit - p.tip_wall_mm
     upper, lower = c.corners_x_mm[4], c.corners_x_mm[5]
@@ -99,9 +99,9 @@ def clamp_front_x_mm(
     return x + front * cos + larger(low * sin, high * sin)
 
 
-def lip_front_mm(face: Real, proud: Real, fit: Real) -> Real:
+def lip_front_mm(face: Real, proud: Real, play: Real) -> Real:
     """How far the clamp's lips reach before the pinhole, the lens `proud` of the housing."""
-    return fit + larger(smaller(CLAMP_LIP_MM, proud - fit - LIP_GAP_MM), 0.0) - face
+    return play + larger(smaller(CLAMP_LIP_MM, proud - play - LIP_GAP_MM), 0.0) - face
 
 
 def housing_missed(
@@ -109,7 +109,7 @@ def housing_missed(
 ) -> HousingMissed:
     """How far envelope, mirror and clamp miss their limits."""
     fit, lower_x = p.fit_clearance_mm, lower_end_x_mm(p, m)
-    front = lip_front_mm(c.face_mm, c.face_mm + lens_front_mm(p), fit)
+    front = lip_front_mm(c.face_mm, c.face_mm + lens_front_mm(p), p.clamp_play_mm)
     lower_z, cover_z = m.lower_z_mm - p.mirror_border_mm * m.sin, p.window_z_mm - depth
     lips_x = clamp_front_x_mm(c.x_mm, c.z_mm, c.cos, c.sin, front, cover_z, lower_z)
     channel_x = ledge_x_mm - p.end_support_mm - fit - CHANNEL_WALL_MM

@@ -62,6 +62,7 @@ class FoldProblem:
     mount_length_mm: Array
     baffle_inner_y_mm: Array
     clamp_width_mm: Array
+    clamp_play_mm: Array
     max_depth_mm: Array
     """Depth below the window that the envelope allows; NO_LIMIT_MM where it says nothing."""
     max_length_mm: Array

@@ -95,10 +95,16 @@ def baffle_top_z_mm(stack_window_bottom_z_mm: Real, guide_inner_radius_mm: Real)
     return stack_window_bottom_z_mm - guide_inner_radius_mm
 
 
-@dimension("clamp.width_mm", formula="module width + 2 (fit + cheek)")
-def clamp_width_mm(camera_module_width_mm: Real, housing_fit_clearance_mm: Real) -> Real:
+@dimension("clamp.play_mm", formula="camera play, or the fit clearance where it is not given")
+def clamp_play_mm(housing_camera_play_mm: Real | None, housing_fit_clearance_mm: Real) -> Real:
+    """Gap on each side of the camera in its clamp."""
+    return housing_fit_clearance_mm if housing_camera_play_mm is None else housing_camera_play_mm
+
+
+@dimension("clamp.width_mm", formula="module width + 2 (play + cheek)")
+def clamp_width_mm(camera_module_width_mm: Real, clamp_play_mm: Real) -> Real:
     """Camera clamp across the finger."""
-    return camera_module_width_mm + 2 * (housing_fit_clearance_mm + CLAMP_CHEEK_MM)
+    return camera_module_width_mm + 2 * (clamp_play_mm + CLAMP_CHEEK_MM)
 
 
 @dimension("bezel.thickness_mm", formula="gel total - proud")
@@ -184,12 +190,12 @@ def clamp_rear_x_mm(
     camera_pose_face_mm: Real,
     camera_module_depth_mm: Real,
     camera_module_height_mm: Real,
-    housing_fit_clearance_mm: Real,
+    clamp_play_mm: Real,
     cover_top_z_mm: Real,
 ) -> Real:
     """Rearmost point of the camera clamp, which is pitched with the camera."""
     pitch = np.radians(camera_pose_pitch_deg)
-    back = camera_pose_face_mm + camera_module_depth_mm + housing_fit_clearance_mm
+    back = camera_pose_face_mm + camera_module_depth_mm + clamp_play_mm
     ends = clamp_ends_x_mm(
         camera_pose_x_mm,
         camera_pose_z_mm,
@@ -211,7 +217,7 @@ def clamp_front_x_mm(
     camera_pose_pitch_deg: Real,
     camera_pose_face_mm: Real,
     camera_pose_lens_front_mm: Real,
-    housing_fit_clearance_mm: Real,
+    clamp_play_mm: Real,
     cover_top_z_mm: Real,
     mirror_lower_z_mm: Real,
 ) -> Real:
@@ -223,7 +229,7 @@ def clamp_front_x_mm(
         camera_pose_z_mm,
         np.cos(pitch),
         np.sin(pitch),
-        lip_front_mm(camera_pose_face_mm, proud, housing_fit_clearance_mm),
+        lip_front_mm(camera_pose_face_mm, proud, clamp_play_mm),
         cover_top_z_mm,
         mirror_lower_z_mm,
     )

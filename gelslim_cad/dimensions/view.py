@@ -62,6 +62,7 @@ PROBLEM: dict[str, Name] = {
     "mount_length_mm": "mount.length_mm",
     "baffle_inner_y_mm": "baffle.inner_y_mm",
     "clamp_width_mm": "clamp.width_mm",
+    "clamp_play_mm": "clamp.play_mm",
     "max_depth_mm": "design.envelope.max_thickness_mm",
     "back_wall_mm": "design.housing.back_wall_mm",
     "max_length_mm": "design.envelope.max_length_mm",

@@ -37,6 +37,7 @@ DimensionName = Literal[
     "channel.outer_y_mm",
     "baffle.inner_y_mm",
     "baffle.top_z_mm",
+    "clamp.play_mm",
     "clamp.width_mm",
     "bezel.thickness_mm",
     "bezel.proximal_x_mm",
@@ -203,6 +204,25 @@ FloatName = Literal[
     "manufacturing.gel_thickness_tolerance_mm",
     "manufacturing.acrylic_tolerance_ratio",
     "mesh.least_fill",
+    "tolerance.mirror_thickness_mm",
+    "tolerance.acrylic_sheet_mm",
+    "tolerance.acrylic_measured_mm",
+    "tolerance.gel_place_mm",
+    "tolerance.shrinkage_percent",
+    "tolerance.marker_scale_percent",
+    "tolerance.marker_jitter_mm",
+    "tolerance.marker_place_mm",
+    "tolerance.focal_length_percent",
+    "tolerance.thread_pitch_mm",
+    "tolerance.lens_turn",
+    "tolerance.lens_centring_mm",
+    "tolerance.entrance_pupil_mm",
+    "tolerance.led_flux_percent",
+    "tolerance.calibration_scale_percent",
+    "tolerance.alignment_px",
+    "tolerance.largest_blur_per_diameter",
+    "tolerance.least_picture_ratio",
+    "tolerance.least_light_ratio",
 ]
 IntName = Literal[
     "camera.image_width_px",
@@ -214,6 +234,7 @@ IntName = Literal[
 BoolName = Literal[
     "material.allow_stiff_gel",
     "manufacturing.fabric_skin",
+    "tolerance.adjusted",
 ]
 TextName = Literal[
     "format",
@@ -234,6 +255,7 @@ TextName = Literal[
     "manufacturing.marking_process",
     "mesh.element",
     "mesh.weighting",
+    "tolerance.acrylic",
 ]
 FloatsName = Literal[
     "design.leds.emission_angle_deg",
@@ -247,9 +269,11 @@ OptionalFloatName = Literal[
     "camera.field_of_view_at_mm",
     "camera.focus_distance_mm",
     "camera.entrance_pupil_mm",
+    "design.housing.camera_play_mm",
     "design.envelope.max_thickness_mm",
     "design.envelope.max_width_mm",
     "design.envelope.max_length_mm",
+    "tolerance.print_flatness_mm",
 ]
 OptionalIntName = Literal[
     "design.markers.rows",

@@ -58,7 +58,7 @@ def clamp_screw_positions(d: Dimensions) -> list[Point2]:
 def camera_clamp(d: Dimensions) -> Part:
     """U-shaped cradle of two cheeks with front lips and a rear bar, open towards the gel."""
     at = Layout(d)
-    fit = d["design.housing.fit_clearance_mm"]
+    fit = d["clamp.play_mm"]
     face = -d["camera_pose.face_mm"]
     rear = face - d["camera.module_depth_mm"] - fit
     inner = d["camera.module_width_mm"] / 2 + fit

@@ -182,6 +182,12 @@ class Housing(Block):
     fit_clearance_mm: float = between(
         0.02, 2, "Gap between parts that slide into each other", default=0.2
     )
+    camera_play_mm: float | None = between(
+        0,
+        2,
+        "Gap on each side of the camera in its clamp; fit_clearance_mm when left out",
+        default=None,
+    )
     gel_proud_mm: float = between(0, 10, "How far the gel stands above the bezel", default=0.6)
     shim_thickness_mm: float = between(0.2, 5, "Free thickness of the elastic shims", default=1.0)
     precompression_mm: float = between(

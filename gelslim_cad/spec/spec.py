@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from gelslim_cad.spec.camera import Camera
 from gelslim_cad.spec.design import Design
 from gelslim_cad.spec.limits import above, between
+from gelslim_cad.spec.tolerance import Tolerance
 from gelslim_core.yaml.base import Block, require_folder_name
 from gelslim_core.yaml.errors import FieldError
 
@@ -25,10 +26,10 @@ class GelMaterial(Block):
     name: str = Field(default="XP-565 silicone", max_length=80, description="Gel, for the BOM")
     youngs_modulus_mpa: float = above(0, 2000, "Young's modulus E", default=0.147)
     poissons_ratio: float = Field(default=0.3223, ge=0, lt=0.5, description="Poisson's ratio")
-    youngs_modulus_tolerance_ratio: float = above(
+    youngs_modulus_tolerance_ratio: float = between(
         0, 1, "Standard deviation of Young's modulus between batches, as a part of it", default=0.1
     )
-    poissons_ratio_tolerance: float = above(
+    poissons_ratio_tolerance: float = between(
         0, 0.2, "Standard deviation of Poisson's ratio", default=0.02
     )
     density_kg_m3: float = between(200, 4000, "Density", default=1020.0)
@@ -76,7 +77,7 @@ class Manufacturing(Block):
         default="sla", description="Process of the printed finger parts"
     )
     print_tolerance_mm: float = between(
-        0.005, 1, "Accuracy of the printed parts, plus or minus", default=0.1
+        0, 1, "Accuracy of the printed parts, plus or minus", default=0.1
     )
     max_overhang_deg: float = between(
         0, 90, "Steepest unsupported overhang from the vertical", default=45.0
@@ -87,7 +88,7 @@ class Manufacturing(Block):
     gel_shrinkage_percent: float = between(
         0, 10, "Linear shrinkage of the gel while curing", default=0.1
     )
-    gel_thickness_tolerance_mm: float = above(
+    gel_thickness_tolerance_mm: float = between(
         0, 1, "Standard deviation of the cast gel's thickness", default=0.05
     )
     marking_process: MarkingProcess = Field(
@@ -163,6 +164,7 @@ class Spec(Block):
         material: Gel and acrylic.
         manufacturing: Processes, tolerances and stock.
         mesh: Finite-element mesh of the pad.
+        tolerance: What making the finger varies.
     """
 
     starting_point: ClassVar[str] = "`gelslim new` writes a spec to start from"
@@ -181,6 +183,9 @@ class Spec(Block):
         default=Manufacturing(), description="Processes, tolerances, stock"
     )
     mesh: Mesh = Field(default=Mesh(), description="Finite-element mesh of the pad")
+    tolerance: Tolerance = Field(
+        default=Tolerance(), description="What making the finger varies"
+    )
 
     @model_validator(mode="after")
     def _names_a_folder(self) -> Spec:

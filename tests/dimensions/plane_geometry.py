@@ -309,7 +309,7 @@ class Layout:
         if p.clearance_mm < p.ledge_depth_mm + fit:
             ledge = max(ledge, mirror_rear + fit)
         tip = max(ledge + p.end_support_mm, mirror_rear) + fit + p.tip_wall_mm
-        bar = -(p.module_depth_mm + fit + 1.5)
+        bar = -(p.module_depth_mm + p.clamp_play_mm + 1.5)
         foot = self._on_camera(bar, self.window_z - self.depth)
         top = self.pinhole + (bar - self.face) * self.ahead + p.module_height_mm / 2 * self.above
         rear = min(foot.real, top.real, *(c.real for c in self.corners))
@@ -324,7 +324,8 @@ class Layout:
             self.near_across * (self.lower - self.virtual).imag,
             self.far_across * (self.upper - self.virtual).imag,
         )
-        lips = fit + max(min(1.2, self.face - self.front - fit - 0.2), 0.0)
+        play = p.clamp_play_mm
+        lips = play + max(min(1.2, self.face - self.front - play - 0.2), 0.0)
         ends = (self.window_z - self.depth, self.glass_end.imag)
         foremost = max(self._on_camera(lips, z).real for z in ends)
         channel = self.ledge_x - p.end_support_mm - fit - 1.2

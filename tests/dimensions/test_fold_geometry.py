@@ -62,6 +62,7 @@ SPANS = {
     "mount_length_mm": (8.0, 20.0),
     "baffle_inner_y_mm": (8.0, 20.0),
     "clamp_width_mm": (10.0, 30.0),
+    "clamp_play_mm": (0.0, 0.4),
     "max_depth_mm": (8.0, 40.0),
     "max_length_mm": (50.0, 150.0),
     "depth_worth": (0.0, 1.0),

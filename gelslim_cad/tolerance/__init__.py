@@ -1,0 +1,1 @@
+"""What making a finger varies: yields of the rules, their causes, and errors of the forces."""
