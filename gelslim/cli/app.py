@@ -28,6 +28,7 @@ from gelslim.cli.commands.plan import plan
 from gelslim.cli.commands.schema import schema
 from gelslim.cli.commands.simulate import simulate
 from gelslim.cli.commands.thinner import thinner
+from gelslim.cli.commands.tolerance import tolerance
 from gelslim.cli.commands.track import track
 from gelslim.cli.commands.validate import validate
 from gelslim.cli.main import carried
@@ -36,7 +37,7 @@ from gelslim_core import __version__
 COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
     "Design a finger": (new, examples, check, derive, explain, diff),
     "Search for one": (thinner, explore, optimise),
-    "Try it before it is built": (light, plan, simulate, validate),
+    "Try it before it is built": (tolerance, light, plan, simulate, validate),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),
     "Measure with it": (calibrate, force, track),
     "This program": (doctor, bench, schema),

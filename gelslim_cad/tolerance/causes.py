@@ -55,6 +55,11 @@ class Cause:
         """Standard deviation."""
         return float(self.spread * DEVIATION[self.distribution])
 
+    @property
+    def limit(self) -> float:
+        """Half width, or three standard deviations of a normal error."""
+        return float(self.spread * (3 if self.distribution == "normal" else 1))
+
 
 @dataclass(frozen=True)
 class Group:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,11 +101,12 @@ RULES: Mapping[str, Kept] = {
     ),
 }
 """The rules in the order in which they are listed; a place of one is `rule@place`."""
-CORRECTED: Mapping[Stage, str] = {
-    "as_built": "The camera is glued as it falls into its clamp, the lens is set with the jig.",
-    "adjusted": "The camera is turned in its clamp, and the lens on its thread, until the live "
-    "picture is centred, upright and sharp; then the camera is glued.",
+ASSEMBLY: Mapping[Stage, str] = {
+    "as_built": "The camera is glued as it falls into its clamp; the lens is set with the jig.",
+    "adjusted": "The camera is turned within its play until the gel lies upright in its frame in "
+    "the live picture, and the lens until near and far edge are equally sharp; then it is glued.",
 }
+"""What a person does, by way of assembling."""
 
 
 def margins(d: Dimensions, e: Errors, stage: Stage) -> dict[str, Array]:
@@ -154,13 +155,17 @@ def worst_margins(places: Mapping[str, Array]) -> dict[str, Array]:
 
 def _coverage(d: Dimensions, finger: Built, border: Rays) -> dict[str, Array]:
     u, v = on_sensor(finger, border)
+    rules = ("coverage.along", "coverage.along", "coverage.across", "coverage.across")
+    return _in_picture(d, rules, u, v)
+
+
+def _in_picture(d: Dimensions, rules: Sequence[str], u: Array, v: Array) -> dict[str, Array]:
+    """Picture left beside points (n, m) at its four sides, as parts of the half picture."""
     half_u, half_v = d["view.sensor_across_mm"] / 2, d["view.sensor_along_mm"] / 2
-    return {
-        "coverage.along@near": 1 + v.min(axis=1) / half_v,
-        "coverage.along@far": 1 - v.max(axis=1) / half_v,
-        "coverage.across@left": 1 + u.min(axis=1) / half_u,
-        "coverage.across@right": 1 - u.max(axis=1) / half_u,
-    }
+    room = (v.min(axis=1) / half_v, -v.max(axis=1) / half_v)
+    room = (*room, u.min(axis=1) / half_u, -u.max(axis=1) / half_u)
+    places = map("@".join, zip(rules, ("near", "far", "left", "right"), strict=True))
+    return {place: 1 + left for place, left in zip(places, room, strict=True)}
 
 
 def _markers(d: Dimensions, e: Errors, finger: Built) -> dict[str, Array]:
@@ -176,9 +181,7 @@ def _markers(d: Dimensions, e: Errors, finger: Built) -> dict[str, Array]:
     x = x + (e["gel_x_mm"] + e["print_x_mm"])[:, None]
     y = y + (e["gel_y_mm"] + e["print_y_mm"])[:, None]
     u, v = on_sensor(finger, rays(finger, x, y))
-    along = 1 - np.abs(v).max(axis=1) / (d["view.sensor_along_mm"] / 2)
-    across = 1 - np.abs(u).max(axis=1) / (d["view.sensor_across_mm"] / 2)
-    return {"coverage.markers@along": along, "coverage.markers@across": across}
+    return _in_picture(d, ["coverage.markers"] * 4, u, v)
 
 
 def _outermost(d: Dimensions) -> tuple[Array, Array] | None:
@@ -225,10 +228,13 @@ def _mirror(d: Dimensions, finger: Built, border: Rays) -> dict[str, Array]:
         np.abs(crossing) < 1e-6, 1e-6, crossing
     )
     met = start + away[:, :, None] * ray - point
-    along = np.abs(met @ finger.mirror_along).max(axis=1)
+    along, across = met @ finger.mirror_along, met[:, :, 1]
+    half_length, half_width = d["mirror.length_mm"] / 2, d["mirror.width_mm"] / 2
     return {
-        "mirror.covers@ends": d["mirror.length_mm"] / 2 - along,
-        "mirror.covers@sides": d["mirror.width_mm"] / 2 - np.abs(met[:, :, 1]).max(axis=1),
+        "mirror.covers@upper": half_length - along.max(axis=1),
+        "mirror.covers@lower": half_length + along.min(axis=1),
+        "mirror.covers@left": half_width + across.min(axis=1),
+        "mirror.covers@right": half_width - across.max(axis=1),
     }
 
 
