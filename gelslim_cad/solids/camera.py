@@ -14,6 +14,8 @@ from gelslim_cad.solids.shapes import Point2, box, pair, rod, single, subtract, 
 
 FAR_MM = 200.0
 SCREW_DEPTH_MM = 5.0
+LEAST_FLOOR_MM = 0.8
+"""Thinner floors of the clamp are left out: there the cover is the floor."""
 
 
 def _placed(d: Dimensions, local: cq.Shape) -> cq.Shape:
@@ -56,7 +58,7 @@ def clamp_screw_positions(d: Dimensions) -> list[Point2]:
 
 
 def camera_clamp(d: Dimensions) -> Part:
-    """U-shaped cradle of two cheeks with front lips and a rear bar, open towards the gel."""
+    """Cradle of floor, two cheeks with front lips and a rear bar, open towards the gel."""
     at = Layout(d)
     fit = d["clamp.play_mm"]
     face = -d["camera_pose.face_mm"]
@@ -73,6 +75,9 @@ def camera_clamp(d: Dimensions) -> Part:
     if lip > 0.4 and lens + fit < inner - 0.4:
         pieces += pair((face - 0.1, face + fit + lip), (inner, outer), (-FAR_MM, lens))
         pieces += pair((face + fit, face + fit + lip), (lens + fit, inner + 0.1), (-FAR_MM, lens))
+    floor = box((rear - CLAMP_BAR_MM, face), (-outer, outer), (-high - fit - 0.1, -high - fit))
+    if _placed(d, floor).BoundingBox().zmin - d["cover.top_z_mm"] > LEAST_FLOOR_MM:
+        pieces.append(box((rear - CLAMP_BAR_MM, face), (-outer, outer), (-FAR_MM, -high - fit)))
     slab = box(
         (-FAR_MM, FAR_MM),
         (-FAR_MM, FAR_MM),
@@ -95,5 +100,5 @@ def camera_clamp(d: Dimensions) -> Part:
         process="print",
         colour=CLAMP,
         explode_mm=(-14, 0, -22),
-        note="drop the camera in from the gel side; a dot of glue holds it",
+        note="drop the camera in from the gel side; align it by its picture, then glue it",
     )

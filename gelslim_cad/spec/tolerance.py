@@ -82,7 +82,7 @@ class Tolerance(Block):
         "the live picture is centred and sharp, before the camera is glued",
     )
     alignment_px: float = between(
-        0, 100, "Half width (uniform) of how closely the picture is centred then", default=2.0
+        0, 100, "Half width (uniform) of how closely the picture is centred then", default=4.0
     )
     largest_blur_per_diameter: float = above(
         0, 5, "Largest blur of a built finger, in marker diameters", default=0.5

@@ -13,13 +13,13 @@ from gelslim_cad.tolerance.margins import RULES
 from gelslim_cad.tolerance.yields import ALL, Yield, yield_of
 
 Change = Mapping[str, Any]
-MOST_STEPS = 10
+MOST_STEPS = 12
 LEAST_GAIN = 0.005
 """Gain of yield below which a change is not worth a step."""
 FREE_MM = 0.02
 """Thickness below which a change costs none."""
 MARGIN_PATH, BORDER_PATH = "design.optics.image_margin", "design.mirror.border_mm"
-MARGIN_STEP, BORDER_STEP_MM, BACK_WALL_STEP_MM = 0.02, 0.3, 0.1
+MARGIN_STEP, BORDER_STEP_MM, BACK_WALL_STEP_MM = 0.01, 0.3, 0.1
 LARGEST_MARGIN, MARGIN_FOUND = 0.3, 5e-4
 COVERAGE = ("coverage.along", "coverage.across", "coverage.markers")
 SHIMMED_MM = 0.05
@@ -171,8 +171,11 @@ def _changes(spec: Spec) -> Iterator[tuple[str, Change]]:
         {"design.optics.blur_per_diameter": blur},
     )
     wall = round(spec.design.housing.back_wall_mm - BACK_WALL_STEP_MM, 3)
-    if spec.design.envelope.max_thickness_mm is not None and wall > 0:
+    if spec.design.envelope.max_thickness_mm is not None:
         yield f"Back wall {wall:g} mm", {"design.housing.back_wall_mm": wall}
+        more = round(1.1 * optics.blur_per_diameter, 3)
+        words = f"Blur of {more:g} marker diameters, for a thinner finger"
+        yield words, {"design.optics.blur_per_diameter": more}
     px = round(1.05 * optics.min_px_per_marker, 2)
     yield f"{px:g} px per marker at least", {"design.optics.min_px_per_marker": px}
 
