@@ -53,7 +53,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_cad": (
         "spec", "markers", "pictures", "geometry", "light", "dimensions", "checks", "export",
-        "proof", "solids", "report", "sensor", "build", "compare", "explore", "family",
+        "proof", "solids", "report", "sensor", "tolerance", "build", "compare", "explore", "family",
     ),
     "gelslim": (
         "ending", "examples", "scene_sensor", "design", "contacts", "doctor", "cli", "__main__",
@@ -77,7 +77,8 @@ FORBIDDEN = {
     },
 }
 CAD_FREE = (
-    "spec", "geometry", "dimensions", "markers", "light", "checks", "sensor", "explore",
+    "spec", "geometry", "dimensions", "markers", "light", "checks", "sensor", "tolerance",
+    "explore",
 )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.instructions import build_guide
 from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
 from gelslim_cad.build.work import Files
-from gelslim_cad.build.writers import LIGHT_JSON
+from gelslim_cad.build.writers import LIGHT_JSON, TOLERANCE_JSON
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.geometry.part import Part
@@ -222,6 +222,7 @@ def report_data(
         projection=pictures(contents, PROJECTION_PICTURES),
         projection_notes=(Note("Projection", projection_sentence(d)),),
         versions=versions(),
+        tolerance=json.loads(contents[TOLERANCE_JSON]),
     )
 
 

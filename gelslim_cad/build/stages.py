@@ -81,6 +81,7 @@ class Stages:
         packed = {p.name: PackedPart.of(p) for p in (*finger, *tooling)}
         whole = tuple(packed[p.name] for p in finger)
         named = (("name", self.name),)
+        spec = (("spec", self.loaded.spec.model_dump_json()),)
         units = [
             Unit("assembly", "assembly", whole, named, cost=8),
             Unit("glb", "glb", whole, named, cost=6),
@@ -88,7 +89,8 @@ class Stages:
             self._mould_unit(packed["gel_pad"]),
             Unit("view", "view", (), tuple(view_inputs(self.dimensions).items())),
             Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
-            Unit("bundle", "bundle", (), (("spec", self.loaded.spec.model_dump_json()),), cost=18),
+            Unit("bundle", "bundle", (), spec, cost=18),
+            Unit("tolerance", "tolerance", (), spec, cost=7),
         ]
         units += [
             Unit(f"part {p.name}", "part", (packed[p.name],), cost=len(packed[p.name].shape) / 1e5)

@@ -18,6 +18,7 @@ GLB_LINEAR_MM = 0.1
 GLB_ANGULAR_DEG = 20.0
 PROOF_DECIMALS = 8
 LIGHT_JSON = "light.json"
+TOLERANCE_JSON = "tolerance.json"
 ERROR_PICTURE = "pictures/projection_error.png"
 LEDGER_LIMIT = 1e-9
 LOST_LIMIT = 1e-9
@@ -142,6 +143,16 @@ def write_view(parts: Sequence[Part], **values: Any) -> Written:
     return Written({ERROR_PICTURE: (projection_png(values), "picture of the projection error")})
 
 
+def write_tolerance(parts: Sequence[Part], spec: str) -> Written:
+    """Yields of built fingers, their causes and the errors of their forces."""
+    from gelslim_cad.spec import Spec
+    from gelslim_cad.tolerance.study import BUILD_SAMPLES, study_record, tolerance_study
+
+    study = tolerance_study(Spec.model_validate_json(spec), samples=BUILD_SAMPLES)
+    data = json_bytes(study_record(study))
+    return Written({TOLERANCE_JSON: (data, "yields of the rules, causes, force errors")})
+
+
 def _light_proofs(study: Any) -> tuple[dict[str, Any], ...]:
     """The fluxes add up to that of the sources, and no ray is lost."""
     lost = max(g.value("lost") for g in (study.light, study.glued, study.air_gap))
@@ -223,5 +234,6 @@ WRITERS: dict[str, Callable[..., Written]] = {
     "view": write_view,
     "light": write_light,
     "bundle": write_bundle_files,
+    "tolerance": write_tolerance,
 }
 """The function that does each kind of unit."""

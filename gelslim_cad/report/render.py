@@ -16,6 +16,7 @@ from gelslim_cad.report.camera_view import CameraView, camera_view, ramp_style
 from gelslim_cad.report.markup import text
 from gelslim_cad.report.rules import MARKS, pill, rules, verdict
 from gelslim_cad.report.tables import BomLine, Note
+from gelslim_cad.report.tolerance import tolerance_section
 
 if TYPE_CHECKING:
     from gelslim_cad.build.manifest import FileEntry
@@ -66,6 +67,8 @@ class ReportData:
     """Pictures of the projection, shown below the camera's view, with notes."""
     projection_notes: tuple[Note, ...]
     versions: tuple[tuple[str, str], ...]
+    tolerance: Mapping[str, Any]
+    """The study of the tolerances as plain data; empty where there is none."""
 
 
 def render_report(data: ReportData) -> bytes:
@@ -110,6 +113,7 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
         ("pictures", "Pictures", _pictures(data.pictures)),
         ("camera", "What the camera sees", camera_view(data.camera_view) + projection),
         ("light", "How the gel is lit", light),
+        ("tolerance", "What tolerances do", tolerance_section(data.tolerance)),
         ("thickness", "What sets the thickness", _binding(data.binding)),
         ("rules", f"Design rules <small>{tally}</small>", rules(data.rules)),
         ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),

@@ -183,9 +183,7 @@ class Spec(Block):
         default=Manufacturing(), description="Processes, tolerances, stock"
     )
     mesh: Mesh = Field(default=Mesh(), description="Finite-element mesh of the pad")
-    tolerance: Tolerance = Field(
-        default=Tolerance(), description="What making the finger varies"
-    )
+    tolerance: Tolerance = Field(default=Tolerance(), description="What making the finger varies")
 
     @model_validator(mode="after")
     def _names_a_folder(self) -> Spec:

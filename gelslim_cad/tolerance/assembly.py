@@ -53,8 +53,9 @@ def frame_mm(d: Lookup) -> tuple[float, float]:
     finger = built(d, none, as_dropped_in(d, none))
     seen = on_sensor(finger, rays(finger, *border_points(d, none)))
     middles = []
-    for place, side in zip(seen, ("across", "along"), strict=True):
-        half = d[f"view.sensor_{side}_mm"] / 2  # type: ignore[index]
+    sides = (d["view.sensor_across_mm"], d["view.sensor_along_mm"])
+    for place, side in zip(seen, sides, strict=True):
+        half = side / 2
         low, high = half + float(place.min()), half - float(place.max())
         towards = min(max(FREE * half - min(low, high), 0.0), abs(high - low) / 2)
         middles.append((low - high) / 2 + (towards if low < high else -towards))

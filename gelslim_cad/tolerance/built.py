@@ -172,15 +172,11 @@ def _mirror(d: Lookup, e: Errors) -> tuple[Array, Array, Array]:
         + np.tan(np.radians(e["mirror_roll_deg"]))[:, None] * np.array([0.0, 1.0, 0.0])
     )
     tilted = tilted / np.linalg.norm(tilted, axis=1)[:, None]
-    middle = np.array(
-        [
-            (d[f"mirror.upper_{axis}_mm"] + d[f"mirror.lower_{axis}_mm"]) / 2  # type: ignore[index]
-            for axis in ("x", "z")
-        ]
-    )
+    upper = np.array([d["mirror.upper_x_mm"], 0.0, d["mirror.upper_z_mm"]])
+    lower = np.array([d["mirror.lower_x_mm"], 0.0, d["mirror.lower_z_mm"]])
     raised = (e["mirror_seat_mm"] + e["mirror_glass_mm"])[:, None] * normal
     raised = raised + e["mirror_stop_mm"][:, None] * along
-    return np.array([middle[0], 0.0, middle[1]]) + raised, tilted, along
+    return (upper + lower) / 2 + raised, tilted, along
 
 
 def _camera(d: Lookup, e: Errors, setting: Setting, extension: Array) -> tuple[Array, Array]:

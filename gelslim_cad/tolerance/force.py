@@ -131,9 +131,7 @@ def patch_forces(
         (-CELLS * cell / 2, -CELLS * cell / 2, -thickness_mm),
     )
     formulation: Any = element
-    operator = surface_operator(
-        mesh, Material(1.0, poisson, 1000.0), formulation, "pcg", rtol=1e-8
-    )
+    operator = surface_operator(mesh, Material(1.0, poisson, 1000.0), formulation, "pcg", rtol=1e-8)
     at = np.asarray(mesh.nodes_mm)[mesh.surface][:, :2] / lateral
     bump = np.exp(-(at**2).sum(axis=1) / (2 * WIDTH_MM**2))[:, None]
     totals = {way: operator.force(bump * np.array(v)).sum(axis=0) for way, v in WAYS.items()}
@@ -197,4 +195,3 @@ def picture_scale_log(d: Dimensions, e: Errors, stage: Stage) -> Array:
     _, seen = scales(assembled(d, e, stage), middle, middle)
     _, design = scales(assembled(d, no_errors(d), "as_built"), middle, middle)
     return np.asarray(np.log(np.maximum(seen / design, LEAST_LAYER)))[:, 0]
-

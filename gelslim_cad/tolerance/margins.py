@@ -148,9 +148,7 @@ def rule_of(place: str) -> str:
 def worst_margins(places: Mapping[str, Array]) -> dict[str, Array]:
     """Margin (n,) of each rule: the least of its places."""
     rules = dict.fromkeys(map(rule_of, places))
-    return {
-        r: np.minimum.reduce([v for k, v in places.items() if rule_of(k) == r]) for r in rules
-    }
+    return {r: np.minimum.reduce([v for k, v in places.items() if rule_of(k) == r]) for r in rules}
 
 
 def _coverage(d: Dimensions, finger: Built, border: Rays) -> dict[str, Array]:
@@ -162,8 +160,8 @@ def _coverage(d: Dimensions, finger: Built, border: Rays) -> dict[str, Array]:
 def _in_picture(d: Dimensions, rules: Sequence[str], u: Array, v: Array) -> dict[str, Array]:
     """Picture left beside points (n, m) at its four sides, as parts of the half picture."""
     half_u, half_v = d["view.sensor_across_mm"] / 2, d["view.sensor_along_mm"] / 2
-    room = (v.min(axis=1) / half_v, -v.max(axis=1) / half_v)
-    room = (*room, u.min(axis=1) / half_u, -u.max(axis=1) / half_u)
+    ends = (v.min(axis=1) / half_v, -v.max(axis=1) / half_v)
+    room = (*ends, u.min(axis=1) / half_u, -u.max(axis=1) / half_u)
     places = map("@".join, zip(rules, ("near", "far", "left", "right"), strict=True))
     return {place: 1 + left for place, left in zip(places, room, strict=True)}
 
@@ -260,9 +258,15 @@ def _light(d: Dimensions, e: Errors) -> dict[str, Array]:
 
 def _led_margin(d: Dimensions, finger: Built) -> Array:
     """The rule `led.hidden_mm` with the camera where it is."""
-    names = ("baffle.top_z_mm", "baffle.inner_y_mm", "led.y_mm", "led.top_z_mm")
-    values = (*(d[n] for n in names), d["design.leds.package_mm"])  # type: ignore[misc]
-    found = led_hidden(*values, finger.camera_z_mm, d["camera.lens_diameter_mm"])
+    found = led_hidden(
+        d["baffle.top_z_mm"],
+        d["baffle.inner_y_mm"],
+        d["led.y_mm"],
+        d["led.top_z_mm"],
+        d["design.leds.package_mm"],
+        finger.camera_z_mm,
+        d["camera.lens_diameter_mm"],
+    )
     return np.asarray(found.value)
 
 

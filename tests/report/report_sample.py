@@ -315,4 +315,5 @@ def report(name: str = "gelslim2", pictures: tuple[Picture, ...] = ()) -> Report
         projection=(),
         projection_notes=(),
         versions=(("gelslim-cad", "0.1.0"), ("cadquery", "2.8")),
+        tolerance={},
     )
