@@ -9,12 +9,13 @@ import numpy as np
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.tolerance.built import Array, Built, Errors, Setting, as_dropped_in, built, rocking
 from gelslim_cad.tolerance.causes import no_errors
-from gelslim_cad.tolerance.picture import image_distances_mm, on_sensor, rays
+from gelslim_cad.tolerance.picture import Rays, image_distances_mm, on_sensor, rays
 
 Stage = Literal["as_built", "adjusted"]
 STAGES: tuple[Stage, ...] = ("as_built", "adjusted")
 TURNS = 3
-"""Repetitions of looking and turning; each leaves less than a twentieth of the offset."""
+"""Repetitions of looking and turning; each leaves less than a tenth of the offset."""
+TILT_STEP_DEG = 0.1
 FREE = 0.05
 """Part of the half picture left free on every side of the gel, where it is not as full."""
 
@@ -40,9 +41,20 @@ def assembled(d: Lookup, e: Errors, stage: Stage) -> Built:
     finger = built(d, e, setting)
     if stage == "as_built":
         return finger
-    aim = frame_mm(d)
+    aim, turn = frame_mm(d), _degrees_per_offset(d)
+    largest = np.array([c.spread for c in rocking(d).values()])
+    wanted = d["view.pixel_pitch_mm"] * np.stack(
+        [e["align_u_px"], e["align_v_px"], e["align_roll_px"]], axis=1
+    )
     for _ in range(TURNS):
-        setting = _adjusted(d, e, setting, finger, aim)
+        ray = rays(finger, *border_points(d, e))
+        off = _offsets_mm(finger, ray, aim) - wanted
+        tilt = np.stack([setting.pitch_deg, setting.yaw_deg, setting.roll_deg], axis=1)
+        tilt = np.clip(tilt - off @ turn.T, -largest, largest)
+        sagittal, tangential = image_distances_mm(finger, ray)
+        least, most = tangential.min(axis=1), sagittal.max(axis=1)
+        focus = 2 * least * most / (least + most)
+        setting = Setting(tilt[:, 0], tilt[:, 1], tilt[:, 2], focus)
         finger = built(d, e, setting)
     return finger
 
@@ -62,27 +74,21 @@ def frame_mm(d: Lookup) -> tuple[float, float]:
     return middles[0], middles[1]
 
 
-def _adjusted(
-    d: Lookup, e: Errors, old: Setting, finger: Built, aim_mm: tuple[float, float]
-) -> Setting:
-    ray = rays(finger, *border_points(d, e))
+def _offsets_mm(finger: Built, ray: Rays, aim_mm: tuple[float, float]) -> Array:
+    """How far (n, 3) the gel's picture is right and below its frame, and its far edge slopes."""
     u, v = on_sensor(finger, ray)
-    pixel = d["view.pixel_pitch_mm"]
-    off_u = (u.max(axis=1) + u.min(axis=1)) / 2 - aim_mm[0] - pixel * e["align_u_px"]
-    off_v = (v.max(axis=1) + v.min(axis=1)) / 2 - aim_mm[1] - pixel * e["align_v_px"]
-    # An edge of the gel from -y to +y, which is level in the picture of the design.
-    across_u, across_v = u[:, 5] - u[:, 4], v[:, 5] - v[:, 4]
-    lean = (across_v - 2 * pixel * e["align_roll_px"]) / across_u
-    largest = {name: c.spread for name, c in rocking(d).items()}
+    middles = [(w.max(axis=1) + w.min(axis=1)) / 2 for w in (u, v)]
+    # Points 4 and 5 are the ends of the far edge, which is level in the picture of the design.
+    return np.stack([middles[0] - aim_mm[0], middles[1] - aim_mm[1], v[:, 5] - v[:, 4]], axis=1)
 
-    def turned(name: str, angle_deg: Array, by_rad: Array) -> Array:
-        return np.clip(angle_deg + np.degrees(by_rad), -largest[name], largest[name])
 
-    sagittal, tangential = image_distances_mm(finger, ray)
-    least, most = tangential.min(axis=1), sagittal.max(axis=1)
-    return Setting(
-        pitch_deg=turned("rock_pitch_deg", old.pitch_deg, off_v / finger.image_mm),
-        yaw_deg=turned("rock_yaw_deg", old.yaw_deg, off_u / finger.image_mm),
-        roll_deg=turned("rock_roll_deg", old.roll_deg, lean),
-        focus_mm=2 * least * most / (least + most),
-    )
+def _degrees_per_offset(d: Lookup) -> Array:
+    """Tilts (3, 3) of the camera in its clamp that shift and turn the picture by 1 mm."""
+    none = no_errors(d, 3)
+    tilts = TILT_STEP_DEG * np.eye(3)
+    focus = as_dropped_in(d, none).focus_mm
+    ends = []
+    for sign in (1, -1):
+        finger = built(d, none, Setting(*(sign * tilts), focus))
+        ends.append(_offsets_mm(finger, rays(finger, *border_points(d, none)), (0.0, 0.0)))
+    return np.asarray(np.linalg.inv((ends[0] - ends[1]).T / (2 * TILT_STEP_DEG)))

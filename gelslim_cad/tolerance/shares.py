@@ -117,30 +117,28 @@ def sobol_shares(
 
     def values(u: Array) -> Array:
         found = margins(d, errors(all_causes, u), stage)
-        return np.stack([found[place] for place in places])
+        # SciPy fails for a single margin of a single group: the first one stands there twice.
+        return np.stack([found[place] for place in (places[0], *places)])
 
+    none = dict.fromkeys(groups, 0.0)
+    if not groups or not places:
+        return dict.fromkeys(places, (none, none))
     mixed = []
     for members in groups.values():
         columns = a.copy()
         columns[:, members] = b[:, members]
         mixed.append(values(columns))
-    if not groups:
-        return {place: ({}, {}) for place in places}
-    of_a, of_b, of_mixed = values(a), values(b), np.stack(mixed)
+    of_a, of_b = values(a), values(b)
+    indices = sobol_indices(func={"f_A": of_a, "f_B": of_b, "f_AB": np.stack(mixed)}, n=count)
     still = np.std(np.concatenate([of_a, of_b], axis=1), axis=1) < LEAST_DEVIATION
-    noise = np.where(still[:, None], np.arange(count) * 1.0, 0.0)
-    # A margin that nothing changes has no indices; a ramp in its place keeps them finite.
-    indices = sobol_indices(
-        func={"f_A": of_a + noise, "f_B": of_b + noise, "f_AB": of_mixed + noise}, n=count
+    first, total = (
+        np.where(still[:, None], 0.0, np.reshape(of, (len(places) + 1, len(groups))))
+        for of in (indices.first_order, indices.total_order)
     )
-    first, total = np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
-    none = dict.fromkeys(groups, 0.0)
     return {
-        place: (none, none)
-        if still[k]
-        else (
-            dict(zip(groups, map(float, first[k]), strict=True)),
-            dict(zip(groups, map(float, total[k]), strict=True)),
+        place: (
+            dict(zip(groups, first[k].tolist(), strict=True)),
+            dict(zip(groups, total[k].tolist(), strict=True)),
         )
-        for k, place in enumerate(places)
+        for k, place in enumerate(places, start=1)
     }

@@ -101,7 +101,9 @@ def _print_causes(study: ToleranceStudy) -> None:
     for group in sorted(worst.total, key=lambda g: -worst.total[g]):
         figures = (worst.linear[group], worst.first[group], worst.total[group])
         if max(figures) >= SHOWN:
-            shown.add_row(group, GROUPS[group].field, *(f"{100 * f:.0f} %" for f in figures))
+            shown.add_row(
+                group, GROUPS[group].field, *(f"{100 * max(f, 0):.0f} %" for f in figures)
+            )
     console().print(shown)
     say(
         f"Linear: squared standardised coefficients, which explain {100 * worst.r_squared:.0f} % "

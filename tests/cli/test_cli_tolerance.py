@@ -1,0 +1,46 @@
+"""`gelslim tolerance`: its answers for people and programs, and its exit status."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from cli_samples import MINI20
+
+from gelslim.cli import main
+
+FEW = ("--samples", "128", "--least-yield")
+
+
+def test_the_answer_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tolerance", str(MINI20), *FEW, "0.01", "--json", "--seed", "3"]) == 1
+    record = json.loads(capsys.readouterr().out)
+    assert record["format"] == "gelslim-tolerance/1"
+    assert (record["samples"], record["seed"], record["assembly"]) == (128, 3, "as_built")
+    assert set(record["yields"]) == {"as_built", "adjusted"}
+    everything = record["yields"]["adjusted"]["all"]
+    assert everything["low"] < everything["yield"] < everything["high"]
+    assert all({"field", "source", "distribution", "spread"} <= set(c) for c in record["causes"])
+    assert len(record["forces"]) == 4
+    assert record["worst_rule"] == "coverage.along"
+    worst = next(v for v in record["variance"] if v["place"].startswith("coverage.along"))
+    assert max(worst["total"], key=worst["total"].get) == "camera in its clamp"
+
+
+def test_the_answer_for_people_and_the_status(
+    capsys: pytest.CaptureFixture[str], tmp_path: object
+) -> None:
+    from pathlib import Path
+
+    good = Path(str(tmp_path)) / "good.yaml"
+    good.write_text(
+        MINI20.read_text(encoding="utf-8") + "tolerance:\n  adjusted: true\n", encoding="utf-8"
+    )
+    assert main(["tolerance", str(good), *FEW, "0.2"]) == 0
+    out = capsys.readouterr().out
+    assert "adjusted" in out
+    assert "design.housing.camera_play_mm" in out or "tolerance." in out
+
+
+def test_too_few_samples_are_bad_input() -> None:
+    assert main(["tolerance", str(MINI20), "--samples", "3"]) == 2
