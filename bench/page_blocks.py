@@ -19,6 +19,7 @@ from typing import Any
 
 import force_tables
 import page_tables
+import tolerance_tables
 import twin_tables
 from bench_data import DOCS, write_whole
 
@@ -66,6 +67,11 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "iterations": _from("stiffness_cases", page_tables.iterations),
         "noise": _from("stiffness_cases", page_tables.noise),
         "assembly": _from("assembly", page_tables.assembly),
+    },
+    "docs/tolerance.md": {
+        "tolerance-causes": tolerance_tables.causes,
+        "tolerance-yields": _from("tolerance_yields", tolerance_tables.yields),
+        "tolerance-forces": _from("tolerance_yields", tolerance_tables.forces),
     },
     "docs/light_guide.md": {
         "rays": _from("light_rays", page_tables.rays),

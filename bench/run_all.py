@@ -49,6 +49,7 @@ STEPS = (
     Step("design_batch", quick=("--count", "500", "--jobs", "1", "--repeats", "1"), writes=False),
     Step("force_overlay", quick=None, writes=False),
     Step("stiffness_cases", quick=None),
+    Step("tolerance_yields", quick=("--samples", "256")),
     Step("page_blocks", quick=None, writes=False),
 )
 PAGE = "accuracy_page"

@@ -89,6 +89,6 @@ def _degrees_per_offset(d: Lookup) -> Array:
     focus = as_dropped_in(d, none).focus_mm
     ends = []
     for sign in (1, -1):
-        finger = built(d, none, Setting(*(sign * tilts), focus))
+        finger = built(d, none, Setting(sign * tilts[0], sign * tilts[1], sign * tilts[2], focus))
         ends.append(_offsets_mm(finger, rays(finger, *border_points(d, none)), (0.0, 0.0)))
     return np.asarray(np.linalg.inv((ends[0] - ends[1]).T / (2 * TILT_STEP_DEG)))

@@ -33,6 +33,8 @@ def test_the_answer_for_people_and_the_status(
     from pathlib import Path
 
     good = Path(str(tmp_path)) / "good.yaml"
+    assert main(["tolerance", str(MINI20), "--samples", "100", "--json"]) == 0
+    capsys.readouterr()
     good.write_text(
         MINI20.read_text(encoding="utf-8") + "tolerance:\n  adjusted: true\n", encoding="utf-8"
     )
