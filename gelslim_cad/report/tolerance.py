@@ -24,12 +24,7 @@ def tolerance_section(record: Mapping[str, Any]) -> str:
     """
     if not record:
         return '<p class="soft">No tolerances were studied.</p>'
-    return (
-        f'<div class="card scroll">{_yields(record)}</div>'
-        f'<div class="card scroll">{_causes(record)}</div>'
-        f'<div class="card scroll">{_forces(record)}</div>'
-        f'<div class="card scroll">{_plan(record)}</div>'
-    )
+    return "".join(part(record) for part in (_yields, _causes, _forces, _plan))
 
 
 def _yields(record: Mapping[str, Any]) -> str:
@@ -77,8 +72,8 @@ def _bar(worst: Mapping[str, Any], group: str) -> str:
     share = min(max(worst["total"][group], 0.0), 1.0)
     return (
         f'<svg viewBox="0 0 {WIDTH:g} 12" width="{WIDTH:g}" height="12" role="img" '
-        f'aria-label="{number(100 * share, 2)} %"><rect class="track" width="{WIDTH:g}" '
-        f'height="12"/><rect fill="currentColor" opacity=".55" width="'
+        f'aria-label="{number(100 * share, 2)} %"><rect fill="currentColor" opacity=".12" '
+        f'width="{WIDTH:g}" height="12"/><rect fill="currentColor" opacity=".55" width="'
         f'{coordinate(share * WIDTH)}" height="12"/></svg> {number(100 * share, 2)} %'
     )
 
@@ -134,4 +129,5 @@ def _table(heads: list[str], rows: list[list[str]], raw: int = -1) -> str:
         + "</tr>"
         for row in rows
     )
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="card scroll">{table}</div>'

@@ -122,15 +122,22 @@ def test_pictures_of_random_fingers_are_those_of_a_traced_lens(name: str) -> Non
     off = [np.abs(z - s) / z for z in image_distances_mm(finger, ray)]
     blurs = (finger.aperture_mm * finger.image_mm / finger.focus_mm)[:, None] * np.maximum(*off)
     left, pitch = play_left(d, e), d["view.pixel_pitch_mm"]
+    found = margins(d, e, "as_built")
     circle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     rim = np.stack([np.cos(circle), np.sin(circle)], axis=1)
     for k in range(count):
         lens = traced(d, {n: float(value[k]) for n, value in e.items()}, float(left[k]))
         middle = (np.array(lens.size_px) - 1) / 2
+        on_mirror = []
         for m in range(x.shape[1]):
             sensor = np.array([u[k, m], v[k, m]]) - finger.principal_mm[k]
             pixel = seen(lens, np.array([x[k, m], y[k, m]]), middle + sensor / pitch)
             assert (pixel - middle) * pitch == pytest.approx(sensor, abs=1e-7)
+            across, along = (pixel - middle) * pitch
+            chief = lens.forward * lens.sensor_mm + lens.right * across + lens.down * along
+            away = (lens.mirror_point - lens.centre) @ lens.mirror_normal
+            met = lens.centre + chief * (away / (chief @ lens.mirror_normal))
+            on_mirror.append(met - lens.mirror_point)
             rim_mm = lens.on_gel(np.broadcast_to(pixel, rim.shape), rim)
             steps = [
                 seen(lens, np.array([x[k, m], y[k, m]]) + sign * h, pixel)
@@ -141,6 +148,14 @@ def test_pictures_of_random_fingers_are_those_of_a_traced_lens(name: str) -> Non
             width = np.ptp((rim_mm - rim_mm.mean(axis=0)) @ per_mm @ rim.T, axis=0).max() * pitch
             # In the picture A v |Z - s| / (Z s), by the image that is less sharp.
             assert width == pytest.approx(float(blurs[k, m]), rel=0.05, abs=2e-4)
+        slope = np.radians(d["mirror.angle_deg"])
+        up = np.array(on_mirror) @ np.array([np.cos(slope), 0.0, np.sin(slope)])
+        side = np.array(on_mirror)[:, 1]
+        half_length, half_width = d["mirror.length_mm"] / 2, d["mirror.width_mm"] / 2
+        room = (half_length - up.max(), half_length + up.min())
+        room = (*room, half_width + side.min(), half_width - side.max())
+        for place, left_over in zip(("upper", "lower", "left", "right"), room, strict=True):
+            assert found[f"mirror.covers@{place}"][k] == pytest.approx(left_over, abs=1e-6)
 
 
 def test_an_adjusted_camera_sees_the_gel_in_its_frame() -> None:
@@ -173,3 +188,30 @@ def test_focus_of_an_adjusted_lens_blurs_nearest_and_farthest_image_alike() -> N
     least, most = tangential.min(axis=1), sagittal.max(axis=1)
     s = finger.focus_mm
     assert (s - least) / least == pytest.approx((most - s) / most, rel=1e-3)
+
+
+def test_an_led_beside_a_thin_leg_loses_its_light() -> None:
+    """A package of 2 mm, 0.5 mm off the middle of a leg of 2.5 mm, has 1.75 mm before it."""
+    d = derive(exact("gelslim2"))
+    e = {**no_errors(d, 3), "led_mm": np.array([0.0, 0.5, 0.0])}
+    e["acrylic_mm"] = np.array([0.0, 0.0, -1.0])
+    e["red_percent"] = np.array([-10.0, 0.0, 0.0])
+    found = margins(d, e, "as_built")
+    assert found["light@red"] + 0.7 == pytest.approx([0.9, 1.75 / 2, 1.5 / 2])
+    assert found["light@green"] + 0.7 == pytest.approx([1.0, 1.75 / 2, 1.5 / 2])
+
+
+def test_calibration_adds_a_tilt_and_an_offset_of_the_lens() -> None:
+    """Both shift the picture: its tolerances are 1 degree and 0.2 % of the picture's width."""
+    d = derive(exact("gelslim2"))
+    v = d["view.image_distance_mm"]
+    e = {**no_errors(d, 3), "rock_yaw_deg": np.array([2.0, 0.0, 2.0])}
+    shift = v * np.tan(np.radians(2.0))
+    e["centre_u_mm"] = np.array([0.0, shift, shift])
+    one = np.hypot(np.radians(1.0), 0.002 * 640 * d["view.pixel_pitch_mm"] / v)
+    expected = 5 - np.radians(2.0) / one
+    found = margins(d, e, "as_built")["calibration@worst"]
+    assert found[:2] == pytest.approx([expected] * 2, abs=5e-3)
+    # Together they cancel; what stays is how far the camera's turn has moved its pupil.
+    behind = d["camera_pose.face_mm"] + d["camera.module_depth_mm"] / 2
+    assert found[2] == pytest.approx(5 - behind * np.sin(np.radians(2.0)) / 0.4, abs=5e-3)
