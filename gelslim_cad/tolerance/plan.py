@@ -98,8 +98,8 @@ def plan(spec: Spec, wanted: float, count: int, seed: int) -> Plan:
         seed: Their seed.
 
     Returns:
-        The changes with yield and thickness after each. Where the last step changes the image
-        margin or the mirror's border, the margin is the least that reaches the yield.
+        The changes with yield and thickness after each. An image margin that was changed is in
+        the end the least that reaches the yield.
     """
     steps = [_step("", {}, derive(spec), count, seed)]
     while steps[-1].share < wanted and len(steps) <= MOST_STEPS:
@@ -109,9 +109,7 @@ def plan(spec: Spec, wanted: float, count: int, seed: int) -> Plan:
         steps.append(best)
         spec = with_values(spec, best.change)
     done = Plan(wanted, tuple(steps))
-    if done.reached and MARGIN_PATH in done.steps[-1].change:
-        return _trimmed(spec, done, count, seed)
-    return done
+    return _trimmed(spec, done, count, seed) if MARGIN_PATH in done.changes() else done
 
 
 def _step(words: str, change: Change, d: Dimensions, count: int, seed: int) -> Step:
@@ -181,17 +179,24 @@ def _changes(spec: Spec) -> Iterator[tuple[str, Change]]:
 
 
 def _trimmed(spec: Spec, done: Plan, count: int, seed: int) -> Plan:
-    """The plan with the image margin of its last step no larger than it must be."""
-    last = done.steps[-1]
-    before = spec.design.optics.image_margin - MARGIN_STEP
-    margin = least_margin(spec, done.wanted, count, seed, low=max(before, 0.0))
-    if margin is None:
+    """The plan with the image margin, in the end, no larger than it must be."""
+    if not done.reached:
         return done
-    change = {**last.change, MARGIN_PATH: margin}
-    named = "Image margin {:g}".format
-    words = last.words.replace(named(last.change[MARGIN_PATH]), named(margin))
+    margin = least_margin(spec, done.wanted, count, seed)
+    if margin is None or margin > spec.design.optics.image_margin - MARGIN_FOUND:
+        return done
+    last, words, change = (
+        done.steps[-1],
+        f"Image margin {margin:g} is enough",
+        {MARGIN_PATH: margin},
+    )
+    kept = done.steps
+    if MARGIN_PATH in last.change:
+        named = f"Image margin {last.change[MARGIN_PATH]:g}"
+        words = last.words.replace(named, f"Image margin {margin:g}")
+        change, kept = {**last.change, **change}, done.steps[:-1]
     final = _step(words, change, derive(with_values(spec, change)), count, seed)
-    return Plan(done.wanted, (*done.steps[:-1], final))
+    return Plan(done.wanted, (*kept, final))
 
 
 def least_margin(

@@ -9,12 +9,12 @@ from typing import Any
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec import Spec
 from gelslim_cad.tolerance.assembly import Stage
-from gelslim_cad.tolerance.causes import GROUPS, Cause, causes
+from gelslim_cad.tolerance.causes import GROUPS, Cause, causes, no_errors
 from gelslim_cad.tolerance.force import ForceError, force_errors
-from gelslim_cad.tolerance.margins import ASSEMBLY, RULES
+from gelslim_cad.tolerance.margins import ASSEMBLY, RULES, margins, worst_margins
 from gelslim_cad.tolerance.plan import Plan, plan, thickness_per_percent
 from gelslim_cad.tolerance.shares import Shares, linear_shares, sobol_shares, worst_places
-from gelslim_cad.tolerance.yields import ALL, Yield, counted, sampled
+from gelslim_cad.tolerance.yields import ALL, SLACK, Yield, counted, sampled
 
 SAMPLES, BUILD_SAMPLES, PLAN_SAMPLES = 10_000, 2_000, 2_048
 LEAST_YIELD = 0.95
@@ -30,6 +30,7 @@ class ToleranceStudy:
         samples: Number of sampled fingers.
         seed: Seed of the samples.
         stage: The way of assembling that the spec chose.
+        broken: Rules that the design breaks without any error, so that no tolerance helps.
         causes: All causes of error.
         yields: Yields of the rules and of all together by way of assembling.
         shares: For each rule the causes of its worst margin, in the way that the spec chose.
@@ -43,6 +44,7 @@ class ToleranceStudy:
     samples: int
     seed: int
     stage: Stage
+    broken: tuple[str, ...]
     causes: tuple[Cause, ...]
     yields: Mapping[Stage, Mapping[str, Yield]]
     shares: tuple[Shares, ...]
@@ -81,6 +83,7 @@ def tolerance_study(
     """
     d = derive(spec)
     stage = counted(d)
+    exact = worst_margins(margins(d, no_errors(d), "as_built"))
     both = sampled(d, samples, seed)
     found = both[stage]
     places = worst_places(found)
@@ -95,6 +98,7 @@ def tolerance_study(
         samples=samples,
         seed=seed,
         stage=stage,
+        broken=tuple(rule for rule, v in exact.items() if v[0] < -SLACK),
         causes=causes(d),
         yields={way: fingers.yields() for way, fingers in both.items()},
         shares=shares,
@@ -113,6 +117,7 @@ def study_record(study: ToleranceStudy) -> dict[str, Any]:
         "seed": study.seed,
         "assembly": study.stage,
         "assembly_means": dict(ASSEMBLY),
+        "broken": list(study.broken),
         "causes": [
             {**asdict(c), "field": GROUPS[c.group].field, "source": GROUPS[c.group].source}
             for c in study.causes

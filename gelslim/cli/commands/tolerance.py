@@ -69,6 +69,12 @@ def _print_yields(study: ToleranceStudy) -> None:
         style = "bold" if rule == ALL else ""
         shown.add_row(title, *(_yield_text(study.yields[s][rule]) for s in STAGES), style=style)  # type: ignore[index]
     console().print(shown)
+    if study.broken:
+        say(
+            f"Without any error the design already breaks {', '.join(study.broken)}: see "
+            "`gelslim check` first.",
+            style="bold red",
+        )
     for stage, words in ASSEMBLY.items():
         say(f"{STAGES[stage].capitalize()}: {words}")
     say(
