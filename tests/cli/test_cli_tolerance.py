@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from cli_samples import MINI20
@@ -28,11 +29,9 @@ def test_the_answer_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_answer_for_people_and_the_status(
-    capsys: pytest.CaptureFixture[str], tmp_path: object
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    from pathlib import Path
-
-    good = Path(str(tmp_path)) / "good.yaml"
+    good = tmp_path / "good.yaml"
     assert main(["tolerance", str(MINI20), "--samples", "100", "--json"]) == 0
     capsys.readouterr()
     good.write_text(
@@ -42,6 +41,18 @@ def test_the_answer_for_people_and_the_status(
     out = capsys.readouterr().out
     assert "adjusted" in out
     assert "design.housing.camera_play_mm" in out or "tolerance." in out
+
+
+def test_the_changed_spec_is_written_and_has_the_yield(tmp_path: Path) -> None:
+    better = tmp_path / "better.yaml"
+    design = str(MINI20.with_name("long50.yaml"))
+    few = ("--samples", "256", "--least-yield", "0.9")
+    assert main(["tolerance", design, *few, "--save", str(better)]) == 1
+    assert main(["tolerance", str(better), *few]) == 0
+    other = tmp_path / "notes.txt"
+    other.write_text("mine", encoding="utf-8")
+    assert main(["tolerance", design, *few, "--save", str(other)]) == 2
+    assert other.read_text(encoding="utf-8") == "mine"
 
 
 def test_too_few_samples_are_bad_input() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gelslim.cli.answer import OK, RULE_FAILED, console, number, print_json, say, table
 from gelslim.cli.options import AsJson, SpecFile
+from gelslim.cli.output import replace_file, require_own_file
 
 if TYPE_CHECKING:
     from gelslim_cad.tolerance.study import ToleranceStudy
@@ -33,6 +35,9 @@ def tolerance(
             "Without it the changes lead to 0.95.",
         ),
     ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the spec with these changes to this file.")
+    ] = None,
     as_json: AsJson = False,
 ) -> int:
     """Print which share of built fingers keeps the rules, and what limits it.
@@ -40,13 +45,20 @@ def tolerance(
     Samples the errors of making a finger (block `tolerance` of the spec and others). Prints the
     yield of each rule, the causes of the rule that fails most, the errors of the forces, and
     changes of the spec that give the yield of --least-yield with what they cost in thickness.
+    With --save it writes the changed spec.
     """
     from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.spec.starter import spec_text
     from gelslim_cad.tolerance.study import LEAST_YIELD, study_record, tolerance_study
     from gelslim_cad.tolerance.yields import ALL
 
     wanted = LEAST_YIELD if least_yield is None else least_yield
-    study = tolerance_study(read_spec(spec).spec, samples=samples, seed=seed, least_yield=wanted)
+    if save is not None:
+        require_own_file(save, b"gelslim-spec/", "spec")
+    loaded = read_spec(spec)
+    study = tolerance_study(loaded.spec, samples=samples, seed=seed, least_yield=wanted)
+    if save is not None:
+        replace_file(save, spec_text(loaded.text, study.plan.changes()).encode())
     if as_json:
         print_json(study_record(study))
     else:
@@ -54,6 +66,8 @@ def tolerance(
         _print_causes(study)
         _print_forces(study)
         _print_plan(study)
+        if save is not None:
+            print(f"Wrote {save}. Next: gelslim check {save}")
     enough = study.yields[study.stage][ALL].share >= wanted
     return OK if enough or least_yield is None else RULE_FAILED
 
