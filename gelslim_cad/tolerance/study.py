@@ -9,12 +9,12 @@ from typing import Any
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec import Spec
 from gelslim_cad.tolerance.assembly import Stage
-from gelslim_cad.tolerance.causes import GROUPS, Cause, causes, no_errors
+from gelslim_cad.tolerance.causes import GROUPS, Cause, causes
 from gelslim_cad.tolerance.force import ForceError, force_errors
-from gelslim_cad.tolerance.margins import ASSEMBLY, RULES, margins, worst_margins
+from gelslim_cad.tolerance.margins import ASSEMBLY, RULES
 from gelslim_cad.tolerance.plan import Plan, plan, thickness_per_percent
 from gelslim_cad.tolerance.shares import Shares, linear_shares, sobol_shares, worst_places
-from gelslim_cad.tolerance.yields import ALL, SLACK, Yield, counted, sampled
+from gelslim_cad.tolerance.yields import ALL, Yield, broken, counted, sampled
 
 SAMPLES, BUILD_SAMPLES, PLAN_SAMPLES = 10_000, 2_000, 2_048
 LEAST_YIELD = 0.95
@@ -83,7 +83,6 @@ def tolerance_study(
     """
     d = derive(spec)
     stage = counted(d)
-    exact = worst_margins(margins(d, no_errors(d), "as_built"))
     both = sampled(d, samples, seed)
     found = both[stage]
     places = worst_places(found)
@@ -98,7 +97,7 @@ def tolerance_study(
         samples=samples,
         seed=seed,
         stage=stage,
-        broken=tuple(rule for rule, v in exact.items() if v[0] < -SLACK),
+        broken=broken(d),
         causes=causes(d),
         yields={way: fingers.yields() for way, fingers in both.items()},
         shares=shares,

@@ -12,7 +12,7 @@ from scipy.stats import binomtest, qmc
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.tolerance.assembly import STAGES, Stage
-from gelslim_cad.tolerance.causes import Cause, causes, errors
+from gelslim_cad.tolerance.causes import Cause, causes, errors, no_errors
 from gelslim_cad.tolerance.margins import margins, worst_margins
 
 Array = NDArray[np.float64]
@@ -91,6 +91,12 @@ def yield_of(d: Dimensions, count: int, seed: int) -> dict[str, Yield]:
     all_causes = causes(d)
     found = errors(all_causes, probabilities(len(all_causes), count, seed))
     return Sampled(found, margins(d, found, counted(d))).yields()
+
+
+def broken(d: Dimensions) -> tuple[str, ...]:
+    """Rules that the design breaks without any error, so that no tolerance helps."""
+    exact = worst_margins(margins(d, no_errors(d), "as_built"))
+    return tuple(rule for rule, margin in exact.items() if margin[0] < -SLACK)
 
 
 def by_group(all_causes: tuple[Cause, ...]) -> dict[str, list[int]]:
