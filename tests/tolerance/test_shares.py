@@ -32,8 +32,7 @@ def test_a_sum_of_two_errors_has_the_shares_of_its_variances() -> None:
         assert total[group] == pytest.approx(share, abs=0.02)
 
 
-@pytest.mark.parametrize("name", ["gelslim2", "thin"])
-@pytest.mark.parametrize("stage", ["as_built", "adjusted"])
+@pytest.mark.parametrize(("name", "stage"), [("gelslim2", "as_built"), ("thin", "adjusted")])
 def test_screen_and_indices_agree_where_the_margin_is_linear(name: str, stage: str) -> None:
     d = derive(spec(name))
     found = sampled(d, 8192, 0)[stage]  # type: ignore[index]
