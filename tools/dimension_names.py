@@ -30,6 +30,7 @@ KINDS: dict[str, set[Any]] = {
     "FloatsName": {tuple},
     "OptionalFloatName": {float, NoneType},
     "OptionalIntName": {int, NoneType},
+    "OptionalTextName": {str, NoneType},
     "FloatOrTextName": {float, str},
 }
 """The types of values by the name of the type of their names."""

@@ -121,7 +121,9 @@ class _Tracer:
 
     def _field(self, path: str) -> Node:
         place = self.loaded.source_map.get(path)
-        origin = "default" if place is None else f"{self.loaded.path}:{place.line}"
+        origin = self.loaded.lent.get(path, "default")
+        if place is not None:
+            origin = f"{self.loaded.path}:{place.line}"
         described = field_at(Spec, path)
         return Node(
             path,

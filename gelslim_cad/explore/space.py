@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from gelslim_cad.spec import Spec
+from gelslim_cad.spec.camera_library import own_fields
 from gelslim_cad.spec.reader import suggestion
 from gelslim_core.errors import GelslimError
 from gelslim_core.yaml.fields import Field, field_table
@@ -198,8 +199,15 @@ class Space:
 
 
 def changed(spec: Spec, overrides: Mapping[str, Any]) -> Spec:
-    """The spec with fields replaced by dotted path; raises ValidationError where it is illegal."""
+    """The spec with fields replaced by dotted path; raises ValidationError where it is illegal.
+
+    Another camera of the library, or another mode, brings its own fields along; those that the
+    spec itself gives stay.
+    """
     content = spec.model_dump()
+    exchanged = not {"camera.model", "camera.mode"}.isdisjoint(overrides)
+    if exchanged and overrides.get("camera.model", spec.camera.model) is not None:
+        content["camera"] = own_fields(content["camera"])
     for path, value in overrides.items():
         *blocks, last = path.split(".")
         inner = content

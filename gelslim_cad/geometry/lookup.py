@@ -16,6 +16,7 @@ from gelslim_cad.geometry.names import (
     Name,
     OptionalFloatName,
     OptionalIntName,
+    OptionalTextName,
     TextName,
 )
 
@@ -45,6 +46,8 @@ class NamedValues(ABC):
     def __getitem__(self, name: OptionalFloatName, /) -> float | None: ...
     @overload
     def __getitem__(self, name: OptionalIntName, /) -> int | None: ...
+    @overload
+    def __getitem__(self, name: OptionalTextName, /) -> str | None: ...
     @overload
     def __getitem__(self, name: FloatOrTextName, /) -> float | str: ...
     @overload

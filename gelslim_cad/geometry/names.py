@@ -241,6 +241,7 @@ TextName = Literal[
     "name",
     "camera.name",
     "camera.focusing",
+    "camera.picture",
     "design.leds.model",
     "design.leds.emission",
     "design.markers.anchors",
@@ -281,6 +282,10 @@ OptionalIntName = Literal[
     "mesh.cells_along",
     "mesh.cells_across",
 ]
+OptionalTextName = Literal[
+    "camera.model",
+    "camera.mode",
+]
 FloatOrTextName = Literal["design.light_guide.bend_radius_ratio"]
 Name = (
     DimensionName
@@ -291,5 +296,6 @@ Name = (
     | FloatsName
     | OptionalFloatName
     | OptionalIntName
+    | OptionalTextName
     | FloatOrTextName
 )

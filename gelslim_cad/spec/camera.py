@@ -3,22 +3,55 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
 
+LIBRARY = Path(__file__).with_name("cameras")
+"""Folder with a file per camera of the library, named as the camera."""
 FOV_TOLERANCE = 0.05
 NEAREST_FOCUS = 1.5
 """Nearest distance, in focal lengths, for which a sheet's figure is believed."""
 
 
-class Camera(Block):
-    """Camera parameters as in a data sheet. The wider image axis lies across the finger."""
+@cache
+def camera_names() -> tuple[str, ...]:
+    """Names of the cameras of the library, in alphabetical order."""
+    return tuple(sorted(path.stem for path in LIBRARY.glob("*.yaml")))
 
+
+def _name_cameras(schema: dict[str, Any]) -> None:
+    schema["enum"] = [*camera_names(), None]
+
+
+def _given_or_from_library(schema: dict[str, Any]) -> None:
+    """In the JSON Schema the required fields may be left out where `model` names a camera."""
+    required = schema.pop("required")
+    schema["anyOf"] = [{"required": ["model"]}, {"required": required}]
+
+
+class Camera(Block):
+    """A camera by its sheet or of the library. The wider image axis lies across the finger."""
+
+    model_config = ConfigDict(json_schema_extra=_given_or_from_library)
+
+    model: str | None = Field(
+        default=None,
+        json_schema_extra=_name_cameras,
+        description="Camera of the library (`gelslim cameras`) that gives every field that is "
+        "left out here",
+    )
+    mode: str | None = Field(
+        default=None,
+        description="Its mode, such as 640x400; the first that `gelslim cameras NAME` lists when "
+        "left out",
+    )
     name: str = Field(default="camera", max_length=80, description="Camera name, for the BOM")
     image_width_px: int = between(64, 10000, "Image width (across the finger)")
     image_height_px: int = between(64, 10000, "Image height (along the finger)")
@@ -83,6 +116,9 @@ class Camera(Block):
     )
     cable_width_mm: float = above(0, 60, "Width of the flat cable", default=6.0)
     cable_bend_radius_mm: float = between(0, 50, "Smallest bend radius of the cable", default=3.0)
+    picture: Literal["colour", "mono"] = Field(
+        default="colour", description="What the sensor tells apart: colours, or brightness alone"
+    )
     frame_rate_hz: float = above(0, 5000, "Highest frame rate at this image size", default=90.0)
     quantum_efficiency: float = above(
         0, 1, "Electrons per photon, colour filter included", default=0.3
@@ -94,11 +130,18 @@ class Camera(Block):
 
     @model_validator(mode="after")
     def _consistent(self) -> Camera:
+        if self.mode is not None and self.model is None:
+            raise FieldError(
+                "mode",
+                "belongs to a camera of the library, and model names none",
+                "give model too, or leave mode out and give the fields themselves",
+            )
         if self.image_height_px > self.image_width_px:
             raise FieldError(
                 "image_height_px",
                 f"must be at most image_width_px ({self.image_width_px})",
                 "the wider axis lies across the finger: swap the two, and the sensor sides",
+                ("image_width_px",),
             )
         if self.lens_diameter_mm > self.module_width_mm:
             raise FieldError(
@@ -118,6 +161,7 @@ class Camera(Block):
                 "pixels are not square: image_width_px / image_height_px and sensor_width_mm / "
                 "sensor_height_mm differ by more than 2 %",
                 "give the area of the sensor that the image covers",
+                ("image_height_px", "sensor_width_mm", "sensor_height_mm"),
             )
         return self
 
@@ -178,4 +222,5 @@ class Camera(Block):
                     "disagrees with sensor size and focal length, "
                     f"which give {implied:.2f} degrees",
                     "correct one of them or leave the field of view out",
+                    ("focal_length_mm",),
                 )

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from gelslim_cad.spec.camera_library import lend_fields
 from gelslim_cad.spec.spec import Spec
 from gelslim_core.html_table import table_html
 from gelslim_core.yaml.fields import field_at
@@ -34,7 +35,7 @@ class LoadedSpec(Loaded[Spec]):
         rows = []
         for path, value in leaves(self.model):
             place = self.source_map.get(path)
-            origin = "default" if place is None else str(place.line)
+            origin = self.lent.get(path, "default") if place is None else str(place.line)
             field = field_at(Spec, path)
             unit = field.unit.label if field and field.unit else ""
             meaning = field.description if field else ""
@@ -65,10 +66,8 @@ def read_spec(path: str | os.PathLike[str]) -> LoadedSpec:
     Raises:
         InputError: Every problem of the file. A file with faults is not read in part.
     """
-    loaded = read_model(path, Spec)
-    return LoadedSpec(
-        loaded.model, loaded.source_map, loaded.sha256, loaded.text, loaded.path, loaded.defaulted
-    )
+    loaded = read_model(path, Spec, lend_fields)
+    return LoadedSpec(**vars(loaded))
 
 
 def suggestion(name: str, known: Iterable[str], otherwise: str) -> str:

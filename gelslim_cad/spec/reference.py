@@ -7,6 +7,8 @@ from gelslim_cad.spec.spec import Spec
 from gelslim_core.yaml.schema import reference_markdown
 
 RULES = (
+    ("camera", "`model` names a camera of the library, or all required fields are given"),
+    ("camera", "`mode` needs `model`, and names one of its modes"),
     (
         "camera",
         "`image_height_px` is at most `image_width_px`: the wider axis lies across the finger",

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from gelslim_cad.spec.camera import Camera
+from gelslim_cad.spec.camera_library import completed
 from gelslim_cad.spec.design import Design
 from gelslim_cad.spec.limits import above, between
 from gelslim_cad.spec.tolerance import Tolerance
@@ -176,7 +177,9 @@ class Spec(Block):
         pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$",
         description="Name of the finger; becomes the output folder",
     )
-    camera: Camera = Field(description="The camera, as given by its data sheet")
+    camera: Annotated[Camera, BeforeValidator(completed)] = Field(
+        description="The camera, as given by its data sheet or taken from the library"
+    )
     design: Design = Field(description="What the designer chooses")
     material: Material = Field(default=Material(), description="Gel and acrylic")
     manufacturing: Manufacturing = Field(

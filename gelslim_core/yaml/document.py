@@ -82,6 +82,14 @@ class Document:
     """Of every value, by its path from the top, in file order."""
     problems: list[Problem] = field(default_factory=list)
     """Values that were refused; `data` holds None in their place, or nothing for a refused key."""
+    lent: dict[Path, str] = field(default_factory=dict)
+    """Where values come from that do not stand in the file."""
+
+    def lend(self, path: Path, value: ScalarValue, origin: str, because: Path) -> None:
+        """Set a plain value from `origin` that the file asks for by the value at `because`."""
+        self.value(path[:-1])[path[-1]] = value
+        self.marks[path] = self.marks[because]._replace(raw=shown(str(value)))
+        self.lent[path] = origin
 
     def locate(self, location: Sequence[PathPart]) -> tuple[Path, Path, int]:
         """Follow `location` from the top as far as values exist.

@@ -182,6 +182,8 @@ class Translator:
     ) -> Problem:
         mark, file = self.document.marks[path], self.document.source.path
         name, value = shown(join_path(path), 120), mark.raw or None
+        if path in self.document.lent:
+            message += f" (it is that of {self.document.lent[path]})"
         return Problem(file, *(position or mark.position), name, value, message, remedy)
 
     def _shape(self, path: str) -> tuple[Shape | None, Unit | None]:
@@ -217,11 +219,18 @@ class Translator:
         if not isinstance(error, FieldError):
             text = str(error) if error is not None else complaint.text
             return self._at(complaint.path, text, "correct the fields of this block")
+        places = []
         for name in (error.field, *error.related):
             parts = [int(p) if p.isdigit() else p for p in re.split(r"[.\[\]]+", name) if p]
             path, labels, _ = self.document.locate((*complaint.path, *parts))
             if not labels:
-                return self._at(path, error.message, error.remedy)
+                places.append(path)
+        if places:
+            # The line of a field that the file gives is more to the point than that of the field
+            # that asks for what was lent.
+            line = next((p for p in places if p not in self.document.lent), places[0])
+            position = self.document.marks[line].position
+            return self._at(places[0], error.message, error.remedy, position)
         position = self.document.marks[complaint.path].position
         name = ".".join(part for part in (join_path(complaint.path), error.field) if part)
         file = self.document.source.path

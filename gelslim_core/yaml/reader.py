@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ValidationError
@@ -35,6 +35,8 @@ class Loaded(Generic[M]):
         text: The file's text.
         path: The file, as the caller named it.
         defaulted: Dotted paths of the fields that the file leaves to their defaults.
+        lent: Fields that the file asks for from elsewhere, by dotted path, with where they come
+            from.
     """
 
     model: M
@@ -43,14 +45,22 @@ class Loaded(Generic[M]):
     text: str
     path: str
     defaulted: tuple[str, ...]
+    lent: Mapping[str, str] = field(default_factory=dict, kw_only=True)
 
 
-def read_model(path: str | os.PathLike[str], model: type[M]) -> Loaded[M]:
+Completion = Callable[[Document], None]
+"""Adds to a document what its file asks for from elsewhere, by `Document.lend`."""
+
+
+def read_model(
+    path: str | os.PathLike[str], model: type[M], complete: Completion | None = None
+) -> Loaded[M]:
     """Read a model from a YAML file.
 
     Args:
         path: The file.
         model: The class of the model.
+        complete: Adds to the document what the file asks for from elsewhere.
 
     Returns:
         The model with the places of its fields in the file.
@@ -58,23 +68,34 @@ def read_model(path: str | os.PathLike[str], model: type[M]) -> Loaded[M]:
     Raises:
         InputError: The file cannot be read or breaks a rule of the model; all problems are listed.
     """
-    return load_source(read_source(path), model)
+    return load_source(read_source(path), model, complete)
 
 
-def load_bytes(name: str, data: bytes, model: type[M]) -> Loaded[M]:
+def load_bytes(
+    name: str, data: bytes, model: type[M], complete: Completion | None = None
+) -> Loaded[M]:
     """The `model` in `data`, called `name` in messages. Raises `InputError`."""
-    return load_source(decode_source(name, data), model)
+    return load_source(decode_source(name, data), model, complete)
 
 
-def load_source(source: Source, model: type[M]) -> Loaded[M]:
+def load_source(source: Source, model: type[M], complete: Completion | None = None) -> Loaded[M]:
     """The `model` in the YAML text of `source`. Raises `InputError`."""
     starting_point = getattr(model, "starting_point", Block.starting_point)
     document = parse_document(source, starting_point)
     _check_format(document, model, starting_point)
+    if complete is not None:
+        complete(document)
     instance = _validated(document, model)
-    source_map = {join_path(path): mark.position for path, mark in document.marks.items() if path}
+    source_map = {
+        join_path(path): mark.position
+        for path, mark in document.marks.items()
+        if path and path not in document.lent
+    }
     defaulted = tuple(_defaulted(instance.model_dump(), document.marks))
-    return Loaded(instance, source_map, source.sha256, source.text, source.path, defaulted)
+    lent = {join_path(path): origin for path, origin in document.lent.items()}
+    return Loaded(
+        instance, source_map, source.sha256, source.text, source.path, defaulted, lent=lent
+    )
 
 
 def _check_format(document: Document, model: type[BaseModel], starting_point: str) -> None:

@@ -33,6 +33,8 @@ observe: [force]
 
 
 SPEC_FAULTS: tuple[tuple[str, Callable[[str], str]], ...] = (
+    ("camera", lambda t: t.replace("image_width_px: 640, ", "model: ov9821, ")),
+    ("camera", lambda t: t.replace("image_width_px: 640", "mode: 640x480, image_width_px: 640")),
     ("camera", lambda t: t.replace("640", "400")),
     ("camera", lambda t: t.replace("3.6288", "3.9")),
     ("camera", lambda t: t.replace("f_number: 2.9", "f_number: 2.9, vertical_fov_deg: 60")),
