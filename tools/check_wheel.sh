@@ -17,6 +17,8 @@ cd "$place"
 PATH="$place/env/bin:$PATH"
 gelslim --version
 gelslim examples
+gelslim new --camera ov9281 mono
+gelslim check mono.yaml
 gelslim new --from mini20 mine
 gelslim build mine.yaml -o mine
 gelslim new --from press_sphere press

@@ -12,6 +12,7 @@ from gelslim.cli.commands.bench import bench
 from gelslim.cli.commands.build import build
 from gelslim.cli.commands.bundle import bundle, bundle_export, bundle_info
 from gelslim.cli.commands.calibrate import calibrate
+from gelslim.cli.commands.cameras import cameras
 from gelslim.cli.commands.check import check
 from gelslim.cli.commands.derive import derive
 from gelslim.cli.commands.diff import diff
@@ -35,7 +36,7 @@ from gelslim.cli.main import carried
 from gelslim_core import __version__
 
 COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
-    "Design a finger": (new, examples, check, derive, explain, diff),
+    "Design a finger": (new, examples, cameras, check, derive, explain, diff),
     "Search for one": (thinner, explore, optimise),
     "Try it before it is built": (tolerance, light, plan, simulate, validate),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),

@@ -133,12 +133,12 @@ class LibraryCamera(Block):
             "frame_rate_hz": chosen.frame_rate_hz,
         }
 
-    def implied_fov_deg(self) -> dict[str, float]:
-        """Field of view of the whole sensor by its sides and the focal length, thin lens."""
+    def implied_fov_deg(self, part_px: tuple[int, int] | None = None) -> dict[str, float]:
+        """Field of view of the sensor, or a part of it, by its sides and f, for a thin lens."""
         f, view = float(self.camera["focal_length_mm"]), self.field_of_view
         at = None if view is None else view.at_mm
         image_mm = f if at is None else f * at / (at - f)
-        sides = [count * self.pixel_um / 1000 for count in self.sensor_px]
+        sides = [count * self.pixel_um / 1000 for count in part_px or self.sensor_px]
         named = ("horizontal_deg", "vertical_deg", "diagonal_deg")
         return {
             name: math.degrees(2 * math.atan(side / 2 / image_mm))

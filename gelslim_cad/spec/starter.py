@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from gelslim_cad.spec.camera_library import lend_fields, library_camera
 from gelslim_cad.spec.spec import Spec
 from gelslim_core.yaml.document import RefusedScalarError, resolve
 from gelslim_core.yaml.errors import InputError
@@ -42,12 +43,19 @@ def starter_text(
     gel_length_mm: float = 24.0,
     gel_width_mm: float = 22.0,
     camera: Mapping[str, Any] = SPY_CAMERA,
+    model: str = "",
 ) -> str:
     """A complete spec called `name`: required fields filled in, all others as comments.
 
-    `camera` gives values by dotted path. The text is read back before it is returned.
-    Raises `InputError` where it would be refused, as for a `name` with spaces.
+    `camera` gives values by dotted path, unless `model` names a camera of the library, whose
+    figures are then the defaults. The text is read back before it is returned. Raises `InputError`
+    where it would be refused, as for a `name` with spaces, and `CameraLibraryError` for an unknown
+    model.
     """
+    defaults: dict[str, Any] = {}
+    if model:
+        camera = {"camera.model": model}
+        defaults = {f"camera.{n}": v for n, v in library_camera(model).fields().items()}
     values = {
         "format": Spec.model_fields["format"].annotation.__args__[0],  # type: ignore[union-attr]
         "name": name,
@@ -55,9 +63,9 @@ def starter_text(
         "design.gel.width_mm": gel_width_mm,
         **camera,
     }
-    text = _HEAD + "\n".join(_block(Spec, "", values, 0)) + "\n"
+    text = _HEAD + "\n".join(_block(Spec, "", values, defaults, 0)) + "\n"
     try:
-        load_bytes("gelslim new", text.encode(), Spec)
+        load_bytes("gelslim new", text.encode(), Spec, lend_fields)
     except InputError as error:
         problems = tuple(replace(problem, line=None, column=None) for problem in error.problems)
         raise InputError(problems) from None
@@ -70,20 +78,29 @@ def require_name(name: str) -> None:
 
 
 def _block(
-    model: type[BaseModel], path: str, values: Mapping[str, Any], depth: int
+    model: type[BaseModel],
+    path: str,
+    values: Mapping[str, Any],
+    defaults: Mapping[str, Any],
+    depth: int,
 ) -> Iterator[str]:
     for field in children(model, path):
         here = f"{path}.{field.name}" if path else field.name
         if field.models:
-            yield from _below(model, replace(field, path=here), values, depth)
+            yield from _below(model, replace(field, path=here), values, defaults, depth)
         else:
-            yield _line(replace(field, path=here), values, depth)
+            default = defaults.get(here, field.default)
+            yield _line(replace(field, path=here, default=default), values, depth)
 
 
 def _below(
-    model: type[BaseModel], field: Field, values: Mapping[str, Any], depth: int
+    model: type[BaseModel],
+    field: Field,
+    values: Mapping[str, Any],
+    defaults: Mapping[str, Any],
+    depth: int,
 ) -> Iterator[str]:
-    inside = list(_block(model, field.path, values, depth + 1))
+    inside = list(_block(model, field.path, values, defaults, depth + 1))
     head = f"{'  ' * depth}{field.name}:"
     if depth == 0:
         yield ""

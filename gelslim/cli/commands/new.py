@@ -22,20 +22,26 @@ def new(
         str,
         typer.Option("--from", help="Copy this example; `gelslim examples` lists them."),
     ] = "",
+    camera: Annotated[
+        str,
+        typer.Option(help="Camera of the library; `gelslim cameras` lists them."),
+    ] = "",
     length: Annotated[float, typer.Option(help="Length of the gel along the finger in mm.")] = 24.0,
     width: Annotated[float, typer.Option(help="Width of the gel across the finger in mm.")] = 22.0,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> int:
     """Write a commented spec to start from, or copy an example.
 
-    A new spec has the data of the Raspberry Pi spy camera, and shows every other field with its
-    default. With --from, a design or a scene that comes with the program is copied under the new
-    name.
+    A new spec has the data of the Raspberry Pi spy camera, or takes the --camera named, and shows
+    every other field with its default. With --from, a design or a scene that comes with the program
+    is copied under the new name.
     """
+    if camera and source:
+        raise CommandError("gelslim new: give --camera or --from, not both")
     target = out or Path(f"{name}.yaml")
     if target.is_dir():
         target = target / f"{name}.yaml"
-    texts, following = _texts(name, source, length, width)
+    texts, following = _texts(name, source, camera, length, width)
     files = {target: texts.pop(f"{name}.yaml")}
     files |= {target.parent / other: text for other, text in texts.items()}
     for path, text in files.items():
@@ -51,12 +57,14 @@ def new(
     return 0
 
 
-def _texts(name: str, source: str, length: float, width: float) -> tuple[dict[str, str], str]:
+def _texts(
+    name: str, source: str, camera: str, length: float, width: float
+) -> tuple[dict[str, str], str]:
     """Return the texts by file name, and the command to use on the first file."""
     from gelslim_cad.spec.starter import require_name, starter_text
 
     if not source:
-        text = starter_text(name, gel_length_mm=length, gel_width_mm=width)
+        text = starter_text(name, gel_length_mm=length, gel_width_mm=width, model=camera)
         return {f"{name}.yaml": text}, "check"
     from gelslim.examples import example
 
