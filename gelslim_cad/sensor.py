@@ -11,12 +11,13 @@ import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.led_strips import camera_responses
 from gelslim_cad.geometry.optics import camera_record, guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.spec import Spec
-from gelslim_optics.light.light_map import LED_COLOURS, LightMap, light_arrays
+from gelslim_optics.light.light_map import LightMap, light_arrays
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
 from ifem_export.markers.grid import Anchors, MarkerGrid, build_marker_grid
@@ -28,8 +29,6 @@ from ifem_export.operators.ladder import REFERENCE_LAYERS, Progress, measure_lad
 from ifem_export.operators.operator_ladder import OperatorLadder
 
 RAYS = 1 << 16
-RED_SHARE = 0.45
-"""Red appears weaker than green in published images of this sensor."""
 ELEVATION_DEG = 25.0
 """Mean angle at which the light rises through the gel; the tracer does not record directions."""
 SMOOTHING_MM = 0.6
@@ -234,17 +233,19 @@ def pad_light(d: Dimensions) -> LightMap:
         d: The dimensions of the finger.
 
     Returns:
-        Irradiance and direction of the red and the green light over the pad.
+        Irradiance and direction of the light of each strip over the pad.
     """
     from gelslim_optics.light.trace import trace_light
 
     traced = trace_light(light_scene(d, guide_profile(d)), RAYS, seed=0)
+    shares, colour = camera_responses(d)
+    bins = [w * traced.irradiance(c) for w, c in zip(shares, traced.colours, strict=True)]
     return LightMap.from_bins(
-        np.stack([RED_SHARE * traced.irradiance("red"), traced.irradiance("green")]),
+        np.stack(bins),
         float(d["design.gel.length_mm"]),
         float(d["design.gel.width_mm"]),
         azimuth_deg=np.array([90.0, -90.0]),
         elevation_deg=np.full(2, ELEVATION_DEG),
-        colour=LED_COLOURS,
+        colour=colour,
         smooth_mm=SMOOTHING_MM,
     )

@@ -19,6 +19,7 @@ from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
+from gelslim_optics.camera.record import is_mono
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle
 
@@ -69,7 +70,8 @@ def open_sensor(
         The pipeline; `process` takes one frame after the other.
 
     Raises:
-        SensorError: Arguments are missing, or contradict one another.
+        SensorError: Arguments are missing, or contradict one another, or an indenter is to be found
+            in the pictures of a mono camera.
         IfemError: The bundle cannot be read, or no operator keeps the budget.
         CalibrationError: The reference does not show this sensor at rest, or the calibration
             cannot be read or belongs to another sensor.
@@ -78,6 +80,8 @@ def open_sensor(
     _require_consistent(reference, calibration, indenter, depth_mm, normal)
     sensor = bundle if isinstance(bundle, Bundle) else load_bundle(Path(bundle))
     shape = None if indenter is None else _shape(indenter)
+    if shape is not None:
+        require_colour(sensor)
     picture = reference
     if picture is not None and not isinstance(picture, np.ndarray):
         picture = read_reference(picture)
@@ -114,10 +118,12 @@ def indenter_source(
         The source, for the constructor of `ForcePipeline`.
 
     Raises:
+        SensorError: The sensor's camera is mono.
         CalibrationError: The calibration belongs to another bundle.
         IndenterError: The indenter's description cannot be read.
         ValueError: The reference cannot show a patch, because it is dark or of another size.
     """
+    require_colour(bundle)
     calibration.require_bundle(bundle)
     shape = _shape(indenter)
     points_mm = np.asarray(bundle.mesh.surface_mm)
@@ -133,6 +139,21 @@ def indenter_source(
     )
     operator = (settings or PipelineSettings()).compliance(bundle)
     return IndenterSource(finder, NormalModel(operator, points_mm), shape, depth_mm)
+
+
+def require_colour(bundle: Bundle) -> None:
+    """Raise SensorError for a mono camera, in whose pictures no contact patch is found.
+
+    The lights of the two strips change by opposite amounts where the gel is tilted. In one
+    brightness they cancel, so that a patch shows by the change of red against green alone.
+    """
+    if is_mono(bundle.camera):
+        raise SensorError(
+            "indenter",
+            "the camera of this sensor is mono, and an indenter is found by the change of red "
+            "against green: leave the indenter out for tangential forces, or give the normal "
+            "motion by depth maps or another source",
+        )
 
 
 def _shape(indenter: Indenter | str) -> Indenter:

@@ -56,7 +56,7 @@ PROJECTION_PICTURES = {
 }
 LIGHT_PICTURES = {
     "pictures/light_paths.png": ("Light paths", "From both LED rows, traced through the guide."),
-    "pictures/irradiance.png": ("Light on the gel", "Red and green on the gel's coat."),
+    "pictures/irradiance.png": ("Light on the gel", "That of each strip on the gel's coat."),
     "pictures/light_ratio.png": (
         "Brightness against bend radius",
         "Over a straight guide with glued 45° mirrors, with 95 % intervals.",

@@ -116,9 +116,16 @@ def _head(d: Dimensions, name: str) -> str:
         f"A finger {d['finger.thickness_mm']:.1f} mm thick, {d['finger.width_mm']:.1f} mm wide and "
         f"{d['finger.length_mm']:.1f} mm long, with a {d['design.gel.length_mm']:g} × "
         f"{d['design.gel.width_mm']:g} × {d['stack.gel_total_mm']:g} mm gel. All lengths in mm. "
-        "Left and right are as in the camera's image: red light comes from -y (left), green from "
-        "+y (right)."
+        f"Left and right are as in the camera's image: {_strips(d)}."
     )
+
+
+def _strips(d: Dimensions) -> str:
+    """Which light comes from where."""
+    one = d["design.leds.one_wavelength_nm"]
+    if one is not None:
+        return f"light of {one:g} nm comes from -y (left) and from +y (right)"
+    return "red light comes from -y (left), green from +y (right)"
 
 
 def _shopping(bom: tuple[BomLine, ...]) -> str:
@@ -199,8 +206,8 @@ def _assemble(d: Dimensions) -> str:
         "`body` with the gel in place, push the camera within its play until the gel lies upright "
         "in the live picture with a border on every side, and only then glue it: "
         "`gelslim tolerance` says what that is worth.\n"
-        "3. Lay the LED boards on the pedestals of the cover: red at -y, green at +y; lead the "
-        "wires through the notches into the chamber.\n"
+        f"3. Lay the LED boards on the pedestals of the cover ({_strips(d)}); lead the wires "
+        "through the notches into the chamber.\n"
         "4. Lay the two shims on the ledges of `body`, then the guide with the gel, legs into the "
         "channels.\n"
         f"5. Screw down `tip_bezel`. It compresses the shims from "
@@ -240,5 +247,13 @@ def _check(d: Dimensions) -> str:
         "## 8. Check\n\n"
         "Compare the live image with the camera's view in `report.html`: all dots in the picture, "
         f"about {d['view.marker_across_px']:.1f} px wide at the far edge, near edge "
-        f"{d['view.keystone']:.2f} times larger than the far one. Left red, right green."
+        f"{d['view.keystone']:.2f} times larger than the far one. {_seen(d)}"
     )
+
+
+def _seen(d: Dimensions) -> str:
+    """What the picture shows of the light of the two strips."""
+    if d["camera.picture"] == "mono":
+        return "The picture is grey, and left and right are equally bright."
+    alike = d["design.leds.one_wavelength_nm"] is not None
+    return "Left and right have the same colour." if alike else "Left red, right green."

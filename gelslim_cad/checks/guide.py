@@ -22,6 +22,28 @@ def bend_ratio(guide_bend_ratio: Real, guide_full_guidance_ratio: Real) -> Findi
 
 
 @rule(
+    "led.colours_nm",
+    title="Colours of the strips suit the camera",
+    parameter="design.leds.one_wavelength_nm",
+    why="a mono camera cannot tell two colours apart, and its lens blurs them more than one; a "
+    "colour camera finds a contact by the change of red against green",
+    advice="give both strips one wavelength with a mono camera, and leave it out with another",
+    unit="nm",
+)
+def led_colours(
+    camera_picture: str,
+    leds_one_wavelength_nm: Real | None,
+    leds_red_wavelength_nm: Real,
+    leds_green_wavelength_nm: Real,
+) -> Finding:
+    """Difference of the two wavelengths."""
+    apart = leds_red_wavelength_nm - leds_green_wavelength_nm
+    apart = apart if leds_one_wavelength_nm is None else 0 * apart
+    mono = camera_picture == "mono"
+    return Finding(apart, 0.0 if mono else 1.0, least=not mono, advisory=True)
+
+
+@rule(
     "led.fits_mm",
     title="LED package fits the guide's edge",
     parameter="design.leds.package_mm",

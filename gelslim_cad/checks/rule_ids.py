@@ -7,6 +7,7 @@ from typing import Literal
 
 RuleId = Literal[
     "guide.bend_ratio",
+    "led.colours_nm",
     "led.fits_mm",
     "led.gap_mm",
     "led.pitch_mm",

@@ -36,6 +36,7 @@ LIGHT_NAMES: tuple[Name, ...] = (
     "design.leds.emission_intensity",
     "design.leds.red_wavelength_nm",
     "design.leds.green_wavelength_nm",
+    "design.leds.one_wavelength_nm",
     "design.housing.fit_clearance_mm",
     "design.housing.side_wall_mm",
     "design.envelope.max_width_mm",

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.light.exposure import exposure_at
 from gelslim_cad.light.scene import NAMES
@@ -20,17 +21,16 @@ EXPOSED = (
 )
 """What sets the exposure but not where the light goes."""
 TRACED = tuple(n for n in NAMES if n not in EXPOSED)
-COLOURS = ("red", "green")
 RAYS = 1 << 13
 
 
 @dataclass(frozen=True)
 class Traced:
-    """What one trace tells: share on the coat, W/mm² per W of the LEDs of each colour."""
+    """What one trace tells: share on the coat, W/mm² per W of the LEDs of each strip."""
 
     on_coat: float
-    red_per_w: float
-    green_per_w: float
+    left_per_w: float
+    right_per_w: float
 
 
 def trace(values: Mapping[str, Any], rays: int) -> Traced:
@@ -40,16 +40,14 @@ def trace(values: Mapping[str, Any], rays: int) -> Traced:
     from gelslim_optics.light.trace import trace_light
 
     light = trace_light(light_scene(values, guide_profile(values)), rays, threads=1)
-    red, green = (float(light.irradiance(c).mean()) for c in COLOURS)
-    return Traced(light.value("delivered"), red, green)
+    left, right = (float(light.irradiance(c).mean()) for c in strip_wavelengths_nm(values))
+    return Traced(light.value("delivered"), left, right)
 
 
 def light_columns(d: Lookup, traced: Traced) -> dict[str, float]:
     """Share on the coat, µW/mm² on it (darker colour), exposure and frame rate (slower colour)."""
-    found = [
-        exposure_at(d, per_w, colour)
-        for colour, per_w in zip(COLOURS, (traced.red_per_w, traced.green_per_w), strict=True)
-    ]
+    per_w = traced.left_per_w, traced.right_per_w
+    found = [exposure_at(d, w, c) for c, w in zip(strip_wavelengths_nm(d), per_w, strict=True)]
     return {
         "light.on_coat": traced.on_coat,
         "light.irradiance_uw_mm2": min(e.irradiance_uw_mm2 for e in found),

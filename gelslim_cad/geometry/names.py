@@ -270,6 +270,7 @@ OptionalFloatName = Literal[
     "camera.field_of_view_at_mm",
     "camera.focus_distance_mm",
     "camera.entrance_pupil_mm",
+    "design.leds.one_wavelength_nm",
     "design.housing.camera_play_mm",
     "design.envelope.max_thickness_mm",
     "design.envelope.max_width_mm",

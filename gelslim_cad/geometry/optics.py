@@ -83,6 +83,7 @@ def camera_record(d: Lookup) -> dict[str, object]:
     """The virtual camera as plain values for the bundle; lengths mm, angles as unit vectors."""
     return {
         **virtual_camera(d).to_record(),
+        "picture": d["camera.picture"],
         "aperture_mm": d["view.aperture_mm"],
         "focus_mm": d["view.focus_mm"],
     }

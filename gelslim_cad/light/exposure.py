@@ -6,16 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
-from gelslim_cad.geometry.names import FloatName
 from gelslim_optics.light.result import LightResult
 
 PLANCK_J_S = 6.62607015e-34
 LIGHT_M_S = 2.99792458e8
-WAVELENGTHS: dict[str, FloatName] = {
-    "red": "design.leds.red_wavelength_nm",
-    "green": "design.leds.green_wavelength_nm",
-}
 WELL_SHARE = 0.5
 """Part of the full well that the mean of the image fills, so that bright spots do not saturate."""
 
@@ -56,7 +52,7 @@ def exposure_at(d: Lookup, irradiance_per_w: float, colour: str) -> Exposure:
     arriving = watts * irradiance_per_w
     radiance = _to_air(d) * d["material.gel.coat_reflectance"] * arriving / math.pi
     on_sensor = math.pi * d["camera.lens_transmission"] * radiance / (4 * d["camera.f_number"] ** 2)
-    photon_j = PLANCK_J_S * LIGHT_M_S / (d[WAVELENGTHS[colour]] * 1e-9)
+    photon_j = PLANCK_J_S * LIGHT_M_S / (strip_wavelengths_nm(d)[colour] * 1e-9)
     electrons = on_sensor * 1e-6 / photon_j * d["camera.quantum_efficiency"]
     needed = WELL_SHARE * d["camera.full_well_e_um2"]
     seconds = needed / electrons if electrons > 0 else math.inf

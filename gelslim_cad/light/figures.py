@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.light.scene import light_scene
@@ -16,7 +17,8 @@ from gelslim_optics.light.trace import trace_paths
 
 PATHS = 70
 ACRYLIC, GEL, INK = "#cfe6f5", "#f4efe2", "#333a44"
-RAY_COLOURS = {"red": "#d0342c", "green": "#1c9a3d"}
+RAY_COLOURS = {"red": "#d0342c", "green": "#1c9a3d", "left": "#8a5a00", "right": "#5a4a8a"}
+SHADES = {"red": "Reds", "green": "Greens", "left": "Greys", "right": "Greys"}
 
 
 def paths_png(d: Lookup, title: str | None = None, seed: int = 3) -> bytes:
@@ -29,7 +31,7 @@ def paths_png(d: Lookup, title: str | None = None, seed: int = 3) -> bytes:
     for colour, points in trace_paths(light_scene(d, profile), PATHS, seed=seed):
         axes.plot(points[:, 1], points[:, 2], color=RAY_COLOURS[colour], lw=0.5, alpha=0.5)
     half, package = d["led.y_mm"], d["design.leds.package_mm"]
-    for side, colour in ((-1, "red"), (1, "green")):
+    for side, colour in zip((-1, 1), strip_wavelengths_nm(d), strict=True):
         low = d["led.top_z_mm"] - d["design.leds.height_mm"]
         corner = (side * half - package / 2, low)
         axes.add_patch(_box(corner, package, d["design.leds.height_mm"], RAY_COLOURS[colour]))
@@ -41,15 +43,15 @@ def paths_png(d: Lookup, title: str | None = None, seed: int = 3) -> bytes:
 
 
 def irradiance_png(d: Lookup, study: LightStudy) -> bytes:
-    """Irradiance of the coat for red and green, each over its mean, and profiles across."""
+    """Irradiance of the coat by each strip, over its mean, and profiles across."""
     figure, axes = new_figure(10.0, 3.6, columns=3)
     half_x, half_y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
-    for panel, colour, shade in zip(axes, ("red", "green"), ("Reds", "Greens"), strict=False):
+    for panel, colour in zip(axes, strip_wavelengths_nm(d), strict=False):
         bins = study.light.irradiance(colour)
         shown = panel.imshow(
             bins / bins.mean(),
             extent=(-half_y, half_y, half_x, -half_x),
-            cmap=shade,
+            cmap=SHADES[colour],
             vmin=0,
             interpolation="nearest",
         )

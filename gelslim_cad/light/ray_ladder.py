@@ -18,7 +18,7 @@ import numpy as np
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.light.scene import light_scene
-from gelslim_cad.light.study import COLOURS, RATIOS, study_light
+from gelslim_cad.light.study import RATIOS, study_light
 from gelslim_core.budget.ladder import Ladder, Rung, Wording
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.trace import trace_light
@@ -80,7 +80,7 @@ def measure_errors(d: Lookup, seed: int = 0, progress: Progress | None = None) -
 
 def half_widths(light: LightResult) -> tuple[float, ...]:
     """Relative half-width of the 95 % interval of the light on the coat, of each colour."""
-    estimates = [light.arrived(colour) for colour in COLOURS]
+    estimates = [light.arrived(colour) for colour in light.colours]
     return tuple((e.high - e.low) / 2 / e.value if e.value else math.inf for e in estimates)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
 from gelslim_optics.guide.profile import GuideProfile
@@ -34,6 +35,7 @@ NAMES: tuple[Name, ...] = (
     "design.leds.emission_intensity",
     "design.leds.green_wavelength_nm",
     "design.leds.height_mm",
+    "design.leds.one_wavelength_nm",
     "design.leds.package_mm",
     "design.leds.radiant_flux_mw",
     "design.leds.red_wavelength_nm",
@@ -79,7 +81,7 @@ def light_scene(d: Lookup, profile: GuideProfile) -> LightScene:
 
 
 def led_rows(d: Lookup) -> tuple[LedRow, LedRow]:
-    """Red LEDs under the left leg, green under the right one."""
+    """Red LEDs under the left leg, green under the right one; or LEDs of one wavelength."""
     count, pitch = round(d["led.count"]), d["led.pitch_mm"]
     places = tuple((i + 0.5 - count / 2) * pitch for i in range(count))
     size, gap, law = (
@@ -87,9 +89,10 @@ def led_rows(d: Lookup) -> tuple[LedRow, LedRow]:
         d["design.housing.fit_clearance_mm"],
         angular_law(d),
     )
+    left, right = strip_wavelengths_nm(d)
     return (
-        LedRow("foot_left", places, size, gap, law, "red"),
-        LedRow("foot_right", places, size, gap, law, "green"),
+        LedRow("foot_left", places, size, gap, law, left),
+        LedRow("foot_right", places, size, gap, law, right),
     )
 
 
@@ -117,11 +120,16 @@ def launched_na(d: Lookup) -> float:
 def media(d: Lookup) -> dict[str, Medium]:
     """Air, acrylic (window and legs) and gel; acrylic with the dispersion of PMMA."""
     n, gel = d["material.acrylic.refractive_index"], d["material.gel.refractive_index"]
-    wavelengths_nm = d["design.leds.red_wavelength_nm"], d["design.leds.green_wavelength_nm"]
-    red, green = (
-        n + _pmma(wavelength / 1000) - _pmma(PMMA_REFERENCE_UM) for wavelength in wavelengths_nm
+    indices = {
+        name: max(n + _pmma(wavelength_nm / 1000) - _pmma(PMMA_REFERENCE_UM), 1)
+        for name, wavelength_nm in strip_wavelengths_nm(d).items()
+    }
+    acrylic = Medium(
+        indices.get("left", n),
+        d["material.acrylic.absorption_per_m"] / 1000,
+        indices.get("red"),
+        indices.get("green"),
     )
-    acrylic = Medium(n, d["material.acrylic.absorption_per_m"] / 1000, max(red, 1), max(green, 1))
     return {"air": Medium(1.0), "acrylic": acrylic, "leg": acrylic, "gel": Medium(gel)}
 
 

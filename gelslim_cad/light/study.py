@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.optics import (
     curved_guide,
@@ -27,7 +28,6 @@ from gelslim_optics.light.trace import trace_light
 RATIOS = (0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0)
 RAYS = 1 << 17
 CURVE_RAYS = 1 << 14
-COLOURS = ("red", "green")
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
 Verdict = Literal["brighter", "darker", "no different"]
@@ -128,8 +128,8 @@ def study_light(
                 (f"a straight guide with air-gapped 45° mirrors ({same})", gap),
             )
         ),
-        exposures=tuple(exposure(d, light, c) for c in COLOURS),
-        glued_exposures=tuple(exposure(d, glued, c) for c in COLOURS),
+        exposures=tuple(exposure(d, light, c) for c in strip_wavelengths_nm(d)),
+        glued_exposures=tuple(exposure(d, glued, c) for c in strip_wavelengths_nm(d)),
         curve=ratio_curve(
             d, rays // 8, seed, threads, lambda ratio, k: tell(f"R/t = {ratio:g}", 3 + k, steps)
         )
@@ -206,7 +206,7 @@ def _guide(result: LightResult) -> dict[str, Any]:
         "ledger": {name: _estimate(found) for name, found in result.ledger().items()},
         "ledger_gap": result.ledger_gap(),
         "entered_gel": _estimate(result.entered_gel()),
-        "by_colour": {c: _colour(result, c) for c in COLOURS},
+        "by_colour": {c: _colour(result, c) for c in result.colours},
     }
 
 

@@ -41,7 +41,7 @@ def camera(d: Dimensions) -> Part:
     return Part(
         name="camera",
         solid=single(_placed(d, shape), "camera"),
-        material=d["camera.name"],
+        material=d["camera.name"] + (", mono" if d["camera.picture"] == "mono" else ""),
         process="buy",
         colour=CAMERA,
         explode_mm=(-14, 0, -12),

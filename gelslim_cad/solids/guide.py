@@ -13,9 +13,10 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.materials import ACRYLIC, GREEN_BOARD, RED_BOARD
+from gelslim_cad.solids.materials import ACRYLIC, GREEN_BOARD, PLAIN_BOARD, RED_BOARD
 from gelslim_cad.solids.shapes import Piece, box, closed_wire, single, union
 from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Point, Segment
 
@@ -111,18 +112,21 @@ def _board(d: Dimensions, side: int) -> cq.Solid:
 
 
 def led_boards(d: Dimensions) -> tuple[Part, Part]:
-    """The red and the green board."""
+    """The red and the green board, or two boards of one wavelength."""
     model, count = d["design.leds.model"], round(d["led.count"])
-    red, green = (
+    one, (left, right) = d["design.leds.one_wavelength_nm"], strip_wavelengths_nm(d)
+    colours = {"red": RED_BOARD, "green": GREEN_BOARD}
+    lower, upper = (
         Part(
             name=f"led_board_{name}",
             solid=_board(d, side),
-            material=f"{count} × {model} {name}, {d['design.leds.board_thickness_mm']:g} mm board",
+            material=f"{count} × {model} {name if one is None else f'{one:g} nm'}, "
+            f"{d['design.leds.board_thickness_mm']:g} mm board",
             process="pcb",
-            colour=colour,
+            colour=colours.get(name, PLAIN_BOARD),
             explode_mm=(0, side * 16, -6),
             note=f"{count} LEDs at {d['led.pitch_mm']:.2f} mm pitch",
         )
-        for name, side, colour in (("red", -1, RED_BOARD), ("green", 1, GREEN_BOARD))
+        for name, side in ((left, -1), (right, 1))
     )
-    return red, green
+    return lower, upper

@@ -55,7 +55,7 @@ class LightGuide(Block):
 
 
 class Leds(Block):
-    """Two strips under the legs: red at -y (left in the image), green at +y."""
+    """Two strips under the legs: red at -y (left in the image), green at +y, or both alike."""
 
     model: str = Field(default="LUXEON CZ", max_length=80, description="LED type, for the BOM")
     package_mm: float = between(0.3, 10, "Package edge length", default=2.0)
@@ -74,6 +74,12 @@ class Leds(Block):
     )
     red_wavelength_nm: float = between(560, 760, "Wavelength of the red LEDs", default=625.0)
     green_wavelength_nm: float = between(480, 580, "Wavelength of the green LEDs", default=525.0)
+    one_wavelength_nm: float | None = between(
+        400,
+        1000,
+        "Wavelength of both strips, for a mono camera; red and green when left out",
+        default=None,
+    )
     emission: Literal["lambertian", "dome", "table"] = Field(
         default="lambertian",
         description="How the LED's light spreads: bare die, lens dome, or a data-sheet table",

@@ -30,6 +30,9 @@ SPY_CAMERA: dict[str, Any] = {
 }
 """2592 x 1944 pixels of 1.4 µm, read out as 640 x 480 over the whole sensor; f = 3.60 mm, f/2.9."""
 
+MONO_LIGHT_NM = 525.0
+"""Wavelength of both LED strips in a new spec with a mono camera: where its sensor sees most."""
+
 _HEAD = """\
 ## A GelSlim-type tactile finger. All sizes in the unit that ends the name.
 ## What is not given takes its default, shown behind "# "; to change one, delete the "# "
@@ -56,6 +59,8 @@ def starter_text(
     if model:
         camera = {"camera.model": model}
         defaults = {f"camera.{n}": v for n, v in library_camera(model).fields().items()}
+        if defaults["camera.picture"] == "mono":
+            camera = {**camera, "design.leds.one_wavelength_nm": MONO_LIGHT_NM}
     values = {
         "format": Spec.model_fields["format"].annotation.__args__[0],  # type: ignore[union-attr]
         "name": name,

@@ -117,7 +117,7 @@ def enlarged(image: Image, factor: int) -> Image:
 
 
 def encoded(image: Image, suffix: str, quality: int = 92) -> bytes:
-    """Return an RGB picture (h, w, 3) as a PNG or JPEG file.
+    """Return an RGB picture (h, w, 3), or a grey one (h, w), as a PNG or JPEG file.
 
     Raises OutputError for another suffix, MissingLibraryError without OpenCV.
     """
@@ -129,7 +129,9 @@ def encoded(image: Image, suffix: str, quality: int = 92) -> bytes:
     # sixth of the time.
     png = [cv.IMWRITE_PNG_COMPRESSION, 6, cv.IMWRITE_PNG_STRATEGY, cv.IMWRITE_PNG_STRATEGY_RLE]
     options = png if kind == ".png" else [cv.IMWRITE_JPEG_QUALITY, quality]
-    success, data = cv.imencode(kind, np.ascontiguousarray(image[:, :, ::-1]), options)
+    success, data = cv.imencode(
+        kind, np.ascontiguousarray(image[..., ::-1] if image.ndim == 3 else image), options
+    )
     if not success:
         raise OutputError(f"OpenCV could not encode a picture of {image.shape} as {kind}")
     return bytes(data)

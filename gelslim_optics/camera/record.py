@@ -72,3 +72,8 @@ def _vector(record: Mapping[str, object], name: str, count: int = 3) -> list[flo
     if not isinstance(value, list | tuple) or len(value) != count:
         raise ValueError(f"the camera record's {name} = {value!r} must be {count} numbers")
     return [_number({name: v}, name) for v in value]
+
+
+def is_mono(record: Mapping[str, object]) -> bool:
+    """Whether the camera of a record sees brightness alone; colours where it says nothing."""
+    return record.get("picture") == "mono"

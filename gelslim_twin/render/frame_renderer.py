@@ -27,7 +27,7 @@ class RenderedFrame:
     """A picture and the true positions of the dots in it, in the order of the print.
 
     Attributes:
-        image: Picture (h, w, 3), uint8, RGB.
+        image: Picture (h, w, 3), uint8, RGB; (h, w) of a mono camera.
         centres_px: Area centroids (m, 2) of the dots' images, averaged over the open shutter;
             pixel centres have integer coordinates.
         diameter_px: Diameter (m,) of the disc of the same area.
@@ -61,6 +61,7 @@ class FrameRenderer:
         pad: Outline and appearance of the pad.
         look: The effects to render.
         top: The outer surface at rest where it is crowned; None for a flat one.
+        mono: Whether the camera sees brightness alone, by the first response of `light`.
     """
 
     camera: VirtualCamera
@@ -69,6 +70,7 @@ class FrameRenderer:
     pad: Pad
     look: Look
     top: DomedTop | None = None
+    mono: bool = False
 
     @cached_property
     def dots(self) -> PrintedDots:
@@ -196,6 +198,8 @@ class FrameRenderer:
             if noise is not None:
                 noise.apply(rows, gain, number, top * width)
             develop(rows.reshape(-1), self._curve, image[top : top + _STRIP].reshape(-1))
+        if self.mono:
+            image = np.ascontiguousarray(image[..., 0])
         return image if self.look.compression is None else self.look.compression.apply(image)
 
     def _outlines(

@@ -131,7 +131,7 @@ class Compression:
     quality: int | None = None
 
     def apply(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The picture (h, w, 3) after coding and decoding.
+        """The picture (h, w, 3) or (h, w) after coding and decoding.
 
         Raises MissingLibraryError if Pillow is not installed.
         """
@@ -140,4 +140,6 @@ class Compression:
         pillow = load("PIL.Image", "the effect compression")
         store = io.BytesIO()
         pillow.fromarray(image).save(store, "JPEG", quality=self.quality, subsampling=2)
-        return np.array(pillow.open(io.BytesIO(store.getvalue())).convert("RGB"))
+        return np.array(
+            pillow.open(io.BytesIO(store.getvalue())).convert("L" if image.ndim == 2 else "RGB")
+        )

@@ -90,4 +90,4 @@ def sensor_renderer(
         *sensor.size_mm, sensor.corner_radius_mm, mottle=MOTTLE, vignetting=VIGNETTING, seed=seed
     )
     top = DomedTop.of_nodes(sensor.points_mm)
-    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, look, top)
+    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, look, top, sensor.mono)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gelslim_core.files.file_lock import locked, use, used_elsewhere
 from gelslim_core.files.replaced_file import json_bytes, replace_file, sweep
+from gelslim_optics.camera.record import is_mono
 from gelslim_twin.simulation.run_folder import SimulationError
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle, write_bundle
@@ -30,7 +31,8 @@ class TwinSensor:
 
     Attributes:
         bundle: The sensor. Without an outline in it, the box of the mesh is that of the pad;
-            without light, the pad is lit evenly red and green from its sides.
+            without light, the pad is lit evenly from its sides, red and green but for a mono
+            camera.
     """
 
     bundle: Bundle
@@ -44,6 +46,11 @@ class TwinSensor:
     def camera_record(self) -> Mapping[str, Any]:
         """The camera's parameters."""
         return self.bundle.camera
+
+    @property
+    def mono(self) -> bool:
+        """Whether the camera sees brightness alone."""
+        return is_mono(self.bundle.camera)
 
     @cached_property
     def grid(self) -> MarkerGrid:
@@ -73,7 +80,8 @@ class TwinSensor:
         if self.bundle.light:
             return LightMap(**{n: np.asarray(v) for n, v in self.bundle.light.items()})
         length, width = self.size_mm
-        return red_green_sides(length, width, decay_mm=0.8 * width)
+        light = red_green_sides(length, width, decay_mm=0.8 * width)
+        return replace(light, colour=np.ones((2, 3))) if self.mono else light
 
 
 BUNDLE, RECORD = "bundle", "sensor.json"

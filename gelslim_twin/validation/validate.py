@@ -27,6 +27,7 @@ from gelslim_force.forces.estimator import ForceSettings
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
+from gelslim_optics.camera.record import is_mono
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import unfit
 from gelslim_twin.render.look import lens_of, sensor_look
@@ -54,6 +55,8 @@ FRAMES_APART = 100
 
 
 Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
+FOUND_BY_COLOUR = ("shape", "cap")
+"""Knowledge that needs a contact patch, which pictures of a mono camera do not show."""
 """What the chain is given: the true heights (`depth`), with the true contact region (`contact`), or
 the shape of the indenter (`shape`; `cap` with the paper's model of it)."""
 
@@ -85,14 +88,14 @@ CHAINS: tuple[Chain, ...] = (
 
 
 def chains_for(bundle: Bundle, budget: Budget | None = None) -> tuple[Chain, ...]:
-    """The chains for a bundle's pad; those that name no operator get the budget."""
-    fit = unfit(bundle) is None
+    """The chains for a bundle's pad and camera; those that name no operator get the budget."""
+    fit, mono = unfit(bundle) is None, is_mono(bundle.camera)
     return tuple(
         chain
         if chain.settings.rung is not None
         else replace(chain, settings=replace(chain.settings, budget=budget))
         for chain in CHAINS
-        if fit or not chain.needs_even_layers
+        if (fit or not chain.needs_even_layers) and not (mono and chain.knows in FOUND_BY_COLOUR)
     )
 
 
@@ -146,7 +149,7 @@ class Bench:
         for chain in self.chains:
             pipeline = self._pipelines[chain.name]
             pipeline.reset()
-            if chain.knows in ("shape", "cap"):
+            if chain.knows in FOUND_BY_COLOUR:
                 if not known:
                     continue
                 pipeline = pipeline.with_normal(self._source(chain, known))

@@ -18,6 +18,10 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"design.light_guide.bend_radius_ratio": 1.5}, "warn"),
         ({"design.light_guide.bend_radius_ratio": 0.4}, "fail"),
     ],
+    "led.colours_nm": [
+        ({"camera.picture": "mono"}, "warn"),
+        ({"design.leds.one_wavelength_nm": 525.0}, "warn"),
+    ],
     "led.fits_mm": [({"design.leds.package_mm": 2.3}, "fail")],
     "led.gap_mm": [({"design.leds.max_pitch_mm": 2.2}, "fail")],
     "led.pitch_mm": [({"design.leds.max_count": 2}, "warn")],

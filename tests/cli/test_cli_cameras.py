@@ -73,4 +73,5 @@ def test_a_new_spec_takes_the_camera_and_check_judges_it(
     assert loaded.lent["camera.focal_length_mm"]
     capsys.readouterr()
     assert main(["check", str(target), "--json"]) in (0, 1)
-    assert json.loads(capsys.readouterr().out)["checks"]
+    told = {c["id"]: c["status"] for c in json.loads(capsys.readouterr().out)["checks"]}
+    assert told["led.colours_nm"] == "pass"

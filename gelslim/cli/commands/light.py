@@ -154,7 +154,7 @@ def _report(name: str, study: LightStudy) -> None:
     print()
     _ledger(study.light)
     print()
-    for colour in ("red", "green"):
+    for colour in study.light.colours:
         _evenness(study.light, colour)
     for ours, glued in zip(study.exposures, study.glued_exposures, strict=True):
         say(f"{ours.sentence()} (with glued mirrors: {glued.frame_rate_hz:.0f}).")
