@@ -23,6 +23,7 @@ from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.frames.frame import Frame
+from gelslim_force.frames.upright import upright
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.settings import PipelineSettings
@@ -149,7 +150,8 @@ class ForcePipeline:
         """Estimate the forces of the next frame.
 
         Args:
-            frame: A frame of a source, or a picture (h, w) or (h, w, 3) uint8.
+            frame: A frame of a source, or a picture (h, w) or (h, w, 3) uint8; of a camera in
+                portrait also as the camera gives it, on its side.
             time_s: When it was taken. By default the frame's own time; for a picture, the number
                 of frames so far.
             normal_mm: (c,) motion of the surface nodes along z in mm, negative where the gel is
@@ -168,6 +170,7 @@ class ForcePipeline:
             image, time_s = frame.image, frame.time_s if time_s is None else time_s
             if image is None:
                 return self.unreadable(frame.problem, time_s=time_s)
+        image = upright(image, self.calibration.camera)
         problem = self._size_problem(image)
         if problem:
             return self._numbered(time_s, problems=(problem,))

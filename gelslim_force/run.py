@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.frames.frame import Frame
+from gelslim_force.frames.upright import upright
 from gelslim_force.pipeline import ForcePipeline
 
 Progress = Callable[[str, int, int], None]
@@ -99,12 +100,14 @@ def run_frames(
     report = progress or (lambda text, done, total: None)
     summary = RunSummary()
     for frame in frames:
-        if frame.image is None:
+        image = frame.image
+        if image is None:
             result = pipeline.unreadable(frame.problem, time_s=frame.time_s)
         else:
-            result = pipeline.process(frame.image, time_s=frame.time_s)
+            image = upright(image, pipeline.calibration.camera)
+            result = pipeline.process(image, time_s=frame.time_s)
         summary.add(result)
         for sink in sinks:
-            sink.take(frame.image, result)
+            sink.take(image, result)
         report("frames", summary.frames, count or summary.frames + 1)
     return summary

@@ -17,6 +17,7 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.indenter import Indenter, parse_indenter
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
+from gelslim_force.frames.upright import upright
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
 from gelslim_optics.camera.record import is_mono
@@ -131,7 +132,7 @@ def indenter_source(
     radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
     finder = PatchFinder(
         calibration.camera,
-        reference,
+        upright(reference, calibration.camera),
         followed.positions_px,
         marker_radius_px=radius_px[np.searchsorted(calibration.markers, followed.markers)],
         surface_mm=points_mm,

@@ -202,8 +202,8 @@ def _assemble(d: Dimensions) -> str:
         "## 6. Assemble\n\n"
         "1. Glue the mirror on `mirror_seat` against its stop, coated side up; screw the seat to "
         "`back_cover` (its thin end drops into the recess).\n"
-        "2. Drop the camera into `camera_clamp`, screw the clamp to the cover. Hold the cover to "
-        "`body` with the gel in place, push the camera within its play until the gel lies upright "
+        f"2. Drop the camera into `camera_clamp`, screw the clamp to the cover.{_turned(d)} Hold the "
+        "cover to `body` with the gel in place, push the camera within its play until the gel lies upright "
         "in the live picture with a border on every side, and only then glue it: "
         "`gelslim tolerance` says what that is worth.\n"
         f"3. Lay the LED boards on the pedestals of the cover ({_strips(d)}); lead the wires "
@@ -257,3 +257,13 @@ def _seen(d: Dimensions) -> str:
         return "The picture is grey, and left and right are equally bright."
     alike = d["design.leds.one_wavelength_nm"] is not None
     return "Left and right have the same colour." if alike else "Left red, right green."
+
+
+def _turned(d: Dimensions) -> str:
+    """How a camera in portrait lies; nothing for one in landscape."""
+    if d["camera.orientation"] == "landscape":
+        return ""
+    return (
+        " It is turned by 90°: its picture lies on its side, with the near edge of the gel, that "
+        "next to the camera, at the left."
+    )

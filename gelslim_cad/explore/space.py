@@ -198,14 +198,17 @@ class Space:
         return tuple(reversed(values))
 
 
+EXCHANGING = {"camera.model", "camera.mode", "camera.orientation"}
+
+
 def changed(spec: Spec, overrides: Mapping[str, Any]) -> Spec:
     """The spec with fields replaced by dotted path; raises ValidationError where it is illegal.
 
-    Another camera of the library, or another mode, brings its own fields along; those that the
+    Another camera of the library, mode or orientation brings its own fields along; those that the
     spec itself gives stay.
     """
     content = spec.model_dump()
-    exchanged = not {"camera.model", "camera.mode"}.isdisjoint(overrides)
+    exchanged = not EXCHANGING.isdisjoint(overrides)
     if exchanged and overrides.get("camera.model", spec.camera.model) is not None:
         content["camera"] = own_fields(content["camera"])
     for path, value in overrides.items():

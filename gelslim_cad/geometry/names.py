@@ -240,6 +240,7 @@ TextName = Literal[
     "format",
     "name",
     "camera.name",
+    "camera.orientation",
     "camera.focusing",
     "camera.picture",
     "design.leds.model",

@@ -37,7 +37,7 @@ def _given_or_from_library(schema: dict[str, Any]) -> None:
 
 
 class Camera(Block):
-    """A camera by its sheet or of the library. The wider image axis lies across the finger."""
+    """A camera by its sheet or of the library. Width is across the finger, height along it."""
 
     model_config = ConfigDict(json_schema_extra=_given_or_from_library)
 
@@ -53,6 +53,11 @@ class Camera(Block):
         "left out",
     )
     name: str = Field(default="camera", max_length=80, description="Camera name, for the BOM")
+    orientation: Literal["landscape", "portrait"] = Field(
+        default="landscape",
+        description="How the module is mounted: the wider axis of the picture is across the finger "
+        "in `landscape`, along it in `portrait`; sizes are those as mounted",
+    )
     image_width_px: int = between(64, 10000, "Image width (across the finger)")
     image_height_px: int = between(64, 10000, "Image height (along the finger)")
     sensor_width_mm: float = above(0.3, 40, "Width of the sensor area that the image covers")
@@ -136,13 +141,7 @@ class Camera(Block):
                 "belongs to a camera of the library, and model names none",
                 "give model too, or leave mode out and give the fields themselves",
             )
-        if self.image_height_px > self.image_width_px:
-            raise FieldError(
-                "image_height_px",
-                f"must be at most image_width_px ({self.image_width_px})",
-                "the wider axis lies across the finger: swap the two, and the sensor sides",
-                ("image_width_px",),
-            )
+        self._check_orientation()
         if self.lens_diameter_mm > self.module_width_mm:
             raise FieldError(
                 "lens_diameter_mm",
@@ -164,6 +163,25 @@ class Camera(Block):
                 ("image_height_px", "sensor_width_mm", "sensor_height_mm"),
             )
         return self
+
+    def _check_orientation(self) -> None:
+        """The wider axis of the picture lies across the finger, or in portrait along it."""
+        wide, high = self.image_width_px, self.image_height_px
+        if self.orientation == "portrait" and high <= wide:
+            raise FieldError(
+                "orientation",
+                f"is portrait, and image_height_px ({high}) is not above image_width_px ({wide})",
+                "give picture, sensor and housing as they are mounted, turned by 90 degrees",
+                ("image_height_px",),
+            )
+        if self.orientation == "landscape" and high > wide:
+            raise FieldError(
+                "image_height_px",
+                f"must be at most image_width_px ({wide})",
+                "the wider axis lies across the finger: swap the two, and the sensor sides, or "
+                "give orientation: portrait",
+                ("image_width_px",),
+            )
 
     def _check_focusing(self) -> None:
         """Each way to focus has the figures that it needs, and the pupil lies in the camera."""

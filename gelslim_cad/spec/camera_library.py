@@ -19,7 +19,14 @@ from gelslim_core.yaml.reader import read_model
 from gelslim_core.yaml.suggest import suggest_choice
 
 Pixels = Annotated[int, Field(ge=1, le=20000)]
+PORTRAIT = "portrait"
 Figure = float | int | str
+TURNED = {
+    f"{what}_{side}": f"{what}_{other}"
+    for what, unit in (("image", "px"), ("sensor", "mm"), ("module", "mm"))
+    for side, other in (("width_" + unit, "height_" + unit), ("height_" + unit, "width_" + unit))
+}
+"""Fields of a camera in portrait, with those in landscape whose values they take."""
 ABOUT = ("format", "summary", "default_mode", "sources")
 """Fields of a library file that are no figures of the camera."""
 
@@ -112,10 +119,11 @@ class LibraryCamera(Block):
                 return source
         raise KeyError(figure)
 
-    def fields(self, mode: str | None = None) -> dict[str, Any]:
+    def fields(self, mode: str | None = None, portrait: bool = False) -> dict[str, Any]:
         """Fields of a spec's camera in a mode, the first by default, `model` excepted.
 
-        Raises `FieldError` for a mode that the camera does not have.
+        In `portrait` the module is turned by 90°, so that what was its width is its height. Raises
+        `FieldError` for a mode that the camera does not have.
         """
         by_name = {m.name: m for m in self.modes}
         if mode is not None and mode not in by_name:
@@ -123,7 +131,7 @@ class LibraryCamera(Block):
             raise FieldError("mode", "is no mode of this camera of the library", told)
         chosen = self.modes[0] if mode is None else by_name[mode]
         width, height = (round(count * self.pixel_um / 1000, 9) for count in chosen.crop_px)
-        return {
+        fields = {
             **self.camera,
             "mode": chosen.name,
             "image_width_px": chosen.image_px[0],
@@ -132,6 +140,8 @@ class LibraryCamera(Block):
             "sensor_height_mm": height,
             "frame_rate_hz": chosen.frame_rate_hz,
         }
+        turned = {name: fields[other] for name, other in TURNED.items() if other in fields}
+        return fields | turned if portrait else fields
 
     def implied_fov_deg(self, part_px: tuple[int, int] | None = None) -> dict[str, float]:
         """Field of view of the sensor, or a part of it, by its sides and f, for a thin lens."""
@@ -203,7 +213,8 @@ def completed(given: Any) -> Any:
         raise FieldError(
             "model", "is no camera of the library", suggest_choice(name, camera_names())
         )
-    fields = library_camera(name).fields(mode if isinstance(mode, str) else None)
+    portrait = given.get("orientation") == PORTRAIT
+    fields = library_camera(name).fields(mode if isinstance(mode, str) else None, portrait)
     return {**fields, **{n: v for n, v in given.items() if n != "mode" or v is not None}}
 
 
@@ -216,7 +227,7 @@ def own_fields(camera: Mapping[str, Any]) -> dict[str, Any]:
     name = camera["model"]
     if name is None:
         return {}
-    taken = library_camera(name).fields(camera["mode"])
+    taken = library_camera(name).fields(camera["mode"], camera["orientation"] == PORTRAIT)
     defaults = {n: f.default for n, f in Camera.model_fields.items()}
     kept = {n: v for n, v in camera.items() if v != taken.get(n, defaults[n])}
     return kept | {"model": name}

@@ -11,7 +11,8 @@ RULES = (
     ("camera", "`mode` needs `model`, and names one of its modes"),
     (
         "camera",
-        "`image_height_px` is at most `image_width_px`: the wider axis lies across the finger",
+        "`image_height_px` is at most `image_width_px`, the wider axis lying across the finger; "
+        "`orientation: portrait` has it along the finger, and `image_height_px` above",
     ),
     ("camera", "pixels are square: picture and sensor have the same proportions within 2 %"),
     ("camera", "a field of view that is given agrees with sensor and focal length within 5 %"),

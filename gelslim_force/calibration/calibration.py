@@ -19,6 +19,7 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import BORDER, Detections
 from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.frames.upright import upright
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.registration import Registration, register
 from ifem_export.operators.single_thread import single_threaded
@@ -45,7 +46,8 @@ def calibrate(
 
     Args:
         bundle: The sensor's design, with markers and camera.
-        image: (h, w) or (h, w, 3) uint8, without contact.
+        image: (h, w) or (h, w, 3) uint8, without contact; of a camera in portrait also on its
+            side, as the camera gives it.
         tolerance: Standard deviations of the built camera about its design.
         allow_contact: Accept a region in which neighbouring dots are displaced together, for
             prints that are warped there.
@@ -60,6 +62,7 @@ def calibrate(
         IfemError: The bundle has no markers or no camera.
     """
     grid, design = bundle_grid(bundle), bundle_camera(bundle)
+    image = upright(image, design)
     checks.require_size(image, design)
     settings = expected_dots(design, grid)
     dots = Detector(settings).detect(image)

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from gelslim_core.errors import GelslimError
 from gelslim_force.contact.normal_source import NormalReading
+from gelslim_force.frames.upright import upright
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
@@ -88,6 +89,7 @@ class DepthMapSource:
     def _heights_at_nodes(self, heights: Array) -> Array:
         """(c,) heights; each node is looked up where the camera sees it at its own height."""
         camera = self.camera
+        heights = upright(heights, camera)
         expected = (camera.image_height_px, camera.image_width_px)
         if heights.shape != expected:
             raise DepthMapError(
