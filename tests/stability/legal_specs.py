@@ -17,6 +17,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from gelslim_cad.spec import Spec
+from gelslim_cad.spec.camera import camera_names
+from gelslim_cad.spec.camera_library import library_camera
 
 from .plausible import plausible, short
 from .ranges import LEAVES, anywhere
@@ -77,9 +79,18 @@ def _edge(rng: np.random.Generator, values: Values) -> None:
     """Draw a few fields anew from their whole range."""
     for path in rng.choice(list(LEAVES), size=int(rng.integers(1, 4)), replace=False):
         values[str(path)] = anywhere(rng, LEAVES[str(path)])
+        if path in ("camera.model", "camera.mode"):
+            values |= _of_library(rng)
     ratio = values["camera.image_height_px"] / values["camera.image_width_px"]
     values["camera.sensor_height_mm"] = short(values["camera.sensor_width_mm"] * ratio, 8)
     _both_cell_counts(values, 17)
+
+
+def _of_library(rng: np.random.Generator) -> Values:
+    """A camera of the library and one of its modes."""
+    name = str(rng.choice(camera_names()))
+    mode = str(rng.choice([m.name for m in library_camera(name).modes]))
+    return {"camera.model": name, "camera.mode": mode}
 
 
 def _both_cell_counts(values: Values, count: int) -> None:
@@ -113,12 +124,17 @@ def _agree_camera(rng: np.random.Generator, values: Values) -> None:
     height = max(height, math.ceil(width / 100))
     least = 0.31 * width / height
     sensor = short(math.exp(rng.uniform(math.log(least), math.log(40))), 6)
-    values |= {
-        "camera.image_width_px": width,
-        "camera.image_height_px": height,
-        "camera.sensor_width_mm": sensor,
-        "camera.sensor_height_mm": short(sensor * height / width, 8),
+    portrait = width > height and values["camera.orientation"] == "portrait"
+    across, along = ("height", "width") if portrait else ("width", "height")
+    values |= {"camera.model": None, "camera.mode": None} | {
+        "camera.orientation": "portrait" if portrait else "landscape",
+        f"camera.image_{across}_px": width,
+        f"camera.image_{along}_px": height,
+        f"camera.sensor_{across}_mm": sensor,
+        f"camera.sensor_{along}_mm": short(sensor * height / width, 8),
     }
+    if rng.random() < 0.5:
+        values |= _of_library(rng)
     lens = values["camera.lens_diameter_mm"]
     values["camera.lens_diameter_mm"] = min(lens, values["camera.module_width_mm"])
     for axis, side in (("horizontal", "width"), ("vertical", "height")):
