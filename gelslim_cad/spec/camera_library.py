@@ -27,7 +27,7 @@ TURNED = {
     for side, other in (("width_" + unit, "height_" + unit), ("height_" + unit, "width_" + unit))
 }
 """Fields of a camera in portrait, with those in landscape whose values they take."""
-ABOUT = ("format", "summary", "default_mode", "sources")
+ABOUT = ("format", "summary", "sources")
 """Fields of a library file that are no figures of the camera."""
 
 
@@ -215,6 +215,9 @@ def completed(given: Any) -> Any:
         )
     portrait = given.get("orientation") == PORTRAIT
     fields = library_camera(name).fields(mode if isinstance(mode, str) else None, portrait)
+    if given.get("focusing", fields.get("focusing")) != "fixed":
+        # A lens that is taken to be movable has no distance of its own.
+        fields.pop("focus_distance_mm", None)
     return {**fields, **{n: v for n, v in given.items() if n != "mode" or v is not None}}
 
 

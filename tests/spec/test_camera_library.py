@@ -118,6 +118,13 @@ def test_the_first_mode_is_the_default_and_written_fields_prevail():
     assert "camera.lens_transmission" in plain.defaulted
 
 
+def test_a_fixed_lens_that_is_taken_to_be_movable_loses_its_distance():
+    text = TEXT.replace("model: ov9281\n  mode: 640x400", "model: ovm6211\n  focusing: unit")
+    camera = load(text).model.camera
+    assert (camera.focusing, camera.focus_distance_mm) == ("unit", None)
+    assert load(text.replace("  focusing: unit\n", "")).model.camera.focus_distance_mm == 40
+
+
 def test_a_spec_is_the_same_with_the_fields_of_the_library_written_out(tmp_path: Path):
     loaded = load()
     assert Spec.model_validate_json(loaded.model.model_dump_json()) == loaded.model
