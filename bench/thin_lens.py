@@ -70,9 +70,26 @@ class ThinLens:
             ),
         )
 
-    def on_gel(self, pixels: ArrayLike, in_pupil: ArrayLike) -> Array:
-        """Where (x, y) rays (n, 2) from pixels, through points of the unit pupil, meet the gel."""
-        uv, pupil = np.asarray(pixels, float), np.asarray(in_pupil, float)
+    def on_gel(
+        self, pixels: ArrayLike, in_pupil: ArrayLike, height_mm: Array | float = 0.0
+    ) -> Array:
+        """Where (x, y) rays (n, 2) from pixels, through points of the unit pupil, meet the gel.
+
+        The rays are followed to the gel's outer surface, or to other heights, scalar or (n,).
+        """
+        start, ray = self._reflected(
+            *self.leaving(np.asarray(pixels, float), np.asarray(in_pupil, float))
+        )
+        before = 1.0
+        for lower_z, index in self.layers:
+            start = start + ray * ((lower_z - start[:, 2]) / ray[:, 2])[:, None]
+            ray = _refracted(ray, before / index)
+            before = index
+        end = start + ray * ((height_mm - start[:, 2]) / ray[:, 2])[:, None]
+        return np.asarray(end[:, :2])
+
+    def leaving(self, uv: Array, pupil: Array) -> tuple[Array, Array]:
+        """Points (n, 3) of the lens and unit rays (n, 3) that leave it towards the mirror."""
         middle = (np.asarray(self.size_px) - 1) / 2
         across, along = ((uv - middle) * self.pitch_mm).T[:, :, None]
         chief = self.forward * self.sensor_mm + self.right * across + self.down * along
@@ -80,15 +97,7 @@ class ThinLens:
         shift = (self.right * pupil[:, :1] + self.down * pupil[:, 1:]) * self.aperture_mm / 2
         start = self.centre + shift
         ray = chief * (distance / self.sensor_mm) - shift
-        ray = ray / np.linalg.norm(ray, axis=1)[:, None]
-        start, ray = self._reflected(start, ray)
-        before = 1.0
-        for lower_z, index in self.layers:
-            start = start + ray * ((lower_z - start[:, 2]) / ray[:, 2])[:, None]
-            ray = _refracted(ray, before / index)
-            before = index
-        end = start + ray * (-start[:, 2] / ray[:, 2])[:, None]
-        return np.asarray(end[:, :2])
+        return start, ray / np.linalg.norm(ray, axis=1)[:, None]
 
     def _reflected(self, start: Array, ray: Array) -> tuple[Array, Array]:
         away = (self.mirror_point - start) @ self.mirror_normal / (ray @ self.mirror_normal)
