@@ -16,7 +16,7 @@ COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#30a0b0", "#c
 OURS, PAPER, FRONT = "#d62728", "#000000", "#9aa3ad"
 NEGLIGIBLE = 1e-6
 """Of a ladder's largest error: what is below is drawn there, as an open triangle."""
-MOST_NAMES = {"ladder": 20, "problems": 0, "omissions": 30}
+MOST_NAMES = {"ladder": 20, "problems": 8, "omissions": 30}
 KEY = "Ladder"
 """PNG text that says from which record a figure was drawn."""
 UNITS = {"relative": "", "share": "", "um": " (µm)", "px": " (px)", "N": " (N)", "mm": " (mm)",

@@ -22,6 +22,7 @@ from accuracy_figure import drawn
 from accuracy_text import conclusion, table
 from bench_data import DOCS, write_data, write_whole
 from ladder_record import LadderRecord, records_of
+from ladders_of_camera import camera
 from ladders_of_force import force
 from ladders_of_solids import light, stiffness, tessellation
 from ladders_of_twin import rendering, twin
@@ -31,6 +32,7 @@ SOURCES: dict[str, Convert] = {
     "stiffness_ladder": stiffness,
     "light_rays": light,
     "tessellation": tessellation,
+    "camera_models": camera,
     "force_ladders": force,
     "twin_ladders": twin,
     "rendering": rendering,

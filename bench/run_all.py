@@ -40,6 +40,7 @@ STEPS = (
     Step("stiffness_ladder"),
     Step("light_rays", quick=("--rays", "12", "--reference", "18", "--ladder-alone")),
     Step("tessellation"),
+    Step("camera_models"),
     Step("force_ladders"),
     Step("twin_ladders"),
     Step("rendering"),
