@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gelslim.contacts import plan, simulate, validate
     from gelslim.design import build, check, derive, make_bundle
     from gelslim.examples import examples
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
     from gelslim_core.budget.budget import Budget
     from gelslim_core.errors import GelslimError
     from gelslim_force.calibration.calibration import calibrate

@@ -37,7 +37,8 @@ def spec_of(spec: SpecLike) -> Spec:
         InputError: The file has faults.
     """
     from gelslim_cad.spec import Spec
-    from gelslim_cad.spec.reader import LoadedSpec, read_spec
+    from gelslim_cad.spec.reader import LoadedSpec
+    from gelslim_cad.tolerance.asked import read_spec
 
     if isinstance(spec, Spec):
         return spec

@@ -50,7 +50,7 @@ def spec_bundle(path: Path, with_light: bool = True) -> Bundle:
     """
     from gelslim_cad.dimensions import derive
     from gelslim_cad.sensor import make_bundle, marker_grid, pad_mesh
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     spec = read_spec(path).spec
     d = derive(spec)
@@ -99,7 +99,7 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     from gelslim_cad.dimensions import derive
     from gelslim_cad.geometry.optics import camera_record
     from gelslim_cad.sensor import marker_grid, pad_mesh
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
     from gelslim_twin.planning.question import figures
 
     spec = read_spec(loaded.sensor_path).spec

@@ -88,7 +88,7 @@ def build_variant(
         OutputError: The folder cannot be written.
     """
     from gelslim_cad.build.stages import Stages
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     loaded = read_spec(spec_path)
     target = Path(os.path.abspath(out_dir))

@@ -276,6 +276,7 @@ OptionalFloatName = Literal[
     "design.envelope.max_thickness_mm",
     "design.envelope.max_width_mm",
     "design.envelope.max_length_mm",
+    "design.envelope.least_yield",
     "tolerance.print_flatness_mm",
 ]
 OptionalIntName = Literal[

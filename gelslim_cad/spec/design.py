@@ -245,6 +245,14 @@ class Envelope(Block):
         0, 10, "Thickness that a pixel more per marker is worth, goal: thinnest", default=0.0
     )
 
+    least_yield: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="Share of fingers that must keep every rule as they vary; the least "
+        "optics.image_margin that reaches it takes the place of the given one",
+    )
+
     @model_validator(mode="after")
     def _weights_have_their_goal(self) -> Envelope:
         for name in ("length_worth", "pixel_worth_mm"):

@@ -175,7 +175,9 @@ def test_the_objective_is_that_of_plane_geometry(candidates: Compared) -> None:
     np.testing.assert_allclose(found, [v.objective() for v in layouts], rtol=1e-8)
     # The same candidates, as if they missed nothing but what they use of the picture.
     kept = {k: np.minimum(v, 0.0) for k, v in ours.violations.items()}
-    spared = replace(ours, violations=kept, housing={k: np.full_like(v, -1.0) for k, v in kept.items()})
+    spared = replace(
+        ours, violations=kept, housing={k: np.full_like(v, -1.0) for k, v in kept.items()}
+    )
     sides = ("field of view along", "field of view across")
     within = np.array([max(v.missed()[side] for side in sides) < 0 for v in layouts])
     expected = np.array([v.goal() for v in layouts])[within]

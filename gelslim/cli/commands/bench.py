@@ -131,7 +131,7 @@ def bench_light(path: Path, progress: Progress | None = None) -> Part:
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.ray_ladder import measure_times, times_key
     from gelslim_cad.sensor import spec_hash
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     spec = read_spec(path).spec
     now = measure_times(derive(spec), progress)

@@ -40,7 +40,7 @@ def build(
     written and the exit status is 1.
     """
     from gelslim_cad.build import BuildRefusedError, build_variant
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     started = time.monotonic()
     folder = out or Path("out") / read_spec(spec).spec.name

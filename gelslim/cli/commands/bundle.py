@@ -55,7 +55,7 @@ def bundle(
     chooses the operator that the force pipeline starts with.
     """
     from gelslim.design import derive, make_bundle
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
     from ifem_export.bundle.files import write_bundle
 
     budget = budget_of(error, within)

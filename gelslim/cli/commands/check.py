@@ -37,7 +37,7 @@ def check(
     from gelslim_cad.checks import check as apply_rules
     from gelslim_cad.checks.binding import binding_sentences
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     loaded = read_spec(spec)
     dimensions = derive(loaded.spec)

@@ -32,7 +32,7 @@ def derive(spec: SpecFile, as_json: AsJson = False) -> int:
     `gelslim explain` shows where one of them comes from.
     """
     from gelslim_cad.dimensions import derive as derive_dimensions
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     loaded = read_spec(spec)
     dimensions = derive_dimensions(loaded.spec)

@@ -44,7 +44,7 @@ def diff(
     """
     from gelslim_cad.compare import compare
     from gelslim_cad.explore.price import measured, prices
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     one, two = read_spec(first), read_spec(second)
     found = compare(one.spec, two.spec)

@@ -36,7 +36,7 @@ def explain(
     from gelslim_cad.checks.explain import UnknownNameError
     from gelslim_cad.checks.explain import explain as trace
     from gelslim_cad.dimensions import derive
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     loaded = read_spec(spec)
     try:

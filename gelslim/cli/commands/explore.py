@@ -69,7 +69,7 @@ def explore(
     from gelslim_cad.explore.space import ExploreError, Space, parse_axis
     from gelslim_cad.explore.study import Request
     from gelslim_cad.explore.study import explore as run
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
     from gelslim_core.jobs import Engine, processors
 
     started = time.monotonic()

@@ -46,7 +46,7 @@ def family(
     and family.csv with their sizes. The exit status is 1 if a finger breaks a design rule; the
     others are still built and drawn.
     """
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
     from gelslim_core.optional_library import require
 
     started = time.monotonic()

@@ -70,7 +70,7 @@ def light(
     """
     from gelslim_cad.dimensions import derive
     from gelslim_cad.light.study import RAYS, study_light, study_record
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     started = time.monotonic()
     loaded = read_spec(spec)

@@ -24,7 +24,7 @@ def markers(
     from gelslim_cad.markers.process import MARKING_PROCESSES
     from gelslim_cad.markers.write import FIRST_FILE, render_marker_files, write_marker_files
     from gelslim_cad.sensor import marker_grid, marker_print
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     loaded = read_spec(spec)
     d = derive(loaded.spec)

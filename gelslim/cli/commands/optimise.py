@@ -68,8 +68,8 @@ def optimise(
     from gelslim_cad.dimensions import derive
     from gelslim_cad.explore.price import measured, prices
     from gelslim_cad.explore.space import changed
-    from gelslim_cad.spec.reader import read_spec
     from gelslim_cad.spec.starter import spec_text
+    from gelslim_cad.tolerance.asked import read_spec
 
     if save is not None:
         require_own_file(save, b"gelslim-spec/", "spec")

@@ -39,7 +39,7 @@ def thinner(
     """
     from gelslim_cad.explore.space import ExploreError
     from gelslim_cad.explore.thinner import thinner as run
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
 
     loaded = read_spec(spec)
     try:

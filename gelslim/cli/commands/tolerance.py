@@ -47,8 +47,8 @@ def tolerance(
     changes of the spec that give the yield of --least-yield with what they cost in thickness.
     With --save it writes the changed spec.
     """
-    from gelslim_cad.spec.reader import read_spec
     from gelslim_cad.spec.starter import spec_text
+    from gelslim_cad.tolerance.asked import read_spec
     from gelslim_cad.tolerance.study import LEAST_YIELD, study_record, tolerance_study
     from gelslim_cad.tolerance.yields import ALL
 

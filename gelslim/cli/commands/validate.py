@@ -42,7 +42,7 @@ def validate(
     from gelslim.cli.validate_report import print_validation
     from gelslim.contacts import validate as validated
     from gelslim.scene_sensor import spec_bundle
-    from gelslim_cad.spec.reader import read_spec
+    from gelslim_cad.tolerance.asked import read_spec
     from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.outputs.packed_frame import plain
     from gelslim_twin.simulation.sensor import TwinSensor
