@@ -44,7 +44,7 @@ def camera(d: Dimensions) -> Part:
         material=d["camera.name"] + (", mono" if d["camera.picture"] == "mono" else ""),
         process="buy",
         colour=CAMERA,
-        explode_mm=(-14, 0, -12),
+        explode_mm=(0, 0, -26),
         note=f"unscrew the lens by {d['view.lens_travel_mm']:.2f} mm from infinity focus",
     )
 
@@ -99,6 +99,6 @@ def camera_clamp(d: Dimensions) -> Part:
         material=PRINTED[d["manufacturing.print_process"]],
         process="print",
         colour=CLAMP,
-        explode_mm=(-14, 0, -22),
+        explode_mm=(0, 0, -40),
         note="drop the camera in from the gel side; align it by its picture, then glue it",
     )

@@ -42,7 +42,7 @@ def cover(d: Dimensions) -> Part:
         material=PRINTED[d["manufacturing.print_process"]],
         process="print",
         colour=COVER,
-        explode_mm=(0, 0, -34),
+        explode_mm=(0, 0, -56),
         note="black, as the body",
     )
 

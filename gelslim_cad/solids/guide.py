@@ -124,7 +124,7 @@ def led_boards(d: Dimensions) -> tuple[Part, Part]:
             f"{d['design.leds.board_thickness_mm']:g} mm board",
             process="pcb",
             colour=colours.get(name, PLAIN_BOARD),
-            explode_mm=(0, side * 16, -6),
+            explode_mm=(0, side * 4, -46),
             note=f"{count} LEDs at {d['led.pitch_mm']:.2f} mm pitch",
         )
         for name, side in ((left, -1), (right, 1))

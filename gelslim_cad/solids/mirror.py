@@ -33,7 +33,7 @@ def mirror(d: Dimensions) -> Part:
         material=f"front-surface mirror, {d['design.mirror.thickness_mm']:g} mm glass",
         process="buy",
         colour=MIRROR,
-        explode_mm=(0, 0, -12),
+        explode_mm=(0, 0, -26),
         note="front-surface: a back-surface mirror ghosts; cut to size, edges masked",
     )
 
@@ -87,6 +87,6 @@ def mirror_seat(d: Dimensions) -> Part:
         material=PRINTED[d["manufacturing.print_process"]],
         process="print",
         colour=SEAT,
-        explode_mm=(0, 0, -22),
+        explode_mm=(0, 0, -40),
         note="glue the mirror against the stop; reprint to trim the angle",
     )

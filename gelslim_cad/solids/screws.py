@@ -109,7 +109,7 @@ def _instances(kind: str, material: str, places: list[tuple[cq.Solid, float, int
                 process="buy",
                 colour=STEEL,
                 quantity=lengths.count(length) if first else 0,
-                explode_mm=(0, 0, 48 * side),
+                explode_mm=(0, 0, 48 if side > 0 else -70),
                 tags=frozenset({"fastener"} if first else {"fastener", "instance"}),
             )
         )
