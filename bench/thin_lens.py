@@ -104,12 +104,21 @@ class ThinLens:
         met = start + ray * away[:, None]
         return met, ray - 2 * np.outer(ray @ self.mirror_normal, self.mirror_normal)
 
-    def picture(self, dots_mm: ArrayLike, diameter_mm: ArrayLike, samples: int = 32) -> Array:
+    def picture(
+        self,
+        dots_mm: ArrayLike,
+        diameter_mm: ArrayLike,
+        samples: int = 32,
+        moved_mm: ArrayLike | None = None,
+    ) -> Array:
         """Picture (h, w) from 0 to 1 of dark dots (k, 2), diameters (k,), on a bright gel.
 
-        Of each pixel an even number of `samples` is traced.
+        Of each pixel an even number of `samples` is traced. Dots that have moved (k, 2) stay
+        nearer to their own place than to the next one's.
         """
-        dots = _Dots(np.asarray(dots_mm, float), np.asarray(diameter_mm, float))
+        at = np.asarray(dots_mm, float)
+        moved = np.zeros_like(at) if moved_mm is None else np.asarray(moved_mm, float)
+        dots = _Dots(at, np.asarray(diameter_mm, float), moved)
         width, height = self.size_px
         u, v = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
         pixels = np.column_stack([u.ravel(), v.ravel()])
@@ -135,15 +144,17 @@ def _refracted(ray: Array, ratio: float) -> Array:
 class _Dots:
     """Dots on a regular lattice, some of its sites empty."""
 
-    def __init__(self, dots_mm: Array, diameter_mm: Array) -> None:
+    def __init__(self, dots_mm: Array, diameter_mm: Array, moved_mm: Array) -> None:
         self.first = dots_mm.min(axis=0)
         self.pitch = np.diff(np.unique(np.round(dots_mm[:, 0], 6))).min()
         sites = np.round((dots_mm - self.first) / self.pitch).astype(int) + 1
         self.radius = np.full(sites.max(axis=0) + 2, -1.0)
         self.radius[sites[:, 0], sites[:, 1]] = diameter_mm / 2
+        self.moved = np.zeros((*self.radius.shape, 2))
+        self.moved[sites[:, 0], sites[:, 1]] = moved_mm
 
     def covers(self, points: Array) -> NDArray[np.bool_]:
         site = np.round((points - self.first) / self.pitch)
-        off = points - self.first - site * self.pitch
         x, y = np.clip(site.astype(int) + 1, 0, np.array(self.radius.shape) - 1).T
+        off = points - self.first - site * self.pitch - self.moved[x, y]
         return np.asarray(np.hypot(*off.T) <= self.radius[x, y])

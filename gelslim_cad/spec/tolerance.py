@@ -11,11 +11,7 @@ from gelslim_core.yaml.base import Block
 
 
 class Tolerance(Block):
-    """Errors of making a finger, for `gelslim tolerance`; 0 switches a cause off.
-
-    Further causes have their fields elsewhere: `design.housing.camera_play_mm`,
-    `design.leds.placement_tolerance_mm`, `manufacturing` and `material.gel`.
-    """
+    """Errors of making a finger, besides those of design, manufacturing and material; 0 = none."""
 
     print_flatness_mm: float | None = Field(
         default=None,

@@ -89,7 +89,7 @@ def test_optimise_saves_a_spec_that_checks(
     assert main([*command, "--rounds", "1", "--save", str(best)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "design.gel.length_mm: 16" in shown
-    assert "17.88 mm" in shown
+    assert "17.64 mm" in shown
     assert "400 mm² 320 mm² -20.0 % worse" in shown
     assert main(["check", str(best)]) == 0
     capsys.readouterr()

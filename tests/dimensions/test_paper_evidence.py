@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fold_samples import shipped
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import derive
@@ -77,7 +78,7 @@ def test_the_field_shows_an_error_that_the_resultant_hides(
 
 def test_errors_of_the_projection_formulas() -> None:
     """The table's figures, for a press of 0.5 mm anywhere on the gel of gelslim2."""
-    camera = virtual_camera(derive(read_spec(ROOT / "designs" / "gelslim2.yaml").spec))
+    camera = virtual_camera(derive(shipped("gelslim2")))
     height, foot = -camera.position_mm[2], camera.position_mm[0]
     seen = error_map(camera, np.linspace(-14, 14, 57), np.linspace(-14, 14, 57), -0.5)
 

@@ -16,7 +16,7 @@ from gelslim_cad.spec.reader import read_spec
 
 def finger(name: str, changes: dict[str, Any]) -> Dimensions:
     data = read_spec(f"designs/{name}.yaml").spec.model_dump()
-    for path, value in changes.items():
+    for path, value in {"design.optics.image_margin": 0.015, **changes}.items():
         *blocks, field = path.split(".")
         block = data
         for key in blocks:

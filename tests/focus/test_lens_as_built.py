@@ -17,6 +17,7 @@ from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.design import bundle_grid
 from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.settings import PipelineSettings
 from ifem_export.bundle.bundle import Bundle
 
 DESIGNS = Path(__file__).parents[2] / "designs"
@@ -128,6 +129,42 @@ def test_a_picture_of_a_finger_built_to_the_letter_calibrates() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_design_built_to_the_letter_calibrates(name: str) -> None:
     seen_by_calibration(bundle_of(name), ThinLens.as_built(design(name)), samples=64)
+
+
+def picture(bundle: Bundle, lens: ThinLens, moved_mm: NDArray, samples: int) -> NDArray:
+    """The markers where the gel has carried them, seen through the lens."""
+    grid = bundle_grid(bundle)
+    bright = lens.picture(grid.positions_mm[:, :2], grid.diameter_mm, samples, moved_mm)
+    return np.round(60 + 150 * bright).astype(np.uint8)
+
+
+def motion_is_measured(name: str, samples: int) -> None:
+    """A bump of shear, drawn by the lens, comes out of the pipeline within a fiftieth of it."""
+    bundle, lens = bundle_of(name), ThinLens.as_built(design(name))
+    at = bundle_grid(bundle).positions_mm[:, :2]
+    half = np.abs(at).max(axis=0)
+    bump = np.prod(np.cos(np.pi / 2 * np.clip(at / half, -1, 1)) ** 2, axis=1)
+    true_mm = bump[:, None] * [0.16, -0.12]
+    still = picture(bundle, lens, 0 * true_mm, samples)
+    sensor = gelslim.open_sensor(bundle, reference=still, settings=PipelineSettings(rung="fft"))
+    sensor.process(still)
+    result = sensor.process(picture(bundle, lens, true_mm, samples))
+    assert result.tracks is not None
+    assert result.marker_displacement_mm is not None
+    assert result.tracks.tracked.all()
+    off_mm = result.marker_displacement_mm[:, :2] - true_mm
+    assert np.sqrt(np.mean(np.sum(off_mm**2, axis=1))) < 0.02 * 0.2
+    assert np.abs(off_mm).max() < 0.05 * 0.2
+
+
+def test_a_finger_built_to_the_letter_measures() -> None:
+    motion_is_measured("mini20", samples=24)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_every_design_built_to_the_letter_measures(name: str) -> None:
+    motion_is_measured(name, samples=64)
 
 
 def test_a_lens_left_at_infinity_is_refused() -> None:

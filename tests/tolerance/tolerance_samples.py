@@ -35,10 +35,20 @@ NONE: dict[str, Any] = {
 """Every cause switched off."""
 
 
+UNPREPARED = {
+    "tolerance.adjusted": False,
+    "tolerance.acrylic": "as_bought",
+    "design.optics.image_margin": 0.015,
+    "design.mirror.border_mm": 0.8,
+    "design.mirror.thickness_mm": 1.0,
+}
+"""The shipped designs before they were made to have their yield."""
+
+
 def spec(name: str, **values: Any) -> Spec:
-    """A design with other values; `__` stands for the dots of a path."""
+    """A design made without a thought of its yield, with other values; `__` stands for a dot."""
     changed = {path.replace("__", "."): value for path, value in values.items()}
-    return with_values(read_spec(DESIGNS / f"{name}.yaml").spec, changed)
+    return with_values(read_spec(DESIGNS / f"{name}.yaml").spec, {**UNPREPARED, **changed})
 
 
 def exact(name: str, **values: Any) -> Spec:
