@@ -86,8 +86,8 @@ def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
         raise ValueError(f"camera deviation of shape {v.shape}: must be ({len(PARAMETERS)},)")
     turned = Rotation.from_rotvec(np.radians(v[:3])).apply(design.axes)
     lens = design.lens or LensDistortion()
-    distorted = LensDistortion(
-        k1=lens.k1 + v[7], k2=lens.k2 + v[8], p1=lens.p1 + v[9], p2=lens.p2 + v[10], k3=lens.k3
+    distorted = dataclasses.replace(
+        lens, k1=lens.k1 + v[7], k2=lens.k2 + v[8], p1=lens.p1 + v[9], p2=lens.p2 + v[10]
     )
     x, y = design.principal_offset_px
     return dataclasses.replace(
@@ -98,5 +98,5 @@ def deviated_camera(design: VirtualCamera, values: ArrayLike) -> VirtualCamera:
         down=turned[1],
         forward=turned[2],
         focal_px=design.focal_px * (1 + v[6] / 100),
-        lens=distorted if any(dataclasses.astuple(distorted)) else None,
+        lens=distorted if distorted.distorts else None,
     )

@@ -1,13 +1,16 @@
-"""Brown-Conrady lens distortion, with the domain on which it can be inverted."""
+"""Lens distortion by Brown-Conrady or Kannala-Brandt, with its domain and its inverse."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from gelslim_optics.camera.radial_scale import radial_scale
 
 Array = NDArray[np.float64]
 
@@ -18,6 +21,10 @@ SMALL_RESIDUAL = 4e-16
 # Below this number compiled code does not pay; BLOCK points fit into the processor's cache.
 COMPILED_FROM = 64
 BLOCK = 4096
+BROWN, KANNALA_BRANDT = "brown", "kannala_brandt"
+COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4")
+SCANNED, ZOOMS = 4001, 5
+"""Angles among which the rim of a wide lens's domain is looked for, each time nearer to it."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +36,20 @@ class LensDistortion:
 
         x' = x f + 2 p1 x y + p2 (ρ² + 2 x²),  y' = y f + p1 (ρ² + 2 y²) + 2 p2 x y.
 
+    A wide lens has f = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) / ρ with ρ = tan θ instead (Kannala
+    and Brandt 2006). A focal length is here the image distance, as in a calibration.
+
     Attributes:
-        k1: Radial coefficient of ρ².
-        k2: Radial coefficient of ρ⁴.
+        k1: Radial coefficient of ρ², or θ².
+        k2: Radial coefficient of ρ⁴, or θ⁴.
         p1: First tangential coefficient.
         p2: Second tangential coefficient.
-        k3: Radial coefficient of ρ⁶.
+        k3: Radial coefficient of ρ⁶, or θ⁶.
+        k4: Radial coefficient of θ⁸.
+        model: `brown` or `kannala_brandt`.
 
     Raises:
-        ValueError: A coefficient is not finite.
+        ValueError: A coefficient is not finite, or the model does not have it.
     """
 
     k1: float = 0.0
@@ -45,12 +57,32 @@ class LensDistortion:
     p1: float = 0.0
     p2: float = 0.0
     k3: float = 0.0
+    k4: float = 0.0
+    model: Literal["brown", "kannala_brandt"] = "brown"
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for name in COEFFICIENTS:
+            value = getattr(self, name)
             if not np.isfinite(value):
-                raise ValueError(f"distortion coefficient {field.name} = {value} is not finite")
+                raise ValueError(f"lens distortion coefficient {name} = {value} is not finite")
+        if self.model not in (BROWN, KANNALA_BRANDT):
+            raise ValueError(
+                f"lens distortion model {self.model!r}: give {BROWN} or {KANNALA_BRANDT}"
+            )
+        if self.k4 and not self.fisheye:
+            raise ValueError(
+                f"k4 = {self.k4} of the lens distortion belongs to the model {KANNALA_BRANDT}"
+            )
+
+    @property
+    def fisheye(self) -> bool:
+        """Whether the model is that of Kannala and Brandt."""
+        return self.model == KANNALA_BRANDT
+
+    @property
+    def distorts(self) -> bool:
+        """Whether any point is moved."""
+        return self.fisheye or any(getattr(self, name) for name in COEFFICIENTS)
 
     @cached_property
     def monotone_radius(self) -> float:
@@ -63,6 +95,8 @@ class LensDistortion:
         does.
         """
         slope = -6 * float(np.hypot(self.p1, self.p2))
+        if self.fisheye:
+            return self._scanned_radius(slope)
         if not (self.k1 or self.k2 or self.k3 or slope):
             return float(np.inf)
         outward = [7 * self.k3, 0.0, 5 * self.k2, 0.0, 3 * self.k1, slope, 1.0]
@@ -71,6 +105,26 @@ class LensDistortion:
         # The eigenvalue solver returns a double root as a pair that is nearly real.
         real = roots[np.abs(roots.imag) <= 1e-7 * np.abs(roots)].real
         return float(min(real[real > 0], default=np.inf))
+
+    def _scanned_radius(self, slope: float) -> float:
+        """The first ρ at which min(f, (ρ f)') + `slope` ρ is zero, looked for in equal angles."""
+
+        def room(angle: ArrayLike) -> Array:
+            rho = np.tan(angle)
+            f, change = self._radial(rho * rho)
+            # Over 1/cos² of the angle, which has no limit.
+            return np.asarray(
+                (np.minimum(f, f + 2 * rho * rho * change) + slope * rho) * np.cos(angle) ** 2
+            )
+
+        low, high = 0.0, np.pi / 2
+        for _ in range(ZOOMS):
+            angles = np.linspace(low, high, SCANNED)
+            lost = room(angles[:-1]) <= 0
+            if not lost.any():
+                return float(np.inf) if high == np.pi / 2 else float(np.tan(high))
+            low, high = angles[np.argmax(lost) - 1], angles[np.argmax(lost)]
+        return float(np.tan(low))
 
     def distort(self, undistorted: ArrayLike) -> Array:
         """Distorted coordinates (n, 2) of undistorted ones (n, 2); NaN stays NaN.
@@ -119,9 +173,9 @@ class LensDistortion:
         from gelslim_optics.camera.undistort_kernel import undistort
 
         converged = np.zeros(len(target), dtype=bool)
-        coefficients = np.array([self.k1, self.k2, self.k3, self.p1, self.p2])
+        coefficients = np.array([self.k1, self.k2, self.k3, self.k4, self.p1, self.p2])
         points = np.ascontiguousarray(target)
-        undistort(points, coefficients, self.monotone_radius, xy, converged)
+        undistort(points, coefficients, self.fisheye, self.monotone_radius, xy, converged)
         return xy, np.flatnonzero(~converged)
 
     def jacobian(self, undistorted: ArrayLike) -> Array:
@@ -133,16 +187,19 @@ class LensDistortion:
         """The elements xx, xy = yx and yy of the Jacobian."""
         x, y = xy[..., 0], xy[..., 1]
         s = x * x + y * y
-        f = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
-        g = 2 * (self.k1 + s * (2 * self.k2 + s * 3 * self.k3))
+        f, change = self._radial(s)
+        g = 2 * change
         cross = g * x * y + 2 * self.p1 * x + 2 * self.p2 * y
         xx = f + g * x * x + 2 * self.p1 * y + 6 * self.p2 * x
         yy = f + g * y * y + 6 * self.p1 * y + 2 * self.p2 * x
         return xx, cross, yy
 
-    def to_record(self) -> dict[str, float]:
-        """The coefficients by name."""
-        return asdict(self)
+    def to_record(self) -> dict[str, float | str]:
+        """The coefficients by name, and the model where it is not Brown's."""
+        record = asdict(self)
+        if not self.fisheye:
+            del record["k4"], record["model"]
+        return record
 
     @classmethod
     def from_record(cls, record: Mapping[str, object]) -> LensDistortion:
@@ -150,21 +207,35 @@ class LensDistortion:
 
         Raises ValueError for an unknown name or a value that is not a number.
         """
-        names = [f.name for f in fields(cls)]
-        values: dict[str, float] = {}
+        values: dict[str, Any] = {}
         for name, value in record.items():
-            if name not in names or isinstance(value, bool) or not isinstance(value, int | float):
+            if name == "model":
+                values[name] = value
+                continue
+            if (
+                name not in COEFFICIENTS
+                or isinstance(value, bool)
+                or not isinstance(value, int | float)
+            ):
                 raise ValueError(
-                    f"{name} = {value!r} of the lens distortion: give numbers for "
-                    f"{', '.join(names)}"
+                    f"{name} = {value!r} of the lens distortion: give a model, and numbers for "
+                    f"{', '.join(COEFFICIENTS)}"
                 )
             values[name] = float(value)
         return cls(**values)
 
+    def scale(self, radius: float) -> float:
+        """The radial scale f at a distance ρ from the axis, in focal lengths."""
+        return float(self._radial(np.asarray(radius**2))[0])
+
+    def _radial(self, squared: Array) -> tuple[Array, Array]:
+        """The scale f at ρ² and its derivative by ρ²."""
+        return radial_scale(squared, self.fisheye, self.k1, self.k2, self.k3, self.k4)
+
     def _map(self, xy: Array) -> Array:
         x, y = xy[..., 0], xy[..., 1]
         s = x * x + y * y
-        f = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
+        f, _ = self._radial(s)
         return np.stack(
             [
                 x * f + 2 * self.p1 * x * y + self.p2 * (s + 2 * x * x),

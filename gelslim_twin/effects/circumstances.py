@@ -59,6 +59,7 @@ class SensorFigures:
         aperture_mm: Diameter of the entrance pupil, 0 for a pinhole.
         focus_mm: Distance of best focus, 0 for a pinhole.
         lens_distortion: Names and values of the distortion coefficients.
+        wide_lens: Whether they are of Kannala and Brandt's model.
     """
 
     length_mm: float
@@ -83,6 +84,7 @@ class SensorFigures:
     aperture_mm: float = 0.0
     focus_mm: float = 0.0
     lens_distortion: tuple[tuple[str, float], ...] = ()
+    wide_lens: bool = False
 
     @property
     def px_per_mm(self) -> float:

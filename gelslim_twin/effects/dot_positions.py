@@ -69,22 +69,22 @@ REFRACTION = Effect(
 
 
 def lens_distortion_bound(c: Circumstances) -> Bound:
-    """Radial and tangential shift at the farthest point of the gel's image."""
+    """Radial and tangential shift at the farthest point of the gel's image, exactly refracted."""
     k = dict(c.sensor.lens_distortion)
-    rho = c.sensor.half_view_px / c.sensor.focal_px
-    radial = sum(
-        abs(k.get(name, 0.0)) * rho**power for name, power in (("k1", 3), ("k2", 5), ("k3", 7))
-    )
+    rho = (c.sensor.half_view_px + paraxial_px(c)) / c.sensor.focal_px
+    angle = math.atan(rho) if c.sensor.wide_lens else rho
+    radial = rho - angle + sum(abs(k.get(f"k{i}", 0.0)) * angle ** (2 * i + 1) for i in range(1, 5))
     tangential = 3 * math.hypot(k.get("p1", 0.0), k.get("p2", 0.0)) * rho**2
     return optics(c.sensor.focal_px * (radial + tangential))
 
 
 LENS_DISTORTION = Effect(
     name="lens_distortion",
-    description="Brown-Conrady distortion with the coefficients of the sensor's lens",
+    description="Distortion with the model and the coefficients of the sensor's lens",
     parameters=EffectParameters,
     bound=lens_distortion_bound,
-    formula="f (|k1| rho³ + |k2| rho⁵ + |k3| rho⁷ + 3 |p| rho²) at the farthest point of the gel",
+    formula="f (|k1| rho³ + |k2| rho⁵ + |k3| rho⁷ + 3 |p| rho²) at the farthest point of the gel; "
+    "for a wide lens with angles for rho, and rho less its angle",
     ladder=lambda c: (Rung("exact", Bound(), 0.02 * c.sensor.markers / 575),),
     implementation="gelslim_twin.render.look",
     refines=("markers",),

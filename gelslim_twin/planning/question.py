@@ -185,6 +185,7 @@ def figures(
     Raises:
         KeyError: the record lacks a value.
     """
+    lens = camera.get("lens_distortion") or {}
     stack = tuple((float(v["thickness_mm"]), float(v["index"])) for v in camera["layers"])
     lift = sum(h * (1 - 1 / n) for h, n in stack)
     corners = list(product(*((-side / 2, side / 2) for side in size_mm[:2])))
@@ -212,7 +213,8 @@ def figures(
         layers_mm=stack,
         aperture_mm=float(camera.get("aperture_mm") or 0.0),
         focus_mm=float(camera.get("focus_mm") or 0.0),
-        lens_distortion=tuple(sorted((camera.get("lens_distortion") or {}).items())),
+        lens_distortion=tuple(sorted((k, v) for k, v in lens.items() if k != "model")),
+        wide_lens=lens.get("model") == "kannala_brandt",
     )
 
 

@@ -15,7 +15,7 @@ from gelslim_optics.camera.virtual_camera import VirtualCamera
 LENS = LensDistortion(k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4, k3=0.001)
 
 
-@pytest.mark.parametrize("lens", [None, LENS])
+@pytest.mark.parametrize("lens", [None, LENS, replace(LENS, model="kannala_brandt", k4=0.01)])
 def test_round_trip_through_json_is_the_same_camera(lens: LensDistortion | None) -> None:
     camera = finger_camera(lens=lens)
     back = VirtualCamera.from_record(json.loads(json.dumps(camera.to_record())))

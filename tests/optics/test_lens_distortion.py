@@ -1,6 +1,9 @@
-"""Brown–Conrady distortion: against its definition, its inverse and the edge of its domain."""
+"""Distortion by both models: against its definition, its inverse and the edge of its domain."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -17,6 +20,9 @@ LENSES = [
     # Newton's full steps leave the disc near its rim: they must be halved up to four times.
     LensDistortion(k1=0.72, k2=0.17, p1=0.0315, p2=-0.0087, k3=-0.196),
     LensDistortion(k1=0.7, k2=-0.25, p1=0.012, p2=-0.019, k3=-0.05),
+    LensDistortion(model="kannala_brandt"),
+    LensDistortion(k1=-0.04, k2=0.02, k3=-0.012, k4=0.003, model="kannala_brandt"),
+    LensDistortion(k1=0.1, k2=-0.2, p1=8e-4, p2=-5e-4, model="kannala_brandt"),
 ]
 
 
@@ -39,10 +45,17 @@ def test_agrees_with_opencv() -> None:
     cv2 = pytest.importorskip("cv2")
     points = disc(0.6, 50)
     for lens in LENSES:
-        coefficients = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
         objects = np.column_stack([points, np.ones(50)])
-        theirs, _ = cv2.projectPoints(objects, np.zeros(3), np.zeros(3), np.eye(3), coefficients)
-        np.testing.assert_allclose(lens.distort(points), theirs[:, 0], atol=1e-14)
+        none = np.zeros(3)
+        if lens.fisheye:
+            radial = np.array([lens.k1, lens.k2, lens.k3, lens.k4])
+            theirs, _ = cv2.fisheye.projectPoints(objects[:, None], none, none, np.eye(3), radial)
+            ours = replace(lens, p1=0.0, p2=0.0).distort(points)
+        else:
+            coefficients = np.array([lens.k1, lens.k2, lens.p1, lens.p2, lens.k3])
+            theirs, _ = cv2.projectPoints(objects, none, none, np.eye(3), coefficients)
+            ours = lens.distort(points)
+        np.testing.assert_allclose(ours, theirs.reshape(-1, 2), atol=1e-14)
 
 
 @pytest.mark.parametrize("lens", LENSES)
@@ -72,6 +85,10 @@ def test_monotone_radius_of_one_coefficient_is_the_closed_form() -> None:
     assert LensDistortion(k1=-0.2).monotone_radius == pytest.approx(1 / np.sqrt(0.6), rel=1e-12)
     assert LensDistortion(k1=0.2).monotone_radius == np.inf
     assert LensDistortion().monotone_radius == np.inf
+    # (θ + k1 θ³)' = 0 at θ = 1/sqrt(-3 k1); an ideal f-theta lens never folds
+    wide = LensDistortion(k1=-0.2, model="kannala_brandt")
+    assert wide.monotone_radius == pytest.approx(np.tan(1 / np.sqrt(0.6)), rel=1e-12)
+    assert LensDistortion(model="kannala_brandt").monotone_radius == np.inf
     # Decentring alone: 6 |p| ρ = 1
     assert LensDistortion(p1=0.03, p2=0.04).monotone_radius == pytest.approx(1 / 0.3, rel=1e-12)
 
@@ -79,16 +96,17 @@ def test_monotone_radius_of_one_coefficient_is_the_closed_form() -> None:
 def test_the_jacobian_keeps_its_sign_in_the_disc_and_loses_it_just_beyond() -> None:
     rng = np.random.default_rng(2)
     lost = 0
-    for _ in range(40):
+    for trial in range(40):
         k1, k2, k3 = rng.normal(0, 0.3, 3)
         p1, p2 = rng.normal(0, 0.02, 2)
-        lens = LensDistortion(k1, k2, p1, p2, k3)
+        model: Literal["brown", "kannala_brandt"] = "kannala_brandt" if trial % 3 == 0 else "brown"
+        lens = LensDistortion(k1, k2, p1, p2, k3, model=model)
         radius = lens.monotone_radius
         if not np.isfinite(radius):
             continue
         inside = np.vstack([disc(0.999999 * radius, 2000), radius * 0.999999 * _circle(720)])
         assert np.linalg.eigvalsh(lens.jacobian(inside)).min() > 0
-        radial = LensDistortion(k1, k2, k3=k3)
+        radial = replace(lens, p1=0.0, p2=0.0)
         if np.isfinite(radial.monotone_radius):
             ring = 1.0001 * radial.monotone_radius * _circle(8)
             lost += np.linalg.det(radial.jacobian(ring)).max() < 0
@@ -124,7 +142,8 @@ def test_record_round_trip_and_refusals() -> None:
     for lens in LENSES:
         assert LensDistortion.from_record(lens.to_record()) == lens
     assert LensDistortion.from_record({"k1": -1}) == LensDistortion(k1=-1.0)
-    for record in ({"k4": 0.1}, {"k1": "0.1"}, {"p1": None}, {"k1": True}):
+    refused = ({"k4": 0.1}, {"k9": 0.1}, {"k1": "0.1"}, {"p1": None}, {"k1": True}, {"model": "f"})
+    for record in refused:
         with pytest.raises(ValueError, match="lens distortion"):
             LensDistortion.from_record(record)
     with pytest.raises(ValueError, match="finite"):
@@ -149,9 +168,10 @@ def test_the_compiled_steps_find_what_the_careful_ones_do() -> None:
 
 
 def compiled(lens: LensDistortion, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    coefficients = np.array([lens.k1, lens.k2, lens.k3, lens.p1, lens.p2])
+    coefficients = np.array([lens.k1, lens.k2, lens.k3, lens.k4, lens.p1, lens.p2])
     out, converged = np.full_like(seen, 7.0), np.zeros(len(seen), dtype=bool)
-    undistort_kernel.undistort(seen, coefficients, lens.monotone_radius, out, converged)
+    radius = lens.monotone_radius
+    undistort_kernel.undistort(seen, coefficients, lens.fisheye, radius, out, converged)
     return out, converged
 
 

@@ -167,6 +167,7 @@ def test_blur_vanishes_at_the_focus_and_grows_to_both_sides() -> None:
 
 
 LENS = LensDistortion(k1=-0.12, k2=0.03, p1=4e-4, p2=-3e-4)
+WIDE = LensDistortion(k1=-0.04, k2=0.02, k3=0.01, k4=-0.003, model="kannala_brandt")
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -183,7 +184,7 @@ def test_a_distorted_lens_moves_the_traced_pixels_by_its_polynomial(seed: int) -
     assert np.abs(expected - ideal).max() > 1
 
 
-@pytest.mark.parametrize("lens", [None, LENS])
+@pytest.mark.parametrize("lens", [None, LENS, WIDE])
 def test_jacobian_is_the_derivative_in_all_three_directions(lens: LensDistortion | None) -> None:
     for seed in range(4):
         rng = np.random.default_rng(30 + seed)

@@ -114,9 +114,17 @@ def test_a_picture_of_little_names_what_it_cannot_tell():
     assert "principal_y_px" in strongest
 
 
-def test_lens_of_the_design_is_kept_and_changed():
+@pytest.mark.parametrize("model", ["brown", "kannala_brandt"])
+def test_lens_of_the_design_is_kept_and_changed(model):
     lens = DESIGN.to_record() | {
-        "lens_distortion": {"k1": -0.1, "k2": 0.02, "p1": 0.0, "p2": 0.0, "k3": 0.001}
+        "lens_distortion": {
+            "k1": -0.1,
+            "k2": 0.02,
+            "p1": 0.0,
+            "p2": 0.0,
+            "k3": 0.001,
+            "model": model,
+        }
     }
     design = type(DESIGN).from_record(lens)
     change = np.zeros(len(PARAMETERS))
@@ -125,6 +133,7 @@ def test_lens_of_the_design_is_kept_and_changed():
     fit = _fit(_seen(deviated_camera(design, change)), design)
     assert fit.camera.lens.k1 == pytest.approx(-0.07, abs=0.003)
     assert fit.camera.lens.k3 == 0.001
+    assert fit.camera.lens.model == model
 
 
 def test_impossible_input_is_refused():

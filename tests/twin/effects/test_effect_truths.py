@@ -31,7 +31,7 @@ from gelslim_twin.effects.dot_contrast import (
     DrawingParameters,
     ExposureParameters,
 )
-from gelslim_twin.effects.dot_positions import MarkerPrintParameters
+from gelslim_twin.effects.dot_positions import MarkerPrintParameters, paraxial_px
 from gelslim_twin.effects.effect import Bound, optics, picture
 from gelslim_twin.effects.grey_values import (
     CompressionParameters,
@@ -46,7 +46,7 @@ LENS = (("k1", -0.13), ("k2", 0.05), ("p1", 0.004), ("p2", -0.003), ("k3", -0.02
 
 def test_distortion_is_that_of_the_farthest_point() -> None:
     """Radial parts without their signs; the tangential part where it points outwards."""
-    rho, given = 364.0 / 634.9, dict(LENS)
+    rho, given = (364.0 + paraxial_px(circumstances())) / 634.9, dict(LENS)
     radial = sum(abs(given[f"k{i}"]) * rho ** (2 * i + 1) for i in (1, 2, 3))
     angle = np.linspace(0, 2 * np.pi, 100_001)
     x, y, p1, p2 = rho * np.cos(angle), rho * np.sin(angle), given["p1"], given["p2"]
@@ -59,6 +59,10 @@ def test_distortion_is_that_of_the_farthest_point() -> None:
     assert not IS_NULL["lens_distortion"](c)
     plain = replace(FIGURES, lens_distortion=(("k1", 0.1),))
     same(BOUND["lens_distortion"](circumstances(sensor=plain)), optics(63.49 * rho**3))
+    # A wide lens without coefficients draws angles.
+    wide = replace(FIGURES, lens_distortion=(("k1", 0.0),), wide_lens=True)
+    expected = optics(634.9 * (rho - np.arctan(rho)))
+    same(BOUND["lens_distortion"](circumstances(sensor=wide)), expected)
     still = replace(FIGURES, lens_distortion=(("k1", 0.0), ("p2", 0.0)))
     assert IS_NULL["lens_distortion"](circumstances(sensor=still))
     assert BOUND["lens_distortion"](circumstances(sensor=still)) == Bound()

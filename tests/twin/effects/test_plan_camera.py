@@ -17,6 +17,7 @@ from gelslim_twin.planning.question import figures, plan_scene, question
 from gelslim_twin.render.look import plan_camera, plan_look, refracting
 
 LENS = {"k1": -0.12, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.0}
+WIDE = {"model": "kannala_brandt", "k1": -0.04, "k2": 0.02, "k3": 0.01, "k4": -0.003}
 
 
 @cache
@@ -56,8 +57,9 @@ def plan_of(tmp_path, record, **use):
     return plan_scene(load(tmp_path, text), sensor(record))
 
 
-def test_with_everything_kept_the_camera_is_the_bundles(tmp_path, record):
-    record["lens_distortion"] = LENS
+@pytest.mark.parametrize("lens", [LENS, WIDE])
+def test_with_everything_kept_the_camera_is_the_bundles(tmp_path, record, lens):
+    record["lens_distortion"] = lens
     plan = plan_of(tmp_path, record)
     camera = plan_camera(plan, record)
     points = gel_points()
@@ -86,10 +88,11 @@ def test_apparent_depths_err_by_no_more_than_their_rung_says(tmp_path, record):
     assert worst < 0.5 * REFRACTION.bound(c).markers_px
 
 
-def test_leaving_the_lens_out_errs_by_no_more_than_its_bound(tmp_path, record):
+@pytest.mark.parametrize("lens", [LENS, WIDE])
+def test_leaving_the_lens_out_errs_by_no_more_than_its_bound(tmp_path, record, lens):
     points = gel_points()
     ideal = VirtualCamera.from_record(record).project(points)
-    record["lens_distortion"] = LENS
+    record["lens_distortion"] = lens
     bound = LENS_DISTORTION.bound(asked(tmp_path, record)).markers_px
     worst = np.linalg.norm(VirtualCamera.from_record(record).project(points) - ideal, axis=1).max()
     assert 0 < worst <= bound < 4 * worst
