@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from gelslim_cad.dimensions import bend, guide, housing, lens, pad, placement, view  # noqa: F401  (registers)
+from gelslim_cad.dimensions import (  # noqa: F401  (registers)
+    bend,
+    distortion,
+    guide,
+    housing,
+    lens,
+    pad,
+    placement,
+    view,
+)
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension, identifier
 from gelslim_cad.dimensions.solver import threads

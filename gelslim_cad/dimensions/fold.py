@@ -5,9 +5,9 @@ by the air angles of the two marginal rays that end on the gel's edges and by th
 everything else follows in closed form, exact refraction included (docs/physics.md).
 
 Every field is an array; candidates broadcast against designs. The functions of `fold_focus`,
-`fold_sight`, `fold_mirror`, `fold_camera` and `fold_room` are written once for arrays and for
-single numbers: `fold_search` compiles them (each module's `SHARED`) to score one candidate after
-the other.
+`fold_distortion`, `fold_sight`, `fold_mirror`, `fold_camera` and `fold_room` are written once for
+arrays and for single numbers: `fold_search` compiles them (each module's `SHARED`) to score one
+candidate after the other.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from gelslim_cad.dimensions import fold_room as room
 from gelslim_cad.dimensions.fold_camera import Camera, camera, largest, pitch_rad, smallest
-from gelslim_cad.dimensions.fold_focus import Distances, along_scale, distances
+from gelslim_cad.dimensions.fold_focus import Distances, distances
 from gelslim_cad.dimensions.fold_goal import besides_depth, beyond_mm, score, tie_mm
 from gelslim_cad.dimensions.fold_housing import (
     HousingMissed,
@@ -37,6 +37,7 @@ from gelslim_cad.dimensions.fold_mirror import (
 from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
 from gelslim_cad.dimensions.fold_sight import (
     Sight,
+    edge_scales,
     field_missed,
     keystone,
     least_px,
@@ -96,6 +97,7 @@ class Fold:
     near_sagittal_mm: Array
     far_tangential_mm: Array
     far_sagittal_mm: Array
+    across_scale: Array
     along_scale: Array
     focus_mm: Array
     image_distance_mm: Array
@@ -208,6 +210,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
     """Candidates with all that is known of them; see `layout`."""
     at = layout(p, mid_rad, spread, mirror_rad)
     s, d, m, c = at.sight, at.distances, at.mirror, at.camera
+    scales = edge_scales(p, s, d)
     return Fold(
         near_ray_rad=s.near_ray_rad,
         far_ray_rad=s.far_ray_rad,
@@ -235,7 +238,8 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         near_sagittal_mm=d.near_span_mm[1],
         far_tangential_mm=d.far_span_mm[0],
         far_sagittal_mm=d.far_span_mm[1],
-        along_scale=np.minimum(along_scale(d.near, d.image_mm), along_scale(d.far, d.image_mm)),
+        across_scale=np.minimum(scales[0], scales[2]),
+        along_scale=np.minimum(scales[1], scales[3]),
         focus_mm=d.focus_mm,
         image_distance_mm=d.image_mm,
         lens_extension_mm=at.extension_mm,
@@ -246,7 +250,7 @@ def fold(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -> Fo
         depth_mm=at.depth_mm,
         keystone=keystone(d),
         length_mm=length_mm(p, at),
-        least_px=least_px(p, d),
+        least_px=least_px(p, s, d),
         violations=dict(zip(VIEW_LIMITS, view_missed(p, at), strict=True)),
         housing=dict(zip(HOUSING_LIMITS, housing_limits(p, at), strict=True)),
     )
@@ -280,7 +284,7 @@ def measures(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -
         camera_depth_mm(p, low[3]),
         camera_depth_mm(p, low[5]),
     )
-    pixels = marker_sides_px(p, at.distances)
+    pixels = marker_sides_px(p, at.sight, at.distances)
     rest = (housing.mirror_between_baffles, housing.clamp_before_seat, housing.clamp_beside_channel)
     tops = room.camera_parts_below_window(p, at.camera)
     below = (tops[0] / room.SCALE_MM, tops[1] / room.SCALE_MM, tops[2] / room.SCALE_MM)

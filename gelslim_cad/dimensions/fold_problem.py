@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,16 @@ class FoldProblem:
     """Distance on which a lens that cannot be focused is sharp; 0 for one that can."""
     fixed_image_mm: Array
     """Image distance that is the same for every focus; 0 where it follows from the focus."""
+    fisheye: Array
+    """1 where the distortion is Kannala and Brandt's, 0 where it is Brown's."""
+    k1: Array
+    k2: Array
+    k3: Array
+    k4: Array
+    p1: Array
+    p2: Array
+    most_tan: Array
+    """Tangent of the ray to the sensor's corner, beyond which the distortion is not known."""
     moving_lens: Array
     """1 where the whole lens moves to focus, 0 where it stays in its place."""
     entrance_pupil_mm: Array
@@ -90,9 +101,21 @@ class FoldProblem:
         image_mm = np.where(self.fixed_image_mm > 0, self.fixed_image_mm, self.focal_length_mm)
         return np.arctan(self.half_along_mm / image_mm)
 
+    @cached_property
+    def distorted(self) -> Array:
+        """1 where the lens distorts, else 0."""
+        parts = (self.fisheye, self.k1, self.k2, self.k3, self.k4, self.p1, self.p2)
+        return np.any([part != 0 for part in parts], axis=0).astype(float)
+
+    @property
+    def most_tan_squared(self) -> Array:
+        """r² at the sensor's corner."""
+        return self.most_tan**2
+
     def records(self) -> NDArray[np.void]:
         """One record (n,) per design, with the same names: what the compiled search reads."""
-        names = [*(f.name for f in fields(self)), "window_z_mm", "widest_along_rad"]
+        derived = ("window_z_mm", "widest_along_rad", "distorted", "most_tan_squared")
+        names = [*(f.name for f in fields(self)), *derived]
         records = np.empty(len(self), dtype=[(name, float) for name in names])
         for name in names:
             records[name] = np.ravel(getattr(self, name))

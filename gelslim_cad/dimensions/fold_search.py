@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gelslim_cad.dimensions import (
     fold,
     fold_camera,
+    fold_distortion,
     fold_focus,
     fold_goal,
     fold_housing,
@@ -67,11 +68,12 @@ from gelslim_cad.dimensions.fold_sight import (
     picture_missed,
     sight,
 )
-from gelslim_optics.camera import refraction_kernel, refraction_newton
+from gelslim_optics.camera import radial_scale, refraction_kernel, refraction_newton
 from gelslim_optics.camera.refraction_kernel import COMPILED, INLINED, let_compile, source_key
 
 SOURCES = (
-    fold_focus, fold_sight, fold_mirror, fold_camera, fold_room, fold_housing, fold_goal, fold
+    radial_scale, fold_focus, fold_distortion, fold_sight, fold_mirror, fold_camera, fold_room,
+    fold_housing, fold_goal, fold
 )  # fmt: skip
 
 
@@ -177,7 +179,7 @@ def _best_of_grid(p: Any, mids: Any, spreads: Any, turns: Any, known: Any, found
             if _worse(missed, min(known, best)):
                 continue
             use = 1 + larger(field.field_of_view_along, field.field_of_view_across)
-            picture = (missed, least_px(p, d), tie_mm(use, keystone(d)))
+            picture = (missed, least_px(p, s, d), tie_mm(use, keystone(d)))
             for k in range(len(turns)):
                 to_beat = min(known, best)
                 angle = mirror_angle_rad(turns[k], mids[i])

@@ -7,8 +7,12 @@ lens that moves as a whole then stands v - f farther out, with its entrance pupi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from gelslim_cad.dimensions.distortion import RADIAL, image_of, tangent_of
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import Real, dimension
 
@@ -34,42 +38,38 @@ def view_sheet_image_mm(
     return f if at is None else f * at / (at - f)
 
 
+SHEET = (*RADIAL, "view.sheet_image_mm", "camera.focusing")
+
+
 @dimension(
     "view.sensor_across_mm",
-    formula="min(sensor width, 2 v sheet tan(given / 2)); the sensor width for internal focusing",
+    formula="min(sensor width, 2 v sheet r g(r²)), r = tan(given / 2); the sensor width for "
+    "internal focusing",
     source=LENS,
+    inputs=(*SHEET, "camera.sensor_width_mm", "camera.horizontal_fov_deg"),
 )
-def view_sensor_across_mm(
-    camera_sensor_width_mm: Real,
-    camera_horizontal_fov_deg: Real | None,
-    view_sheet_image_mm: Real,
-    camera_focusing: str,
-) -> Real:
+def view_sensor_across_mm(values: Mapping[str, Any]) -> Real:
     """Width of the sensor that the lens fills with the picture."""
-    given = camera_horizontal_fov_deg
-    return _filled_mm(camera_sensor_width_mm, given, view_sheet_image_mm, camera_focusing)
+    return _filled_mm(values, values["camera.sensor_width_mm"], values["camera.horizontal_fov_deg"])
 
 
 @dimension(
     "view.sensor_along_mm",
-    formula="min(sensor height, 2 v sheet tan(given / 2)); the sensor height for internal focusing",
+    formula="min(sensor height, 2 v sheet r g(r²)), r = tan(given / 2); the sensor height for "
+    "internal focusing",
     source=LENS,
+    inputs=(*SHEET, "camera.sensor_height_mm", "camera.vertical_fov_deg"),
 )
-def view_sensor_along_mm(
-    camera_sensor_height_mm: Real,
-    camera_vertical_fov_deg: Real | None,
-    view_sheet_image_mm: Real,
-    camera_focusing: str,
-) -> Real:
+def view_sensor_along_mm(values: Mapping[str, Any]) -> Real:
     """Height of the sensor that the lens fills with the picture."""
-    given = camera_vertical_fov_deg
-    return _filled_mm(camera_sensor_height_mm, given, view_sheet_image_mm, camera_focusing)
+    return _filled_mm(values, values["camera.sensor_height_mm"], values["camera.vertical_fov_deg"])
 
 
-def _filled_mm(side_mm: Real, given_deg: Real | None, image_mm: Real, focusing: str) -> Real:
-    if given_deg is None or focusing == "internal":
+def _filled_mm(values: Mapping[str, Any], side_mm: Real, given_deg: Real | None) -> Real:
+    if given_deg is None or values["camera.focusing"] == "internal":
         return side_mm
-    return np.minimum(side_mm, 2 * image_mm * np.tan(np.radians(given_deg) / 2))
+    image = image_of(values, np.tan(np.radians(given_deg) / 2))
+    return np.minimum(side_mm, 2 * values["view.sheet_image_mm"] * image)
 
 
 @dimension("view.aperture_mm", formula="f / N", source="thin lens")
@@ -91,21 +91,26 @@ def view_fixed_focus_mm(camera_focusing: str, camera_focus_distance_mm: Real | N
 
 @dimension(
     "view.fixed_image_mm",
-    formula="internal: sensor width / (2 tan(given / 2)); fixed: f s / (s - f); unit: 0",
+    formula="internal: sensor width / (2 r g(r²)), r = tan(given / 2); fixed: f s / (s - f); "
+    "unit: 0",
     source=LENS,
+    inputs=(
+        *RADIAL,
+        "camera.focusing",
+        "camera.sensor_width_mm",
+        "camera.horizontal_fov_deg",
+        "camera.focal_length_mm",
+        "view.fixed_focus_mm",
+    ),
 )
-def view_fixed_image_mm(
-    camera_focusing: str,
-    camera_sensor_width_mm: Real,
-    camera_horizontal_fov_deg: Real | None,
-    camera_focal_length_mm: Real,
-    view_fixed_focus_mm: Real,
-) -> Real:
+def view_fixed_image_mm(values: Mapping[str, Any]) -> Real:
     """Image distance of a lens that stays in its place."""
-    if camera_focusing == "internal" and camera_horizontal_fov_deg is not None:
-        return camera_sensor_width_mm / 2 / np.tan(np.radians(camera_horizontal_fov_deg) / 2)
-    if camera_focusing == "fixed":
-        f, s = camera_focal_length_mm, view_fixed_focus_mm
+    focusing, given_deg = values["camera.focusing"], values["camera.horizontal_fov_deg"]
+    if focusing == "internal" and given_deg is not None:
+        image = image_of(values, np.tan(np.radians(given_deg) / 2))
+        return values["camera.sensor_width_mm"] / 2 / image
+    if focusing == "fixed":
+        f, s = values["camera.focal_length_mm"], values["view.fixed_focus_mm"]
         return f * s / (s - f)
     return 0.0
 
@@ -139,16 +144,28 @@ def view_focal_px(view_image_distance_mm: Real, view_pixel_pitch_mm: Real) -> Re
     return view_image_distance_mm / view_pixel_pitch_mm
 
 
-@dimension("view.across_fov_deg", formula="2 atan(sensor across / 2v)", source=LENS)
-def view_across_fov_deg(view_sensor_across_mm: Real, view_image_distance_mm: Real) -> Real:
+@dimension(
+    "view.across_fov_deg",
+    formula="2 atan r, r g(r²) = sensor across / 2v",
+    source=LENS,
+    inputs=(*RADIAL, "view.sensor_across_mm", "view.image_distance_mm"),
+)
+def view_across_fov_deg(values: Mapping[str, Any]) -> Real:
     """Field of view across the finger, the lens focused on the gel."""
-    return np.degrees(2 * np.arctan(view_sensor_across_mm / 2 / view_image_distance_mm))
+    image = values["view.sensor_across_mm"] / 2 / values["view.image_distance_mm"]
+    return np.degrees(2 * np.arctan(tangent_of(values, image)))
 
 
-@dimension("view.along_fov_deg", formula="2 atan(sensor along / 2v)", source=LENS)
-def view_along_fov_deg(view_sensor_along_mm: Real, view_image_distance_mm: Real) -> Real:
+@dimension(
+    "view.along_fov_deg",
+    formula="2 atan r, r g(r²) = sensor along / 2v",
+    source=LENS,
+    inputs=(*RADIAL, "view.sensor_along_mm", "view.image_distance_mm"),
+)
+def view_along_fov_deg(values: Mapping[str, Any]) -> Real:
     """Field of view along the finger, the lens focused on the gel."""
-    return np.degrees(2 * np.arctan(view_sensor_along_mm / 2 / view_image_distance_mm))
+    image = values["view.sensor_along_mm"] / 2 / values["view.image_distance_mm"]
+    return np.degrees(2 * np.arctan(tangent_of(values, image)))
 
 
 @dimension(
@@ -171,7 +188,9 @@ def view_lens_travel_mm(
     return np.where(view_focus_mm >= camera_focus_nearest_mm, 0.0, view_lens_extension_mm)
 
 
-@dimension("view.image_blur_px", formula="A v |Z - s| / (Z s) / pixel pitch", source=LENS)
+@dimension(
+    "view.image_blur_px", formula="A v |Z - s| / (Z s) / pixel pitch, undistorted", source=LENS
+)
 def view_image_blur_px(
     view_aperture_mm: Real,
     view_focal_px: Real,

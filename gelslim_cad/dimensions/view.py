@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_cad.dimensions.distortion import is_fisheye
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.fold_problem import NO_LIMIT_MM, FoldProblem
 from gelslim_cad.dimensions.registry import Real, dimension
@@ -34,6 +35,14 @@ PROBLEM: dict[str, Name] = {
     "image_margin": "design.optics.image_margin",
     "pixel_pitch_mm": "view.pixel_pitch_mm",
     "focal_length_mm": "camera.focal_length_mm",
+    "fisheye": "camera.distortion.model",
+    "k1": "view.distortion_k1",
+    "k2": "camera.distortion.k2",
+    "k3": "camera.distortion.k3",
+    "k4": "camera.distortion.k4",
+    "p1": "camera.distortion.p1",
+    "p2": "camera.distortion.p2",
+    "most_tan": "view.corner_tan",
     "moving_lens": "camera.focusing",
     "fixed_focus_mm": "view.fixed_focus_mm",
     "fixed_image_mm": "view.fixed_image_mm",
@@ -86,6 +95,7 @@ def fold_layout(values: Mapping[str, Any]) -> Fold:
     free = 1 - given.pop("image_margin")
     for side in ("half_across_mm", "half_along_mm"):
         given[side] = given[side] / 2 * free
+    given["fisheye"] = is_fisheye(given["fisheye"])
     given["moving_lens"] = float(given["moving_lens"] == "unit")
     given |= _worths(given.pop("goal"), given["length_worth"], given["pixel_worth_mm"])
     taken_mm = given.pop("back_wall_mm") + given["guide_thickness_mm"] + given["gel_total_mm"]
@@ -257,21 +267,23 @@ def _farther_off(sagittal_mm: Real, tangential_mm: Real, focus_mm: Real) -> Real
     return np.maximum(np.abs(sagittal_mm - focus_mm), np.abs(tangential_mm - focus_mm))
 
 
-@dimension("view.marker_across_px", formula="f_px d / max(Zn, Zf)", source=FOLD)
+@dimension(
+    "view.marker_across_px",
+    formula="f_px d / max(Zn, Zf), times what the distortion scales it at the edge's middle or end",
+    source=FOLD,
+)
 def view_marker_across_px(
-    view_focal_px: Real,
-    markers_diameter_mm: Real,
-    view_near_distance_mm: Real,
-    view_far_distance_mm: Real,
+    fold_layout: Fold, markers_diameter_mm: Real, view_focal_px: Real
 ) -> Real:
-    """Width in the image of the marker that is farthest from the camera."""
-    farthest = np.maximum(view_near_distance_mm, view_far_distance_mm)
-    return view_focal_px * markers_diameter_mm / farthest
+    """Width in the image of the marker that is drawn narrowest."""
+    per_mm = fold_layout.across_scale / fold_layout.image_distance_mm
+    return view_focal_px * markers_diameter_mm * per_mm
 
 
 @dimension(
     "view.marker_along_px",
-    formula="f_px d cos θ / (Zt cos(θ-γ)) at the edge where it is smaller, Zt tangential",
+    formula="f_px d cos θ / (Zt cos(θ-γ)) at the edge where it is smaller, Zt tangential; "
+    "distorted likewise",
     source=FOLD,
 )
 def view_marker_along_px(fold_layout: Fold, markers_diameter_mm: Real, view_focal_px: Real) -> Real:
@@ -281,12 +293,16 @@ def view_marker_along_px(fold_layout: Fold, markers_diameter_mm: Real, view_foca
 
 
 @dimension("view.across_use", formula="largest image x of the gel / half image", source=FOLD)
-def view_across_use(fold_layout: Fold, view_across_fov_deg: Real) -> Real:
+def view_across_use(
+    fold_layout: Fold, view_image_distance_mm: Real, view_sensor_across_mm: Real
+) -> Real:
     """Part of the half image width that the gel fills; above 1 it is not seen whole."""
-    return fold_layout.corner_horizontal_tan / np.tan(np.radians(view_across_fov_deg) / 2)
+    return fold_layout.corner_horizontal_tan * view_image_distance_mm * 2 / view_sensor_across_mm
 
 
 @dimension("view.along_use", formula="largest image y of the gel / half image", source=FOLD)
-def view_along_use(fold_layout: Fold, view_along_fov_deg: Real) -> Real:
+def view_along_use(
+    fold_layout: Fold, view_image_distance_mm: Real, view_sensor_along_mm: Real
+) -> Real:
     """Part of the half image height that the gel fills; above 1 it is not seen whole."""
-    return fold_layout.corner_vertical_tan / np.tan(np.radians(view_along_fov_deg) / 2)
+    return fold_layout.corner_vertical_tan * view_image_distance_mm * 2 / view_sensor_along_mm

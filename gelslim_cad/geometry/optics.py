@@ -6,6 +6,7 @@ import math
 
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera
 from gelslim_optics.guide.profile import GuideProfile
 from gelslim_optics.guide.shapes import CurvedGuide, GelSection, MirrorGuide, curved_profile
@@ -63,6 +64,7 @@ def virtual_camera(d: Lookup) -> VirtualCamera:
     Returns:
         The camera as it is seen in the fold mirror.
     """
+    lens = lens_distortion(d)
     return VirtualCamera.from_fold(
         camera_mm=(d["camera_pose.x_mm"], 0.0, d["camera_pose.z_mm"]),
         pitch_rad=math.radians(d["camera_pose.pitch_deg"]),
@@ -76,6 +78,21 @@ def virtual_camera(d: Lookup) -> VirtualCamera:
             Layer(d["design.light_guide.thickness_mm"], d["material.acrylic.refractive_index"]),
             Layer(d["stack.gel_total_mm"], d["material.gel.refractive_index"]),
         ),
+        lens=lens if lens.distorts else None,
+    )
+
+
+def lens_distortion(d: Lookup) -> LensDistortion:
+    """The distortion of the lens as the spec gives it."""
+    wide = d["camera.distortion.model"] == "kannala_brandt"
+    return LensDistortion(
+        k1=d["view.distortion_k1"],
+        k2=d["camera.distortion.k2"],
+        p1=d["camera.distortion.p1"],
+        p2=d["camera.distortion.p2"],
+        k3=d["camera.distortion.k3"],
+        k4=d["camera.distortion.k4"],
+        model="kannala_brandt" if wide else "brown",
     )
 
 

@@ -22,6 +22,12 @@ TITLES = {
     "effective_height": "apparent height",
 }
 NAMES: tuple[Name, ...] = (
+    "camera.distortion.k2",
+    "camera.distortion.k3",
+    "camera.distortion.k4",
+    "camera.distortion.model",
+    "camera.distortion.p1",
+    "camera.distortion.p2",
     "camera.image_height_px",
     "camera.image_width_px",
     "camera_pose.pitch_deg",
@@ -37,6 +43,7 @@ NAMES: tuple[Name, ...] = (
     "mirror.lower_z_mm",
     "stack.gel_total_mm",
     "stack.window_bottom_z_mm",
+    "view.distortion_k1",
     "view.focal_px",
 )
 """Names that the camera and its figures look up."""

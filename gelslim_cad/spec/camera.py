@@ -9,9 +9,11 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
+from gelslim_cad.spec.distortion import Distortion, require_one_to_one
 from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
+from gelslim_optics.camera.lens_distortion import LensDistortion
 
 LIBRARY = Path(__file__).with_name("cameras")
 """Folder with a file per camera of the library, named as the camera."""
@@ -83,6 +85,9 @@ class Camera(Block):
         gt=0,
         le=1e6,
         description="Distance at which the field of view holds; infinity when left out",
+    )
+    distortion: Distortion = Field(
+        default=Distortion(), description="Distortion of the lens; none when left out"
     )
     focusing: Literal["unit", "internal", "fixed"] = Field(
         default="unit",
@@ -223,22 +228,34 @@ class Camera(Block):
             )
 
     def _check_field_of_view(self) -> None:
-        """The sheet's field of view agrees with sensor and focal length, where it must."""
+        """The sheet's field of view agrees with sensor, focal length and distortion, if it must."""
+        image_mm, lens = self._sheet_lens()
+        tans = self.sensor_width_mm / 2 / image_mm, self.sensor_height_mm / 2 / image_mm
+        require_one_to_one(lens, tans[0], tans[1], image_mm, f"distortion.{self.distortion.stated}")
         if self.focusing == "internal":
             return
-        at = self.field_of_view_at_mm
-        f = self.focal_length_mm
-        image_mm = f if at is None else f * at / (at - f)
-        for axis, side_mm, given in (
-            ("horizontal", self.sensor_width_mm, self.horizontal_fov_deg),
-            ("vertical", self.sensor_height_mm, self.vertical_fov_deg),
+        for axis, tan, given in (
+            ("horizontal", (tans[0], 0.0), self.horizontal_fov_deg),
+            ("vertical", (0.0, tans[1]), self.vertical_fov_deg),
         ):
-            implied = math.degrees(2 * math.atan(side_mm / 2 / image_mm))
+            seen = math.hypot(*lens.undistort([tan])[0])
+            implied = math.degrees(2 * math.atan(seen))
             if given is not None and abs(given - implied) > FOV_TOLERANCE * implied:
                 raise FieldError(
                     f"{axis}_fov_deg",
-                    "disagrees with sensor size and focal length, "
+                    "disagrees with sensor size, focal length and distortion, "
                     f"which give {implied:.2f} degrees",
                     "correct one of them or leave the field of view out",
                     ("focal_length_mm",),
                 )
+
+    def _sheet_lens(self) -> tuple[float, LensDistortion]:
+        """Image distance at which the sheet's field of view holds, and the distortion."""
+        width, height = self.sensor_width_mm / 2, self.sensor_height_mm / 2
+        at, f = self.field_of_view_at_mm, self.focal_length_mm
+        image_mm = f if at is None else f * at / (at - f)
+        if self.focusing != "internal" or self.horizontal_fov_deg is None:
+            return image_mm, self.distortion.lens(width / image_mm, height / image_mm)
+        side = math.tan(math.radians(self.horizontal_fov_deg) / 2)
+        lens = self.distortion.lens(side, side * height / width)
+        return width / side / lens.scale(side), lens

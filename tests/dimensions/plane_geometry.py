@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import cmath
 import math
+from copy import copy
 from dataclasses import fields
 from typing import TypeVar
 
+import numpy as np
 from scipy.optimize import brentq
 
 from gelslim_cad.dimensions.fold_problem import FoldProblem
@@ -29,6 +31,9 @@ class Problem:
 
 Number = TypeVar("Number", float, complex)
 Images = tuple[tuple[float, float], tuple[float, float]]
+Points = np.ndarray
+NODES = 65
+"""Points of an edge of the gel at which a distorted picture is looked at."""
 STEP = 1e-20
 """Imaginary part of an angle by which a derivative is exact to rounding."""
 
@@ -46,6 +51,29 @@ def met(start: complex, along: complex, other: complex, other_along: complex) ->
     """How far from `start` in units of `along` two lines meet."""
     apart = other - start
     return (apart.conjugate() * other_along).imag / (along.conjugate() * other_along).imag
+
+
+def drawn(p: Problem, at: Points) -> Points:
+    """Where the ideal image points h + iv are drawn; beyond the sensor as large as at its rim."""
+    r = np.maximum(np.minimum(abs(at), p.most_tan), 1e-9)
+    if p.fisheye:
+        t = np.arctan(r)
+        seen = t + p.k1 * t**3 + p.k2 * t**5 + p.k3 * t**7 + p.k4 * t**9
+    else:
+        seen = r + p.k1 * r**3 + p.k2 * r**5 + p.k3 * r**7 + p.k4 * r**9
+    h, v, squared = at.real, at.imag, abs(at) ** 2
+    across = 2 * p.p1 * h * v + p.p2 * (squared + 2 * h * h)
+    along = p.p1 * (squared + 2 * v * v) + 2 * p.p2 * h * v
+    return at * (seen / r) + across + 1j * along
+
+
+def drawn_scale(p: Problem, at: complex) -> tuple[float, float]:
+    """How much longer than ideal short lines across and along are drawn, but for decentring."""
+    plain = copy(p)
+    plain.p1 = plain.p2 = 0.0
+    steps = 1e-6 * np.array([1, 1j])
+    moved = drawn(plain, at + steps) - drawn(plain, at - steps)
+    return tuple(abs(moved) / 2e-6)
 
 
 class Layout:
@@ -86,24 +114,71 @@ class Layout:
         return slope * along / reach, slope * across / reach
 
     def _corners_of_the_gel(self) -> None:
+        p = self.p
         self.corner_rays = near, far = self._ray_to_corner(-1), self._ray_to_corner(1)
         self.near_across, self.far_across = near[1], far[1]
         self.near_slope = min(math.tan(self.near_rad), near[0])
         self.far_slope = max(math.tan(self.far_rad), far[0])
-        low, high = math.atan(self.near_slope), math.atan(self.far_slope)
-        axis = (math.sin(self.tilt), math.cos(self.tilt))
-        self.horizontal_tan = max(c[1] / (c[0] * axis[0] + axis[1]) for c in (near, far))
-        self.vertical_tan = math.tan(max(high - self.tilt, self.tilt - low))
+        ends = [
+            (complex(math.tan(angle)), complex(*corner))
+            for angle, corner in zip((self.near_rad, self.far_rad), self.corner_rays, strict=True)
+        ]
+        self.edges = [np.array(pair) for pair in ends]
+        self.side = np.array([complex(*near), complex(*far)])
+        if self.distorted:
+            x, y = p.gel_length_mm / 2, np.linspace(0, p.gel_width_mm / 2, NODES)
+            self.edges = [
+                np.append(edge, self._rays_to(sign * x, y))
+                for edge, sign in zip(self.edges, (-1, 1), strict=True)
+            ]
+            along = np.linspace(-x, x, NODES)
+            self.side = np.append(self.side, self._rays_to(along, p.gel_width_mm / 2))
+        images = self._images_of(self.side, self.tilt)
+        mirrored = np.append(images, -images.conjugate())
+        self.horizontal_tan = abs(drawn(p, mirrored).real).max()
+        self.vertical_tan = max(self._reach_along(k, self.tilt) for k in (0, 1))
+
+    @property
+    def distorted(self) -> bool:
+        p = self.p
+        return any((p.fisheye, p.k1, p.k2, p.k3, p.k4, p.p1, p.p2))
+
+    def _rays_to(self, x: Points | float, y: Points | float) -> Points:
+        """Slopes dx/dz + i dy/dz in air of rays to points of the gel, by a table of angles."""
+        angles = np.linspace(0, 1.55, 20_001)
+        reach = self.air * np.tan(angles)
+        for height, index in (
+            (self.p.guide_thickness_mm, self.p.guide_index),
+            (self.p.gel_total_mm, self.p.gel_index),
+        ):
+            reach += height * np.tan(np.arcsin(np.sin(angles) / index))
+        away = (x - self.virtual.real) + 1j * y
+        return np.tan(np.interp(abs(away), reach, angles)) * away / abs(away)
+
+    def _images_of(self, slopes: Points, tilt: float) -> Points:
+        """Ideal images h + iv of rays."""
+        ahead = slopes.real * math.sin(tilt) + math.cos(tilt)
+        return (slopes.imag + 1j * (slopes.real * math.cos(tilt) - math.sin(tilt))) / ahead
+
+    def _reach_along(self, edge: int, tilt: float) -> float:
+        """How far out the near (0) or far (1) edge is drawn along the finger."""
+        images = self._images_of(self.edges[edge], tilt)
+        found = drawn(self.p, np.append(images, -images.conjugate())).imag
+        return float(found.max() if edge else -found.min())
 
     def least_tilt_rad(self) -> float:
         """Upright, unless the far rays are then outside of the picture of a lens focused there."""
-        low, high = math.atan(self.near_slope), math.atan(self.far_slope)
 
         def too_small(tilt: float) -> float:
-            half = math.atan(self.p.half_along_mm / self.image_mm(self.spans_at_mm(tilt)))
-            return min(max(0.0, high - half), low + half) - tilt
+            half = self.p.half_along_mm / self.image_mm(self.spans_at_mm(tilt))
+            near, far = (self._reach_along(k, tilt) / half - 1 for k in (0, 1))
+            return min(max(-tilt, far), -near)
 
-        return brentq(too_small, -math.pi / 2, math.pi / 2, xtol=1e-13)
+        return brentq(too_small, *self._tilts(), xtol=1e-13)
+
+    def _tilts(self) -> tuple[float, float]:
+        """Tilts between which both edges are before the camera."""
+        return math.atan(self.far_slope) - 1.55, math.atan(self.near_slope) + 1.55
 
     def focus_mm(self, spans: Images) -> float:
         """Where the nearest and the farthest image are equally blurred, relative to distance."""
@@ -239,15 +314,10 @@ class Layout:
 
     def _picture(self) -> dict[str, float]:
         p = self.p
-        near, far = self.images_mm
         focus, image = self.focus_mm(self.spans_mm), self.image_mm(self.spans_mm)
         distances = (d for edge in self.spans_mm for d in edge)
         blur = max(p.aperture_mm * abs(d - focus) / focus for d in distances)
-        least = min(
-            image / max(near[0], far[0]),
-            self.along_scale(self.near_rad),
-            self.along_scale(self.far_rad),
-        )
+        least = min(map(min, self.scales()))
         px = least * p.marker_diameter_mm / p.pixel_pitch_mm
         travel = self.extension_mm if focus < p.focus_nearest_mm else 0.0
         return {
@@ -262,9 +332,20 @@ class Layout:
 
     def _beyond_half_view(self, image: float) -> float:
         """Image of the far rim of a view whose near rim is the picture's, by half the picture."""
-        rays = [math.atan(v) for v in (self.near_slope, self.far_slope)]
-        half = math.atan((1 - 1e-6) * self.p.half_along_mm / image)
-        return math.tan(rays[1] - rays[0] - half) * image / self.p.half_along_mm
+        half = (1 - 1e-6) * self.p.half_along_mm / image
+        tilt = brentq(lambda t: self._reach_along(0, t) - half, *self._tilts(), xtol=1e-15)
+        return self._reach_along(1, tilt) * image / self.p.half_along_mm
+
+    def scales(self) -> list[tuple[float, float]]:
+        """Length in the image of a unit length across and along each edge, as it is drawn."""
+        found = []
+        image = self.image_mm(self.spans_mm)
+        for k, angle in enumerate((self.near_rad, self.far_rad)):
+            ends = self._images_of(self.edges[k][:2], self.tilt)
+            stretch = np.min([drawn_scale(self.p, at) for at in ends], axis=0)
+            ideal = image / self.images_mm[k][0], self.along_scale(angle)
+            found.append(tuple(np.array(ideal) * (stretch if self.distorted else 1)))
+        return found
 
     def _camera_in_mirror(self) -> float:
         gap = self.p.clearance_mm

@@ -36,6 +36,14 @@ SPANS = {
     "focal_length_mm": (1.5, 4.0),
     "fixed_focus_mm": (15.0, 60.0),
     "fixed_image_mm": (2.0, 5.0),
+    "fisheye": (0.0, 1.0),
+    "k1": (-0.12, 0.12),
+    "k2": (-0.06, 0.06),
+    "k3": (-0.02, 0.02),
+    "k4": (-0.01, 0.01),
+    "p1": (-0.002, 0.002),
+    "p2": (-0.0005, 0.0005),
+    "most_tan": (0.9, 1.3),
     "moving_lens": (0.0, 1.0),
     "entrance_pupil_mm": (-1.0, 0.5),
     "aperture_mm": (0.3, 2.0),
@@ -82,6 +90,11 @@ def candidates() -> Compared:
     columns["moving_lens"] = np.round(columns["moving_lens"])
     for name in ("fixed_focus_mm", "fixed_image_mm"):
         columns[name] = np.where(rng.random((COUNT, 1, 1)) < 0.7, 0.0, columns[name])
+    ideal, wide = rng.random((2, COUNT, 1, 1)) < [[[[0.5]]], [[[0.4]]]]
+    columns["fisheye"] = np.where(wide & ~ideal, 1.0, 0.0)
+    for name in ("k1", "k2", "k3", "k4", "p1", "p2"):
+        absent = ideal | (wide if name in ("p1", "p2") else ~wide & (name == "k4"))
+        columns[name] = np.where(absent, 0.0, columns[name])
     assert set(columns) == {f.name for f in fields(FoldProblem)}
     problem = FoldProblem(**columns)
     lower, upper = (*LOWER[:2], FLATTEST_RAD), (*UPPER[:2], STEEPEST_RAD)
@@ -94,12 +107,45 @@ def candidates() -> Compared:
     return ours, layouts, problem
 
 
+OF_DISTORTION = {
+    "across_scale",
+    "along_scale",
+    "corner_horizontal_tan",
+    "corner_vertical_tan",
+    "least_px",
+    "field of view along",
+    "field of view across",
+    "pixels per marker",
+    "missed parts",
+    "objective",
+    "goal",
+}
+NODAL = 2e-5
+"""What a peak between the points of an edge may reach beyond them."""
+ROOM = -0.05
+
+
+def compare(ours: np.ndarray, expected: list[float], problem: FoldProblem, name: str) -> None:
+    """Equal to rounding, where no peak is looked for among points of a distorted edge.
+
+    The room along is that of the points that reach out most where the view is used up.
+    """
+    distorted, ours = np.ravel(problem.distorted) > 0, np.ravel(ours)
+    tolerance = 1e-8 + NODAL * distorted * (name in OF_DISTORTION)
+    if name == "field of view along":
+        ours, expected = (np.where(distorted, np.maximum(v, ROOM), v) for v in (ours, expected))
+    # A limit that cannot be missed is minus infinity.
+    off = np.where(ours == expected, 0.0, np.abs(np.maximum(ours, -1e9) - expected))
+    assert (off <= tolerance * (1 + np.abs(expected))).all(), (name, off.max())
+
+
 def test_the_axis_is_tilted_as_little_as_the_field_of_view_lets_it(
     candidates: Compared,
 ) -> None:
-    ours, layouts, _ = candidates
+    ours, layouts, problem = candidates
     expected = [layout.least_tilt_rad() for layout in layouts]
-    np.testing.assert_allclose(np.ravel(ours.tilt_rad), expected, atol=2e-6)
+    off = np.abs(np.ravel(ours.tilt_rad) - expected)
+    assert (off <= 2e-6 + NODAL * np.ravel(problem.distorted)).all()
     assert 0.2 < np.mean(np.ravel(ours.tilt_rad) == 0) < 0.8
 
 
@@ -135,7 +181,8 @@ LENGTHS = {
     "near_sagittal_mm": lambda v: v.spans_mm[0][1],
     "far_tangential_mm": lambda v: v.spans_mm[1][0],
     "far_sagittal_mm": lambda v: v.spans_mm[1][1],
-    "along_scale": lambda v: min(v.along_scale(v.near_rad), v.along_scale(v.far_rad)),
+    "across_scale": lambda v: min(across for across, _ in v.scales()),
+    "along_scale": lambda v: min(along for _, along in v.scales()),
     "corner_horizontal_tan": lambda v: v.horizontal_tan,
     "corner_vertical_tan": lambda v: v.vertical_tan,
     "mirror_depth_mm": lambda v: v.mirror_depth,
@@ -148,31 +195,29 @@ LENGTHS = {
 
 
 def test_all_lengths_are_those_of_plane_geometry(candidates: Compared) -> None:
-    ours, layouts, _ = candidates
+    ours, layouts, problem = candidates
     assert {f.name for f in fields(Fold)} == {*LENGTHS, "violations", "housing"}
     for name, read in LENGTHS.items():
         expected = [read(layout) for layout in layouts]
-        np.testing.assert_allclose(
-            np.ravel(getattr(ours, name)), expected, rtol=1e-9, atol=1e-9, err_msg=name
-        )
+        compare(getattr(ours, name), expected, problem, name)
 
 
 def test_all_limits_are_those_of_plane_geometry(candidates: Compared) -> None:
-    ours, layouts, _ = candidates
+    ours, layouts, problem = candidates
     missed = [layout.missed() | layout.beyond() for layout in layouts]
     found = ours.violations | ours.housing
     assert set(found) == set(missed[0])
     for name, values in found.items():
         expected = np.array([m[name] for m in missed])
-        np.testing.assert_allclose(np.ravel(values), expected, rtol=1e-8, atol=1e-8, err_msg=name)
+        compare(values, expected, problem, name)
         assert 0 < np.mean(expected > 0) < 1, name
 
 
 def test_the_objective_is_that_of_plane_geometry(candidates: Compared) -> None:
     ours, layouts, problem = candidates
-    np.testing.assert_allclose(np.ravel(ours.worst()), [v.worst() for v in layouts], rtol=1e-8)
+    compare(ours.worst(), [v.worst() for v in layouts], problem, "missed parts")
     found = np.ravel(ours.objective(problem))
-    np.testing.assert_allclose(found, [v.objective() for v in layouts], rtol=1e-8)
+    compare(found, [v.objective() for v in layouts], problem, "objective")
     # The same candidates, as if they missed nothing but what they use of the picture.
     kept = {k: np.minimum(v, 0.0) for k, v in ours.violations.items()}
     spared = replace(
@@ -182,7 +227,8 @@ def test_the_objective_is_that_of_plane_geometry(candidates: Compared) -> None:
     within = np.array([max(v.missed()[side] for side in sides) < 0 for v in layouts])
     expected = np.array([v.goal() for v in layouts])[within]
     assert len(expected) > COUNT / 20
-    np.testing.assert_allclose(np.ravel(spared.objective(problem))[within], expected, rtol=1e-8)
+    found = np.ravel(spared.objective(problem))[within]
+    compare(found, expected, problem.rows(within), "goal")
 
 
 def test_grids_shrink_around_the_best_of_each_band() -> None:

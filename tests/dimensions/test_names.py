@@ -71,7 +71,19 @@ def test_every_parameter_is_a_dimension_or_a_field() -> None:
 
 
 def test_every_unit_of_a_length_or_angle_is_known() -> None:
-    plain = {"ratio", "count", "keystone", "use", "rows", "columns", "x", "y", "layout"}
+    plain = {
+        "ratio",
+        "count",
+        "keystone",
+        "use",
+        "rows",
+        "columns",
+        "x",
+        "y",
+        "layout",
+        "k1",
+        "tan",
+    }
     for entry in REGISTRY.values():
         assert entry.name.rsplit("_", 1)[-1].rsplit(".", 1)[-1] in UNITS.keys() | plain
 

@@ -61,6 +61,32 @@ def sample(seed: int, index: int) -> Sample:
     raise AssertionError(f"no legal spec drawn for seed {seed}, index {index}")
 
 
+def distorted(drawn: Sample, rng: np.random.Generator) -> Sample:
+    """The same spec with a lens that distorts, and without a field of view that may disagree."""
+    data = json.loads(drawn.text)
+    for name in ("horizontal_fov_deg", "vertical_fov_deg", "field_of_view_at_mm"):
+        data["camera"].pop(name, None)
+    if data["camera"].get("focusing") == "internal":
+        data["camera"]["focusing"] = "unit"
+    for _ in range(MOST_TRIES):
+        data["camera"]["distortion"] = _distortion(rng)
+        text = json.dumps(data, indent=1, ensure_ascii=False)
+        try:
+            spec = Spec.model_validate_json(text)
+        except ValidationError:
+            continue
+        return Sample(drawn.seed, drawn.index, drawn.kind, spec, text)
+    raise AssertionError(f"no lens fits spec {drawn.index} of seed {drawn.seed}")
+
+
+def _distortion(rng: np.random.Generator) -> Values:
+    kind = rng.integers(3)
+    if kind == 0:
+        return {"tv_percent": short(rng.uniform(-12, 5))}
+    k = {f"k{n + 1}": short(rng.normal(0, size)) for n, size in enumerate((0.15, 0.08, 0.03))}
+    return k if kind == 1 else {"model": "kannala_brandt", **k}
+
+
 def as_text(name: str, values: Values) -> str:
     """The spec as a file: JSON is YAML."""
     data: dict[str, Any] = {"format": "gelslim-spec/1", "name": name}

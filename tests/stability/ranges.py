@@ -99,9 +99,14 @@ def _leaves(model: type[BaseModel], prefix: str = "") -> Iterator[Leaf]:
 
 
 LEAVES: dict[str, Leaf] = {
-    leaf.path: leaf for leaf in _leaves(Spec) if leaf.path not in ("format", "name")
+    leaf.path: leaf
+    for leaf in _leaves(Spec)
+    if leaf.path not in ("format", "name") and not leaf.path.startswith("camera.distortion.")
 }
-"""All leaf fields but format and name, by path."""
+"""All leaf fields but format and name, by path.
+
+Coefficients of a distortion are drawn by `legal_specs.distorted`: few of their range make a lens.
+"""
 
 TEXTS = (
     "part",
