@@ -2,8 +2,9 @@
 
 It shares no formula with the product: the lens maps a point of the sensor to its conjugate point
 (1/f = 1/s + 1/v), the mirror and the layers act on single rays by the vector laws of reflection and
-refraction. The camera and the mirror stand where the parts put them, and the lens is turned until
-the target of the build guide is sharp.
+refraction. A lens that distorts draws a point nearer to the axis or farther from it than a perfect
+one would; a table of radii tells where that was. The camera and the mirror stand where the parts
+put them, and the lens is turned until the target of the build guide is sharp.
 """
 
 from __future__ import annotations
@@ -12,11 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from gelslim_cad.dimensions import Dimensions
 
 Array = NDArray[np.float64]
 GOLDEN = 2.399963229728653
+IDEAL = (np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+WIDEST = 3.0
+"""Tangent of the ray farthest from the axis."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,9 @@ class ThinLens:
     mirror_normal: Array
     layers: tuple[tuple[float, float], ...]
     """Lower face and refractive index of each layer, the one next to the camera first."""
+    radii: tuple[Array, Array] = IDEAL
+    """Distance from the axis of the point that is drawn, and of the perfect one; 0 and larger, in
+    units of the distance of the sensor."""
 
     @classmethod
     def as_built(cls, d: Dimensions, extension_mm: float | None = None) -> ThinLens:
@@ -68,6 +76,7 @@ class ThinLens:
                 (-(acrylic + gel), d["material.acrylic.refractive_index"]),
                 (-gel, d["material.gel.refractive_index"]),
             ),
+            radii=_radii(d),
         )
 
     def on_gel(
@@ -91,13 +100,22 @@ class ThinLens:
     def leaving(self, uv: Array, pupil: Array) -> tuple[Array, Array]:
         """Points (n, 3) of the lens and unit rays (n, 3) that leave it towards the mirror."""
         middle = (np.asarray(self.size_px) - 1) / 2
-        across, along = ((uv - middle) * self.pitch_mm).T[:, :, None]
+        drawn = (uv - middle) * self.pitch_mm
+        radius = np.maximum(np.hypot(*drawn.T) / self.sensor_mm, 1e-12)
+        perfect = drawn * (self._perfect(radius) / radius)[:, None]
+        across, along = perfect.T[:, :, None]
         chief = self.forward * self.sensor_mm + self.right * across + self.down * along
         distance = self.focal_mm * self.sensor_mm / (self.sensor_mm - self.focal_mm)
         shift = (self.right * pupil[:, :1] + self.down * pupil[:, 1:]) * self.aperture_mm / 2
         start = self.centre + shift
         ray = chief * (distance / self.sensor_mm) - shift
         return start, ray / np.linalg.norm(ray, axis=1)[:, None]
+
+    def _perfect(self, drawn: Array) -> Array:
+        """The radius without distortion of a radius that is drawn."""
+        if self.radii is IDEAL:
+            return drawn
+        return np.asarray(np.interp(drawn, *self.radii))
 
     def _reflected(self, start: Array, ray: Array) -> tuple[Array, Array]:
         away = (self.mirror_point - start) @ self.mirror_normal / (ray @ self.mirror_normal)
@@ -132,6 +150,39 @@ class ThinLens:
                 pupil = np.broadcast_to(sign * in_pupil, pixels.shape)
                 total += dots.covers(self.on_gel(pixels + sign * in_pixel, pupil))
         return np.asarray(1 - total.reshape(height, width) / samples)
+
+
+def _radii(d: Dimensions) -> tuple[Array, Array]:
+    """Radii that the lens of the spec draws and would draw without distortion, in even steps."""
+    k = [d[f"camera.distortion.k{n}"] for n in (1, 2, 3, 4)]
+    wide, tv = d["camera.distortion.model"] == "kannala_brandt", d["camera.distortion.tv_percent"]
+    if tv is not None:
+        k[0] = _brown_of_tv(d, tv)
+    if not (wide or any(k)):
+        return IDEAL
+    assert d["camera.distortion.p1"] == d["camera.distortion.p2"] == 0
+    perfect = np.linspace(0, WIDEST, 200_001)
+    bent = np.arctan(perfect) if wide else perfect
+    drawn = bent + sum(c * bent ** (2 * n + 3) for n, c in enumerate(k))
+    rising = np.append(True, np.cumsum(np.diff(drawn) <= 0) == 0)
+    return drawn[rising], perfect[rising]
+
+
+def _brown_of_tv(d: Dimensions, tv_percent: float) -> float:
+    """The coefficient by which a rectangle's sides are so much longer or shorter than its middle.
+
+    Its picture without distortion fills the sensor, the lens focused where the sheet's field of
+    view holds.
+    """
+    f, at = d["camera.focal_length_mm"], d["camera.field_of_view_at_mm"]
+    image_mm = f if at is None else 1 / (1 / f - 1 / at)
+    x, y = d["camera.sensor_width_mm"] / 2 / image_mm, d["camera.sensor_height_mm"] / 2 / image_mm
+
+    def too_large(k1: float) -> float:
+        side, middle = (y * (1 + k1 * (u * u + y * y)) for u in (x, 0.0))
+        return 100 * (side - middle) / middle - tv_percent
+
+    return float(brentq(too_large, -0.9 / y**2, 10.0, xtol=1e-14))
 
 
 def _refracted(ray: Array, ratio: float) -> Array:

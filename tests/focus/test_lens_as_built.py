@@ -13,6 +13,7 @@ from thin_lens import ThinLens
 import gelslim
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.spec.reader import read_spec
+from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.design import bundle_grid
@@ -38,7 +39,7 @@ def bundle_of(name: str) -> Bundle:
     return gelslim.make_bundle(DESIGNS / f"{name}.yaml", measure=False).bundle
 
 
-def seen_by_calibration(bundle: Bundle, lens: ThinLens, samples: int) -> None:
+def seen_by_calibration(bundle: Bundle, lens: ThinLens, samples: int) -> BuiltDeviation:
     """The scale of the picture is the design's, and so is the focal length as far as it is known.
 
     From one picture the focal length is known to between 0.1 and 1 %, because the distance of the
@@ -50,6 +51,7 @@ def seen_by_calibration(bundle: Bundle, lens: ThinLens, samples: int) -> None:
     focal = PARAMETERS.index("focal_percent")
     assert abs(found.deviation.scale_percent) < 0.2
     assert abs(found.deviation.values[focal]) < max(0.3, 3 * found.deviation.sigma[focal])
+    return found.deviation
 
 
 def seen_at(lens: ThinLens, point_mm: tuple[float, float], guess_px: NDArray) -> NDArray:
