@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.optics import lens_distortion
 from gelslim_cad.tolerance.causes import Cause, causes
+from gelslim_optics.camera.lens_distortion import LensDistortion
 
 Array = NDArray[np.float64]
 Errors = Mapping[str, Array]
@@ -55,6 +57,7 @@ class Built:
         focus_mm: Distances (n,) on which the lenses are sharp.
         aperture_mm: Diameters (n,) of the lens openings.
         principal_mm: Principal points (n, 2) on the sensor, from its middle.
+        lens: Its distortion.
         mirror_point_mm: Middles (n, 3) of the mirrors.
         mirror_normal: Their unit normals (n, 3).
         mirror_along: Unit vector (3,) along the mirror's length.
@@ -69,6 +72,7 @@ class Built:
     focus_mm: Array
     aperture_mm: Array
     principal_mm: Array
+    lens: LensDistortion
     mirror_point_mm: Array
     mirror_normal: Array
     mirror_along: Array
@@ -137,6 +141,7 @@ def built(d: Lookup, e: Errors, setting: Setting) -> Built:
         focus_mm=focus,
         aperture_mm=focal / d["camera.f_number"],
         principal_mm=np.stack([e["centre_u_mm"], e["centre_v_mm"]], axis=1),
+        lens=lens_distortion(d),
         mirror_point_mm=point,
         mirror_normal=normal,
         mirror_along=along,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.tolerance.built import Built
+from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.refraction_newton import newton_slope
 
 Array = NDArray[np.float64]
@@ -45,10 +46,19 @@ def rays(built: Built, x_mm: Array, y_mm: Array) -> Rays:
 
 
 def on_sensor(built: Built, ray: Rays) -> tuple[Array, Array]:
-    """Positions u and v (n, m) on the sensor, in mm."""
-    scale = built.image_mm[:, None] / ray.forward
-    u, v = built.principal_mm[:, :1], built.principal_mm[:, 1:]
-    return scale * ray.right + u, scale * ray.down + v
+    """Positions u and v (n, m) on the sensor, in mm, distorted as the lens of the spec does."""
+    x, y = _distorted(built.lens, ray.right / ray.forward, ray.down / ray.forward)
+    scale, (u, v) = built.image_mm[:, None], built.principal_mm.T[:, :, None]
+    return scale * x + u, scale * y + v
+
+
+def _distorted(lens: LensDistortion, x: Array, y: Array) -> tuple[Array, Array]:
+    """Coordinates in image distances; beyond the lens's valid radius they grow in proportion."""
+    if not lens.distorts:
+        return x, y
+    beyond = np.maximum(1.0, np.hypot(x, y) / (0.999 * lens.monotone_radius))
+    seen = lens.distort(np.stack([x / beyond, y / beyond], axis=-1))
+    return seen[..., 0] * beyond, seen[..., 1] * beyond
 
 
 def image_distances_mm(built: Built, ray: Rays) -> tuple[Array, Array]:

@@ -19,6 +19,19 @@ from gelslim_cad.tolerance.margins import margins
 from gelslim_cad.tolerance.picture import image_distances_mm, on_sensor, rays
 
 
+@pytest.mark.parametrize("k1", [-0.12, 0.12])
+def test_a_distorting_lens_counts_as_in_the_rules(k1: float) -> None:
+    """Barrel and pincushion; the rules also look between corners and middles of the edges."""
+    d = derive(spec("mini20", camera__distortion={"model": "brown", "k1": k1}))
+    found = {place: float(v[0]) for place, v in margins(d, no_errors(d), "as_built").items()}
+    along = min(found["coverage.along@near"], found["coverage.along@far"])
+    across = min(found["coverage.across@left"], found["coverage.across@right"])
+    assert along == pytest.approx(1 - d["view.along_use"], abs=1e-6)
+    assert across == pytest.approx(1 - d["view.across_use"], abs=1e-3)
+    plain = derive(spec("mini20"))
+    assert abs(across - (1 - plain["view.across_use"])) > 0.005
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_finger_without_errors_has_the_margins_of_its_dimensions(name: str) -> None:
     d = derive(spec(name))
