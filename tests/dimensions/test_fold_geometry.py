@@ -70,7 +70,6 @@ SPANS = {
     "mount_length_mm": (8.0, 20.0),
     "baffle_inner_y_mm": (8.0, 20.0),
     "clamp_width_mm": (10.0, 30.0),
-    "clamp_play_mm": (0.0, 0.4),
     "max_depth_mm": (8.0, 40.0),
     "max_length_mm": (50.0, 150.0),
     "depth_worth": (0.0, 1.0),
@@ -87,6 +86,7 @@ def candidates() -> Compared:
     """Random candidates of random designs: our layouts, and the same by plane geometry."""
     rng = np.random.default_rng(31)
     columns = {name: rng.uniform(*span, (COUNT, 1, 1)) for name, span in SPANS.items()}
+    columns["clamp_play_mm"] = np.random.default_rng(32).uniform(0.0, 0.4, (COUNT, 1, 1))
     columns["moving_lens"] = np.round(columns["moving_lens"])
     for name in ("fixed_focus_mm", "fixed_image_mm"):
         columns[name] = np.where(rng.random((COUNT, 1, 1)) < 0.7, 0.0, columns[name])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from dimensions.fold_samples import changed, shipped
+from dimensions.fold_samples import USUAL, changed, shipped
 from test_lens_as_built import DESIGNS, calibrated, seen_at, seen_by_calibration
 from thin_lens import ThinLens
 
@@ -103,6 +103,9 @@ def keeps_all_rules(d: Dimensions) -> bool:
 def bundle_of(d_changes: dict[str, Any], name: str, folder: Path) -> Bundle:
     data = yaml.safe_load((DESIGNS / f"{name}.yaml").read_text(encoding="utf-8"))
     data["camera"]["distortion"] = d_changes
+    for field, value in USUAL.items():
+        _, block, leaf = field.split(".")
+        data["design"].setdefault(block, {})[leaf] = value
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump(data), encoding="utf-8")
     return gelslim.make_bundle(path, measure=False).bundle
