@@ -62,7 +62,13 @@ def test_an_unknown_camera_is_bad_input_and_nothing_is_written(
     assert not target.exists()
 
 
-@pytest.mark.parametrize("name", camera_names())
+QUICK = ("ov9281", "ov5647_spy", "ovm6946")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in camera_names()],
+)
 def test_a_new_spec_takes_the_camera_and_check_judges_it(
     name: str, tmp_path: Path, capsys: Capture
 ) -> None:

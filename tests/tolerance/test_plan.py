@@ -18,6 +18,7 @@ from gelslim_cad.tolerance.plan import (
 from gelslim_cad.tolerance.yields import ALL, yield_of
 
 
+@pytest.mark.slow
 def test_a_plan_leads_to_the_yield_also_with_other_samples() -> None:
     start = spec("long50")
     found = plan(start, 0.95, 512, 0)
