@@ -1,0 +1,1 @@
+"""The LED boards: circuit, layout and the files that a board house takes; no CAD kernel."""

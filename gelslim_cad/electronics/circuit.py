@@ -1,0 +1,231 @@
+"""The circuit of one board: current, strings, resistor, power and temperatures.
+
+Everything works on numbers and, for many designs at once, on arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.electronics.heat import board_k_per_w
+from gelslim_cad.electronics.leds import NAMES as LED_NAMES
+from gelslim_cad.electronics.leds import BoardLed, Side, board_led
+from gelslim_cad.electronics.resistors import derated, of_size, resistor_index
+from gelslim_cad.electronics.strings import (
+    RESISTOR_TOLERANCE,
+    leds_in_series,
+    next_e24_ohm,
+    string_current_ma,
+)
+from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.names import Name
+
+DRIVER_DROPOUT_V = 1.0
+"""Voltage that a constant-current driver keeps for itself, as usual linear ones do."""
+LEAST_OHM = 1.0
+"""Resistor where the LEDs leave no voltage for one; a rule then refuses the supply."""
+NAMES: tuple[Name, ...] = (
+    *LED_NAMES,
+    "design.housing.side_wall_mm",
+    "electronics.ambient_c",
+    "electronics.current_ma",
+    "electronics.driver",
+    "electronics.supply_v",
+    "led.board_length_mm",
+    "led.board_width_mm",
+    "led.count",
+)
+"""Names that a circuit uses."""
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """The circuit of one board; each figure a number or an array over designs.
+
+    Attributes:
+        led: The LED.
+        count: LEDs on the board.
+        wanted_ma: Current that the spec asks for.
+        series: LEDs of the longest string.
+        strings: Strings side by side.
+        resistance_ohm: Resistor of the longest strings, E24; 0 with a constant-current driver.
+        current_ma: Current of an LED with typical voltages.
+        least_ma: Current with LEDs of the greatest forward voltage, cold.
+        greatest_ma: Current with LEDs of the least forward voltage, hot.
+        forward_v: Typical forward voltage at that current.
+        needed_v: Supply that the longest string needs at the least.
+        supply_ma: Current of the board.
+        resistor_mw: Power of a resistor at the greatest current.
+        resistor: Its place in `RESISTORS`.
+        heat_mw: Heat of the board: the supply's power less the light.
+        flux_mw: Radiant flux of an LED.
+        board_c: Temperature of the board.
+        junction_c: Temperature of the junctions.
+    """
+
+    led: BoardLed
+    count: Any
+    wanted_ma: Any
+    series: Any
+    strings: Any
+    resistance_ohm: Any
+    current_ma: Any
+    least_ma: Any
+    greatest_ma: Any
+    forward_v: Any
+    needed_v: Any
+    supply_ma: Any
+    resistor_mw: Any
+    resistor: Any
+    heat_mw: Any
+    flux_mw: Any
+    board_c: Any
+    junction_c: Any
+
+    @property
+    def known(self) -> Any:
+        """Whether the LED is that of the spec, so that the figures hold."""
+        return self.led.fits
+
+    @property
+    def allowed_mw(self) -> Any:
+        """Power that the chosen resistor stands on this board."""
+        return of_size(self.resistor, "rated_mw") * derated(self.board_c)
+
+    @property
+    def resistor_height_mm(self) -> Any:
+        """Height of the chosen resistor; 0 with a driver."""
+        return of_size(self.resistor, "height_mm") * (self.resistance_ohm > 0)
+
+    @property
+    def spread(self) -> Any:
+        """How far the current may lie above the typical one, as a part of it."""
+        return self.greatest_ma / self.current_ma - 1
+
+
+def side_circuit(d: Lookup, side: Side) -> Circuit | None:
+    """The circuit of a board; None where its LED is not known.
+
+    Args:
+        d: Spec fields and dimensions, those of `NAMES`.
+        side: `left` or `right`.
+
+    Returns:
+        The circuit.
+    """
+    led = board_led(d, side)
+    if led is None:
+        return None
+    given = d["electronics.current_ma"]
+    wanted = led.current_for_ma(d["design.leds.radiant_flux_mw"])
+    wanted = wanted if given is None else np.asarray(given, dtype=float)
+    return circuit(
+        led,
+        count=d["led.count"],
+        wanted_ma=wanted,
+        supply_v=d["electronics.supply_v"],
+        driven=d["electronics.driver"] == "constant_current",
+        ambient_c=d["electronics.ambient_c"],
+        board_k=board_k_per_w(
+            d["led.board_length_mm"], d["led.board_width_mm"], d["design.housing.side_wall_mm"]
+        ),
+    )
+
+
+def circuit(
+    led: BoardLed,
+    *,
+    count: Any,
+    wanted_ma: Any,
+    supply_v: Any,
+    driven: bool,
+    ambient_c: Any,
+    board_k: Any,
+) -> Circuit:
+    """Choose strings and resistors for a current and compute what follows.
+
+    The light leaves the board, T_board = T_air + R_board (P - n Φ), and a junction is warmer by
+    its own heat, T_j = T_board + R_JS (V I - Φ).
+
+    Args:
+        led: The LED.
+        count: LEDs on the board.
+        wanted_ma: Current wanted of each.
+        supply_v: Supply in V.
+        driven: Whether a constant-current driver at the supply takes the place of resistors.
+        ambient_c: Temperature of the air in °C.
+        board_k: Thermal resistance from board to air in K/W.
+
+    Returns:
+        The circuit.
+    """
+    variant = led.variant
+    least_v, typical_v, greatest_v = variant.forward_v
+    high_v = variant.voltage_v(wanted_ma, greatest_v, ambient_c)
+    volts = variant.voltage_v(wanted_ma, typical_v, ambient_c)
+    if driven:
+        series, strings = count, np.ones_like(np.asarray(count, dtype=float))
+        ohm = 0.0 * strings
+        current = least = wanted_ma + 0.0 * strings
+        greatest = current
+        needed = series * high_v + DRIVER_DROPOUT_V
+    else:
+        series = leds_in_series(supply_v, volts, high_v, count)
+        strings = np.ceil(count / series)
+        wanted_ohm = 1000 * (supply_v - series * volts) / wanted_ma
+        ohm = next_e24_ohm(np.maximum(wanted_ohm, LEAST_OHM))
+        current = string_current_ma(supply_v, series, ohm, variant, typical_v, ambient_c)
+        high = ohm * (1 + RESISTOR_TOLERANCE)
+        least = string_current_ma(supply_v, series, high, variant, greatest_v, ambient_c)
+        needed = series * high_v
+    forward = variant.voltage_v(current, typical_v, ambient_c)
+    flux = led.flux_at_mw(current)
+    supply_ma = strings * current
+    electrical_mw = count * forward * current if driven else supply_v * supply_ma
+    heat = electrical_mw - count * flux
+    board_c = ambient_c + board_k * heat / 1000
+    junction_c = board_c + variant.thermal_k_per_w * (forward * current - flux) / 1000
+    if not driven:
+        low = ohm * (1 - RESISTOR_TOLERANCE)
+        greatest = string_current_ma(supply_v, series, low, variant, least_v, junction_c)
+    resistor_mw = ohm * greatest**2 / 1000
+    return Circuit(
+        led=led,
+        count=count,
+        wanted_ma=wanted_ma,
+        series=series,
+        strings=strings,
+        resistance_ohm=ohm,
+        current_ma=current,
+        least_ma=least,
+        greatest_ma=greatest,
+        forward_v=forward,
+        needed_v=needed,
+        supply_ma=supply_ma,
+        resistor_mw=resistor_mw,
+        resistor=resistor_index(resistor_mw, board_c),
+        heat_mw=heat,
+        flux_mw=flux,
+        board_c=board_c,
+        junction_c=junction_c,
+    )
+
+
+def string_resistors_ohm(found: Circuit, supply_v: float, lengths: tuple[int, ...]) -> list[float]:
+    """E24 resistor of each string of one board, for the current wanted.
+
+    Args:
+        found: The circuit of one design.
+        supply_v: Supply in V.
+        lengths: LEDs of each string.
+
+    Returns:
+        Resistances in Ω.
+    """
+    series = np.array(lengths, dtype=float)
+    each_v = (supply_v - found.resistance_ohm * found.current_ma / 1000) / found.series
+    wanted = 1000 * (supply_v - series * each_v) / found.current_ma
+    return [float(v) for v in next_e24_ohm(np.maximum(wanted, LEAST_OHM))]
