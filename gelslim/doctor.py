@@ -53,7 +53,8 @@ GL_LIBRARIES = {
 """Libraries that CAD and rendering load on Linux, with the Debian package of each."""
 _DRAW = """
 import numpy as np
-from gelslim_cad.pictures.finger_pictures import PictureError, picture_whole
+from gelslim_cad.pictures.finger_pictures import picture_whole
+from gelslim_cad.pictures.window import PictureError
 corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 try:

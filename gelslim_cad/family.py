@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.geometry.gel_shape import GelShape
-from gelslim_cad.pictures.finger_pictures import render_window
+from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.pictures.mesh_scene import MeshScene, View
+from gelslim_cad.pictures.window import draw, offscreen_window
 from gelslim_cad.sensor import marker_grid
 from gelslim_core.figure import as_png
 
@@ -53,12 +53,13 @@ class Member:
 
 def member(name: str, d: Dimensions, folder: Path) -> Member:
     """A finger from its dimensions and the GLB of its build."""
+    meshes = read_glb(folder / f"{name}.glb")
     return Member(
         name,
         (d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.thickness_mm"]),
         (d["finger.length_mm"], d["finger.width_mm"], d["finger.thickness_mm"]),
         folder,
-        (*read_glb(folder / f"{name}.glb"), dots(d)),
+        (*meshes, dots(d)) if has_markers(d) else meshes,
     )
 
 
@@ -123,7 +124,8 @@ def family_png(members: Sequence[Member]) -> bytes:
 
     shapes = [_upright(m) for m in members]
     middles = _middles(shapes)
-    front, edge = _row(members, shapes, FRONT, middles), _row(members, shapes, EDGE, middles)
+    with offscreen_window() as window:
+        front, edge = (_row(window, members, shapes, v, middles) for v in (FRONT, EDGE))
     caption = 140
     height = sum(image.shape[0] for image, *_ in (front, edge)) + 2 * caption
     figure = Figure(figsize=(WIDTH_PX / DPI, height / DPI), dpi=DPI)
@@ -178,11 +180,14 @@ def _middles(shapes: Sequence[Array]) -> list[float]:
 
 
 def _row(
-    members: Sequence[Member], shapes: Sequence[Array], view: View, middles: Sequence[float]
+    window: Any,
+    members: Sequence[Member],
+    shapes: Sequence[Array],
+    view: View,
+    middles: Sequence[float],
 ) -> tuple[Any, list[float], float]:
     """Image, the middle of each finger in px from the left, and mm per px."""
-    window = render_window()
-    scene = MeshScene(window, view)
+    scene = MeshScene(view)
     right = view.axes()[0]
     for m, points, middle in zip(members, shapes, middles, strict=True):
         seen = points @ right
@@ -195,9 +200,6 @@ def _row(
     half = max(float(np.ptp(p @ FRONT.axes()[0])) for p in (shapes[0], shapes[-1])) / 2
     # Both rows as wide as the wider one, so that they come out at one scale.
     scene.include(np.outer([middles[0] - half, middles[-1] + half], right))
-    try:
-        image = scene.image(WIDTH_PX, OVERSAMPLING)
-    finally:
-        window.Finalize()
+    (image,) = draw(window, [scene], WIDTH_PX, OVERSAMPLING)
     places = scene.pixel_positions(np.outer(middles, right), WIDTH_PX)[:, 0]
     return image, [float(x) for x in places], scene.mm_per_px(WIDTH_PX)

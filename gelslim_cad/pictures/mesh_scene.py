@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ MARGIN = 1.06
 """Size of the picture divided by the size of its content."""
 CUT_OFFSET_MM = 1.3e-4
 """Shifts the cut, so that it avoids vertices and faces that lie exactly in its plane."""
+OPAQUE = 0.999
 INK = (0.09, 0.11, 0.14)
 
 
@@ -37,20 +39,20 @@ class View:
 
 
 class MeshScene:
-    """Collects meshes, then draws them once into an RGB array.
+    """Collects meshes, which a window draws once.
 
     A `cut` = (axis, position in mm) removes everything between the plane and the viewer and
     closes the opened solids with hatched faces.
     """
 
-    def __init__(self, window: Any, view: View, cut: tuple[int, float] | None = None) -> None:
+    def __init__(self, view: View, cut: tuple[int, float] | None = None) -> None:
         from vtkmodules.vtkRenderingCore import vtkRenderer
 
-        self._window = window
         self._view = view
         self._cut = cut
         self._low = np.full(3, np.inf)
         self._high = np.full(3, -np.inf)
+        self._overlays: list[tuple[Any, tuple[float, ...]]] = []
         self._solids: list[tuple[Any, tuple[float, ...], bool]] = []
         self._renderer = vtkRenderer()
         self._renderer.SetBackground(1.0, 1.0, 1.0)
@@ -67,48 +69,55 @@ class MeshScene:
         shown = (*(BRIGHTENING + (1 - BRIGHTENING) * channel for channel in rgba[:3]), rgba[3])
         self._solids.append((_poly_data(vertices, faces), shown, hatch_up))
 
+    def add_overlay(
+        self, vertices: np.ndarray, faces: np.ndarray, rgba: tuple[float, float, float, float]
+    ) -> None:
+        """Add a surface that is drawn whole, flat and without edges, also in a section."""
+        self.include(vertices)
+        self._overlays.append((_poly_data(vertices, faces), rgba))
+
     def include(self, points: np.ndarray) -> None:
         """Make the picture large enough to hold points (n, 3) in mm, without drawing them."""
         low, high = view_box(points, self._view)
         self._low = np.minimum(self._low, low)
         self._high = np.maximum(self._high, high)
 
-    def image(self, width_px: int, oversampling: int) -> np.ndarray:
-        """Draw as uint8 (height, width, 3); the height follows from the content."""
-        from vtkmodules.util.numpy_support import vtk_to_numpy
-        from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+    def height_px(self, width_px: int) -> int:
+        """Height of an image of `width_px`."""
+        return round(width_px * self._shape())
 
-        shape = self._shape()
-        height_px = round(width_px * shape)
-        self._aim(shape)
-        for poly, rgba, hatch_up in self._solids:
-            self._show(poly, rgba, hatch_up)
+    def placed(self, low: float, high: float) -> Any:
+        """The renderer with all that was added, for the part of a window from low to high."""
+        self._aim(self._shape())
+        plane = self._plane()
+        for poly, rgba in self._surfaces():
+            self._show(poly, rgba, plane)
+        if plane is not None:
+            for poly, rgba, hatch_up in self._solids:
+                self._close(poly, plane, rgba, hatch_up)
+        for poly, rgba in self._overlays:
+            self._flat(poly, rgba)
         self._light()
-        window = self._window
-        window.SetSize(width_px * oversampling, height_px * oversampling)
-        window.SetMultiSamples(0)
-        window.SetAlphaBitPlanes(1)
-        renderer = self._renderer
-        renderer.SetUseDepthPeeling(True)
-        renderer.SetMaximumNumberOfPeels(4)
-        renderer.SetOcclusionRatio(0.0)
-        window.AddRenderer(renderer)
-        window.Render()
-        grab = vtkWindowToImageFilter()
-        grab.SetInput(window)
-        grab.ReadFrontBufferOff()
-        grab.SetInputBufferTypeToRGB()
-        grab.Update()
-        flat = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars())
-        k = oversampling
-        tall = flat.reshape(height_px, k, width_px, k, 3)[::-1]
-        return np.ascontiguousarray(np.rint(tall.mean(axis=(1, 3))).astype(np.uint8))
+        # Lines alone need no peeling, which draws the scene once for each layer.
+        colours = [rgba for _, rgba, _ in self._solids] + [rgba for _, rgba in self._overlays]
+        self._renderer.SetUseDepthPeeling(any(rgba[3] < OPAQUE for rgba in colours))
+        self._renderer.SetMaximumNumberOfPeels(4)
+        self._renderer.SetOcclusionRatio(0.0)
+        self._renderer.SetViewport(0.0, low, 1.0, high)
+        return self._renderer
+
+    def _surfaces(self) -> list[tuple[Any, tuple[float, ...]]]:
+        """Solids of one colour as one, which are drawn in a fraction of the time."""
+        joined: dict[tuple[float, ...], list[Any]] = {}
+        for poly, rgba, _ in self._solids:
+            joined.setdefault(rgba, []).append(poly)
+        return [(_appended(polys), rgba) for rgba, polys in joined.items()]
 
     def pixel_positions(self, points: np.ndarray, width_px: int) -> np.ndarray:
         """Pixel positions (n, 2), right and down, of points (n, 3) in mm."""
         seen = points @ self._view.axes().T[:, :2]
         centre = (self._low[:2] + self._high[:2]) / 2
-        height_px = round(width_px * self._shape())
+        height_px = self.height_px(width_px)
         offset = (seen - centre) / self.mm_per_px(width_px) * (1.0, -1.0)
         return np.asarray(offset + np.array([width_px / 2, height_px / 2]))
 
@@ -137,11 +146,10 @@ class MeshScene:
         camera.SetParallelScale(self._scale_mm)
         camera.SetClippingRange(reach, 5 * reach)
 
-    def _show(self, poly: Any, rgba: tuple[float, ...], hatch_up: bool) -> None:
+    def _show(self, poly: Any, rgba: tuple[float, ...], plane: Any) -> None:
         from vtkmodules.vtkFiltersCore import vtkClipPolyData, vtkFeatureEdges, vtkPolyDataNormals
         from vtkmodules.vtkFiltersHybrid import vtkPolyDataSilhouette
 
-        plane = self._plane()
         faces = vtkPolyDataNormals()
         faces.SetFeatureAngle(CREASE_DEG)
         if plane is None:
@@ -163,7 +171,7 @@ class MeshScene:
         rim.SetCamera(self._renderer.GetActiveCamera())
         rim.SetEnableFeatureAngle(0)
         dark = tuple(min(0.32, 0.45 * channel) for channel in rgba[:3])
-        strength = 0.9 if rgba[3] >= 0.999 else 0.55
+        strength = 1.0 if rgba[3] >= OPAQUE else 0.55
         for lines, width in ((edges, 2.0), (rim, 2.6)):
             source: Any = lines
             if plane is not None:
@@ -171,8 +179,6 @@ class MeshScene:
                 source.SetInputConnection(lines.GetOutputPort())
                 source.SetClipFunction(plane)
             self._lines(source, dark, width, strength)
-        if plane is not None:
-            self._close(poly, plane, rgba, hatch_up)
 
     def _plane(self) -> Any:
         from vtkmodules.vtkCommonDataModel import vtkPlane
@@ -228,6 +234,13 @@ class MeshScene:
         look.SetSpecularPower(28.0)
         look.SetInterpolationToGouraud() if smooth else look.LightingOff()
 
+    def _flat(self, poly: Any, rgba: tuple[float, ...]) -> None:
+        from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
+
+        source = vtkTrivialProducer()
+        source.SetOutput(poly)
+        self._actor(source, rgba, smooth=False)
+
     def _lines(
         self, source: Any, colour: tuple[float, ...], width_px: float, opacity: float
     ) -> None:
@@ -271,6 +284,17 @@ def view_box(vertices: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Extent of points (n, 3) along right, up and depth of a view, in mm."""
     seen = vertices @ view.axes().T
     return seen.min(axis=0), seen.max(axis=0)
+
+
+def _appended(polys: Sequence[Any]) -> Any:
+    """Meshes as one; their vertices stay apart."""
+    from vtkmodules.vtkFiltersCore import vtkAppendPolyData
+
+    together = vtkAppendPolyData()
+    for poly in polys:
+        together.AddInputData(poly)
+    together.Update()
+    return together.GetOutput()
 
 
 def _poly_data(vertices: np.ndarray, faces: np.ndarray) -> Any:

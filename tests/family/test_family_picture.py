@@ -24,6 +24,7 @@ from gelslim_cad.family import (
     dots,
     family_png,
 )
+from gelslim_cad.pictures.window import offscreen_window
 from gelslim_cad.spec.reader import read_spec
 from gelslim_core.optional_library import install_command
 
@@ -64,14 +65,16 @@ def spans(image: np.ndarray) -> list[tuple[int, int, int, int]]:
 def test_fingers_stand_on_one_floor_and_are_to_scale() -> None:
     pytest.importorskip("vtkmodules")
     shapes = [_upright(m) for m in FAMILY]
-    image, places, mm_per_px = _row(FAMILY, shapes, EDGE, _middles(shapes))
+    with offscreen_window() as window:
+        image, places, mm_per_px = _row(window, FAMILY, shapes, EDGE, _middles(shapes))
     short, long = spans(image)
     for (left, right, top, bottom), m, place in zip((short, long), FAMILY, places, strict=True):
         assert (bottom - top) * mm_per_px == pytest.approx(m.size_mm[0], abs=6 * mm_per_px)
         assert (right - left) * mm_per_px == pytest.approx(m.size_mm[2], abs=6 * mm_per_px)
         assert place == pytest.approx((left + right) / 2, abs=4)
     assert abs(short[3] - long[3]) <= 2
-    _, _, front = _row(FAMILY, shapes, FRONT, _middles(shapes))
+    with offscreen_window() as window:
+        _, _, front = _row(window, FAMILY, shapes, FRONT, _middles(shapes))
     assert front == pytest.approx(mm_per_px, rel=0.25)
 
 

@@ -19,10 +19,12 @@ pytest.importorskip("vtkmodules", reason="VTK is not installed: no still picture
 from PIL import Image
 
 from gelslim_cad.pictures import finger_pictures as pictures
+from gelslim_cad.pictures import window
 
 try:
-    pictures.render_window()
-except pictures.PictureError as error:
+    with window.offscreen_window():
+        pass
+except window.PictureError as error:
     pytest.skip(f"NO OPENGL: still pictures were not tested; {error}", allow_module_level=True)
 
 
@@ -60,6 +62,7 @@ def drawn() -> list[bytes]:
     return views(report_sample.meshes())
 
 
+@pytest.mark.slow
 def test_pictures_show_many_parts_on_white(drawn):
     for png in drawn:
         image = pixels(png)
@@ -120,10 +123,11 @@ def test_a_section_beside_the_parts_is_refused():
 def test_without_any_opengl_the_reason_is_given_instead_of_a_crash():
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "import report_sample; from gelslim_cad.pictures import finger_pictures as pictures\n"
-        "pictures._loads = lambda name: False\n"
+        "import report_sample\n"
+        "from gelslim_cad.pictures import finger_pictures as pictures, window\n"
+        "window._loads = lambda name: False\n"
         "try: pictures.picture_whole(report_sample.meshes())\n"
-        "except pictures.PictureError as error: print(error)"
+        "except window.PictureError as error: print(error)"
     )
     env = os.environ | {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent", "DISPLAY": ""}
     here = str(Path(__file__).parent)
@@ -135,9 +139,9 @@ def test_without_any_opengl_the_reason_is_given_instead_of_a_crash():
 
 
 def test_a_missing_library_is_named_with_its_debian_package():
-    told = pictures._missing("libXrender.so.1: cannot open shared object file")
+    told = window._missing("libXrender.so.1: cannot open shared object file")
     assert "libxrender1" in told
-    assert install_command("view") in pictures._missing("No module named 'vtkmodules'")
+    assert install_command("view") in window._missing("No module named 'vtkmodules'")
 
 
 def test_a_part_shows_itself_in_a_notebook(monkeypatch):
@@ -152,4 +156,18 @@ def test_a_part_shows_itself_in_a_notebook(monkeypatch):
 
 
 def unable(meshes):
-    raise pictures.PictureError("no VTK")
+    raise window.PictureError("no VTK")
+
+
+def test_a_window_draws_scenes_of_several_sizes_as_windows_of_their_own_do():
+    """Nothing of the pictures that were drawn first is left in those after them."""
+    box = [mesh(hollow())]
+    alone = [pictures.picture_whole(box), pictures.picture_section(box)]
+    with window.offscreen_window() as shared:
+        small = pictures.picture_set(shared, box)
+        large = window.draw(shared, [pictures._scene(box, pictures.ISO)], 600, 1)
+        again = pictures.picture_set(shared, box)
+    assert large[0].shape[1] == 600
+    assert small == again
+    for png, expected in zip((again[0], again[2]), alone, strict=True):
+        assert np.abs(pixels(png) - pixels(expected)).max() <= 2

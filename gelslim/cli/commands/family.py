@@ -127,7 +127,7 @@ def _draw(out: Path, members: list[Member]) -> tuple[list[str], str]:
     """Write table and picture; return their names and why there is no picture, if so."""
     from gelslim_cad.explore.table import csv_bytes
     from gelslim_cad.family import family_png
-    from gelslim_cad.pictures.finger_pictures import PictureError
+    from gelslim_cad.pictures.window import PictureError
 
     if not members:
         return [], ""

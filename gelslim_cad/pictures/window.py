@@ -1,0 +1,130 @@
+"""The off-screen window: it draws scenes, one above the other, and gives their pixels."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import itertools
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from gelslim_cad.pictures.mesh_scene import MeshScene
+from gelslim_core.errors import GelslimError
+from gelslim_core.optional_library import install_command
+
+
+class PictureError(GelslimError):
+    """No picture can be drawn on this machine; the message says what to install."""
+
+
+@contextmanager
+def offscreen_window() -> Iterator[Any]:
+    """An off-screen window that needs no display, through EGL or else OSMesa.
+
+    VTK ends the whole process where neither library works, so this is checked before VTK draws.
+
+    Raises:
+        PictureError: VTK or a system library that it needs is missing.
+    """
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    try:
+        import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 registers the implementation
+        from vtkmodules.vtkCommonCore import vtkObject
+        from vtkmodules.vtkRenderingCore import vtkRenderWindow
+    except ImportError as error:
+        raise PictureError(_missing(str(error))) from error
+    vtkObject.GlobalWarningDisplayOff()
+    window = vtkRenderWindow()
+    kind = type(window).__name__
+    if "OSOpenGL" in kind and not any(map(_loads, ("libOSMesa.so.8", "libOSMesa.so.6"))):
+        raise PictureError(
+            "no off-screen OpenGL: neither EGL nor OSMesa works here; "
+            "install the Debian packages libegl1 and libgl1-mesa-dri"
+        )
+    window.SetOffScreenRendering(1)
+    try:
+        yield window
+    finally:
+        window.Finalize()
+
+
+def draw(
+    window: Any, scenes: Sequence[MeshScene], width_px: int, oversampling: int
+) -> list[np.ndarray]:
+    """Draw scenes, one above the other. A window compiles its shaders only once.
+
+    Args:
+        window: Off-screen window, as `offscreen_window` gives it.
+        scenes: What to draw; each can be drawn once.
+        width_px: Width of each image.
+        oversampling: Pixels that are drawn for one of the image, along each side.
+
+    Returns:
+        An image for each scene, uint8 (height, width, 3).
+    """
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+
+    k = oversampling
+    heights = [scene.height_px(width_px) for scene in scenes]
+    ends = np.cumsum([0, *heights])
+    window.SetSize(width_px * k, int(ends[-1]) * k)
+    window.SetMultiSamples(0)
+    window.SetAlphaBitPlanes(1)
+    placed = [s.placed(low / ends[-1], high / ends[-1])
+              for s, low, high in zip(scenes, ends, ends[1:], strict=False)]  # fmt: skip
+    for renderer in placed:
+        window.AddRenderer(renderer)
+    window.Render()
+    grab = vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    grab.ShouldRerenderOff()
+    grab.SetInputBufferTypeToRGB()
+    grab.Update()
+    for renderer in placed:
+        window.RemoveRenderer(renderer)
+    flat = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars())
+    drawn = flat.reshape(ends[-1] * k, width_px * k, 3)
+    whole = sum(drawn[i::k, j::k].astype(np.uint16) for i in range(k) for j in range(k))
+    whole = ((whole + k * k // 2) // (k * k)).astype(np.uint8)
+    return [np.ascontiguousarray(whole[low:high][::-1]) for low, high in itertools.pairwise(ends)]
+
+
+def png_bytes(image: np.ndarray, optimize: bool = True) -> bytes:
+    """An image, uint8 (height, width, 3), as PNG; `optimize` makes it smaller and takes longer."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(image).save(buffer, format="PNG", optimize=optimize)
+    return buffer.getvalue()
+
+
+def _missing(reason: str) -> str:
+    packages = {
+        "libGL.so": "libgl1",
+        "libEGL": "libegl1",
+        "libOpenGL": "libopengl0",
+        "libXrender": "libxrender1",
+        "libXcursor": "libxcursor1",
+        "libXfixes": "libxfixes3",
+        "libX11": "libx11-6",
+        "libSM": "libsm6",
+        "libICE": "libice6",
+    }
+    for library, package in packages.items():
+        if library in reason:
+            return f"VTK cannot load {library}: install the Debian package {package} ({reason})"
+    return f"VTK is not installed: {install_command('view')} ({reason})"
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
