@@ -1,0 +1,1 @@
+"""Whether the printed parts can be printed well: walls, overhangs, bridges, holes, first layer."""
