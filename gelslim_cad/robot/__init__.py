@@ -1,0 +1,1 @@
+"""Models of the finger for simulators of robots: URDF, MJCF and USD, from one description."""
