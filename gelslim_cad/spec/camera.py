@@ -124,8 +124,23 @@ class Camera(Block):
         description="Entrance pupil before the front face of the housing, the lens focused on "
         "infinity; the front of the lens when left out",
     )
-    cable_width_mm: float = above(0, 60, "Width of the flat cable", default=6.0)
+    cable_kind: Literal["flat", "round"] = Field(
+        default="flat", description="Whether the cable is flat, or round with its width as diameter"
+    )
+    cable_width_mm: float = above(0, 60, "Width of the cable", default=6.0)
+    cable_thickness_mm: float = above(0, 10, "Thickness of a flat cable", default=0.15)
     cable_bend_radius_mm: float = between(0, 50, "Smallest bend radius of the cable", default=3.0)
+    cable_exit: Literal["rear", "top", "bottom"] = Field(
+        default="rear",
+        description="Where the cable leaves the module as it is mounted: at the middle of its rear "
+        "face, or in its plane at the edge towards the gel (top) or the cover (bottom)",
+    )
+    cable_length_mm: float | None = above(
+        0, 5000, "Length of the cable from the module to the end of its connector", default=None
+    )
+    connector_width_mm: float = above(0, 80, "Far end of the cable: width", default=11.5)
+    connector_thickness_mm: float = above(0, 30, "Far end of the cable: thickness", default=0.3)
+    connector_length_mm: float = above(0, 60, "Far end of the cable: length", default=5.0)
     picture: Literal["colour", "mono"] = Field(
         default="colour", description="What the sensor tells apart: colours, or brightness alone"
     )

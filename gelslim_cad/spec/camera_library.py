@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from gelslim_cad.spec.camera import FOV_TOLERANCE, LIBRARY, Camera, camera_names
 from gelslim_cad.spec.limits import above
+from gelslim_cad.spec.source import Source
 from gelslim_core.errors import GelslimError
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.document import Document
@@ -64,14 +65,6 @@ class FieldOfView(Block):
     deviation: str = Field(
         default="", description="Why it differs from sensor and focal length, where it does"
     )
-
-
-class Source(Block):
-    """Where figures come from."""
-
-    text: str = Field(min_length=1, description="The sheet, or the reason of an assumption")
-    gives: tuple[str, ...] = Field(min_length=1, description="The figures, by dotted path")
-    assumed: bool = Field(default=False, description="Whether no sheet states these figures")
 
 
 class LibraryCamera(Block):

@@ -8,6 +8,8 @@ from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 
+from gelslim_cad.checks import check
+from gelslim_cad.dimensions import derive
 from gelslim_cad.explore.space import changed, illegal
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.camera import LIBRARY, camera_names
@@ -19,6 +21,7 @@ from gelslim_cad.spec.camera_library import (
 )
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.spec.reference import schema_text
+from gelslim_cad.spec.starter import starter_text
 from gelslim_core.yaml.errors import InputError, Problem
 from gelslim_core.yaml.reader import Loaded, load_bytes
 
@@ -195,3 +198,11 @@ def test_another_camera_or_mode_brings_its_fields_along():
     assert illegal(spec, {"camera.model": "none such"}).startswith("camera")
     with pytest.raises(ValidationError):
         changed(plain, {"camera.mode": "640x400"})
+
+
+@pytest.mark.parametrize("name", camera_names())
+def test_the_starter_of_every_camera_lets_its_cable_out(name):
+    loaded = load_bytes("mine.yaml", starter_text("mine", model=name).encode(), Spec, lend_fields)
+    cable = [c for c in check(derive(loaded.model)) if c.id.startswith("cable.")]
+    assert len(cable) >= 6
+    assert [c.id for c in cable if c.status == "fail"] == []
