@@ -14,6 +14,11 @@ THINNEST_WALL_MM = {
     "sls": (0.7, "thinner sintered walls do not survive depowdering"),
 }
 """Smallest wall thickness of each process, with the reason. They are starting values."""
+SHEET_MM = 0.05
+"""Largest difference of a sheet's thickness from that of the part: that of its own tolerance."""
+WINDOW_MPA = 20.0
+"""Stress that annealed cast acrylic bears for years without crazing: 15 to 20 MPa is stated by
+makers of cast sheet for unglued, clean edges (assumed)."""
 SMALLEST_GAP_MM = {"sla": 0.1, "fdm": 0.15, "sls": 0.15}
 
 
@@ -158,24 +163,51 @@ def corner_screw(
 
 
 @rule(
+    "bezel.stock_mm",
+    title="Bezel is made of a sheet on sale",
+    parameter="design.housing.gel_proud_mm",
+    why="another thickness must be milled",
+    advice="change how far the gel stands proud, or print the bezel",
+)
+def bezel_stock(
+    bezel_thickness_mm: Real,
+    housing_bezel_material: str,
+    manufacturing_metal_stock_mm: tuple[float, ...],
+) -> Finding:
+    """Distance of the bezel's thickness from the nearest sheet; none for a printed one."""
+    sheets = np.asarray(manufacturing_metal_stock_mm)
+    away = np.abs(np.asarray(bezel_thickness_mm)[..., None] - sheets).min(axis=-1)
+    printed = housing_bezel_material == "printed"
+    return Finding(np.where(printed, 0.0, away), SHEET_MM, advisory=True, tolerance=1e-9)
+
+
+@rule(
     "precompression.tolerance_mm",
-    title="Pre-compression exceeds the tolerance stack",
-    parameter="design.housing.precompression_mm",
-    why="stock acrylic differs by up to 10 % and the print by its tolerance; a loose window tears",
-    advice="compress more, with a thicker shim",
+    title="Pre-compression that is reached exceeds the tolerance stack",
+    parameter="design.housing.bezel_material",
+    why="acrylic, print and shims differ by their tolerances, and the bezel bows between its "
+    "screws; a loose window tears",
+    advice="use a metal bezel, softer or thicker shims, compress more, or measure the acrylic "
+    "sheet (tolerance.acrylic: measured)",
 )
 def precompression_tolerance(
-    housing_precompression_mm: Real,
-    manufacturing_acrylic_tolerance_ratio: Real,
-    light_guide_thickness_mm: Real,
-    manufacturing_print_tolerance_mm: Real,
+    shim_least_reached_mm: Real,
+    precompression_stack_mm: Real,
 ) -> Finding:
-    """Compression against the worst case of the acrylic and print tolerances."""
-    stack = (
-        manufacturing_acrylic_tolerance_ratio * light_guide_thickness_mm
-        + manufacturing_print_tolerance_mm
-    )
-    return Finding(housing_precompression_mm, stack, least=True)
+    """Least compression of the shims against the worst case of the tolerances."""
+    return Finding(shim_least_reached_mm, precompression_stack_mm, least=True)
+
+
+@rule(
+    "window.stress_mpa",
+    title="Bending of the window under its shims",
+    parameter="design.housing.shim_hardness_shore_a",
+    why="acrylic that is bent for long crazes at its cut edges",
+    advice="use softer or narrower shims, or compress less",
+)
+def window_stress(window_stress_mpa: Real) -> Finding:
+    """Upper bound of the bending stress."""
+    return Finding(window_stress_mpa, WINDOW_MPA)
 
 
 @rule(
@@ -213,24 +245,21 @@ def clamp_beside(
 @rule(
     "screw.shortest_mm",
     title="Shortest screws do not come through",
-    parameter="design.light_guide.thickness_mm",
+    parameter="design.mount.tongue_thickness_mm",
     why="countersunk screws are sold from 3 mm on; a longer one than its hole hits what is behind",
-    advice="use a thicker guide, bezel (thicker gel) or back wall, or a thinner tongue",
+    advice="use a thicker bezel (thicker gel) or back wall, or a thinner tongue",
 )
 def screw_shortest(
     bezel_thickness_mm: Real,
-    light_guide_thickness_mm: Real,
+    thread_roof_depth_mm: Real,
+    thread_tip_depth_mm: Real,
     housing_back_wall_mm: Real,
-    tongue_z_mm: Real,
-    mount_tongue_thickness_mm: Real,
-    housing_fit_clearance_mm: Real,
-    cover_top_z_mm: Real,
+    thread_land_depth_mm: Real,
 ) -> Finding:
     """Depth of plate and hole for the screws of bezel and cover."""
-    slot = tongue_z_mm - mount_tongue_thickness_mm / 2 - housing_fit_clearance_mm
-    under_slot = housing_back_wall_mm + slot - cover_top_z_mm - 0.6
-    room = np.minimum(bezel_thickness_mm + light_guide_thickness_mm, under_slot)
-    return Finding(room, LENGTHS_MM[0], least=True)
+    bezel = bezel_thickness_mm + np.minimum(thread_roof_depth_mm, thread_tip_depth_mm)
+    cover = housing_back_wall_mm + np.minimum(thread_land_depth_mm, thread_tip_depth_mm)
+    return Finding(np.minimum(bezel, cover), LENGTHS_MM[0], least=True)
 
 
 @rule(

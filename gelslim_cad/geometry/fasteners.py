@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 SCREW_EDGE_MM = 2.6
 """Distance from the inner face of a side wall to the axis of the nearest screws."""
 
@@ -37,4 +40,11 @@ LENGTHS_MM = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0)
 
 def stock_length_mm(longest_mm: float) -> float:
     """Longest stock screw that is no longer than `longest_mm`; the shortest when none is."""
-    return max((n for n in LENGTHS_MM if n <= longest_mm), default=LENGTHS_MM[0])
+    return float(stock_lengths_mm(longest_mm))
+
+
+def stock_lengths_mm(longest_mm: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same for many lengths at once."""
+    lengths = np.asarray(LENGTHS_MM)
+    place = np.searchsorted(lengths, np.asarray(longest_mm) + 1e-9, side="right") - 1
+    return np.asarray(lengths[np.maximum(place, 0)])

@@ -9,14 +9,14 @@ import cadquery as cq
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.fasteners import ScrewSize, stock_length_mm
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.camera import clamp_screw_positions
+from gelslim_cad.geometry.thread import SHORT_OF_END_MM
+from gelslim_cad.solids.clamp import SCREW_DEPTH_MM, clamp_screw_positions
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import STEEL
 from gelslim_cad.solids.mirror import seat_pilot_mm, seat_screw_positions
 from gelslim_cad.solids.shapes import single
 
 PLAY_MM = 0.01
-SHORT_MM = 4.0
 
 
 def _countersunk(
@@ -71,7 +71,7 @@ def screws(d: Dimensions) -> tuple[Part, ...]:
     kinds["clamp"] = [
         (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
         for x, y in clamp_screw_positions(d)
-        for n in (stock_length_mm(wall + SHORT_MM),)
+        for n in (stock_length_mm(wall + SCREW_DEPTH_MM - SHORT_OF_END_MM),)
     ]
     kinds["seat"] = [
         (_countersunk(at.screw, x, y, at.back_z_mm, 1, n), n, -1)
