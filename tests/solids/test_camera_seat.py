@@ -1,0 +1,111 @@
+"""The camera's seat: touched at its points alone, springs as stiff and strained as they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from finger_samples import DESIGNS, each_finger, fingers, part
+from scipy.integrate import solve_bvp
+
+from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.dimensions.seat import LEAST_PRELOAD_MM, MODULUS_MPA, STRAIN
+from gelslim_cad.proof.solids import common_volume
+from gelslim_cad.solids.clamp import camera_clamp
+from gelslim_cad.solids.led_seat import uncrushed_ribs
+from gelslim_cad.spec.reader import read_spec
+from gelslim_cad.tolerance.plan import with_values
+
+
+def mini20(**values: object) -> Dimensions:
+    spec = read_spec(next(path for path in DESIGNS if path.stem == "mini20")).spec
+    changed = {name.replace("__", "."): value for name, value in values.items()}
+    return derive(with_values(spec, changed))
+
+
+@each_finger
+def test_the_printed_springs_reach_into_the_camera_by_their_deflection(name: str) -> None:
+    """In place they touch it; as printed they overlap it at two nubs and nowhere else."""
+    d = fingers()[name]
+    if not d["clamp.preloaded"]:
+        assert part(name, "camera_clamp").printed is None
+        return
+    clamp, camera = part(name, "camera_clamp"), part(name, "camera").solid
+    assert common_volume(clamp.solid, camera) < 1e-6
+    printed = clamp.printed
+    assert printed is not None
+    assert printed.isValid()
+    common = printed.intersect(camera)
+    assert len(common.Solids()) == 2
+    pitch = np.radians(d["camera_pose.pitch_deg"])
+    forward = np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+    rear = -d["camera_pose.face_mm"] - d["camera.module_depth_mm"]
+    pinhole = np.array([d["camera_pose.x_mm"], 0.0, d["camera_pose.z_mm"]])
+    ahead = [
+        max((np.array(v.toTuple()) - pinhole) @ forward for v in solid.Vertices()) - rear
+        for solid in common.Solids()
+    ]
+    # The flat nub reaches in by the deflection, the wedge at the rear edge by as much.
+    assert ahead == pytest.approx([d["clamp.spring_deflection_mm"]] * 2, abs=1e-6)
+
+
+@pytest.mark.parametrize("process", ["sla", "fdm", "sls"])
+def test_spring_formulas_are_those_of_an_integrated_beam(process: str) -> None:
+    """E I w'' = F (L - x) from a clamped root, by collocation."""
+    d = mini20(manufacturing__print_process=process)
+    length, thick = d["clamp.spring_length_mm"], d["clamp.spring_mm"]
+    inertia = d["clamp.spring_width_mm"] * thick**3 / 12
+
+    def tip_and_strain(force: float) -> tuple[float, float]:
+        def slope(x: np.ndarray, w: np.ndarray) -> np.ndarray:
+            return np.vstack([w[1], force * (length - x) / (MODULUS_MPA * inertia)])
+
+        x = np.linspace(0, length, 30)
+        found = solve_bvp(slope, lambda a, b: a, x, np.zeros((2, x.size)))
+        return found.y[0, -1], thick / 2 * force * length / (MODULUS_MPA * inertia)
+
+    tip, _ = tip_and_strain(d["clamp.preload_n"] / 2)
+    assert tip == pytest.approx(LEAST_PRELOAD_MM, rel=1e-6)
+    per_newton, strain = tip_and_strain(1.0)
+    most = d["clamp.spring_deflection_mm"] + d["manufacturing.print_tolerance_mm"]
+    assert d["clamp.strain_percent"] / 100 == pytest.approx(strain * most / per_newton, rel=1e-6)
+    assert d["clamp.strain_percent"] / 100 <= STRAIN[process] + 1e-12
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"design__housing__camera_seat": "loose"},
+        {"camera__lens_height_mm": 0.0},
+        {"camera__lens_diameter_mm": 8.0},
+        {"camera__module_depth_mm": 2.0},
+        {"manufacturing__print_tolerance_mm": 0.6},
+    ],
+    ids=["loose", "no lips", "wide lens", "shallow", "coarse print"],
+)
+def test_a_camera_without_room_for_the_seat_lies_loose(changes: dict[str, object]) -> None:
+    d = mini20(**changes)
+    assert d["clamp.preloaded"] == 0
+    height, play = d["camera.module_height_mm"], d["clamp.play_mm"]
+    assert d["clamp.pitch_tilt_deg"] == pytest.approx(np.degrees(2 * play / height))
+    clamp = camera_clamp(d)
+    assert clamp.printed is None
+    assert clamp.solid.isValid()
+
+
+@each_finger
+def test_led_boards_touch_their_edges_and_crush_their_ribs(name: str) -> None:
+    """Pushed out by 1 µm a board overlaps the edges; it overlaps the ribs as printed."""
+    d = fingers()[name]
+    if not uncrushed_ribs(d):
+        pytest.skip("no room for an edge")
+    body, board = part(name, "body"), part(name, "led_board_green").solid
+    assert body.printed is not None
+    assert common_volume(body.solid, board) < 1e-6
+    step = 1e-3
+    outwards = board.translate((0, step, 0))
+    thick = d["design.leds.board_thickness_mm"]
+    assert common_volume(body.solid, outwards) == pytest.approx(2 * 1.5 * thick * step, rel=0.01)
+    squeeze = 2 * d["clamp.point_error_mm"]
+    assert common_volume(body.printed, board) == pytest.approx(2 * 0.5 * thick * squeeze, rel=0.01)
+    tipwards = board.translate((step, 0, 0))
+    assert common_volume(part(name, "back_cover").solid, tipwards) > 0
