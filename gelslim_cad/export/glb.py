@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gelslim_cad.export import ExportError
 from gelslim_cad.export.mesh import Patch, face_patches
+from gelslim_cad.geometry.overlay import linear_light
 from gelslim_cad.geometry.part import Part
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
@@ -133,7 +134,7 @@ def _node(number: int, part: Part) -> dict[str, Any]:
 
 def _material(part: Part) -> dict[str, Any]:
     red, green, blue, alpha = part.colour
-    base = [round(_linear(c), 6) for c in (red, green, blue)] + [round(float(alpha), 6)]
+    base = [round(linear_light(c), 6) for c in (red, green, blue)] + [round(float(alpha), 6)]
     material: dict[str, Any] = {
         "name": part.material,
         "pbrMetallicRoughness": {
@@ -144,11 +145,6 @@ def _material(part: Part) -> dict[str, Any]:
         "doubleSided": alpha < 1.0,
     }
     return material | ({"alphaMode": "BLEND"} if alpha < 1.0 else {})
-
-
-def _linear(srgb: float) -> float:
-    """Linear light from sRGB (IEC 61966-2-1); glTF's factors are linear."""
-    return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
 
 
 def _container(document: dict[str, Any], binary: bytes) -> bytes:

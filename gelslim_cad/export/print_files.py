@@ -25,7 +25,7 @@ _RELATIONS = f"""{_XML}<Relationships xmlns="{_OPC}/relationships">
 Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
 </Relationships>
 """
-HEADER = b"gelslim-cad binary STL, millimetres"
+HEADER = b"gelslim-cad binary STL, "
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -76,12 +76,20 @@ def _hex(colour: tuple[float, float, float, float]) -> str:
     return "#" + "".join(f"{round(255 * min(max(c, 0.0), 1.0)):02X}" for c in colour)
 
 
-def stl_bytes(mesh: TriangleMesh) -> bytes:
-    """Write a mesh as binary STL in mm: 80-byte header, count, 50 bytes a triangle."""
+def stl_bytes(mesh: TriangleMesh, unit: bytes = b"millimetres") -> bytes:
+    """Write a mesh as binary STL: 80-byte header with its unit, count, 50 bytes a triangle."""
     corners = mesh.vertices_mm[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     records = np.zeros(len(corners), dtype=_RECORD)
     records["normal"] = normals / np.where(length > 0, length, 1.0) + 0.0
     records["corners"] = corners
-    return HEADER.ljust(80) + np.uint32(len(corners)).tobytes() + records.tobytes()
+    return (HEADER + unit).ljust(80) + np.uint32(len(corners)).tobytes() + records.tobytes()
+
+
+def stl_size_mm(data: bytes) -> tuple[float, float, float]:
+    """Sides of the box around the mesh of a binary STL."""
+    records = np.frombuffer(data, dtype=_RECORD, offset=84)
+    corners = records["corners"].reshape(-1, 3)
+    x, y, z = (corners.max(axis=0) - corners.min(axis=0)).tolist()
+    return x, y, z

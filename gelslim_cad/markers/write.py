@@ -14,11 +14,11 @@ FIRST_FILE = "markers-Alignment.gbr"
 
 
 def render_marker_files(
-    grid: MarkerGrid, nodes: NearestNodes, outline: Outline
+    grid: MarkerGrid, nodes: NearestNodes, outline: Outline, *, film_kerf_mm: float = 0.0
 ) -> dict[str, bytes]:
-    """Return the content of every marker file by its name.
+    """Return the content of every marker file by its name; the stencil's paths keep the kerf.
 
-    Raises ValueError when a dot crosses the outline.
+    Raises ValueError when a dot crosses the outline, or is narrower than the kerf.
     """
     from gelslim_cad.markers.dxf import render_dxf
     from gelslim_cad.markers.gerber import (
@@ -41,7 +41,7 @@ def render_marker_files(
         "markers-F_Paste.gbr": render_gerber(grid, outline),
         "markers-Edge_Cuts.gbr": render_gerber_profile(outline),
         "markers-Alignment.gbr": render_gerber_alignment(sheet),
-        "stencil.dxf": render_stencil(sheet),
+        "stencil.dxf": render_stencil(sheet, film_kerf_mm),
     }
 
 

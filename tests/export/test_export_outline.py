@@ -14,7 +14,9 @@ from shapely.geometry import Polygon
 
 from gelslim_cad.export import ExportError
 from gelslim_cad.export.contour import frame_of
-from gelslim_cad.export.outline import flat_face, outline_dxf_bytes
+from gelslim_cad.export.outline import flat_face, kept_area_mm2, outline_dxf_bytes
+from gelslim_cad.markers.kerf import KerfError
+from gelslim_cad.proof.outline import prove_dxf
 
 
 def read(data: bytes):
@@ -22,7 +24,10 @@ def read(data: bytes):
     assert not document.audit().has_errors
     assert document.dxfversion == "AC1024"
     assert document.units == ezdxf.units.MM
-    return list(document.modelspace())
+    assert document.layers.get("NOTES").dxf.plot == 0
+    (note,) = [e for e in document.modelspace() if e.dxf.layer == "NOTES"]
+    assert note.dxftype() == "TEXT"
+    return [e for e in document.modelspace() if e is not note]
 
 
 def polygon(entity) -> Polygon:
@@ -104,3 +109,31 @@ def test_a_circle_cut_into_arcs_is_a_circle_again():
 def test_what_cannot_be_cut_is_refused(shape):
     with pytest.raises(ExportError):
         outline_dxf_bytes(shape())
+
+
+def test_kerf_moves_the_outline_out_and_the_holes_in(tmp_path):
+    plate, kerf = samples.drilled_plate(), 0.24
+    data = outline_dxf_bytes(plate, kerf, "plate, cast acrylic")
+    entities = read(data)
+    (outer,) = [polygon(e) for e in entities if e.dxftype() == "LWPOLYLINE"]
+    nominal = [e for e in read(outline_dxf_bytes(plate)) if e.dxftype() == "LWPOLYLINE"]
+    true = polygon(nominal[0]).buffer(kerf / 2, quad_segs=1000)
+    assert outer.symmetric_difference(true).area < 1e-4 * true.area
+    assert [h.dxf.radius for h in entities if h.dxftype() == "CIRCLE"] == pytest.approx([1.88] * 4)
+    kept = kept_area_mm2(flat_face(plate), kerf)
+    assert kept == pytest.approx(true.area - 4 * math.pi * 1.88**2, rel=1e-5)
+    path = tmp_path / "plate.dxf"
+    path.write_bytes(data)
+    assert all(p.ok for p in prove_dxf(path, kept))
+    assert not all(p.ok for p in prove_dxf(path, float(flat_face(plate).Area())))
+    with pytest.raises(KerfError, match="narrower"):
+        outline_dxf_bytes(plate, 4.5)
+
+
+def test_note_says_which_side_stays():
+    for kerf, words in ((0.0, "let the cutter compensate"), (0.3, "0.15 mm outside the part")):
+        data = outline_dxf_bytes(samples.drilled_plate(), kerf, "plate")
+        document = ezdxf.read(io.StringIO(data.decode("utf-8")))
+        (note,) = [e for e in document.modelspace() if e.dxf.layer == "NOTES"]
+        assert words in note.dxf.text
+        assert note.dxf.text.startswith("plate, 40.00 x 20.00 mm: inside the outer line stays")

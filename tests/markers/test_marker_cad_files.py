@@ -2,6 +2,8 @@
 
 import csv
 import io
+import re
+import uuid
 
 import ezdxf
 import numpy as np
@@ -141,6 +143,35 @@ def test_gerber_alignment_holes_match_the_stencil(grid, outline):
     np.testing.assert_allclose(
         flashes(drawn), np.column_stack([sheet.alignment_mm, np.full(4, 3.0)]), atol=2e-6
     )
+
+
+@pytest.mark.parametrize("layer", ["paste", "profile", "alignment"])
+def test_gerber_files_carry_their_attributes(layer, grid, outline):
+    """Each of the header's attributes once, before the first command, with legal values."""
+    made, function, use = {
+        "paste": (render_gerber(grid, outline), "Paste,Top", "Material"),
+        "profile": (render_gerber_profile(outline), "Profile,NP", "Profile"),
+        "alignment": (
+            render_gerber_alignment(lay_out_stencil(grid, outline)),
+            "Other,Alignment",
+            "Other,Alignment hole",
+        ),
+    }[layer]
+    text = made.decode("ascii")
+    found = dict(re.findall(r"%TF\.(\w+),([^*%]*)\*%", text))
+    assert found["FileFunction"] == function
+    assert found["FilePolarity"] == "Positive"
+    assert found["Part"].split(",")[0] in ("Single", "Array", "Coupon", "Other")
+    name, identifier, revision = found["ProjectId"].split(",")
+    assert (name, revision) == ("marker print", "1")
+    assert str(uuid.UUID(identifier)) == identifier
+    assert found["SameCoordinates"] == "sensor frame"
+    assert len(found["GenerationSoftware"].split(",")) == 3
+    assert text.count("%TF.") == len(found) == 6
+    assert text.rindex("%TF.") < text.index("%FSLAX46Y46*%") < text.index("D10*")
+    uses = re.findall(r"%TA\.AperFunction,([^*]+)\*%", text)
+    assert set(uses) == {use}
+    assert len(uses) == text.count("%ADD")
 
 
 def test_gerber_refuses_a_coordinate_beyond_the_format():

@@ -238,7 +238,7 @@ def test_all_tooling_of_the_papers_sensor() -> None:
     d = gelslim2()
     parts = tooling_parts(d, clipped_grid(d))
     names = [p.name for p in parts]
-    assert len(set(names)) == len(names) == 12
+    assert len(set(names)) == len(names) == 14
     assert "light_guide_blank" in names
     assert not any(p.in_assembly for p in parts)
     for part in parts:

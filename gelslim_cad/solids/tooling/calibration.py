@@ -34,11 +34,11 @@ from gelslim_cad.markers.outline import Outline
 from gelslim_cad.solids.materials import PRINTED
 from gelslim_cad.solids.shapes import (
     Hole,
+    Piece,
     Point2,
-    box,
+    closed_wire,
     prism,
     rectangle,
-    rod,
     rounded_polygon,
     single,
     union,
@@ -52,7 +52,7 @@ REST_GAP_MM = 1.0
 """Distance between the gel and the rests."""
 LEAST_REST_MM = 0.05
 PITCHES_MM = (1.0, 2.0, 2.5, 5.0, 10.0)
-MOST_ACROSS = 15
+MOST_ACROSS = 11
 MARK_RATIO = 1.6
 TARGET = (0.12, 0.12, 0.13, 1.0)
 RADIUS_MM = 5.0
@@ -60,13 +60,15 @@ FLANGE_MM = 24.0
 FLANGE_WIDTH_MM = 14.0
 FLANGE_THICKNESS_MM = 5.0
 STEM_MM = 8.0
+STEM_RATIO = 0.8
+"""Radius of the stem over that of its cap."""
 BOLT_MM = 3.4
 BOLT_SPACING_MM = 16.0
 INDENTER = (0.85, 0.86, 0.88, 1.0)
 
 
 def target_pitch_mm(length_mm: float, width_mm: float) -> float:
-    """Smallest pitch of PITCHES_MM with at most 15 holes along the longer side."""
+    """Smallest pitch of PITCHES_MM with at most 11 holes along the longer side."""
     longest = max(length_mm, width_mm)
     return next((p for p in PITCHES_MM if longest / p <= MOST_ACROSS), PITCHES_MM[-1])
 
@@ -168,10 +170,7 @@ def sphere_indenter(d: Dimensions) -> Part:
         (0.0, FLANGE_THICKNESS_MM),
         [(-half, 0.0, BOLT_MM), (half, 0.0, BOLT_MM)],
     )
-    stem = rod(0.0, 0.0, (1.0, apex + 1.0), 1.6 * radius)
-    side = (-1.5 * radius, 1.5 * radius)
-    above = box(side, side, (apex - radius, apex + 2.0)).cut(_ball(radius, apex - radius))
-    solid = union([flange, stem.cut(above)])
+    solid = union([flange, _capped_stem(radius, apex)])
     return Part(
         name="sphere_indenter",
         solid=single(solid, "sphere_indenter"),
@@ -185,10 +184,21 @@ def sphere_indenter(d: Dimensions) -> Part:
     )
 
 
-def _ball(radius: float, centre_z: float) -> cq.Shape:
-    """Sphere with its poles on the x axis and its seam below: the cap contains neither."""
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeSphere
-    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
+def _capped_stem(radius: float, apex: float) -> cq.Solid:
+    """Stem from z = 1 with a spherical cap, as one body of revolution.
 
-    axes = gp_Ax2(gp_Pnt(0, 0, centre_z), gp_Dir(1, 0, 0), gp_Dir(0, 0, -1))
-    return cq.Shape.cast(BRepPrimAPI_MakeSphere(axes, radius).Solid())
+    A sphere that is cut by a cylinder has edges whose curves leave its surface once they have been
+    written to STEP; those of a body of revolution are circles of latitude.
+    """
+    side = STEM_RATIO * radius
+    middle = apex - radius
+    rim = middle + math.sqrt(radius**2 - side**2)
+    halfway = (math.pi / 2 + math.acos(STEM_RATIO)) / 2
+    between = (radius * math.cos(halfway), middle + radius * math.sin(halfway))
+    pieces = [
+        Piece(cq.Vector(0, 0, 1)),
+        Piece(cq.Vector(side, 0, 1)),
+        Piece(cq.Vector(side, 0, rim), cq.Vector(between[0], 0, between[1])),
+        Piece(cq.Vector(0, 0, apex)),
+    ]
+    return cq.Solid.revolve(closed_wire(pieces), [], 360.0, cq.Vector(0, 0, 0), cq.Vector(0, 0, 1))

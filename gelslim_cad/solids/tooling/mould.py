@@ -90,6 +90,15 @@ def mould_parts(d: Dimensions) -> tuple[Part, ...]:
     return _block_and_lid(d, plan, process)
 
 
+def clamped_mm(d: Dimensions) -> float:
+    """Height that the bolts of the closed mould clamp."""
+    plan = plan_mould(d)
+    if d["manufacturing.mould_process"] == "acrylic" and plan.cavity.crown_mm == 0:
+        thickness, count = plate_stock(d["manufacturing.acrylic_stock_mm"], WALL_MM)
+        return plan.depth_mm + 2 * thickness * count
+    return plan.depth_mm + FLOOR_MM + LID_MM
+
+
 def _layers(d: Dimensions, plan: MouldPlan) -> tuple[Part, ...]:
     stock = d["manufacturing.acrylic_stock_mm"]
     thickness, count = plate_stock(stock, WALL_MM)
@@ -99,7 +108,7 @@ def _layers(d: Dimensions, plan: MouldPlan) -> tuple[Part, ...]:
     base = prism(plan.block, (-thickness, 0.0), through)
     frame = prism(plan.block, (0.0, top), through, [plan.cavity.outline])
     lid = prism(plan.block, (top, top + thickness), (*through, plan.gate, *plan.vents))
-    bolt = top + 2 * thickness * count
+    bolt = clamped_mm(d)
     base_note = (
         "bottom plate, its upper face shapes the gel's outer surface: use an unscratched sheet; "
         f"clamp with 4 M3 bolts over {bolt:.1f} mm and 2 dowel pins of 3 mm"
@@ -160,7 +169,7 @@ def _block_and_lid(d: Dimensions, plan: MouldPlan, process: str) -> tuple[Part, 
         pins = tuple((x, y, PEG_MM + fit) for x, y, _ in plan.dowels)
     top = plan.depth_mm
     lid = prism(plan.block, (top, top + LID_MM), (*lid_holes, *pins))
-    bolt = top + FLOOR_MM + LID_MM
+    bolt = clamped_mm(d)
     note = f"{FINISH[process]}; 4 M3 bolts over {bolt:.1f} mm hold the lid"
     if not printed:
         note += ", 2 dowel pins of 3 mm align it"

@@ -16,7 +16,7 @@ o hole to hang it up            o alignment hole,    |   side flap     |
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.stencil import PIN_MM, StencilSheet
@@ -46,8 +46,10 @@ FABRIC = (0.20, 0.22, 0.30, 1.0)
 def cutting_template(d: Dimensions, sheet: StencilSheet) -> Part:
     """Frame whose opening is the gel's outline, on the alignment pins of the stencil `sheet`.
 
-    Cut and markers are then aligned, because both use the same dowel pins.
+    Cut and markers are then aligned, because both use the same dowel pins. Without markers there
+    are none to align, and no holes for pins.
     """
+    pinned = has_markers(d)
     shape = GelShape.of(d)
     thickness, _ = plate_stock(d["manufacturing.acrylic_stock_mm"], LEAST_MM)
     x0, y0, x1, y1 = sheet.sheet.bounds_mm
@@ -64,7 +66,7 @@ def cutting_template(d: Dimensions, sheet: StencilSheet) -> Part:
         ],
         ROUND_MM,
     )
-    pins = [(x, y, PIN_MM) for x, y in sheet.alignment_mm.tolist()]
+    pins = [(x, y, PIN_MM) for x, y in sheet.alignment_mm.tolist() if pinned]
     middle = far - TAB_HOLE_MM / 2 - 4.0
     hang = [(0.0, y0 - middle, TAB_HOLE_MM), (0.0, y1 + middle, TAB_HOLE_MM)]
     tip = (shape.length_mm / 2 + x1) / 2 + ARROW_MM / 2
@@ -79,8 +81,8 @@ def cutting_template(d: Dimensions, sheet: StencilSheet) -> Part:
         process="laser",
         colour=ACRYLIC,
         in_assembly=False,
-        note="cut the gel along the opening with a new scalpel, blade flat against the wall; the "
-        f"{PIN_MM:g} mm pins register it with the marker stencil",
+        note="cut the gel along the opening with a new scalpel, blade flat against the wall"
+        + (f"; the {PIN_MM:g} mm pins register it with the marker stencil" if pinned else ""),
         tags=frozenset({"tooling"}),
     )
 
