@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.error import CalibrationError
     from gelslim_force.calibration.file import read_calibration, write_calibration
+    from gelslim_force.calibration.intrinsics import Intrinsics, read_intrinsics
     from gelslim_force.calibration.reference_picture import read_reference
     from gelslim_force.calibration.sensor_calibration import Calibration
     from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
@@ -42,6 +43,7 @@ __all__ = [
     "ForceSettings",
     "Frame",
     "FrameResult",
+    "Intrinsics",
     "NormalReading",
     "NormalSource",
     "Overlay",
@@ -56,6 +58,7 @@ __all__ = [
     "open_sensor",
     "read_calibration",
     "read_depth_maps",
+    "read_intrinsics",
     "read_reference",
     "read_run",
     "run_frames",

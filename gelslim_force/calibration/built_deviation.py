@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration.camera_deviation import deviated_camera
+from gelslim_force.calibration.camera_deviation import CameraTolerance, deviated_camera
 from gelslim_force.calibration.residual_bump import ResidualField
 from gelslim_optics.camera.lens_distortion import LensDistortion
 
@@ -56,26 +56,30 @@ class BuiltDeviation:
 
 
 def built_deviation(
-    fit: CameraFit, rest_mm: Array, points_mm: Array, residuals: ResidualField
+    fit: CameraFit,
+    design: VirtualCamera,
+    rest_mm: Array,
+    points_mm: Array,
+    residuals: ResidualField,
 ) -> BuiltDeviation:
-    """Derive the numbers from a fit.
+    """Derive the numbers from a fit, which may have started from a measured lens.
 
     `rest_mm` (n, 2) are the positions of the dots as seen, `points_mm` (n, 3) those in the print.
     """
-    design, built = fit.design, fit.camera
+    built = fit.camera
     was, now = (np.sqrt(np.abs(np.linalg.det(c.jacobian(points_mm)))) for c in (design, built))
     position_sigma, apparent_sigma = _uncertainty(fit, points_mm)
     seen = built.project(np.column_stack([rest_mm, points_mm[:, 2]]))
     moved = seen - design.project(points_mm)
     return BuiltDeviation(
-        values=fit.values,
+        values=np.append(fit.values[:6], _lens_deviation(design, built)),
         sigma=fit.sigma,
-        tolerance=fit.tolerance,
+        tolerance=fit.tolerance if design is fit.design else CameraTolerance().sigma(design),
         weak=tuple(fit.weak_directions),
         rotation_deg=float(np.linalg.norm(fit.values[:3])),
         shift_mm=float(np.linalg.norm(fit.values[3:6])),
         scale_percent=float(100 * (np.mean(now) / np.mean(was) - 1)),
-        distortion_px=_distortion_px(fit, points_mm),
+        distortion_px=_distortion_px(design, built, points_mm),
         moved_px=float(np.median(np.hypot(*moved.T))),
         map_sigma_mm=position_sigma,
         lean_sigma_mm_per_mm=apparent_sigma,
@@ -115,9 +119,22 @@ def _spread(slopes: Array, covariance: Array) -> float:
     return float(np.sqrt(np.einsum("ki,ij,kj->k", flat, covariance, flat).mean()))
 
 
-def _distortion_px(fit: CameraFit, flat: Array) -> float:
+def _lens_deviation(design: VirtualCamera, built: VirtualCamera) -> Array:
+    """(7,) deviations of focal length, distortion and principal point, see `PARAMETERS`.
+
+    Coefficients of two models of distortion cannot be compared: those of the built lens are
+    returned then.
+    """
+    was, now = (c.lens or LensDistortion() for c in (design, built))
+    was = was if was.fisheye == now.fisheye else LensDistortion()
+    coefficients = [getattr(now, k) - getattr(was, k) for k in ("k1", "k2", "p1", "p2")]
+    moved = np.subtract(built.principal_offset_px, design.principal_offset_px)
+    return np.array([100 * (built.focal_px / design.focal_px - 1), *coefficients, *moved])
+
+
+def _distortion_px(design: VirtualCamera, built: VirtualCamera, flat: Array) -> float:
     """Largest shift of a dot if the built lens replaces the designed one."""
-    straight = dataclasses.replace(fit.camera, lens=None)
+    straight = dataclasses.replace(built, lens=None)
     rays = (straight.project(flat) - straight.principal_px) / straight.focal_px
-    was, now = ((c.lens or LensDistortion()).distort(rays) for c in (fit.design, fit.camera))
-    return float(fit.camera.focal_px * np.hypot(*(now - was).T).max())
+    was, now = ((c.lens or LensDistortion()).distort(rays) for c in (design, built))
+    return float(built.focal_px * np.hypot(*(now - was).T).max())

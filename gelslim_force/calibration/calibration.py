@@ -12,7 +12,9 @@ from gelslim_force.calibration.built_deviation import built_deviation
 from gelslim_force.calibration.camera_deviation import CameraTolerance
 from gelslim_force.calibration.design import bundle_camera, bundle_grid, marker_heights_mm
 from gelslim_force.calibration.error import CalibrationError
+from gelslim_force.calibration.fine_dots import fine_centres_px
 from gelslim_force.calibration.fit import CameraFit, fit_camera
+from gelslim_force.calibration.intrinsics import Intrinsics
 from gelslim_force.calibration.report import diagnosis_lines, warning_lines
 from gelslim_force.calibration.residual_bump import ResidualField, split_residuals
 from gelslim_force.calibration.sensor_calibration import Calibration
@@ -41,6 +43,7 @@ def calibrate(
     *,
     tolerance: CameraTolerance | None = None,
     allow_contact: bool = False,
+    intrinsics: Intrinsics | None = None,
 ) -> Calibration:
     """Find the built camera and the position of every marker on the gel.
 
@@ -48,9 +51,11 @@ def calibrate(
         bundle: The sensor's design, with markers and camera.
         image: (h, w) or (h, w, 3) uint8, without contact; of a camera in portrait also on its
             side, as the camera gives it.
-        tolerance: Standard deviations of the built camera about its design.
+        tolerance: Standard deviations of the built camera about its design; by default those of
+            `intrinsics`, or of a lens known by its data sheet.
         allow_contact: Accept a region in which neighbouring dots are displaced together, for
             prints that are warped there.
+        intrinsics: The lens as measured with this camera.
 
     Returns:
         The built camera, and every marker's position at rest.
@@ -58,10 +63,13 @@ def calibrate(
     Raises:
         CalibrationError: The picture does not show this sensor at rest: another size, too few
             dots, another print, a turned or mirrored picture, contact, or a camera far out of
-            tolerance.
+            tolerance. Or the intrinsics are not of this sensor's camera.
         IfemError: The bundle has no markers or no camera.
     """
     grid, design = bundle_grid(bundle), bundle_camera(bundle)
+    expected_camera = design if intrinsics is None else intrinsics.camera(design)
+    if tolerance is None and intrinsics is not None:
+        tolerance = intrinsics.tolerance
     image = upright(image, design)
     checks.require_size(image, design)
     settings = expected_dots(design, grid)
@@ -78,7 +86,15 @@ def calibrate(
     checks.require_print(registration, dots, expected)
     checks.require_anchors(chosen, design, grid, found)
     try:
-        fit, rest, residuals = _fitted(design, flat, diameter, chosen, tolerance, grid.pitch_mm)
+        fit, rest, residuals = _fitted(
+            expected_camera,
+            flat,
+            diameter,
+            fine_centres_px(image, chosen, settings),
+            chosen.trustworthy,
+            tolerance,
+            grid.pitch_mm,
+        )
     except ValueError as error:
         raise CalibrationError(
             "fit",
@@ -88,7 +104,7 @@ def calibrate(
     checks.require_fit(fit, grid.pitch_mm, registration.pitch_px)
     if not allow_contact:
         checks.require_no_contact(residuals)
-    deviation = built_deviation(fit, rest, flat, residuals)
+    deviation = built_deviation(fit, design, rest, flat, residuals)
     in_view = checks.markers_in_view(fit.camera, grid)
     missing = np.setdiff1d(np.flatnonzero(in_view), found)
     aside = found[~fit.used]
@@ -118,21 +134,22 @@ def _fitted(
     design: VirtualCamera,
     points_mm: Array,
     diameter_mm: Array,
-    dots: Detections,
+    centres_px: Array,
+    clean: NDArray[np.bool_],
     tolerance: CameraTolerance | None,
     pitch_mm: float,
 ) -> tuple[CameraFit, Array, ResidualField]:
     """The fit, the positions (n, 2) on the gel and their residuals.
 
-    `points_mm` (n, 3) is the print on the gel at rest. Where the first fit finds a contact, the
-    second one leaves out the dots near it, so that the contact does not distort the camera.
+    `points_mm` (n, 3) is the print on the gel at rest, `clean` (n,) are the dots to fit by. Where
+    the first fit finds a contact, the second one leaves out the dots near it, so that the contact
+    does not distort the camera.
     """
     points, heights = points_mm[:, :2], points_mm[:, 2]
-    clean = dots.trustworthy
     used = clean
     for last in (False, True):
-        fit = fit_camera(design, points, diameter_mm, dots.centres_px, tolerance, used, heights)
-        slopes = fit.camera.pixel_slopes(dots.centres_px - fit.offset_px)
+        fit = fit_camera(design, points, diameter_mm, centres_px, tolerance, used, heights)
+        slopes = fit.camera.pixel_slopes(centres_px - fit.offset_px)
         rest = fit.camera.points_along(slopes, heights)[:, :2]
         residuals = split_residuals(points[clean], (rest - points)[clean], pitch_mm)
         bump = checks.contact_of(residuals)

@@ -76,6 +76,7 @@ def test_a_barrel_reaches_out_in_the_middle_and_a_pincushion_at_the_corners() ->
         assert abs(far[0] - far[2]) > 2
 
 
+@pytest.mark.slow
 def test_a_lens_that_distorts_too_much_by_a_percent_is_refused() -> None:
     """With pixels and thickness given, a barrel of 1 % leaves the gel no room in the picture.
 
@@ -121,6 +122,7 @@ def lens_is_found(lens: str, name: str, folder: Path, samples: int) -> None:
     assert seen_by_calibration(bundle, traced, samples).distortion_px < 0.3
 
 
+@pytest.mark.slow
 def test_a_picture_through_a_distorting_lens_calibrates(tmp_path: Path) -> None:
     lens_is_found("barrel", "mini20", tmp_path, 24)
 

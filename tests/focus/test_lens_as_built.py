@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from chessboard import measured_lens
 from numpy.typing import NDArray
 from scipy.optimize import root
 from thin_lens import ThinLens
@@ -16,12 +18,14 @@ from gelslim_cad.spec.reader import read_spec
 from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.camera_deviation import PARAMETERS
-from gelslim_force.calibration.design import bundle_grid
+from gelslim_force.calibration.design import bundle_camera, bundle_grid
+from gelslim_force.calibration.intrinsics import read_intrinsics
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.settings import PipelineSettings
 from ifem_export.bundle.bundle import Bundle
 
 DESIGNS = Path(__file__).parents[2] / "designs"
+FOCAL = PARAMETERS.index("focal_percent")
 NAMES = sorted(path.stem for path in DESIGNS.glob("*.yaml"))
 
 
@@ -29,10 +33,14 @@ def design(name: str) -> Dimensions:
     return derive(read_spec(DESIGNS / f"{name}.yaml").spec)
 
 
-def calibrated(bundle: Bundle, lens: ThinLens, samples: int) -> Calibration:
+def at_rest(bundle: Bundle, lens: ThinLens, samples: int) -> NDArray[np.uint8]:
     grid = bundle_grid(bundle)
     bright = lens.picture(grid.positions_mm[:, :2], grid.diameter_mm, samples)
-    return calibrate(bundle, np.round(60 + 150 * bright).astype(np.uint8))
+    return np.round(60 + 150 * bright).astype(np.uint8)
+
+
+def calibrated(bundle: Bundle, lens: ThinLens, samples: int) -> Calibration:
+    return calibrate(bundle, at_rest(bundle, lens, samples))
 
 
 def bundle_of(name: str) -> Bundle:
@@ -43,14 +51,26 @@ def seen_by_calibration(bundle: Bundle, lens: ThinLens, samples: int) -> BuiltDe
     """The scale of the picture is the design's, and so is the focal length as far as it is known.
 
     From one picture the focal length is known to between 0.1 and 1 %, because the distance of the
-    camera has nearly the same effect. The scale, which both set, is known ten times better.
+    camera has nearly the same effect. The scale, which both set, is known ten times better. With
+    the lens as OpenCV measures it on a chessboard both are known.
     """
-    found = calibrated(bundle, lens, samples)
+    picture = at_rest(bundle, lens, samples)
+    found = calibrate(bundle, picture)
     assert len(found.missing) == 0
     assert found.deviation is not None
-    focal = PARAMETERS.index("focal_percent")
     assert abs(found.deviation.scale_percent) < 0.2
-    assert abs(found.deviation.values[focal]) < max(0.3, 3 * found.deviation.sigma[focal])
+    assert abs(found.deviation.values[FOCAL]) < max(0.3, 3 * found.deviation.sigma[FOCAL])
+
+    pytest.importorskip("cv2")
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "lens.yaml"
+        focal_px = measured_lens(lens, file, seed=len(found))
+        sharper = calibrate(bundle, picture, intrinsics=read_intrinsics(file)).deviation
+    assert focal_px == pytest.approx(bundle_camera(bundle).focal_px, rel=1e-3)
+    assert sharper is not None
+    assert abs(sharper.scale_percent) < 0.2
+    assert sharper.sigma[FOCAL] < 0.2
+    assert abs(sharper.values[FOCAL]) < 0.3
     return found.deviation
 
 
@@ -92,8 +112,10 @@ def is_blurred_as_the_rule_says(d: Dimensions) -> None:
         for end in (-x, x)
     )
     assert max(near, far) == pytest.approx(d["view.image_blur_px"], rel=0.05)
-    # At best focus the nearest and the farthest image are blurred alike.
-    assert near == pytest.approx(far, rel=0.05)
+    # At best focus the nearest and the farthest image are blurred alike. The farthest is that of
+    # the far edge; a camera that is hardly tilted has the nearest there as well.
+    if d["view.near_tangential_mm"] < d["view.far_tangential_mm"]:
+        assert near == pytest.approx(far, rel=0.05)
 
 
 def blur_px(lens: ThinLens, point_mm: tuple[float, float]) -> float:
@@ -159,6 +181,7 @@ def motion_is_measured(name: str, samples: int) -> None:
     assert np.abs(off_mm).max() < 0.05 * 0.2
 
 
+@pytest.mark.slow
 def test_a_finger_built_to_the_letter_measures() -> None:
     motion_is_measured("mini20", samples=24)
 

@@ -1,6 +1,6 @@
 """Fifty random legal fingers, built as their guides say, through an independent thin lens.
 
-Their gels are flat, as the traced lens takes them to be.
+Their gels are flat, as the traced lens takes them to be, and have markers.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ def legal(seed: int, count: int) -> list[tuple[Sample, Dimensions]]:
     found: list[tuple[Sample, Dimensions]] = []
     for index in range(1000):
         drawn = sample(seed, index)
-        flat = drawn.spec.design.gel.crown_height_mm == 0
-        if not (flat and drawn.kind == "plausible" and drawn.spec.camera.focusing == "unit"):
+        design = drawn.spec.design
+        seen = design.gel.crown_height_mm == 0 and design.markers.pattern != "none"
+        if not (seen and drawn.kind == "plausible" and drawn.spec.camera.focusing == "unit"):
             continue
         d = derive(drawn.spec)
         if all(c.status not in REFUSED.get(c.id, ("fail",)) for c in check(d)):

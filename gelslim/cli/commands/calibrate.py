@@ -29,6 +29,14 @@ def calibrate(
         Path | None,
         typer.Option("-o", "--out", help="Calibration file to write; by default none is written."),
     ] = None,
+    intrinsics: Annotated[
+        Path | None,
+        typer.Option(
+            "--intrinsics",
+            help="Lens as measured with a chessboard: YAML file of ROS (camera_calibration) or "
+            "OpenCV.",
+        ),
+    ] = None,
     allow_contact: Annotated[
         bool,
         typer.Option(
@@ -43,18 +51,25 @@ def calibrate(
     From one picture without contact and the known print it finds pose, focal length and distortion
     of the camera and the position of every marker, and prints how far the sensor is from its
     design. With -o it writes the calibration. It refuses pictures of another sensor, rotated
-    pictures, and pictures with contact (exit status 2).
+    pictures, and pictures with contact (exit status 2). The focal length alone is known to about
+    1 % from one picture, to 0.2 % with measured intrinsics.
     """
     from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate as calibrated
     from gelslim_force.calibration.file import calibration_record
+    from gelslim_force.calibration.intrinsics import read_intrinsics
     from gelslim_force.calibration.reference_picture import read_reference
     from ifem_export.bundle.files import load_bundle
 
     if out is not None:
         require_own_file(out, b"gelslim-calibration/", "calibration")
     sensor = load_bundle(bundle)
-    found = calibrated(sensor, read_reference(reference), allow_contact=allow_contact)
+    found = calibrated(
+        sensor,
+        read_reference(reference),
+        allow_contact=allow_contact,
+        intrinsics=None if intrinsics is None else read_intrinsics(intrinsics),
+    )
     record = calibration_record(found)
     if out is not None:
         replace_file(out, json_bytes(record))

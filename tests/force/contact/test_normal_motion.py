@@ -64,6 +64,7 @@ def disc(x=0.0, y=0.0, a=2.0, sigma=0.0):
     return ContactPatch("disc", np.array([x, y]), a, covariance=np.eye(4) * sigma**2)
 
 
+@pytest.mark.slow
 def test_truth_is_hertz_on_a_thick_layer():
     nu = 0.4
     truth = layer_contact(lambda r: r * r / 20, 1.0, 25.0, E_MPA, nu)

@@ -147,6 +147,7 @@ def test_bytes_of_the_messages(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_killed_recording_can_be_recovered(tmp_path: Path) -> None:
     """Whole chunks of the file are read as a stream; the tail in memory is lost."""
     path = tmp_path / "killed.mcap"
