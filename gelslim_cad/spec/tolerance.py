@@ -11,7 +11,7 @@ from gelslim_core.yaml.base import Block
 
 
 class Tolerance(Block):
-    """Errors of making a finger, besides those of design, manufacturing and material; 0 = none."""
+    """Errors of making a finger that have no field elsewhere; 0 switches one off."""
 
     print_flatness_mm: float | None = Field(
         default=None,
@@ -37,6 +37,12 @@ class Tolerance(Block):
     )
     acrylic_measured_mm: float = between(
         0, 1, "Half width (uniform) of a thickness that was measured", default=0.05
+    )
+    shim_mm: float = between(
+        0,
+        1,
+        "Half width (uniform) of the free thickness of the shims (ISO 3302-1, class M2: 0.15 mm)",
+        default=0.15,
     )
     gel_place_mm: float = between(
         0, 3, "Half width (uniform) of the gel's place on the finger, each axis", default=0.2

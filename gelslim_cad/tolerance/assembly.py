@@ -7,7 +7,15 @@ from typing import Literal
 import numpy as np
 
 from gelslim_cad.geometry.lookup import Lookup
-from gelslim_cad.tolerance.built import Array, Built, Errors, Setting, as_dropped_in, built, rocking
+from gelslim_cad.tolerance.built import (
+    Array,
+    Built,
+    Errors,
+    Setting,
+    as_dropped_in,
+    built,
+    reach_deg,
+)
 from gelslim_cad.tolerance.causes import no_errors
 from gelslim_cad.tolerance.picture import Rays, image_distances_mm, on_sensor, rays
 
@@ -42,7 +50,7 @@ def assembled(d: Lookup, e: Errors, stage: Stage) -> Built:
     if stage == "as_built":
         return finger
     aim, turn = frame_mm(d), _degrees_per_offset(d)
-    largest = np.array([c.spread for c in rocking(d).values()])
+    largest = reach_deg(d)
     wanted = d["view.pixel_pitch_mm"] * np.stack(
         [e["align_u_px"], e["align_v_px"], e["align_roll_px"]], axis=1
     )

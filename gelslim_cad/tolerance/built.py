@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.optics import lens_distortion
-from gelslim_cad.tolerance.causes import Cause, causes
+from gelslim_cad.tolerance.causes import Cause, causes, seated
 from gelslim_optics.camera.lens_distortion import LensDistortion
 
 Array = NDArray[np.float64]
@@ -88,7 +88,12 @@ def as_dropped_in(d: Lookup, e: Errors) -> Setting:
 
 
 def play_left(d: Lookup, e: Errors) -> Array:
-    """Part (n,) of the clamp's gap that the tilt of the camera leaves for its shift."""
+    """Part (n,) of a loose clamp's gap that the tilt of the camera leaves for its shift.
+
+    Printed points shift the camera by what they err, however it is tilted.
+    """
+    if seated(d):
+        return np.ones_like(e[ROCKS[0]])
     used = [np.abs(e[c.name]) / max(c.spread, 1e-12) for c in rocking(d).values()]
     return 1 - np.clip(np.maximum.reduce(used), 0, 1)
 
@@ -96,6 +101,16 @@ def play_left(d: Lookup, e: Errors) -> Array:
 def rocking(d: Lookup) -> dict[str, Cause]:
     """The three tilts of the camera in its clamp by name; their spreads are the largest tilts."""
     return {c.name: c for c in causes(d) if c.name in ROCKS}
+
+
+def reach_deg(d: Lookup) -> Array:
+    """How far (3,) a person can turn the camera in its clamp: pitch, yaw and roll.
+
+    The play on both sides of the module allows it; in a seat of points foils under them do it.
+    """
+    sides = (d["camera.module_height_mm"], d["camera.module_width_mm"])
+    pitch, yaw = (np.degrees(2 * d["clamp.play_mm"] / side) for side in sides)
+    return np.array([pitch, yaw, pitch])
 
 
 def built(d: Lookup, e: Errors, setting: Setting) -> Built:

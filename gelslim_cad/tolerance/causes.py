@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 
 Array = NDArray[np.float64]
 Distribution = Literal["uniform", "triangular", "normal"]
-FLATNESS_MM = {"sla": 0.05, "fdm": 0.1, "sls": 0.1}
-"""Accuracy of a short printed face by process."""
 LEAST_U = 1e-12
 DEVIATION = {"uniform": 1 / np.sqrt(3), "triangular": 1 / np.sqrt(6), "normal": 1.0}
 """Standard deviation of each distribution over its spread."""
@@ -71,8 +70,10 @@ class Group:
 
 GROUPS: Mapping[str, Group] = {
     "camera in its clamp": Group(
-        "design.housing.camera_play_mm",
-        "the gap p of the clamp: a module of height h rocks by 2p/h and shifts by what is left",
+        "design.housing.camera_seat",
+        "preloaded: points whose printed heights err alone by e tilt the camera by 2e over their "
+        "distance; loose: in the gap p a module of height h rocks by 2p/h and shifts by what is "
+        "left",
     ),
     "printed seats": Group(
         "manufacturing.print_tolerance_mm",
@@ -125,21 +126,21 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
     Returns:
         The causes, in a fixed order.
     """
-    play, width = d["clamp.play_mm"], d["camera.module_width_mm"]
-    height, glass = d["camera.module_height_mm"], d["mirror.length_mm"]
-    printed = d["manufacturing.print_tolerance_mm"]
+    width, height = d["camera.module_width_mm"], d["camera.module_height_mm"]
+    glass, printed = d["mirror.length_mm"], d["manufacturing.print_tolerance_mm"]
     flat = flatness_mm(d)
-    rock, turn = (np.degrees(2 * play / side) for side in (height, width))
+    rests: Distribution = "triangular" if seated(d) else "uniform"
+    gap = flat if seated(d) else d["clamp.play_mm"]
     seat, seat_turn = (np.degrees(2 * flat / side) for side in (height, width))
     tilts = [np.degrees(2 * flat / side) for side in (glass, d["mirror.width_mm"])]
     table: dict[str, list[tuple[str, str, Distribution, float]]] = {
         "camera in its clamp": [
-            ("rock_pitch_deg", "pitch", "uniform", rock),
-            ("rock_yaw_deg", "yaw", "uniform", turn),
-            ("rock_roll_deg", "roll", "uniform", rock),
-            ("play_forward_mm", "along its axis", "uniform", play),
-            ("play_right_mm", "across", "uniform", play),
-            ("play_down_mm", "up and down", "uniform", play),
+            ("rock_pitch_deg", "pitch", rests, d["clamp.pitch_tilt_deg"]),
+            ("rock_yaw_deg", "yaw", rests, d["clamp.yaw_tilt_deg"]),
+            ("rock_roll_deg", "roll", rests, d["clamp.roll_tilt_deg"]),
+            ("play_forward_mm", "along its axis", "uniform", gap),
+            ("play_right_mm", "across", "uniform", gap),
+            ("play_down_mm", "up and down", "uniform", gap),
         ],
         "printed seats": [
             ("seat_pitch_deg", "pitch of the clamp", "triangular", seat),
@@ -193,8 +194,10 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
         ],
         "LEDs": [
             ("led_mm", "place", "uniform", d["design.leds.placement_tolerance_mm"]),
-            ("red_percent", "red flux", "uniform", d["tolerance.led_flux_percent"]),
-            ("green_percent", "green flux", "uniform", d["tolerance.led_flux_percent"]),
+            *(
+                (f"{side}_flux_percent", f"{name} flux", "uniform", d["tolerance.led_flux_percent"])
+                for side, name in zip(("left", "right"), strip_wavelengths_nm(d), strict=True)
+            ),
         ],
         "gel batch": [
             (
@@ -220,10 +223,14 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
     )
 
 
+def seated(d: Lookup) -> bool:
+    """Whether springs press the camera against printed points."""
+    return bool(d["clamp.preloaded"] > 0)
+
+
 def flatness_mm(d: Lookup) -> float:
     """Error of a printed seat at each of its ends."""
-    given = d["tolerance.print_flatness_mm"]
-    return FLATNESS_MM[d["manufacturing.print_process"]] if given is None else float(given)
+    return float(d["clamp.point_error_mm"])
 
 
 def acrylic_mm(d: Lookup) -> float:

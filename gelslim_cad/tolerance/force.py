@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.gel_shape import has_markers
 from gelslim_cad.tolerance.assembly import Stage, assembled
 from gelslim_cad.tolerance.built import LEAST_LAYER, Errors
 from gelslim_cad.tolerance.causes import no_errors
@@ -147,8 +148,10 @@ def force_errors(d: Dimensions, e: Errors, stage: Stage) -> tuple[ForceError, ..
         stage: How the fingers are assembled.
 
     Returns:
-        Normal and shear force, first without, then with calibration.
+        Normal and shear force, first without, then with calibration; nothing without markers.
     """
+    if not has_markers(d):
+        return ()
     powers = exponents(d)
     picture = picture_scale_log(d, e, stage)
     found = []

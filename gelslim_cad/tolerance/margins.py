@@ -11,6 +11,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from gelslim_cad.checks.optics import led_hidden
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.gel_shape import has_markers
+from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.sensor import marker_grid
 from gelslim_cad.tolerance.assembly import Stage, assembled, border_points
 from gelslim_cad.tolerance.built import Built, Errors
@@ -62,12 +64,12 @@ RULES: Mapping[str, Kept] = {
     ),
     "blur": Kept(
         "Blur on the gel",
-        "marker diameters",
+        "diameters of a marker or detail",
         "tolerance.largest_blur_per_diameter",
         "a smaller design.optics.blur_per_diameter, or larger markers",
     ),
     "marker.px": Kept(
-        "Pixels across a marker",
+        "Pixels across a marker or detail",
         "px",
         "tolerance.least_picture_ratio",
         "a larger design.optics.min_px_per_marker",
@@ -97,13 +99,13 @@ RULES: Mapping[str, Kept] = {
         "Calibration accepts the camera",
         "tolerances",
         "tolerances of gelslim calibrate",
-        "a smaller design.housing.camera_play_mm",
+        "a preloaded design.housing.camera_seat, or a smaller camera_play_mm in a loose one",
     ),
 }
 """The rules in the order in which they are listed; a place of one is `rule@place`."""
 ASSEMBLY: Mapping[Stage, str] = {
-    "as_built": "The camera is glued as it falls into its clamp; the lens is set with the jig.",
-    "adjusted": "The camera is turned within its play until the gel lies upright in its frame in "
+    "as_built": "The camera stays as it comes into its clamp; the lens is set with the jig.",
+    "adjusted": "The camera is turned in its clamp until the gel lies upright in its frame in "
     "the live picture, and the lens until near and far edge are equally sharp; then it is glued.",
 }
 """What a person does, by way of assembling."""
@@ -184,6 +186,8 @@ def _markers(d: Dimensions, e: Errors, finger: Built) -> dict[str, Array]:
 
 def _outermost(d: Dimensions) -> tuple[Array, Array] | None:
     """Centres (k, 2) of markers on the lattice's hull, and steps (k, 2) to their outer points."""
+    if not has_markers(d):
+        return None
     try:
         centres = marker_grid(d).positions_mm[:, :2]
         hull = centres[ConvexHull(centres).vertices]
@@ -250,9 +254,9 @@ def _light(d: Dimensions, e: Errors) -> dict[str, Array]:
         still + d["design.light_guide.thickness_mm"], still
     )
     return {
-        f"light@{colour}": share * (1 + e[f"{colour}_percent"] / 100)
+        f"light@{name}": share * (1 + e[f"{side}_flux_percent"] / 100)
         - d["tolerance.least_light_ratio"]
-        for colour in ("red", "green")
+        for name, side in zip(strip_wavelengths_nm(d), ("left", "right"), strict=True)
     }
 
 

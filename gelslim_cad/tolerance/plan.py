@@ -153,8 +153,11 @@ def _changes(spec: Spec) -> Iterator[tuple[str, Change]]:
         yield "Adjust camera and lens by the live picture", {"tolerance.adjusted": True}
     if tolerance.acrylic != "measured":
         yield "Measure the acrylic, and give its thickness", {"tolerance.acrylic": "measured"}
-    play = spec.design.housing.camera_play_mm
-    if (spec.design.housing.fit_clearance_mm if play is None else play) > SHIMMED_MM:
+    loose, play = spec.design.housing.camera_seat == "loose", spec.design.housing.camera_play_mm
+    if loose:
+        words = "Press the camera against points by springs"
+        yield words, {"design.housing.camera_seat": "preloaded"}
+    if loose and (spec.design.housing.fit_clearance_mm if play is None else play) > SHIMMED_MM:
         path = "design.housing.camera_play_mm"
         yield f"Shim the camera to {SHIMMED_MM:g} mm of play", {path: SHIMMED_MM}
     margin = round(min(optics.image_margin + MARGIN_STEP, LARGEST_MARGIN), 4)

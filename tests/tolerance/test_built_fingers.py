@@ -17,6 +17,9 @@ from gelslim_cad.tolerance.built import as_dropped_in, built, play_left
 from gelslim_cad.tolerance.causes import causes, no_errors
 from gelslim_cad.tolerance.margins import margins
 from gelslim_cad.tolerance.picture import image_distances_mm, on_sensor, rays
+from gelslim_cad.tolerance.yields import ALL, yield_of
+
+NO_PLAY = {"design.housing.camera_play_mm": 0.0, "design.housing.camera_seat": "loose"}
 
 
 @pytest.mark.parametrize("k1", [-0.12, 0.12])
@@ -171,9 +174,11 @@ def test_pictures_of_random_fingers_are_those_of_a_traced_lens(name: str) -> Non
             assert found[f"mirror.covers@{place}"][k] == pytest.approx(left_over, abs=1e-6)
 
 
-def test_an_adjusted_camera_sees_the_gel_in_its_frame() -> None:
+@pytest.mark.parametrize("seat", ["preloaded", "loose"])
+def test_an_adjusted_camera_sees_the_gel_in_its_frame(seat: str) -> None:
     """Tilts and shifts that the play reaches are gone; what it does not reach stays."""
     few = {"tolerance.alignment_px": 0.0, "tolerance.print_flatness_mm": 0.01}
+    few["design.housing.camera_seat"] = seat
     d = derive(spec("gelslim2", **few))
     e = drawn({c.name: (c.distribution, c.spread) for c in causes(d)}, 200, seed=4)
     finger = assembled(d, e, "adjusted")
@@ -185,8 +190,9 @@ def test_an_adjusted_camera_sees_the_gel_in_its_frame() -> None:
     assert reached.mean() > 0.95
     level = (v[:, 5] - v[:, 4]) / pixel
     assert np.mean(np.abs(level) < 0.5) > 0.95
-    stuck = derive(spec("gelslim2", **few, **{"design.housing.camera_play_mm": 0.0}))
+    stuck = derive(spec("gelslim2", **few | NO_PLAY))
     e = {**e, **{c.name: np.zeros(200) for c in causes(stuck) if c.spread == 0}}
+    assert stuck["clamp.tilt_deg"] == 0
     as_built, adjusted = (assembled(stuck, e, s) for s in ("as_built", "adjusted"))
     assert adjusted.axes == pytest.approx(as_built.axes)
 
@@ -208,7 +214,7 @@ def test_an_led_beside_a_thin_leg_loses_its_light() -> None:
     d = derive(exact("gelslim2"))
     e = {**no_errors(d, 3), "led_mm": np.array([0.0, 0.5, 0.0])}
     e["acrylic_mm"] = np.array([0.0, 0.0, -1.0])
-    e["red_percent"] = np.array([-10.0, 0.0, 0.0])
+    e["left_flux_percent"] = np.array([-10.0, 0.0, 0.0])
     found = margins(d, e, "as_built")
     assert found["light@red"] + 0.7 == pytest.approx([0.9, 1.75 / 2, 1.5 / 2])
     assert found["light@green"] + 0.7 == pytest.approx([1.0, 1.75 / 2, 1.5 / 2])
@@ -228,3 +234,32 @@ def test_calibration_adds_a_tilt_and_an_offset_of_the_lens() -> None:
     # Together they cancel; what stays is how far the camera's turn has moved its pupil.
     behind = d["camera_pose.face_mm"] + d["camera.module_depth_mm"] / 2
     assert found[2] == pytest.approx(5 - behind * np.sin(np.radians(2.0)) / 0.4, abs=5e-3)
+
+
+def test_points_that_err_alone_tilt_the_camera_as_the_cause_says() -> None:
+    """A plane through three points of random heights, against the tilts that are drawn."""
+    d = derive(spec("gelslim2"))
+    assert d["clamp.preloaded"] == 1
+    rng = np.random.default_rng(8)
+    e, count = d["clamp.point_error_mm"], 200_000
+    height, radius, play = d["camera.module_height_mm"], d["camera.lens_diameter_mm"] / 2, 0.2
+    low, high = -height / 2 + 0.5, radius - 0.5
+    across = (radius + play + d["camera.module_width_mm"] / 2) / 2
+    points = np.array([[-across, low], [-across, high], [across, (low + high) / 2]])
+    design = np.column_stack([points, np.ones(3)])
+    slopes = np.linalg.solve(design, rng.uniform(-e, e, (3, count)))
+    found = {c.name: c for c in causes(d)}
+    pitch, yaw = np.degrees(np.arctan(slopes[1])), np.degrees(np.arctan(slopes[0]))
+    assert np.std(pitch) == pytest.approx(found["rock_pitch_deg"].deviation, rel=0.01)
+    assert np.abs(pitch).max() == pytest.approx(found["rock_pitch_deg"].spread, rel=0.01)
+    # The third point errs against the mean of two, so that the yaw is less than is drawn.
+    assert np.abs(yaw).max() <= found["rock_yaw_deg"].spread
+    assert np.std(yaw) == pytest.approx(found["rock_yaw_deg"].deviation * np.sqrt(0.75), rel=0.01)
+
+
+def test_a_seat_keeps_more_fingers_than_a_loose_clamp() -> None:
+    shares = {
+        seat: yield_of(derive(spec("gelslim2", design__housing__camera_seat=seat)), 1024, 5)[ALL]
+        for seat in ("loose", "preloaded")
+    }
+    assert shares["preloaded"].share > 2 * shares["loose"].share

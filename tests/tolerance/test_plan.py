@@ -41,6 +41,7 @@ def test_every_design_reaches_95_per_cent_by_usual_changes(name: str) -> None:
     assert after["finger.thickness_mm"] - found.steps[0].thickness_mm < 0.5
 
 
+@pytest.mark.slow
 def test_the_least_margin_is_enough_and_less_is_not() -> None:
     start = exact("gelslim2", tolerance__lens_centring_mm=0.03)
     margin = least_margin(start, 0.95, 1024, 0, rules=COVERAGE)
