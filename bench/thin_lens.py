@@ -97,6 +97,19 @@ class ThinLens:
         end = start + ray * ((height_mm - start[:, 2]) / ray[:, 2])[:, None]
         return np.asarray(end[:, :2])
 
+    def image_of(self, points_mm: ArrayLike) -> Array:
+        """Pixels (n, 2) of points (n, 3) in the air before the bare camera: right, down, forward.
+
+        Rays through the middle of the lens are straight.
+        """
+        x, y, z = np.asarray(points_mm, float).T
+        perfect = np.column_stack([x / z, y / z])
+        radius = np.maximum(np.hypot(*perfect.T), 1e-12)
+        drawn = radius if self.radii is IDEAL else np.interp(radius, *self.radii[::-1])
+        middle = (np.asarray(self.size_px) - 1) / 2
+        at_mm = perfect * (drawn / radius)[:, None] * self.sensor_mm
+        return np.asarray(middle + at_mm / self.pitch_mm)
+
     def leaving(self, uv: Array, pupil: Array) -> tuple[Array, Array]:
         """Points (n, 3) of the lens and unit rays (n, 3) that leave it towards the mirror."""
         middle = (np.asarray(self.size_px) - 1) / 2

@@ -57,7 +57,7 @@ def pair_ms(bench: KeptBench, name: str, rounds: int, row: dict[str, Any]) -> tu
     if name in ("refraction", "lens_distortion"):
         calls = [partial(v.markers_px, state) for v in viewers]
     else:
-        calls = [partial(v.frame, state, before, 1) for v in viewers]
+        calls = [partial(v.frame, state, before, 1, bench.step_s) for v in viewers]
     on, off = turns_ms(calls, rounds)
     return on, off
 
