@@ -20,7 +20,7 @@ from gelslim_cad.dimensions.registry import unit_of
 from gelslim_cad.export.brep import shape_digest
 from gelslim_cad.geometry.optics import camera_record
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.sensor import marker_grid, pad_mesh
+from gelslim_cad.sensor import pad_mesh, printed_grid
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import LoadedSpec
 from ifem_export.errors import IfemError
@@ -160,7 +160,9 @@ def _blocks(d: Dimensions) -> dict[str, tuple[str, tuple[Any, ...]]]:
 def _pad(d: Dimensions) -> dict[str, tuple[str, tuple[Any, ...]]]:
     # A design that breaks a rule may have no lattice or no mesh; that is a difference too.
     try:
-        grid = marker_grid(d)
+        grid = printed_grid(d)
+        if grid is None:
+            return {"mesh": ("none", ()), "markers": ("none", ())}
         markers = (f"{len(grid)} markers", (grid.positions_mm, grid.diameter_mm, list(grid.kind)))
         mesh, _ = pad_mesh(d, grid)
     except IfemError as error:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 from functools import partial
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.geometry.led_strips import camera_responses
 from gelslim_cad.geometry.optics import camera_record, guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.spec import Spec
+from gelslim_core.errors import GelslimError
 from gelslim_optics.light.light_map import LightMap, light_arrays
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material
@@ -47,6 +48,30 @@ def pad_outline(d: Dimensions) -> RoundedRectangle:
     )
 
 
+class NoMarkersError(GelslimError):
+    """Something needs markers, and the spec has none."""
+
+    kind = "no markers"
+    field = "design.markers.pattern"
+    remedy = "set design.markers.pattern: grid"
+
+    def __init__(self) -> None:
+        super().__init__(
+            f"{self.field} = none: a gel without markers has no marker files, no bundle and no "
+            "forces, which are found from the motion of the printed dots; "
+            f"{self.remedy} for them"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the error as data: kind, message, field, value and remedy."""
+        return {**super().to_dict(), "field": self.field, "value": "none", "remedy": self.remedy}
+
+
+def printed_grid(d: Dimensions) -> MarkerGrid | None:
+    """The printed lattice of markers; None for a gel without."""
+    return marker_grid(d) if has_markers(d) else None
+
+
 def marker_grid(d: Dimensions) -> MarkerGrid:
     """Make the printed lattice of markers.
 
@@ -55,7 +80,12 @@ def marker_grid(d: Dimensions) -> MarkerGrid:
 
     Returns:
         The markers, without those that would cross the gel's outline.
+
+    Raises:
+        NoMarkersError: The gel has no markers.
     """
+    if not has_markers(d):
+        raise NoMarkersError
     grid = build_marker_grid(
         round(d["marker_grid.rows"]),
         round(d["marker_grid.columns"]),

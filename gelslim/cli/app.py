@@ -21,6 +21,7 @@ from gelslim.cli.commands.explain import explain
 from gelslim.cli.commands.explore import explore
 from gelslim.cli.commands.family import family
 from gelslim.cli.commands.force import force
+from gelslim.cli.commands.grippers import grippers
 from gelslim.cli.commands.light import light
 from gelslim.cli.commands.markers import markers
 from gelslim.cli.commands.new import examples, new
@@ -32,11 +33,22 @@ from gelslim.cli.commands.thinner import thinner
 from gelslim.cli.commands.tolerance import tolerance
 from gelslim.cli.commands.track import track
 from gelslim.cli.commands.validate import validate
+from gelslim.cli.commands.view import view
 from gelslim.cli.main import carried
 from gelslim_core import __version__
 
 COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
-    "Design a finger": (new, examples, cameras, check, derive, explain, diff),
+    "Design a finger": (
+        new,
+        examples,
+        cameras,
+        grippers,
+        check,
+        view,
+        derive,
+        explain,
+        diff,
+    ),
     "Search for one": (thinner, explore, optimise),
     "Try it before it is built": (tolerance, light, plan, simulate, validate),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),

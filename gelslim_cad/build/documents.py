@@ -2,46 +2,57 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_cad.assembly.record import read_steps
+from gelslim_cad.build.assembly_steps import ToldStep, fasteners_told, motion, told_steps
+from gelslim_cad.build.bill import finger_bill
 from gelslim_cad.build.fingerprint import versions
-from gelslim_cad.build.instructions import build_guide
+from gelslim_cad.build.instructions import after_assembly, before_assembly, build_guide
 from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
+from gelslim_cad.build.printing import print_hints, printed_parts
+from gelslim_cad.build.stages import Plan, Stages, kerf_mm
 from gelslim_cad.build.work import Files
-from gelslim_cad.build.writers import LIGHT_JSON, TOLERANCE_JSON
+from gelslim_cad.build.writers import (
+    ASSEMBLY_JSON,
+    LIGHT_JSON,
+    LIGHT_PATHS_JSON,
+    TOLERANCE_JSON,
+    step_picture,
+)
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.electronics.finger import finger_boards
+from gelslim_cad.electronics.order import circuit_record, order_files
+from gelslim_cad.geometry.gel_shape import has_markers
 from gelslim_cad.geometry.optics import virtual_camera
-from gelslim_cad.geometry.part import Part
+from gelslim_cad.geometry.overlay import Overlay, light_paths
 from gelslim_cad.markers.outline import Outline
+from gelslim_cad.markers.process import MARKING_PROCESSES
 from gelslim_cad.markers.write import render_marker_files
+from gelslim_cad.ordering.cost import Cost, cost_record
+from gelslim_cad.ordering.line import BomLine
+from gelslim_cad.ordering.orders import OrderInput, order_archives
+from gelslim_cad.ordering.pricing import priced
+from gelslim_cad.ordering.shopping import total_cost
+from gelslim_cad.ordering.tables import bom_csv
+from gelslim_cad.ordering.texts import PrintOrder
+from gelslim_cad.printability.rules import PrintedPart
+from gelslim_cad.report.build_page import PageStep, render_build_page
 from gelslim_cad.report.camera_view import CameraView
 from gelslim_cad.report.render import Picture, ReportData, render_report
-from gelslim_cad.report.tables import BomLine, Note
+from gelslim_cad.report.tables import Note
 from gelslim_cad.report.view_figures import projection_sentence
 from gelslim_cad.sensor import marker_print
+from gelslim_cad.spec.parts import OwnPart
 from ifem_export.markers.grid import MarkerGrid
 
-if TYPE_CHECKING:
-    from gelslim_cad.build.stages import Plan, Stages
-
-
-DENSITY_G_CM3 = {
-    "tough resin": 1.15,
-    "PETG": 1.27,
-    "PA12": 0.95,
-    "cast acrylic": 1.18,
-    "front-surface mirror": 2.5,
-    "silicone sheet": 1.15,
-}
-"""Typical densities, for masses in the BOM only."""
+OF_MARKERS = ("marker_grid.", "pad_mesh.")
+"""Groups of dimensions that the report leaves out for a gel without markers."""
 PICTURES = {
     "pictures/whole.png": ("The finger", "Assembled, seen from the tip."),
     "pictures/exploded.png": ("Exploded", "Every part on its way into the finger."),
@@ -71,14 +82,18 @@ def documents(
     files: Mapping[str, FileEntry],
     missing: str,
 ) -> Files:
-    """Everything that is quick to write: markers, tables, instructions, report.
+    """Everything that is quick to write: markers, LED boards, tables, instructions, report.
 
     `contents` are those of the built files by path, `files` their entries; `missing` says why
     there are no pictures, where there are none.
     """
     d, grid = stages.dimensions, stages.grid
     parts = (*plan.finger, *plan.tooling)
-    bom = bill_of_materials(parts, d["material.gel.density_kg_m3"])
+    boards = finger_boards(d)
+    prices = stages.prices.entries
+    bom = priced(finger_bill(d, parts, boards), prices)
+    cost = total_cost(bom, prices)
+    steps = read_steps(json.loads(contents[ASSEMBLY_JSON]))
     dimensions = {
         "format": "gelslim-dimensions/1",
         "name": stages.name,
@@ -86,69 +101,93 @@ def documents(
         "binding": stages.binding,
         "dimensions": {name: d.record(name) for name in d.values},
     }
-    markers = render_marker_files(grid, *marker_print(d, grid))
-    made: Files = {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
+    made = {} if grid is None else marker_files(d, grid)
+    made |= own_files(stages.loaded.own_parts)
+    made |= {f"electronics/{n}": entries for n, entries in order_files(boards, d).items()}
     made |= {
+        "electronics/circuits.json": (
+            json_bytes(circuit_record(boards)),
+            "circuits of the LED boards",
+        ),
         "spec.yaml": (stages.loaded.text.encode(), "the spec this was built from"),
         "dimensions.json": (
             json_bytes(dimensions),
             "dependent dimensions with formulas and inputs",
         ),
         "checks.json": (json_bytes([asdict(c) for c in plan.checks]), "design rules with margins"),
-        "BUILD.md": (build_guide(d, grid, bom, stages.name), "how to make and assemble it"),
-        "BOM.csv": (bom_csv(bom), "bill of materials"),
+        "orders/cost.json": (json_bytes(cost_record(cost)), "what the finger costs"),
+        "BUILD.md": (build_guide(d, grid, bom, stages.name, steps), "how to make and assemble it"),
+        "BUILD.html": (
+            build_page(stages, bom, told_steps(d, boards, steps), contents),
+            "the same with a picture of each step, to tick off or to print; offline",
+        ),
+        "BOM.csv": (bom_csv(bom, cost), "bill of materials with prices"),
     }
+    printed = printed_parts(d, parts, contents)
+    given = OrderInput(
+        stages.name,
+        bom,
+        {**contents, **{path: data for path, (data, _) in made.items()}},
+        PrintOrder(d["manufacturing.print_tolerance_mm"], print_hints(bom, printed)),
+        {p.name: kerf_mm(d, p) for p in parts},
+        tuple(item.board.name for item in boards.boards),
+        stencil_layers(d),
+    )
+    made |= order_archives(given, cost, prices)
     own = {path: entry(data, purpose, "documents") for path, (data, purpose) in made.items()}
-    page = render_report(report_data(stages, plan, bom, contents, {**files, **own}, missing))
+    page = render_report(
+        report_data(stages, plan, (bom, cost), printed, contents, {**files, **own}, missing)
+    )
     made["report.html"] = (page, "report with 3D viewer, offline")
     return made
 
 
-def bill_of_materials(parts: Iterable[Part], gel_density_kg_m3: float) -> tuple[BomLine, ...]:
-    """Lines in the order of the parts; screws of one kind share a line."""
-    lines = []
-    for part in parts:
-        if part.quantity < 1:
-            continue
-        name = part.name
-        if "fastener" in part.tags:
-            name = name.rsplit("_", 1)[0]
-        lines.append(
-            BomLine(
-                name,
-                part.quantity,
-                part.material,
-                part.process,
-                _mass_g(part, gel_density_kg_m3),
-                part.note,
-                not part.in_assembly,
-            )
+def build_page(
+    stages: Stages,
+    bom: tuple[BomLine, ...],
+    told: Sequence[ToldStep],
+    contents: Mapping[str, bytes],
+) -> bytes:
+    """BUILD.html; `contents` are those of the built files by path."""
+    d = stages.dimensions
+    steps = [
+        PageStep(
+            t.step.key,
+            t.text.title,
+            t.text.minutes,
+            motion(t.step),
+            t.text.do,
+            fasteners_told(t.step),
+            t.text.look,
+            contents.get(step_picture(t.number, t.step.key), b""),
         )
-    return tuple(lines)
+        for t in told
+    ]
+    before = before_assembly(d, stages.grid, bom, stages.name, told)
+    return render_build_page(stages.name, stages.spec_hash, before, steps, after_assembly(d))
 
 
-def _mass_g(part: Part, gel_density_kg_m3: float) -> float | None:
-    volume_cm3 = part.solid.Volume() / 1000
-    if part.name == "gel_pad":
-        return round(volume_cm3 * gel_density_kg_m3 / 1000, 2)
-    for material, density in DENSITY_G_CM3.items():
-        if part.material.startswith(material):
-            return round(volume_cm3 * density, 2)
-    return None
+def own_files(own: Iterable[OwnPart]) -> Files:
+    """Copies of the files of the author's own parts, so that the folder tells what it is of."""
+    return {
+        f"own_parts/{part.file.name}": (part.file.read_bytes(), f"own part: {part.name}")
+        for part in own
+    }
 
 
-def bom_csv(lines: Iterable[BomLine]) -> bytes:
-    """The bill as CSV (UTF-8, comma, quoted where needed)."""
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["part", "quantity", "material", "process", "use", "mass_g", "note"])
-    for line in lines:
-        use = "tooling" if line.tooling else "finger"
-        mass = "" if line.mass_g is None else f"{line.mass_g:.2f}"
-        writer.writerow(
-            [line.name, line.quantity, line.material, line.process, use, mass, line.note]
-        )
-    return text.getvalue().encode()
+def marker_files(d: Dimensions, grid: MarkerGrid) -> Files:
+    """The marker print in every format."""
+    markers = render_marker_files(
+        grid, *marker_print(d, grid), film_kerf_mm=d["manufacturing.kerf.film_mm"]
+    )
+    return {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
+
+
+def stencil_layers(d: Dimensions) -> tuple[str, ...]:
+    """Gerber files of the marker stencil where the spec marks with one; empty otherwise."""
+    if d["manufacturing.marking_process"] != "stencil":
+        return ()
+    return tuple(f for f in MARKING_PROCESSES["stencil"].files if f.endswith(".gbr"))
 
 
 def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
@@ -164,7 +203,10 @@ def headline(d: Dimensions) -> tuple[tuple[str, str], ...]:
         ),
         ("Keystone", f"{d['view.keystone']:.3f}"),
         ("Largest blur", f"{d['view.far_blur_mm']:.3f} mm"),
-        ("Marker, far edge", f"{d['view.marker_along_px']:.1f} px"),
+        (
+            f"{'Marker' if has_markers(d) else 'Detail'} at the gel's far edge",
+            f"{d['view.marker_across_px']:.1f} × {d['view.marker_along_px']:.1f} px",
+        ),
     )
 
 
@@ -194,45 +236,65 @@ def light_notes(record: bytes) -> tuple[Note, ...]:
 def report_data(
     stages: Stages,
     plan: Plan,
-    bom: tuple[BomLine, ...],
+    bill: tuple[tuple[BomLine, ...], Cost],
+    printed: tuple[PrintedPart, ...],
     contents: Mapping[str, bytes],
     files: Mapping[str, FileEntry],
     missing: str,
 ) -> ReportData:
     """Everything the report shows; `missing` says why there are no pictures, where none are.
 
-    `contents` are those of the built files by path, `files` their entries with the documents'.
+    `contents` are those of the built files by path, `files` their entries with the documents',
+    `bill` the priced bill of materials with its sums, `printed` the measured printed parts.
     """
     d = stages.dimensions
+    overlays = (*stages.overlays, *traced_overlays(contents[LIGHT_PATHS_JSON]))
+    explode_mm = {part.name: part.explode_mm for part in plan.finger}
     return ReportData(
         name=stages.name,
         spec_text=stages.loaded.text,
         spec_hash=stages.spec_hash,
         headline=headline(d),
-        dimensions={name: d.record(name) for name in d.values},
+        dimensions={
+            name: d.record(name)
+            for name in d.values
+            if has_markers(d) or not name.startswith(OF_MARKERS)
+        },
         rules=plan.checks,
         binding=stages.binding,
         glb=contents[f"{stages.name}.glb"],
         pictures=pictures(contents, PICTURES, missing),
         camera_view=view_of_markers(d, stages.grid),
         files=files,
-        bom=bom,
+        bom=bill[0],
+        cost=bill[1],
+        printed=printed,
         light=pictures(contents, LIGHT_PICTURES),
         light_notes=light_notes(contents[LIGHT_JSON]),
         projection=pictures(contents, PROJECTION_PICTURES),
         projection_notes=(Note("Projection", projection_sentence(d)),),
         versions=versions(),
         tolerance=json.loads(contents[TOLERANCE_JSON]),
+        overlays=tuple(overlay.record(explode_mm) for overlay in overlays),
+        assembly=json.loads(contents[ASSEMBLY_JSON]),
     )
 
 
-def view_of_markers(d: Dimensions, grid: MarkerGrid) -> CameraView:
+def traced_overlays(content: bytes) -> tuple[Overlay, ...]:
+    """The light paths that were written as data, for the 3D view."""
+    paths = json.loads(content)["paths"]
+    return light_paths([(path["colour"], np.array(path["points_mm"])) for path in paths])
+
+
+def view_of_markers(d: Dimensions, grid: MarkerGrid | None) -> CameraView:
     """Exact projection of the undeformed grid: centres, ellipse axes and blur in px."""
     camera = virtual_camera(d)
-    points = np.column_stack([grid.positions_mm, np.zeros(len(grid))])
+    centres = np.zeros((0, 2)) if grid is None else grid.positions_mm
+    diameters = np.zeros(0) if grid is None else grid.diameter_mm
+    points = np.column_stack([centres, np.zeros(len(centres))])
     # A small circle maps to the ellipse J·circle; its half axes are the singular values of J.
     left, stretch, _ = np.linalg.svd(camera.jacobian(points))
-    axes = stretch * grid.diameter_mm[:, None]
+    axes = stretch * diameters[:, None]
     angle = np.degrees(np.arctan2(left[:, 1, 0], left[:, 0, 0]))
     blur_mm = camera.blur_on_gel_mm(points, d["view.aperture_mm"], d["view.focus_mm"])
     blur_px = blur_mm * camera.focal_px / camera.apparent_distances_mm(points)[:, 0]
@@ -248,8 +310,15 @@ def view_of_markers(d: Dimensions, grid: MarkerGrid) -> CameraView:
         marker_angle_deg=tuple(angle.tolist()),
         blur_px=tuple(blur_px.tolist()),
         outline_px=_pairs(camera.project(edge)),
-        anchors=frozenset(np.flatnonzero(np.asarray(grid.kind) != 0).tolist()),
+        anchors=_anchors(grid),
     )
+
+
+def _anchors(grid: MarkerGrid | None) -> frozenset[int]:
+    """Indices of the markers that differ from the lattice."""
+    if grid is None:
+        return frozenset()
+    return frozenset(np.flatnonzero(np.asarray(grid.kind) != 0).tolist())
 
 
 def _pairs(array: NDArray[np.float64]) -> tuple[tuple[float, float], ...]:

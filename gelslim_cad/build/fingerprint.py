@@ -22,7 +22,7 @@ LIBRARIES = (
 )
 IGNORED = frozenset({"__pycache__"})
 """Folders whose content does not affect the files of a build."""
-SUFFIXES = frozenset({".py", ".js", ".css", ".html", ".json"})
+SUFFIXES = frozenset({".py", ".js", ".css", ".html", ".json", ".yaml"})
 
 
 @functools.cache

@@ -15,8 +15,9 @@ from gelslim_cad.checks import Check
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.export.mesh import face_patches
 from gelslim_cad.geometry.gel_shape import GelShape
-from gelslim_cad.geometry.optics import virtual_camera
+from gelslim_cad.geometry.optics import corner_rays
 from gelslim_cad.geometry.part import Part
+from gelslim_cad.solids.own_parts import OWN, own_source
 from gelslim_cad.solids.shapes import Hole, single
 
 UNDERCUT_MM2 = 1e-3
@@ -42,17 +43,23 @@ def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
 
     blocked = blocked_volumes(d, parts)
     pairs = interferences(parts)
+    own = {p.name: f"{p.name} ({own_source(p)})" for p in parts if OWN in p.tags}
     return (
         _check(
             ("view.line_of_sight", "View from gel over mirror to camera is free"),
             (sum(blocked.values()), 0.0, "mm³"),
-            "in the way: " + ", ".join(f"{n} ({v:.2f} mm³)" for n, v in blocked.items()),
+            "in the way: "
+            + ", ".join(f"{own.get(n, n)} ({v:.2f} mm³)" for n, v in blocked.items()),
             ("design.optics.clearance_mm", "give the view more clearance"),
         ),
         _check(
             ("assembly.interference", "No two parts share space"),
             (sum(p.volume_mm3 for p in pairs), TOLERANCE_MM3, "mm³"),
-            "; ".join(f"{p.first} and {p.second} share {p.volume_mm3:.3f} mm³" for p in pairs),
+            "; ".join(
+                f"{own.get(p.first, p.first)} and {own.get(p.second, p.second)} share "
+                f"{p.volume_mm3:.3f} mm³"
+                for p in pairs
+            ),
             ("design.housing.fit_clearance_mm", "give the parts more room"),
         ),
     )
@@ -148,21 +155,6 @@ def _check(
 _mould_check = partial(
     _check, measured_on="mould and cavity", group="Printing, casting and marking"
 )
-
-
-def corner_rays(d: Dimensions) -> tuple[Points, Points, Points]:
-    """Virtual pinhole (3,), and the points (4, 3) where the corner rays meet mirror and window."""
-    camera = virtual_camera(d)
-    x, y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
-    corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], dtype=float)
-    rays = camera.air_directions(corners)
-    angle = math.radians(d["mirror.angle_deg"])
-    normal = np.array([-math.sin(angle), 0, math.cos(angle)])
-    on_mirror = np.array([d["mirror.lower_x_mm"], 0, d["mirror.lower_z_mm"]])
-    start = camera.position_mm
-    to_mirror = ((on_mirror - start) @ normal) / (rays @ normal)
-    to_window = (camera.window_bottom_z_mm - start[2]) / rays[:, 2]
-    return start, start + rays * to_mirror[:, None], start + rays * to_window[:, None]
 
 
 def view_corridor(d: Dimensions) -> tuple[cq.Solid, cq.Solid]:

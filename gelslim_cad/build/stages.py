@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
+from gelslim_cad.build.printing import print_options
 from gelslim_cad.build.work import PackedPart, Unit
 from gelslim_cad.checks import Check, check
 from gelslim_cad.checks.binding import binding_sentences
 from gelslim_cad.dimensions import Dimensions, derive
+from gelslim_cad.geometry.gel_shape import has_markers
+from gelslim_cad.geometry.overlay import Overlay, camera_view, printed_dots
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.light.scene import light_inputs
+from gelslim_cad.ordering.price_list import Prices, read_prices
 from gelslim_cad.report.view_figures import view_inputs
-from gelslim_cad.sensor import marker_grid, spec_hash
+from gelslim_cad.sensor import printed_grid, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
 from gelslim_core.files.held_interrupt import interrupts_held
 from ifem_export.markers.grid import MarkerGrid
@@ -37,10 +42,11 @@ class Stages:
     checks: tuple[Check, ...]
     binding: tuple[str, ...]
     spec_hash: str
+    prices: Prices
 
     @classmethod
     def prepare(cls, loaded: LoadedSpec) -> Stages:
-        """Derive and check; no CAD yet."""
+        """Derive and check; no CAD yet. Raises InputError for a price list with faults."""
         d = derive(loaded.spec)
         return cls(
             loaded,
@@ -48,17 +54,51 @@ class Stages:
             check(d),
             binding_sentences(loaded.spec, d),
             spec_hash(loaded.spec),
+            read_prices(loaded.spec.manufacturing.prices, loaded.path),
         )
 
     @cached_property
-    def grid(self) -> MarkerGrid:
-        """The marker grid; made on demand, as a design that breaks a rule may have none."""
-        return marker_grid(self.dimensions)
+    def grid(self) -> MarkerGrid | None:
+        """The marker grid, None for a gel without markers.
+
+        It is made on demand, as a design that breaks a rule may have none.
+        """
+        return printed_grid(self.dimensions)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What the build does not write although builds usually do, and why."""
+        if has_markers(self.dimensions):
+            return ()
+        return (
+            "no bundle and no marker files were written: design.markers.pattern is none, and "
+            "forces are found from the motion of printed dots",
+        )
+
+    @cached_property
+    def overlays(self) -> tuple[Overlay, ...]:
+        """What pictures show beside the parts: printed dots and the camera's view."""
+        d, grid = self.dimensions, self.grid
+        if grid is None:
+            return (camera_view(d),)
+        return printed_dots(d, grid.positions_mm, grid.diameter_mm), camera_view(d)
 
     @property
     def name(self) -> str:
         """The finger's name."""
         return self.loaded.spec.name
+
+    @cached_property
+    def units_without_solids(self) -> tuple[Unit, ...]:
+        """The units of work that can begin before any solid is made."""
+        spec = (("spec", self.loaded.spec.model_dump_json()),)
+        bundle = (Unit("bundle", "bundle", (), spec, cost=18),)
+        return (
+            *(bundle if has_markers(self.dimensions) else ()),
+            Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
+            Unit("tolerance", "tolerance", (), spec, cost=7),
+            Unit("view", "view", (), tuple(view_inputs(self.dimensions).items())),
+        )
 
     def plan(self) -> Plan:
         """Make the solids, check them and lay out the work. Loads the CAD kernel."""
@@ -68,7 +108,7 @@ class Stages:
         from gelslim_cad.build.solid_checks import check_mould, check_solids
         from gelslim_cad.solids.finger import finger_parts, tooling_parts
 
-        finger = finger_parts(self.dimensions)
+        finger = finger_parts(self.dimensions, self.loaded.own_parts)
         tooling = tooling_parts(self.dimensions, self.grid)
         checks = (
             *self.checks,
@@ -81,23 +121,41 @@ class Stages:
         packed = {p.name: PackedPart.of(p) for p in (*finger, *tooling)}
         whole = tuple(packed[p.name] for p in finger)
         named = (("name", self.name),)
-        spec = (("spec", self.loaded.spec.model_dump_json()),)
         units = [
+            *self.units_without_solids,
             Unit("assembly", "assembly", whole, named, cost=8),
             Unit("glb", "glb", whole, named, cost=6),
-            Unit("pictures", "pictures", whole, cost=20),
+            Unit("order", "order", whole, self._order(finger), cost=50),
+            Unit("robot", "robot", whole, named + self._robot_values(), cost=3),
             self._mould_unit(packed["gel_pad"]),
-            Unit("view", "view", (), tuple(view_inputs(self.dimensions).items())),
-            Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
-            Unit("bundle", "bundle", (), spec, cost=18),
-            Unit("tolerance", "tolerance", (), spec, cost=7),
         ]
         units += [
-            Unit(f"part {p.name}", "part", (packed[p.name],), cost=len(packed[p.name].shape) / 1e5)
+            Unit(
+                f"part {p.name}",
+                "part",
+                (made,),
+                (("kerf_mm", kerf_mm(self.dimensions, p)), *print_options(self.dimensions, p)),
+                cost=len(made.shape) / 1e5,
+            )
             for p in (*finger, *tooling)
             if "instance" not in p.tags
+            for made in (packed[p.name] if p.printed is None else PackedPart.of(p.as_made()),)
         ]
         return tuple(units)
+
+    def _order(self, finger: tuple[Part, ...]) -> tuple[tuple[str, Any], ...]:
+        """The order of assembly, which the unit proves on the solids, and what it draws."""
+        from gelslim_cad.assembly.finger_order import finger_order, tail_x_mm
+
+        steps = finger_order(self.dimensions, [p.name for p in finger])
+        overlays = ((overlay.name, overlay.packed()) for overlay in self.overlays)
+        tail = ("tail_x_mm", tail_x_mm(self.dimensions))
+        return ("name", self.name), ("steps", steps), tail, *overlays
+
+    def _robot_values(self) -> tuple[tuple[str, Any], ...]:
+        from gelslim_cad.robot.model import robot_inputs
+
+        return tuple(robot_inputs(self.dimensions).items())
 
     def _mould_unit(self, gel: PackedPart) -> Unit:
         """Unit that compares the cavity with the gel enlarged by the shrinkage."""
@@ -106,3 +164,18 @@ class Stages:
         cavity = replace(gel.unpacked(), name="cavity", solid=cavity_solid(self.dimensions))
         scale = 1 / (1 - self.dimensions["manufacturing.gel_shrinkage_percent"] / 100)
         return Unit("mould cavity", "mould", (PackedPart.of(cavity), gel), (("scale", scale),))
+
+
+def kerf_mm(d: Dimensions, part: Part) -> float:
+    """Width of the cut in the sheet that a part is made of; 0 for what is not cut."""
+    if part.process not in ("laser", "cut"):
+        return 0.0
+    for material, kerf in (
+        ("cast acrylic", d["manufacturing.kerf.acrylic_mm"]),
+        ("aluminium", d["manufacturing.kerf.metal_mm"]),
+        ("stainless steel", d["manufacturing.kerf.metal_mm"]),
+        ("polyester film", d["manufacturing.kerf.film_mm"]),
+    ):
+        if part.material.startswith(material):
+            return kerf
+    return d["manufacturing.kerf.soft_mm"]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,12 +16,13 @@ from gelslim_cad.build.folder import locked, require_ours, staged
 from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
 from gelslim_cad.build.work import Unit, Written, run
 from gelslim_cad.checks import Check
+from gelslim_cad.spec.parts import files_key
 from gelslim_core.errors import GelslimError
 from gelslim_core.files.replaced_folder import recover
 from gelslim_core.jobs import worker_pool
 
 if TYPE_CHECKING:
-    from gelslim_cad.build.stages import Stages
+    from gelslim_cad.build.stages import Plan, Stages
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
@@ -51,6 +54,7 @@ class BuildResult:
         checks: The design rules with their results.
         binding: Sentences that say what sets the finger's thickness.
         up_to_date: Whether nothing had to be done.
+        left_out: What was not written although builds usually write it, and why.
     """
 
     folder: Path
@@ -59,6 +63,7 @@ class BuildResult:
     checks: tuple[Check, ...]
     binding: tuple[str, ...]
     up_to_date: bool = False
+    left_out: tuple[str, ...] = ()
 
 
 def build_variant(
@@ -75,8 +80,8 @@ def build_variant(
     Args:
         spec_path: The YAML file.
         out_dir: Folder of the files.
-        jobs: Number of worker processes; by default one per processor, at most four. It does not
-            change a byte of the files.
+        jobs: Number of worker processes; by default one per processor, at most four. If it is not
+            1, one more begins while the solids are made. It does not change a byte of the files.
         progress: Called as the work goes on.
 
     Returns:
@@ -98,10 +103,18 @@ def build_variant(
         require_ours(target)
         stages = Stages.prepare(loaded)
         previous = read_manifest(target)
-        key = combined(code_hash(), stages.spec_hash, loaded.sha256)
+        own = files_key(loaded.own_parts)
+        prices = stages.prices.sha256
+        key = combined(code_hash(), stages.spec_hash, loaded.sha256, own, *prices)
         if previous and previous.key == key and intact(target, previous, list(previous.files)):
             return BuildResult(
-                target, (*previous.files, NAME), (), stages.checks, stages.binding, up_to_date=True
+                target,
+                (*previous.files, NAME),
+                (),
+                stages.checks,
+                stages.binding,
+                up_to_date=True,
+                left_out=stages.left_out,
             )
         _require_rules(stages.name, stages.checks)
         return _build(stages, target, previous, key, jobs or min(4, os.cpu_count() or 1), notify)
@@ -113,15 +126,22 @@ def _build(
     from gelslim_cad.build.documents import documents
 
     notify("solids", 0, 1)
-    plan = stages.plan()
-    _require_rules(stages.name, plan.checks)
-    keys = {unit.name: unit.key() for unit in plan.units}
-    reused = _reusable(previous, target, keys)
-    todo = [u for u in plan.units if u.name not in reused]
-    written = _run_all(todo, jobs, notify)
+    early = stages.units_without_solids
+    kept = _reusable(previous, target, {unit.name: unit.key() for unit in early})
+    with _begun([u for u in early if u.name not in kept], jobs) as begun:
+        plan = stages.plan()
+        _require_rules(stages.name, plan.checks)
+        keys = {unit.name: unit.key() for unit in plan.units}
+        reused = _reusable(previous, target, keys)
+        todo = [u for u in plan.units if u.name not in reused]
+        written = _run_all([u for u in todo if u.name not in begun], jobs, notify)
+        for name, future in begun.items():
+            notify(name, 0, 1)
+            written[name] = future.result()
     _require_proofs(stages.name, plan.checks, written)
     with staged(target, () if previous is None else {*previous.files, NAME}) as folder:
         contents, files = _gathered(list(keys), target, previous, reused, written)
+        plan = _with_print_checks(stages, plan, contents)
         note = " ".join(w.note for w in written.values() if w.note)
         for path, (data, purpose) in documents(stages, plan, contents, files, note).items():
             contents[path] = data
@@ -142,8 +162,29 @@ def _build(
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(data)
     return BuildResult(
-        target, (*sorted(files), NAME), tuple(u.name for u in todo), plan.checks, stages.binding
+        target,
+        (*sorted(files), NAME),
+        tuple(u.name for u in todo),
+        plan.checks,
+        stages.binding,
+        left_out=stages.left_out,
     )
+
+
+def _with_print_checks(stages: Stages, plan: Plan, contents: dict[str, bytes]) -> Plan:
+    """The plan with the rules on printing, which need the meshes of the parts.
+
+    Raises BuildRefusedError when one fails.
+    """
+    from gelslim_cad.build.printing import printed_parts
+    from gelslim_cad.printability.rules import print_checks
+
+    parts = (*plan.finger, *plan.tooling)
+    found = print_checks(printed_parts(stages.dimensions, parts, contents))
+    checks = (*plan.checks, *found)
+    if any(c.status == "fail" for c in found):
+        _require_rules(stages.name, checks)
+    return replace(plan, checks=checks)
 
 
 def _require_rules(name: str, checks: tuple[Check, ...]) -> None:
@@ -209,6 +250,20 @@ def _reusable(
         for name, key in keys.items()
         if previous.units.get(name) == key and intact(target, previous, by_unit.get(name, []))
     }
+
+
+@contextmanager
+def _begun(units: list[Unit], jobs: int) -> Iterator[dict[str, Future[Written]]]:
+    """Units that one more worker does while this process makes the solids, by name.
+
+    There are none if only one process is wanted.
+    """
+    if jobs <= 1 or not units:
+        yield {}
+        return
+    # Forked before the CAD kernel is loaded: it is not needed here, nor are its threads.
+    with worker_pool(1, "fork" if _forks() else "spawn") as pool:
+        yield {unit.name: pool.submit(run, unit) for unit in sorted(units, key=lambda u: -u.cost)}
 
 
 def _run_all(todo: list[Unit], jobs: int, notify: Progress) -> dict[str, Written]:

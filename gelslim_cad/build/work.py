@@ -40,7 +40,7 @@ class PackedPart:
         """Pack a part."""
         from gelslim_cad.export.brep import shape_to_bytes
 
-        return cls(replace(part, solid=None), shape_to_bytes(part.solid))
+        return cls(replace(part, solid=None, printed=None), shape_to_bytes(part.solid))
 
     def unpacked(self) -> Part:
         """The part with its solid again."""
@@ -55,7 +55,7 @@ class PackedPart:
 
 def described(part: Part) -> str:
     """All fields of a part but its solid."""
-    return repr(replace(part, solid=None, tags=frozenset())) + repr(sorted(part.tags))
+    return repr(replace(part, solid=None, printed=None, tags=frozenset())) + repr(sorted(part.tags))
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from gelslim_cad.build.manifest import json_bytes
+from gelslim_cad.build.printing import print_stem
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
+from gelslim_cad.geometry.overlay import Overlay
 from gelslim_cad.geometry.part import Part
 from gelslim_core.files.replaced_folder import scratch_folder
 
@@ -18,7 +21,9 @@ GLB_LINEAR_MM = 0.1
 GLB_ANGULAR_DEG = 20.0
 PROOF_DECIMALS = 8
 LIGHT_JSON = "light.json"
+LIGHT_PATHS_JSON = "light_paths.json"
 TOLERANCE_JSON = "tolerance.json"
+ASSEMBLY_JSON = "assembly.json"
 ERROR_PICTURE = "pictures/projection_error.png"
 LEDGER_LIMIT = 1e-9
 LOST_LIMIT = 1e-9
@@ -28,8 +33,17 @@ Provers = dict[str, Callable[[Path], Proofs]]
 """What reads a file back and checks it, by the file's suffix."""
 
 
-def write_part(parts: Sequence[Part]) -> Written:
-    """STEP of one part, with print meshes or a laser outline where its process needs them."""
+def write_part(
+    parts: Sequence[Part],
+    kerf_mm: float = 0.0,
+    overhang_deg: float = 90.0,
+    bridge_mm: float = math.inf,
+) -> Written:
+    """STEP of one part, with print meshes or a laser outline where its process needs them.
+
+    The outline is moved by half of `kerf_mm` out of the part. A printed part is measured with the
+    steepest overhang and the widest bridge that need no support.
+    """
     from gelslim_cad.export.step import step_bytes
     from gelslim_cad.proof.step import prove_step
 
@@ -38,9 +52,9 @@ def write_part(parts: Sequence[Part]) -> Written:
     files: Files = {f"{folder}/{part.name}.step": (step_bytes(part), "exact solid, AP242")}
     provers: Provers = {".step": lambda path: prove_step(path, part)}
     if part.process == "print":
-        provers |= _meshes(part, files)
-    if part.process in ("laser", "cut"):
-        provers |= _outline(part, files)
+        provers |= _meshes(part, files, overhang_deg, bridge_mm)
+    if part.process in ("laser", "cut") or "outline" in part.tags:
+        provers |= _outline(part, files, kerf_mm)
     return Written(files, _on_disk(files, lambda path: provers[path.suffix](path)))
 
 
@@ -64,25 +78,63 @@ def write_glb(parts: Sequence[Part], name: str) -> Written:
     return Written(files, _on_disk(files, lambda written: prove_glb(written, parts)))
 
 
-def write_pictures(parts: Sequence[Part]) -> Written:
-    """Pictures: assembled, exploded and in two sections; none where VTK cannot draw."""
-    from gelslim_cad.export.mesh import tessellate
-    from gelslim_cad.pictures import finger_pictures
+def write_order(
+    parts: Sequence[Part],
+    name: str,
+    steps: Any,
+    tail_x_mm: float,
+    camera_view: tuple[Any, ...] | None = None,
+    printed_dots: tuple[Any, ...] | None = None,
+) -> Written:
+    """The order of assembly, proved, and pictures of its steps and of the finger.
 
-    meshes = []
-    for part in parts:
-        mesh = tessellate(part.solid, 0.05, 12.0)
-        meshes.append((part.name, mesh.vertices_mm, mesh.faces, part.colour, part.explode_mm))
+    Dots and view are overlays as `Overlay.packed` gives them; what is None is not drawn. There are
+    no pictures where VTK cannot draw.
+
+    Raises AssemblyBlockedError where a step is blocked.
+    """
+    from gelslim_cad.assembly.bodies import bodies, part_meshes
+    from gelslim_cad.assembly.proof import prove
+    from gelslim_cad.assembly.record import assembly_record, read_steps
+    from gelslim_cad.assembly.scenes import step_scene
+    from gelslim_cad.pictures.finger_pictures import picture_set
+    from gelslim_cad.pictures.step_pictures import picture_steps
+    from gelslim_cad.pictures.window import PictureError, offscreen_window
+
+    meshes = part_meshes(parts)
+    record = assembly_record(name, prove(steps, bodies(meshes, tail_x_mm)))
+    data = json_bytes(record)
+    files: Files = {ASSEMBLY_JSON: (data, "order of assembly with ways, fasteners and drivers")}
+    colours = {part.name: part.colour for part in parts}
+    known = read_steps(record)
+    shown = [(p.name, *meshes[p.name], p.colour, p.explode_mm) for p in parts]
+    explode = {part.name: part.explode_mm for part in parts}
+    view, dots = (
+        None if packed is None else _drawn(Overlay.unpacked(packed), explode)
+        for packed in (camera_view, printed_dots)
+    )
     try:
-        files = {
-            "pictures/whole.png": finger_pictures.picture_whole(meshes),
-            "pictures/exploded.png": finger_pictures.picture_exploded(meshes),
-            "pictures/section.png": finger_pictures.picture_section(meshes, "y", SECTION_MM),
-            "pictures/section_across.png": finger_pictures.picture_section(meshes, "x", SECTION_MM),
-        }
-    except finger_pictures.PictureError as error:
-        return Written({}, note=str(error))
-    return Written({path: (data, "picture") for path, data in files.items()})
+        with offscreen_window() as window:
+            drawn = picture_steps(window, [step_scene(s, meshes, colours) for s in known])
+            whole = picture_set(window, shown, SECTION_MM, dots, view)
+    except PictureError as error:
+        return Written(files, note=str(error))
+    for number, (step, png) in enumerate(zip(known, drawn, strict=True), start=1):
+        files[step_picture(number, step.key)] = (png, "picture of a step of the assembly")
+    for kind, png in zip(("whole", "exploded", "section", "section_across"), whole, strict=True):
+        files[f"pictures/{kind}.png"] = (png, "picture")
+    return Written(files)
+
+
+def step_picture(number: int, key: str) -> str:
+    """Path of the picture of a step."""
+    return f"pictures/assembly/{number:02d}_{key}.png"
+
+
+def _drawn(overlay: Overlay, explode: dict[str, tuple[float, float, float]]) -> Any:
+    """An overlay as the pictures take it."""
+    shift = explode.get(overlay.with_part, (0.0, 0.0, 0.0))
+    return overlay.name, overlay.vertices_mm, overlay.faces, overlay.colour, shift
 
 
 def write_mould(parts: Sequence[Part], scale: float) -> Written:
@@ -122,13 +174,14 @@ def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
 
 def write_light(parts: Sequence[Part], **values: Any) -> Written:
     """Trace light through this guide and through straight ones; `values` are `light_inputs`."""
-    from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png
+    from gelslim_cad.light.figures import irradiance_png, paths_png, ratio_png, shown_paths
     from gelslim_cad.light.study import study_light, study_record
 
     study = study_light(values)
     record = json_bytes(study_record(study))
     files: Files = {
         LIGHT_JSON: (record, "light guide: certificate, flux ledger, comparison, exposure"),
+        LIGHT_PATHS_JSON: (json_bytes(shown_paths(values)), "light paths of the 3D view"),
         "pictures/light_paths.png": (paths_png(values), "picture of the light"),
         "pictures/irradiance.png": (irradiance_png(values, study), "picture of the light"),
         "pictures/light_ratio.png": (ratio_png(study), "picture of the light"),
@@ -153,6 +206,24 @@ def write_tolerance(parts: Sequence[Part], spec: str) -> Written:
     return Written({TOLERANCE_JSON: (data, "yields of the rules, causes, force errors")})
 
 
+def write_robot(parts: Sequence[Part], name: str, **values: Any) -> Written:
+    """Models for simulators of robots; `values` are `robot_inputs`."""
+    from gelslim_cad.robot.files import FOLDER, robot_files
+    from gelslim_cad.robot.model import record, robot_finger
+    from gelslim_cad.robot.proof import prove_robot
+
+    finger = robot_finger(name, parts, values)
+    files: Files = robot_files(finger, values)
+    model = json_bytes(record(finger))
+    files[f"{FOLDER}/model.json"] = (model, "masses with sources, frames and contact")
+    with scratch_folder() as scratch:
+        for path, (data, _) in files.items():
+            target = scratch / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+        return Written(files, _recorded(prove_robot(scratch / FOLDER, parts, values)))
+
+
 def _light_proofs(study: Any) -> tuple[dict[str, Any], ...]:
     """The fluxes add up to that of the sources, and no ray is lost."""
     lost = max(g.value("lost") for g in (study.light, study.glued, study.air_gap))
@@ -173,14 +244,15 @@ def _light_proof(check: str, ok: bool, value: float, detail: str) -> dict[str, A
     return {"file": LIGHT_JSON, "check": check, "ok": ok, "value": rounded, "detail": detail}
 
 
-def _meshes(part: Part, files: Files) -> Provers:
+def _meshes(part: Part, files: Files, overhang_deg: float, bridge_mm: float) -> Provers:
     from gelslim_cad.export.mesh import mesh_for, print_mesh
     from gelslim_cad.export.print_files import stl_bytes, threemf_bytes
+    from gelslim_cad.printability.measures import measure
     from gelslim_cad.proof.mesh import prove_3mf, prove_stl
 
     mesh, _ = mesh_for(part.solid, VOLUME_TOLERANCE)
     placed = print_mesh(mesh, part.print_rotation_deg)
-    stem = f"{'mould' if 'mould' in part.tags else 'print'}/{part.name}"
+    stem = print_stem(part)
     files[f"{stem}.stl"] = (
         stl_bytes(placed),
         f"print orientation, mm, {len(mesh.faces)} triangles",
@@ -189,22 +261,26 @@ def _meshes(part: Part, files: Files) -> Provers:
         threemf_bytes(part.name, placed, part.material, part.colour),
         "print orientation, with unit and colour",
     )
+    found = asdict(measure(placed, part.solid, overhang_deg, bridge_mm))
+    files[f"{stem}.json"] = (json_bytes(found), "walls, overhangs and holes, measured for printing")
     volume = float(part.solid.Volume())
     return {
+        ".json": lambda path: [],
         ".stl": lambda path: prove_stl(path, volume),
         ".3mf": lambda path: prove_3mf(path, part.name, volume),
     }
 
 
-def _outline(part: Part, files: Files) -> Provers:
-    from gelslim_cad.export.outline import flat_face, outline_dxf_bytes
+def _outline(part: Part, files: Files, kerf_mm: float) -> Provers:
+    from gelslim_cad.export.outline import flat_face, kept_area_mm2, outline_dxf_bytes
     from gelslim_cad.proof.outline import prove_dxf
 
+    kerf = f"kerf {kerf_mm:g} mm" if kerf_mm else "kerf not compensated"
     files[f"laser/{part.name}.dxf"] = (
-        outline_dxf_bytes(part.solid),
-        f"cutting outline, R2010, mm; {part.material}",
+        outline_dxf_bytes(part.solid, kerf_mm, f"{part.name}, {part.material}"),
+        f"cutting outline, R2010, mm; {part.material}; {kerf}",
     )
-    area = float(flat_face(part.solid).Area())
+    area = kept_area_mm2(flat_face(part.solid), kerf_mm)
     return {".dxf": lambda written: prove_dxf(written, area)}
 
 
@@ -229,11 +305,12 @@ WRITERS: dict[str, Callable[..., Written]] = {
     "part": write_part,
     "assembly": write_assembly,
     "glb": write_glb,
-    "pictures": write_pictures,
+    "order": write_order,
     "mould": write_mould,
     "view": write_view,
     "light": write_light,
     "bundle": write_bundle_files,
     "tolerance": write_tolerance,
+    "robot": write_robot,
 }
 """The function that does each kind of unit."""

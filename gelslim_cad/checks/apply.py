@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.checks import guide, making, mechanics, mount, optics, structure  # noqa: F401
+from gelslim_cad.checks import (  # noqa: F401  (registers)
+    electronics,
+    gripper,
+    guide,
+    making,
+    mechanics,
+    mount,
+    optics,
+    structure,
+    thread,
+)
 from gelslim_cad.checks.rule import GROUPS, OTHER, RULES, Check, Checks, Finding, Rule, Status
 from gelslim_cad.checks.rule_ids import RuleId
 from gelslim_cad.dimensions import Dimensions, DimensionsBatch
@@ -22,10 +32,11 @@ def check(d: Dimensions) -> Checks:
         d: Dimensions of the design.
 
     Returns:
-        One result for each rule, group by group in the order of definition.
+        One result for each rule, group by group in the order of definition; without markers
+        those on markers, mesh and forces are left out.
     """
     order = [*GROUPS.values(), OTHER]
-    ordered = sorted(RULES.values(), key=lambda entry: order.index(entry.group))
+    ordered = sorted(_applied(d), key=lambda entry: order.index(entry.group))
     return Checks(_check(entry, d) for entry in ordered)
 
 
@@ -37,7 +48,7 @@ def margins_batch(d: DimensionsBatch) -> Mapping[RuleId, NDArray[np.float64]]:
     """
     count = len(d)
     margins = {}
-    for entry in RULES.values():
+    for entry in _applied(d):
         found = _find(entry, d)
         value, limit = np.asarray(found.value, dtype=float), np.asarray(found.limit, dtype=float)
         with np.errstate(invalid="ignore"):
@@ -51,6 +62,12 @@ def margins_batch(d: DimensionsBatch) -> Mapping[RuleId, NDArray[np.float64]]:
         missed = np.where(np.isnan(room), -np.inf, np.minimum(room, -least))
         margins[entry.id] = np.broadcast_to(np.where(failed, missed, kept).ravel(), (count,))
     return margins
+
+
+def _applied(d: Derived) -> tuple[Rule, ...]:
+    """The rules that are about this kind of finger."""
+    marked = d.given["design.markers.pattern"] != "none"
+    return tuple(entry for entry in RULES.values() if marked or not entry.of_markers)
 
 
 def _find(entry: Rule, d: Derived) -> Finding:

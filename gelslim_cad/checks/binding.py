@@ -1,19 +1,24 @@
-"""Which limits set the finger's thickness, and what relaxing each of them would gain."""
+"""Which limits set what the finger is arranged for, and what relaxing each of them would gain."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gelslim_cad.checks.relaxation import Relaxation, derive_each, growing_changes, relaxations
-from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.dimensions import Dimensions, DimensionsBatch
 from gelslim_cad.spec import Spec
+from gelslim_cad.spec.design import Envelope
+
+Figures = Dimensions | DimensionsBatch
 
 ACTIVE, ACTIVE_MM = 0.004, 0.02
-LEAST_SAVING_MM = 0.05
+LEAST_GAIN = 0.05
+"""In the unit of the goal: mm or px."""
 SENTENCES_AT_MOST = 6
 
 
@@ -34,75 +39,143 @@ LIMITS = {
     "camera clear of mirror": "the gap between camera and mirror",
     "mirror before camera": "the gap between camera and mirror",
     "camera clear of ledge": "the ledge above the camera",
+    "thickness": "the thickness that design.envelope.max_thickness_mm allows",
     "length": "the length that design.envelope.max_length_mm allows",
     "mirror between baffles": "the mirror between the baffles",
     "clamp before seat": "the camera clamp before the mirror's seat",
     "clamp beside channel": "the camera clamp beside the LED channels",
 }
-GOALS = {
-    "shortest": "Camera and mirror are arranged for the shortest finger",
-    "best_picture": "Camera and mirror are arranged for the most pixels across a marker",
-}
 LARGE_CAMERA_MM = 12.0
 """From this height on a camera is taken for one on a board."""
 
 
+@dataclass(frozen=True)
+class Aim:
+    """What camera and mirror are arranged for."""
+
+    cost: Callable[[Figures], Any]
+    """The figure of the dimensions that is made least."""
+    gain: str
+    """What a change does that lowers the cost."""
+    state: Callable[[Dimensions], str] | None = None
+    """The figure that was reached and that nothing betters; none where it is the thickness."""
+
+
+THINNEST = Aim(lambda d: d["finger.thickness_mm"], "saves {:.2f} mm of thickness")
+SHORTEST = Aim(
+    lambda d: d["finger.length_mm"],
+    "saves {:.2f} mm of length",
+    lambda d: (
+        f"Of the fingers within the limits this is the shortest, {d['finger.length_mm']:.2f} mm; "
+        "it cannot be shorter"
+    ),
+)
+BEST_PICTURE = Aim(
+    lambda d: -_least_px(d),
+    "gains {:.2f} px per marker",
+    lambda d: (
+        "Of the fingers within the limits this one has the best picture, "
+        f"{_least_px(d):.2f} px across the smallest marker; there cannot be more"
+    ),
+)
+
+
+def _least_px(d: Figures) -> Any:
+    return np.minimum(d["view.marker_across_px"], d["view.marker_along_px"])
+
+
+def aim_of(envelope: Envelope) -> Aim:
+    """What the envelope asks camera and mirror to be arranged for."""
+    if envelope.goal != "thinnest":
+        return SHORTEST if envelope.goal == "shortest" else BEST_PICTURE
+    length, pixel_mm = envelope.length_worth, envelope.pixel_worth_mm
+    if length == pixel_mm == 0:
+        return THINNEST
+
+    def cost(d: Figures) -> Any:
+        return d["finger.thickness_mm"] + length * d["finger.length_mm"] - pixel_mm * _least_px(d)
+
+    def state(d: Dimensions) -> str:
+        return (
+            f"Weighed against each other, {d['finger.thickness_mm']:.2f} mm of thickness, "
+            f"{d['finger.length_mm']:.2f} mm of length and {_least_px(d):.2f} px across the "
+            "smallest marker are the best; none is better"
+        )
+
+    return Aim(cost, "is worth {:.2f} mm of thickness", state)
+
+
 def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
-    """Sentences on what sets the thickness, what would reduce it and what would make it fit."""
+    """Sentences on what limits the goal, what would better it and what would make the design fit.
+
+    The goal is the thickness unless `design.envelope` states another.
+    """
     steps = relaxations(spec)
     if not d.feasible():
         return _infeasible(spec, d, steps)
-    tried = _try(spec, [(s,) for s in steps])
-    thickness = float(d["finger.thickness_mm"])
-    goal = GOALS.get(spec.design.envelope.goal)
-    first = _what_binds(d, thickness) if goal is None else f"{goal}: {thickness:.2f} mm thick."
-    savings = _savings(steps, tried, thickness) if goal is None else ()
-    return first, *savings, *_outside(spec, d, steps)
+    aim = aim_of(spec.design.envelope)
+    return _what_binds(d, aim), *_gains(spec, d, aim, steps), *_outside(spec, d, steps)
 
 
-def _try(spec: Spec, sets: Sequence[tuple[Relaxation, ...]]) -> tuple[Any, Any]:
-    """Thickness of the spec under each set of relaxations, and whether it is short enough."""
+def _try(
+    spec: Spec, sets: Sequence[tuple[Relaxation, ...]], aim: Aim = THINNEST
+) -> tuple[Any, Any]:
+    """Cost of the spec under each set of relaxations, and whether it keeps the envelope.
+
+    The thickness is a limit only where it is not what is made least.
+    """
     values = [{s.path: s.value for s in chosen} for chosen in sets]
     batch = derive_each(spec, values)
-    given = spec.design.envelope.max_length_mm
-    limit = math.inf if given is None else given
-    longest = np.array([v.get("design.envelope.max_length_mm", limit) for v in values])
-    short = batch["finger.length_mm"] <= longest + 1e-9
-    return batch["finger.thickness_mm"], batch.feasible() & short
+    envelope, kept = spec.design.envelope, batch.feasible()
+    sizes = {"max_length_mm": (envelope.max_length_mm, batch["finger.length_mm"])}
+    if aim is not THINNEST:
+        sizes["max_thickness_mm"] = (envelope.max_thickness_mm, batch["finger.thickness_mm"])
+    for name, (given, size) in sizes.items():
+        limit = math.inf if given is None else given
+        most = np.array([v.get(f"design.envelope.{name}", limit) for v in values])
+        kept = kept & (size <= most + 1e-9)
+    return aim.cost(batch), kept
 
 
-def _what_binds(d: Dimensions, thickness: float) -> str:
+def _what_binds(d: Dimensions, aim: Aim) -> str:
+    if aim.state is not None:
+        active = _active(d)
+        return aim.state(d) + (f" because of {_list(active)}." if active else ".")
     depths = {
         "mirror": d["finger.mirror_depth_mm"],
         "camera": d["finger.camera_depth_mm"],
         "guide": d["guide.stack_mm"],
     }
     setter = max(depths, key=lambda k: depths[k])
-    text = f"Thickness {thickness:.2f} mm is set by {SETTERS[setter]}"
-    if setter == "guide":
+    text = f"Thickness {d['finger.thickness_mm']:.2f} mm is set by {SETTERS[setter]}"
+    active = [words for words in _active(d) if words != LIMITS["thickness"]]
+    if setter == "guide" or not active:
         return text + "."
-    active = [
+    return f"{text}; it cannot be less because of {_list(active)}."
+
+
+def _active(d: Dimensions) -> list[str]:
+    """The limits that the fold touches, in words."""
+    return [
         LIMITS[name]
         for limits, slack in ((d.fold.violations, ACTIVE), (d.fold.housing, ACTIVE_MM))
         for name, value in limits.items()
         if name in LIMITS and float(np.reshape(value, -1)[0]) > -slack
     ]
-    if not active:
-        return text + "."
-    return f"{text}; it cannot be less because of {_list(active)}."
 
 
-def _savings(
-    steps: tuple[Relaxation, ...], tried: tuple[Any, Any], thickness: float
-) -> tuple[str, ...]:
+def _gains(spec: Spec, d: Dimensions, aim: Aim, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
+    """What each concession would gain, the largest first."""
+    here = float(aim.cost(d))
+    costs, kept = _try(spec, [(s,) for s in steps], aim)
     gains = [
-        (thickness - float(t), s.words)
-        for s, t, ok in zip(steps, *tried, strict=True)
-        if ok and thickness - t > LEAST_SAVING_MM
+        (here - float(cost), s.words)
+        for s, cost, ok in zip(steps, costs, kept, strict=True)
+        if ok and here - cost > LEAST_GAIN
     ]
     gains.sort(key=lambda g: -g[0])
     return tuple(
-        f"{words[0].upper()}{words[1:]} saves {gain:.2f} mm of thickness."
+        f"{words[0].upper()}{words[1:]} {aim.gain.format(gain)}."
         for gain, words in gains[:SENTENCES_AT_MOST]
     )
 

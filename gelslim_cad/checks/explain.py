@@ -56,6 +56,11 @@ def explain(loaded: LoadedSpec, d: Dimensions, name: str) -> Node:
     if name in tracer.dimensions:
         return tracer.node(name)
     if name in RULES:
+        if RULES[name].of_markers and d.given["design.markers.pattern"] == "none":
+            raise UnknownNameError(
+                f"the rule {name} does not apply: the gel has no markers "
+                "(design.markers.pattern = none)"
+            )
         return tracer.rule(name)
     for path in (name, f"design.{name}"):
         if path in d.given:
@@ -90,7 +95,7 @@ class _Tracer:
             entry.title,
             formula=entry.formula,
             source=entry.source,
-            note=_active_limits(self.d.fold) if entry.internal else "",
+            note=_active_limits(self.d.fold) if entry.name == "fold.layout" else "",
             repeated=not first,
             inputs=self._inputs(self._used_inputs(entry)) if first else (),
         )

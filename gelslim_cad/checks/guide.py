@@ -26,19 +26,27 @@ def bend_ratio(guide_bend_ratio: Real, guide_full_guidance_ratio: Real) -> Findi
     title="Colours of the strips suit the camera",
     parameter="design.leds.one_wavelength_nm",
     why="a mono camera cannot tell two colours apart, and its lens blurs them more than one; a "
-    "colour camera finds a contact by the change of red against green",
-    advice="give both strips one wavelength with a mono camera, and leave it out with another",
+    "colour camera finds a contact by the change of one colour against the other",
+    advice="give both strips one wavelength with a mono camera, and two colours with another",
     unit="nm",
 )
 def led_colours(
     camera_picture: str,
+    leds_light: str,
     leds_one_wavelength_nm: Real | None,
     leds_red_wavelength_nm: Real,
     leds_green_wavelength_nm: Real,
+    leds_blue_wavelength_nm: Real,
 ) -> Finding:
-    """Difference of the two wavelengths."""
-    apart = leds_red_wavelength_nm - leds_green_wavelength_nm
-    apart = apart if leds_one_wavelength_nm is None else 0 * apart
+    """Difference of the two wavelengths; 0 for white light."""
+    waves = {
+        "red": leds_red_wavelength_nm,
+        "green": leds_green_wavelength_nm,
+        "blue": leds_blue_wavelength_nm,
+    }
+    two_colours = leds_one_wavelength_nm is None and leds_light != "white"
+    left, right = (waves[n] for n in (leds_light.split("_") if two_colours else ("red", "red")))
+    apart = left - right
     mono = camera_picture == "mono"
     return Finding(apart, 0.0 if mono else 1.0, least=not mono, advisory=True)
 
@@ -176,3 +184,17 @@ def gel_index(
         least=True,
         caution=0.93,
     )
+
+
+@rule(
+    "led.located_mm",
+    title="LED boards lie where their LEDs are traced",
+    parameter="design.housing.fit_clearance_mm",
+    why="crushed ribs press a board against a printed edge, which locates it to 0.05 mm where the "
+    "print is as flat, and 0.02 mm of edge can be printed",
+    advice="print by sla, or measure the brightness of both sides and reprint",
+)
+def led_located(clamp_point_error_mm: Real, led_datum_mm: Real) -> Finding:
+    """Error of the edge that locates a board; all of its play where there is no edge."""
+    error = np.where(led_datum_mm >= 0.02, clamp_point_error_mm, led_datum_mm + 0.05)[()]
+    return Finding(error, 0.05, advisory=True, tolerance=1e-9)

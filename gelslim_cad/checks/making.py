@@ -82,6 +82,7 @@ def crown(gel_crown_height_mm: Real, gel_length_mm: Real, gel_width_mm: Real) ->
     parameter="design.markers.pitch_mm",
     why="closer dots merge under blur and are mistaken for one another",
     advice="use a larger pitch or smaller dots",
+    of_markers=True,
 )
 def marker_pitch(markers_pitch_mm: Real, markers_diameter_mm: Real) -> Finding:
     """Pitch over diameter."""
@@ -94,6 +95,7 @@ def marker_pitch(markers_pitch_mm: Real, markers_diameter_mm: Real) -> Finding:
     parameter="design.markers.diameter_mm",
     why="the marking process resolves nothing smaller",
     advice="use larger dots or another marking process",
+    of_markers=True,
 )
 def marker_diameter(markers_diameter_mm: Real, manufacturing_marking_process: str) -> Finding:
     """Diameter against the smallest that the marking process can make."""
@@ -107,6 +109,7 @@ def marker_diameter(markers_diameter_mm: Real, manufacturing_marking_process: st
     parameter="design.markers.pitch_mm",
     why="the web between two dots must survive the marking process",
     advice="use a larger pitch or another marking process",
+    of_markers=True,
 )
 def marker_gap(
     markers_pitch_mm: Real, markers_diameter_mm: Real, manufacturing_marking_process: str
@@ -123,6 +126,7 @@ def marker_gap(
     parameter="design.markers.edge_margin_mm",
     why="a dot over the edge is neither printed nor seen whole",
     advice="use fewer rows or columns, or a smaller pitch",
+    of_markers=True,
 )
 def marker_inside(
     gel_length_mm: Real,
@@ -144,6 +148,7 @@ def marker_inside(
     parameter="design.gel.corner_radius_mm",
     why="dots that cross the rounded corner are left out of the print",
     advice="use a smaller corner radius, or a wider edge margin",
+    of_markers=True,
 )
 def marker_corner(
     gel_length_mm: Real,
@@ -169,6 +174,7 @@ def marker_corner(
     parameter="design.markers.rows",
     why="anchors need at least five rows and columns; without them tracking can slip by a pitch",
     advice="use a smaller pitch, more markers, or anchors: none",
+    of_markers=True,
 )
 def marker_lattice(
     marker_grid_rows: Real, marker_grid_columns: Real, markers_anchors: str
@@ -184,6 +190,7 @@ def marker_lattice(
     parameter="design.markers.anchors",
     why="a plain grid looks the same after a slip of one pitch",
     advice="use odd_sized or omitted anchors",
+    of_markers=True,
 )
 def marker_anchors(markers_anchors: str) -> Finding:
     """Value 1 where the lattice has anchors."""

@@ -44,6 +44,7 @@ def gel_soft(material_gel_youngs_modulus_mpa: Real) -> Finding:
     parameter="mesh.layers",
     why="one bonded layer locks as Poisson's ratio nears 0.5, whatever the element",
     advice="use at least two layers (four for a good field) and the bbar or incompatible element",
+    of_markers=True,
 )
 def mesh_layers(mesh_layers: Real, mesh_element: str, material_gel_poissons_ratio: Real) -> Finding:
     """Poisson's ratio against the largest that layers and element can represent."""
@@ -60,6 +61,7 @@ def mesh_layers(mesh_layers: Real, mesh_element: str, material_gel_poissons_rati
     parameter="mesh.nodes_per_marker_pitch",
     why="where they do not, displacements are interpolated between markers",
     advice="use nodes_per_marker_pitch instead of cell counts",
+    of_markers=True,
 )
 def mesh_alignment(pad_mesh_alignment_mm: Real) -> Finding:
     """Largest distance of a marker line to a node line."""
@@ -72,6 +74,7 @@ def mesh_alignment(pad_mesh_alignment_mm: Real) -> Finding:
     parameter="mesh.layers",
     why="flat or tall cells cost accuracy and condition",
     advice="change layers or cell size",
+    of_markers=True,
 )
 def mesh_aspect(
     pad_mesh_cell_x_mm: Real, pad_mesh_cell_y_mm: Real, pad_mesh_cell_z_mm: Real
@@ -88,6 +91,7 @@ def mesh_aspect(
     parameter="mesh.layers",
     why="every column of the mesh needs a whole cell under the gel's surface",
     advice="use more layers, a thicker gel or a lower crown",
+    of_markers=True,
 )
 def mesh_crown(
     gel_thickness_mm: Real, gel_crown_height_mm: Real, pad_mesh_cell_z_mm: Real
@@ -105,10 +109,11 @@ def mesh_crown(
     why="the stiffness matrix takes about 2 kB per node",
     advice="use fewer cells or layers",
     unit="nodes",
+    of_markers=True,
 )
-def mesh_size(pad_mesh_node_count: Real) -> Finding:
+def mesh_size(pad_mesh_box_node_count: Real) -> Finding:
     """Number of nodes of the pad mesh."""
-    return Finding(pad_mesh_node_count, MOST_NODES, caution=100_000)
+    return Finding(pad_mesh_box_node_count, MOST_NODES, caution=100_000)
 
 
 @rule(

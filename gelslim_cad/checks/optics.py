@@ -83,7 +83,7 @@ def focus_view(
 
 @rule(
     "blur.gel",
-    title="Blur on the gel, in marker diameters",
+    title="Blur on the gel, in diameters of a marker or detail",
     parameter="design.optics.blur_per_diameter",
     why="markers wash out: 1/3 of a diameter is sharp, 1/2 is the limit",
     advice="stop the lens down, use larger markers, shorten the gel, or allow more thickness",
@@ -124,7 +124,7 @@ def blur_image(view_image_blur_px: Real, camera_circle_of_confusion_px: Real) ->
 
 @rule(
     "marker.far_px",
-    title="Pixels across a marker at the far edge",
+    title="Pixels across a marker or detail at the far edge",
     parameter="design.optics.min_px_per_marker",
     why="below about 6 px the centre of a dot gets uncertain",
     advice="use larger markers, more pixels, a longer lens, or allow more thickness",

@@ -56,6 +56,7 @@ def relaxations(spec: Spec) -> tuple[Relaxation, ...]:
             "a gel 0.5 mm thinner",
         ),
         *_longer(spec),
+        *_thicker(spec),
         *_thinner_acrylic(spec),
         *_tighter_bend(spec),
         Relaxation(
@@ -99,6 +100,16 @@ def growing_changes(spec: Spec) -> tuple[tuple[Relaxation, ...], ...]:
             [Relaxation("camera.focal_length_mm", v, f"a lens of f = {v:.2g} mm") for v in focal]
         )
     return tuple(_legal(spec, steps) for steps in found)
+
+
+def _thicker(spec: Spec) -> Iterable[Relaxation]:
+    """Where the thickness is a limit and not the goal."""
+    envelope = spec.design.envelope
+    thickest = envelope.max_thickness_mm
+    weighed = envelope.length_worth > 0 or envelope.pixel_worth_mm > 0
+    if thickest is not None and (weighed or envelope.goal != "thinnest"):
+        path = "design.envelope.max_thickness_mm"
+        yield Relaxation(path, min(300.0, thickest + 1), "allowing 1 mm more thickness")
 
 
 def _longer(spec: Spec) -> Iterable[Relaxation]:

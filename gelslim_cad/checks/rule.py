@@ -97,6 +97,8 @@ class Rule:
     unit: str
     inputs: tuple[str, ...]
     judge: Callable[..., Finding]
+    of_markers: bool = False
+    """Whether the rule is about the markers or the forces, and so left out without markers."""
 
     @property
     def group(self) -> str:
@@ -108,7 +110,10 @@ GROUPS = {
     "optics": "Camera and view",
     "guide": "Light guide and LEDs",
     "structure": "Walls, fits and screws",
+    "electronics": "LED boards",
+    "thread": "Threads",
     "mount": "Mount and cable",
+    "gripper": "Gripper",
     "making": "Printing, casting and marking",
     "mechanics": "Gel, mesh and envelope",
 }
@@ -121,7 +126,14 @@ RULES: dict[RuleId, Rule] = {}
 
 
 def rule(
-    rule_id: RuleId, *, title: str, parameter: str, why: str, advice: str, unit: str | None = None
+    rule_id: RuleId,
+    *,
+    title: str,
+    parameter: str,
+    why: str,
+    advice: str,
+    unit: str | None = None,
+    of_markers: bool = False,
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
     """Register a rule; `parameter` is the spec path to change when it does not hold."""
 
@@ -138,7 +150,9 @@ def rule(
         if parameter not in PATHS.values():
             raise ValueError(f"rule {rule_id} names {parameter}, which is no spec field")
         shown = unit_of(rule_id) if unit is None else unit
-        RULES[rule_id] = Rule(rule_id, title, parameter, why, advice, shown, inputs, judge)
+        RULES[rule_id] = Rule(
+            rule_id, title, parameter, why, advice, shown, inputs, judge, of_markers
+        )
         return judge
 
     return register

@@ -12,12 +12,18 @@ from pydantic import BaseModel
 
 from gelslim_cad.dimensions import (  # noqa: F401  (registers)
     bend,
+    cable,
     distortion,
+    electronics,
     guide,
     housing,
     lens,
+    mount,
     pad,
     placement,
+    precompression,
+    seat,
+    thread,
     view,
 )
 from gelslim_cad.dimensions.fold import Fold
@@ -40,12 +46,18 @@ class Derived:
     Attributes:
         values: Each dimension by its dotted name.
         given: The spec's fields by dotted path.
-        fold: The layout of camera and mirror that the search found.
+        solved: What the internal dimensions are computed from, by their dotted names.
     """
 
     values: Mapping[str, Any]
     given: Mapping[str, Any]
-    fold: Fold
+    solved: Mapping[str, Any]
+
+    @property
+    def fold(self) -> Fold:
+        """The layout of camera and mirror that the search found."""
+        found: Fold = self.solved["fold.layout"]
+        return found
 
     def value(self, name: str) -> Any:
         """The value under a name that is known at run time only; KeyError where there is none."""
@@ -59,7 +71,7 @@ class Derived:
         """Dotted name and value of a function parameter such as `gel_length_mm`."""
         entry = REGISTRY.get(parameter)
         if entry is not None:
-            return entry.name, self.fold if entry.internal else self.values[entry.name]
+            return entry.name, (self.solved if entry.internal else self.values)[entry.name]
         path = PATHS[parameter]
         return path, self.given[path]
 
@@ -92,7 +104,7 @@ class Dimensions(Derived, NamedValues):
     Attributes:
         values: Each dimension by its dotted name, in the unit that ends the name.
         given: The spec's fields by dotted path.
-        fold: The layout of camera and mirror that the search found.
+        solved: What the internal dimensions are computed from, by their dotted names.
     """
 
     def feasible(self) -> bool:
@@ -116,7 +128,7 @@ class DimensionsBatch(Derived):
     Attributes:
         values: Each dimension by its dotted name, arrays (n,).
         given: The spec's fields by dotted path: arrays (n,) where they differ between designs.
-        fold: The layouts of camera and mirror that the search found.
+        solved: What the internal dimensions are computed from, by their dotted names.
     """
 
     def __getitem__(self, name: DimensionName | FloatName | IntName) -> NDArray[np.float64]:
@@ -195,10 +207,9 @@ def derive(spec: Spec) -> Dimensions:
         The dimensions, as floats.
     """
     given = dict(leaves(spec))
-    computed = _evaluate(given)
-    fold = computed.pop("fold.layout")
+    computed, solved = _evaluate(given)
     values = {name: float(np.reshape(value, -1)[0]) for name, value in computed.items()}
-    return Dimensions(values, given, fold)
+    return Dimensions(values, given, solved)
 
 
 def derive_batch(
@@ -218,18 +229,19 @@ def derive_batch(
             raise KeyError(f"no spec field is called {path}")
         given[path] = np.asarray(value)
     with threads(jobs, among):
-        computed = _evaluate(given)
-    fold = computed.pop("fold.layout")
+        computed, solved = _evaluate(given)
     count = max((np.size(v) for v in overrides.values()), default=1)
     values = {name: np.broadcast_to(value, (count,)) for name, value in computed.items()}
-    return DimensionsBatch(values, given, fold)
+    return DimensionsBatch(values, given, solved)
 
 
-def _evaluate(given: Mapping[str, Any]) -> dict[str, Any]:
+def _evaluate(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values of the dimensions, and of the internal ones, by their dotted names."""
     known = {identifier(path): value for path, value in given.items()}
     results: dict[str, Any] = {}
+    solved: dict[str, Any] = {}
     for entry in ORDER:
         value = entry.compute(*(known[p] for p in entry.inputs))
         known[entry.identifier] = value
-        results[entry.name] = value
-    return results
+        (solved if entry.internal else results)[entry.name] = value
+    return results, solved

@@ -29,8 +29,9 @@ RIM = 0.6
 STARTS = 12
 """Bands into which the coarse grid's mean ray angles are split."""
 NEAR_DEPTH_MM, NEAR_LENGTH_MM, NEAR_PX, NEAR_BEYOND_MM, NEAR_MISSED = 0.5, 5.0, 1.0, 5.0, 0.1
-"""Bands worth a closer look: by their goal, by what they miss in the housing or, as a part, in the
-view, above the best."""
+"""How far the best candidate of a band may be above that of the best band and still be polished: in
+mm of depth or length or in pixels of the goal; in mm outside the housing; as a part of the score
+where limits of the view are missed."""
 
 
 class Best(NamedTuple):

@@ -54,7 +54,7 @@ def finger_lengths_mm(
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Lengths that the camera's rear corners, its clamp's foot and top, and the bezel need."""
     fit, outside = p.fit_clearance_mm, tip_x_mm(p, m) + p.mount_length_mm
-    behind = outside + p.cable_bend_radius_mm + fit
+    behind = outside + p.cable_behind_mm + fit
     back, cover_z = c.face_mm + p.module_depth_mm + p.clamp_play_mm, p.window_z_mm - depth
     foot, top = clamp_ends_x_mm(c.x_mm, c.z_mm, c.cos, c.sin, back, p.module_height_mm / 2, cover_z)
     bezel_x = ledge_x_mm - p.end_support_mm - fit - p.tip_wall_mm

@@ -48,7 +48,7 @@ NEVER_MISSED = -100.0
 LEAST_GAIN = 1e-4
 """Steps that promise less, in mm or by their weight in parts of a limit, end the descent."""
 HOPELESS = 5
-"""So many steps of the promised gain must make a candidate the best of its design, or it ends."""
+"""A candidate's descent ends if not even so many steps like the last would make it the best."""
 
 
 class Candidates(NamedTuple):

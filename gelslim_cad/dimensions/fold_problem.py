@@ -69,7 +69,7 @@ class FoldProblem:
     fit_clearance_mm: Array
     end_support_mm: Array
     tip_wall_mm: Array
-    cable_bend_radius_mm: Array
+    cable_behind_mm: Array
     mount_length_mm: Array
     baffle_inner_y_mm: Array
     clamp_width_mm: Array

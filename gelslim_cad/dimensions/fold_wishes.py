@@ -38,7 +38,8 @@ def closest(problem: FoldProblem, bands: Best, by: Callable[[FoldProblem], Measu
     angle = mirror_angle_rad(bands.turn_rad, bands.mid_rad)
     places = np.stack([bands.mid_rad, bands.spread, angle], axis=1)
     start = Candidates(near % len(problem), places[near], bands.score[near])
-    reached = polished(problem, by(problem), _different(start, SAME_BAND))
+    measure = by(problem)
+    reached = polished(problem, measure, _different(start, SAME_BAND))
     best = reached.rows(_best_of_each(reached))
     weighted = (problem.depth_worth > 0) & (
         (problem.length_worth > 0) | (problem.pixel_worth_mm > 0)
@@ -46,7 +47,7 @@ def closest(problem: FoldProblem, bands: Best, by: Callable[[FoldProblem], Measu
     open_ = (best.score < BEYOND_MM) & ~np.ravel(weighted)
     equal = open_[reached.design] & (reached.score <= best.score[reached.design] + EQUAL_MM)
     if equal.any():
-        wish = _next_wish(problem, by(problem)(best.design, best.place[:, None])[:, 0])
+        wish = _next_wish(problem, measure(best.design, best.place[:, None])[:, 0])
         measure = by(wish)
         rest = _different(reached.rows(equal), SAME_PLACE)
         rest = rest._replace(
@@ -59,7 +60,7 @@ def closest(problem: FoldProblem, bands: Best, by: Callable[[FoldProblem], Measu
 
 
 def _different(candidates: Candidates, apart: float) -> Candidates:
-    """The better ones of candidates of a design that are nearer to each other than `apart`."""
+    """Of a design's candidates that lie in one cell of the size `apart` only the best."""
     order = np.argsort(candidates.score, kind="stable")
     cells = np.column_stack([candidates.design, np.round(candidates.place / apart)])[order]
     _, first = np.unique(cells, axis=0, return_index=True)
@@ -100,5 +101,8 @@ def _next_wish(problem: FoldProblem, measured: Array) -> FoldProblem:
 
 
 def _loosened(reached_mm: Array, limit_mm: Array) -> Array:
-    """What counts as equal to a length that was reached, within a limit that it keeps."""
+    """The largest length that counts as equal to the one that was reached.
+
+    Where the one that was reached keeps the limit, so does this.
+    """
     return np.minimum(reached_mm + EQUAL_MM, np.maximum(limit_mm, reached_mm + 1e-6))

@@ -80,17 +80,31 @@ def guide_length_mm(guide_distal_end_x_mm: Real, guide_proximal_end_x_mm: Real) 
 
 
 @dimension(
-    "guide.blank_width_mm", formula="flat width + 2 (leg + π/2 (R + t/2)), neutral fibre at t/2"
+    "guide.blank_width_mm",
+    formula="(flat width + 2 (leg + trim + π/2 (R + k t))) / (1 - shrinkage), neutral fibre at k t",
 )
 def guide_blank_width_mm(
     guide_flat_width_mm: Real,
     light_guide_leg_length_mm: Real,
     guide_inner_radius_mm: Real,
     light_guide_thickness_mm: Real,
+    manufacturing_leg_trim_mm: Real,
+    manufacturing_bend_neutral_ratio: Real,
+    manufacturing_heat_shrinkage_percent: Real,
 ) -> Real:
     """Flat acrylic blank before bending, across the finger."""
-    arc = np.pi / 2 * (guide_inner_radius_mm + light_guide_thickness_mm / 2)
-    return guide_flat_width_mm + 2 * (light_guide_leg_length_mm + arc)
+    neutral = manufacturing_bend_neutral_ratio * light_guide_thickness_mm
+    leg = light_guide_leg_length_mm + manufacturing_leg_trim_mm
+    bent = guide_flat_width_mm + 2 * (leg + np.pi / 2 * (guide_inner_radius_mm + neutral))
+    return bent / (1 - manufacturing_heat_shrinkage_percent / 100)
+
+
+@dimension("guide.blank_length_mm", formula="length / (1 - shrinkage)")
+def guide_blank_length_mm(
+    guide_length_mm: Real, manufacturing_heat_shrinkage_percent: Real
+) -> Real:
+    """Flat acrylic blank before bending, along the finger."""
+    return guide_length_mm / (1 - manufacturing_heat_shrinkage_percent / 100)
 
 
 @dimension("guide.full_guidance_ratio", formula="1 / (n - 1): collimated light", source=GUIDE)
@@ -163,3 +177,11 @@ def led_board_bottom_z_mm(
 def led_board_length_mm(gel_length_mm: Real, guide_length_mm: Real) -> Real:
     """LED board along the finger."""
     return np.minimum(gel_length_mm + 4.0, guide_length_mm - 1.0)
+
+
+@dimension("led.datum_mm", formula="t / 2 + fit - board width / 2")
+def led_datum_mm(
+    light_guide_thickness_mm: Real, housing_fit_clearance_mm: Real, led_board_width_mm: Real
+) -> Real:
+    """How far the edge that locates an LED board stands out of the channel's outer wall."""
+    return light_guide_thickness_mm / 2 + housing_fit_clearance_mm - led_board_width_mm / 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gelslim_cad.dimensions.cable import LANE_GAP_MM
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.fold_housing import (
     LEDGE_GAP_MM,
@@ -20,8 +21,10 @@ from gelslim_cad.geometry.fasteners import SCREWS
 CLAMP_CHEEK_MM = 3.5
 COVER_TAB_MM = 4.0
 """Least; a larger screw needs its head and 0.4 mm of cover on both sides."""
-TONGUE_ROOM_MM = 4.0
-"""Least from the cable to the outside of a tongue: 1.5 mm of gap and 2.5 mm of tongue."""
+TONGUE_LEAST_MM = 2.5
+"""Least width of a tongue."""
+GROOVE_WALL_MM = 1.1
+"""Plastic between the cable's groove and the slot of a tongue."""
 BEAM_MM = 2.0
 MOUNT_WALL_MM = 1.5
 
@@ -154,16 +157,19 @@ def finger_thickness_mm(
     return housing_back_wall_mm + finger_depth_mm + light_guide_thickness_mm + stack_gel_total_mm
 
 
-@dimension("finger.width_mm", formula="2 · max(channel outer side, clamp / 2 + fit) + 2 side wall")
+@dimension(
+    "finger.width_mm",
+    formula="2 · max(channel outer side, LED wires beside the clamp + 0.15) + 2 side wall",
+)
 def finger_width_mm(
     channel_outer_y_mm: Real,
-    clamp_width_mm: Real,
-    housing_fit_clearance_mm: Real,
+    wire_run_y_mm: Real,
+    leds_wire_diameter_mm: Real,
     housing_side_wall_mm: Real,
 ) -> Real:
     """Finger width."""
-    inside = np.maximum(channel_outer_y_mm, clamp_width_mm / 2 + housing_fit_clearance_mm)
-    return 2 * (inside + housing_side_wall_mm)
+    wires = wire_run_y_mm + leds_wire_diameter_mm / 2 + LANE_GAP_MM
+    return 2 * (np.maximum(channel_outer_y_mm, wires) + housing_side_wall_mm)
 
 
 @dimension("finger.tip_x_mm", formula="guide tip end + fit + tip wall")
@@ -241,17 +247,17 @@ def mirror_seat_x_mm(mirror_lower_x_mm: Real) -> Real:
     return mirror_lower_x_mm - SEAT_STOP_MM
 
 
-@dimension("chamber.rear_x_mm", formula="rear of clamp and camera - cable bend radius - fit")
+@dimension("chamber.rear_x_mm", formula="rear of clamp and camera - room for cable and wires - fit")
 def chamber_rear_x_mm(
     camera_pose_rear_x_mm: Real,
     clamp_rear_x_mm: Real,
     bezel_proximal_x_mm: Real,
-    camera_cable_bend_radius_mm: Real,
+    cable_behind_mm: Real,
     housing_fit_clearance_mm: Real,
 ) -> Real:
     """Rear wall of the camera chamber."""
     rear = np.minimum(camera_pose_rear_x_mm, clamp_rear_x_mm)
-    behind = camera_cable_bend_radius_mm + housing_fit_clearance_mm
+    behind = cable_behind_mm + housing_fit_clearance_mm
     return np.minimum(rear - behind, bezel_proximal_x_mm - 1.0)
 
 
@@ -288,10 +294,10 @@ def finger_length_mm(finger_tip_x_mm: Real, finger_proximal_x_mm: Real) -> Real:
     return finger_tip_x_mm - finger_proximal_x_mm
 
 
-@dimension("tongue.inner_y_mm", formula="cable width / 2 + 1.5")
-def tongue_inner_y_mm(camera_cable_width_mm: Real) -> Real:
-    """Inner side of the mount tongues, beside the cable."""
-    return camera_cable_width_mm / 2 + 1.5
+@dimension("tongue.inner_y_mm", formula="half the cable's groove + wall + fit")
+def tongue_inner_y_mm(cable_slot_half_mm: Real, housing_fit_clearance_mm: Real) -> Real:
+    """Inner side of the mount tongues, beside the cable's groove."""
+    return cable_slot_half_mm + GROOVE_WALL_MM + housing_fit_clearance_mm
 
 
 @dimension("tongue.outer_y_mm", formula="finger width / 2 - side wall - fit")

@@ -6,9 +6,12 @@ import numpy as np
 
 from gelslim_cad.dimensions.registry import Real, dimension
 
+ROWS = "given, or ⌊({} - 2 margin - d) / pitch⌋ + 1, not below 0; 0 without markers"
 
-@dimension("marker_grid.rows", formula="given, or ⌊(L - 2 margin - d) / pitch⌋ + 1, not below 0")
+
+@dimension("marker_grid.rows", formula=ROWS.format("L"))
 def marker_grid_rows(
+    markers_pattern: str,
     markers_rows: Real | None,
     gel_length_mm: Real,
     markers_edge_margin_mm: Real,
@@ -16,13 +19,16 @@ def marker_grid_rows(
     markers_pitch_mm: Real,
 ) -> Real:
     """Marker rows along the finger."""
+    if markers_pattern == "none":
+        return 0.0 * gel_length_mm
     if markers_rows is not None:
         return markers_rows
     return _fill(gel_length_mm, markers_edge_margin_mm, markers_diameter_mm, markers_pitch_mm)
 
 
-@dimension("marker_grid.columns", formula="given, or ⌊(W - 2 margin - d) / pitch⌋ + 1, not below 0")
+@dimension("marker_grid.columns", formula=ROWS.format("W"))
 def marker_grid_columns(
+    markers_pattern: str,
     markers_columns: Real | None,
     gel_width_mm: Real,
     markers_edge_margin_mm: Real,
@@ -30,6 +36,8 @@ def marker_grid_columns(
     markers_pitch_mm: Real,
 ) -> Real:
     """Marker columns across the finger."""
+    if markers_pattern == "none":
+        return 0.0 * gel_width_mm
     if markers_columns is not None:
         return markers_columns
     return _fill(gel_width_mm, markers_edge_margin_mm, markers_diameter_mm, markers_pitch_mm)
@@ -121,8 +129,10 @@ def pad_mesh_cell_z_mm(
     return (gel_thickness_mm + gel_crown_height_mm) / mesh_layers
 
 
-@dimension("pad_mesh.node_count", formula="(nx + 1)(ny + 1)(layers + 1), before the crop")
-def pad_mesh_node_count(pad_mesh_cells_x: Real, pad_mesh_cells_y: Real, mesh_layers: Real) -> Real:
+@dimension("pad_mesh.box_node_count", formula="(nx + 1)(ny + 1)(layers + 1), before the crop")
+def pad_mesh_box_node_count(
+    pad_mesh_cells_x: Real, pad_mesh_cells_y: Real, mesh_layers: Real
+) -> Real:
     """Nodes of the uncropped mesh box."""
     return (pad_mesh_cells_x + 1) * (pad_mesh_cells_y + 1) * (mesh_layers + 1)
 

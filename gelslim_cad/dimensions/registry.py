@@ -90,9 +90,15 @@ def dimension(
     return register
 
 
-UNITS = {"mm": "mm", "deg": "°", "px": "px", "mm2": "mm²", "mm3": "mm³", "percent": "%", "n": "N"}
+UNITS = {
+    "mm": "mm", "deg": "°", "px": "px", "mm2": "mm²", "mm3": "mm³", "percent": "%", "n": "N",
+    "mpa": "MPa", "g": "g", "ma": "mA", "ohm": "Ω", "c": "°C", "v": "V", "mw": "mW",
+}  # fmt: skip
 
 
 def unit_of(name: str) -> str:
-    """Unit of a name by its suffix; empty for a plain number."""
+    """Unit of a name by its suffix, as in `_mm` or `_mpa_per_mm`; empty for a plain number."""
+    first, per, last = name.rpartition("_per_")
+    if per and unit_of(first) and last in UNITS:
+        return f"{unit_of(first)}/{UNITS[last]}"
     return UNITS.get(name.rsplit("_", 1)[-1], "")

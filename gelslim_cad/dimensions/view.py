@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from gelslim_cad.dimensions.solver import solve_fold
 from gelslim_cad.geometry.names import Name
 
 FOLD = "docs/physics.md#camera-and-fold"
+KEPT_FOLDS = 64
+"""Folds that are kept: rules, prices and tolerances of a design ask for the same ones."""
 
 
 @dimension("view.blur_limit_mm", formula="blur_per_diameter · marker diameter", source=FOLD)
@@ -67,7 +70,7 @@ PROBLEM: dict[str, Name] = {
     "fit_clearance_mm": "design.housing.fit_clearance_mm",
     "end_support_mm": "design.light_guide.end_support_mm",
     "tip_wall_mm": "design.housing.tip_wall_mm",
-    "cable_bend_radius_mm": "camera.cable_bend_radius_mm",
+    "cable_behind_mm": "cable.behind_mm",
     "mount_length_mm": "mount.length_mm",
     "baffle_inner_y_mm": "baffle.inner_y_mm",
     "clamp_width_mm": "clamp.width_mm",
@@ -102,8 +105,21 @@ def fold_layout(values: Mapping[str, Any]) -> Fold:
     given["max_depth_mm"] = _limit_mm(given["max_depth_mm"]) - taken_mm
     given["max_length_mm"] = _limit_mm(given["max_length_mm"])
     flat = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given.values()))
+    if flat[0].size == 1:
+        return _solved_alone(tuple(given), tuple(float(v[0]) for v in flat))
     columns = dict(zip(given, (v.reshape(-1, 1, 1) for v in flat), strict=True))
     return solve_fold(FoldProblem(**columns))
+
+
+@lru_cache(maxsize=KEPT_FOLDS)
+def _solved_alone(names: tuple[str, ...], values: tuple[float, ...]) -> Fold:
+    """The fold of one design; read-only, because designs that differ elsewhere share it."""
+    columns = {n: np.full((1, 1, 1), v) for n, v in zip(names, values, strict=True)}
+    found = solve_fold(FoldProblem(**columns))
+    for value in vars(found).values():
+        for array in value.values() if isinstance(value, dict) else (value,):
+            array.setflags(write=False)
+    return found
 
 
 def _limit_mm(given_mm: Real | None) -> Real:

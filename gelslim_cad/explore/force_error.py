@@ -20,6 +20,7 @@ calibration of a built sensor say more of one.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,7 +109,7 @@ class PatchError:
 def patch_error(patch: Patch) -> PatchError:
     """Measure a patch: about a second. Raises IfemError where its mesh has no operator."""
     from ifem_export.elements.material import Material
-    from ifem_export.operators.ladder import reference_force
+    from ifem_export.operators.ladder import reference_forces
     from ifem_export.operators.surface_operator import surface_operator
 
     mesh = _mesh(patch)
@@ -118,13 +119,9 @@ def patch_error(patch: Patch) -> PatchError:
     operator = surface_operator(mesh, gel, element, rung, rtol=1e-6)
     points = np.asarray(mesh.nodes_mm)[mesh.surface]
     errors, sizes, work = [], [], 0.0
-    for way in ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0)):
-
-        def bump(p: Array, way: tuple[float, float, float] = way) -> Array:
-            squares = (np.asarray(p)[:, :2] ** 2).sum(axis=1)
-            return np.asarray(np.exp(-squares / (2 * WIDTH_MM**2))[:, None] * np.array(way))
-
-        expected = reference_force(mesh, gel, bump)
+    motions = [_bump((1.0, 0.0, 0.0)), _bump((0.0, 0.0, -1.0))]
+    truth = reference_forces(mesh, gel, motions)
+    for bump, expected in zip(motions, truth, strict=True):
         found = operator.force(bump(points))
         errors.append(float(np.linalg.norm(found - expected) / np.linalg.norm(expected)))
         sizes.append(float(np.linalg.norm(expected)))
@@ -133,6 +130,16 @@ def patch_error(patch: Patch) -> PatchError:
     noise = [operator.force(u)[contact] for u in _noise(points, patch.pitch_mm)]
     gain = math.sqrt(float(np.mean([(f**2).sum() for f in noise]))) / min(sizes)
     return PatchError(rounded(max(errors)), rounded(gain), rounded(work))
+
+
+def _bump(way: tuple[float, float, float]) -> Callable[[Array], Array]:
+    """Motion of surface points (n, 3) that is 1 mm along `way` at the middle."""
+
+    def motion(points: Array) -> Array:
+        squares = (np.asarray(points)[:, :2] ** 2).sum(axis=1)
+        return np.asarray(np.exp(-squares / (2 * WIDTH_MM**2))[:, None] * np.array(way))
+
+    return motion
 
 
 def _mesh(patch: Patch) -> Any:

@@ -33,7 +33,7 @@ SHOWN: tuple[DimensionName, ...] = (
     "guide.bend_ratio",
     "marker_grid.rows",
     "marker_grid.columns",
-    "pad_mesh.node_count",
+    "pad_mesh.box_node_count",
 )
 """Dimensions in every table."""
 REFUSED = "spec"

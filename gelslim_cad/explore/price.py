@@ -13,6 +13,7 @@ from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.explore.brightness import RAYS, TRACED, Traced, light_columns, trace
 from gelslim_cad.explore.force_error import MARKER_NOISE_PX, Patch, PatchError, patch_error
 from gelslim_cad.explore.pareto import FIGURES, Figure
+from gelslim_cad.geometry.gel_shape import has_markers
 from gelslim_cad.spec import Spec
 
 SAME = 5e-4
@@ -80,9 +81,10 @@ def _traced_and_pressed(d: Dimensions, rays: int, noise_px: float) -> dict[str, 
     with threadpool_limits(1):  # as the tasks of an exploration, so that both say the same
         light = light_columns(d, _lit(tuple(d.value(n) for n in TRACED), rays))
         error = _pressed(Patch.of(d))
+    forces = {"force.error": error.total(d, noise_px)} if has_markers(d) else {}
     return {
         **{n: v for n, v in light.items() if n in {f.name for f in FIGURES}},
-        "force.error": error.total(d, noise_px),
+        **forces,
         "gel.stiffness_n_mm": error.stiffness(d),
     }
 

@@ -19,6 +19,7 @@ from gelslim_cad.explore.judge import SHOWN, VERDICT
 from gelslim_cad.explore.space import ExploreError, Space
 from gelslim_cad.explore.task import Task, run_tasks, unpacked
 from gelslim_cad.geometry.lookup import NamedValues
+from gelslim_cad.sensor import NoMarkersError
 from gelslim_cad.spec.reader import suggestion
 from gelslim_core.files.replaced_file import is_part, replace_file, sweep
 from gelslim_core.jobs import Engine
@@ -87,8 +88,10 @@ def explore(
     """Do every task that the folder does not hold yet and put the table together.
 
     The table does not depend on the engine nor on how often the run was interrupted. Raises
-    ExploreError, OSError.
+    ExploreError, OSError, and NoMarkersError where force errors are asked for without markers.
     """
+    if request.force_error and request.space.spec.design.markers.pattern == "none":
+        raise NoMarkersError
     tell = progress or (lambda text, done, total: None)
     with Store.opened(folder) as store:
         run = _Run(store, engine, tell)

@@ -119,3 +119,8 @@ class GelShape:
             cut += p**2 * r**2 * (1 - math.pi / 4)
             cut += p * r**3 / 3 + r**4 * (1 / 3 - math.pi / 16)
         return rectangle - 4 * cut
+
+
+def has_markers(d: Mapping[str, Any] | Any) -> bool:
+    """Whether markers are printed on the gel of `d` (Dimensions, or any lookup by dotted name)."""
+    return bool(d["design.markers.pattern"] != "none")

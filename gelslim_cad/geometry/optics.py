@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_optics.camera.lens_distortion import LensDistortion
@@ -80,6 +83,21 @@ def virtual_camera(d: Lookup) -> VirtualCamera:
         ),
         lens=lens if lens.distorts else None,
     )
+
+
+def corner_rays(d: Lookup) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Virtual pinhole (3,), and the points (4, 3) where the corner rays meet mirror and window."""
+    camera = virtual_camera(d)
+    x, y = d["design.gel.length_mm"] / 2, d["design.gel.width_mm"] / 2
+    corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], dtype=float)
+    rays = camera.air_directions(corners)
+    angle = math.radians(d["mirror.angle_deg"])
+    normal = np.array([-math.sin(angle), 0, math.cos(angle)])
+    on_mirror = np.array([d["mirror.lower_x_mm"], 0, d["mirror.lower_z_mm"]])
+    start = camera.position_mm
+    to_mirror = ((on_mirror - start) @ normal) / (rays @ normal)
+    to_window = (camera.window_bottom_z_mm - start[2]) / rays[:, 2]
+    return start, start + rays * to_mirror[:, None], start + rays * to_window[:, None]
 
 
 def lens_distortion(d: Lookup) -> LensDistortion:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 if TYPE_CHECKING:
     import cadquery as cq
 
-Process = Literal["print", "laser", "bend", "cast", "buy", "pcb", "cut"]
-"""How a part is made: `print` gives STL and 3MF, `laser` and `cut` a DXF outline; `bend` is
-formed from a laser-cut blank, which is a part of its own."""
+Process = Literal["print", "laser", "bend", "countersink", "cast", "buy", "pcb", "cut"]
+"""How a part is made: `print` gives STL and 3MF, `laser` and `cut` a DXF outline; `bend` and
+`countersink` start from a laser-cut blank, which is a part of its own."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,13 @@ class Part:
         colour: sRGB colour with opacity, each from 0 to 1.
         quantity: How many are needed.
         in_assembly: Whether it belongs to the finger; tooling does not.
-        explode_mm: Displacement of the part in the exploded view.
+        explode_mm: Displacement of the part in the exploded view. The z that a maker gives tells
+            only direction and order; `gelslim_cad/solids/explode.py` finds the distance.
         print_rotation_deg: Rotations about x, then y, then z that lay the part flat for printing.
         note: Advice for the maker, for the bill of materials.
+        printed: The solid as it is made where assembly bends it, such as a spring; None where that
+            is `solid`.
+        density_g_cm3: Density where it is not that of the material, as of a part of one's own.
         tags: Groups that the part belongs to, such as `tooling`, `mould` and `fastener`.
     """
 
@@ -46,11 +50,18 @@ class Part:
     explode_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     print_rotation_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     note: str = ""
+    printed: cq.Shape | None = None
+    density_g_cm3: float | None = None
     tags: frozenset[str] = field(default_factory=frozenset)
+
+    def as_made(self) -> Part:
+        """The part before it is assembled."""
+        return self if self.printed is None else replace(self, solid=self.printed, printed=None)
 
     def _repr_png_(self) -> bytes | None:
         """Picture for a notebook; None, which shows the text instead, where none can be drawn."""
-        from gelslim_cad.pictures.finger_pictures import PictureError, picture_whole
+        from gelslim_cad.pictures.finger_pictures import picture_whole
+        from gelslim_cad.pictures.window import PictureError
 
         # On a copy: a tessellation stays on the shape and would change later exports.
         vertices, faces = self.solid.copy().tessellate(0.05, math.radians(12))

@@ -16,9 +16,16 @@ from gelslim_optics.guide.profile import GuideProfile, Segment
 from gelslim_optics.light.trace import trace_paths
 
 PATHS = 70
+SHOWN_PATHS = 24
 ACRYLIC, GEL, INK = "#cfe6f5", "#f4efe2", "#333a44"
-RAY_COLOURS = {"red": "#d0342c", "green": "#1c9a3d", "left": "#8a5a00", "right": "#5a4a8a"}
-SHADES = {"red": "Reds", "green": "Greens", "left": "Greys", "right": "Greys"}
+RAY_COLOURS = {
+    "red": "#d0342c",
+    "green": "#1c9a3d",
+    "blue": "#1f5fc4",
+    "left": "#8a5a00",
+    "right": "#5a4a8a",
+}
+SHADES = {"red": "Reds", "green": "Greens", "blue": "Blues", "left": "Greys", "right": "Greys"}
 
 
 def paths_png(d: Lookup, title: str | None = None, seed: int = 3) -> bytes:
@@ -40,6 +47,15 @@ def paths_png(d: Lookup, title: str | None = None, seed: int = 3) -> bytes:
     axes.set_ylabel("z, mm")
     axes.set_title("Light paths; where light splits, one branch is followed by chance", fontsize=10)
     return as_png(figure, title)
+
+
+def shown_paths(d: Lookup, seed: int = 3) -> dict[str, Any]:
+    """Some light paths as plain data: for each its colour and its points (k, 3) in mm."""
+    paths = trace_paths(light_scene(d, guide_profile(d)), SHOWN_PATHS, seed=seed)
+    return {
+        "format": "gelslim-light-paths/1",
+        "paths": [{"colour": c, "points_mm": np.round(p, 4).tolist()} for c, p in paths],
+    }
 
 
 def irradiance_png(d: Lookup, study: LightStudy) -> bytes:

@@ -29,16 +29,19 @@ NAMES: tuple[Name, ...] = (
     "design.gel.thickness_mm",
     "design.gel.width_mm",
     "design.housing.fit_clearance_mm",
+    "design.leds.blue_wavelength_nm",
     "design.leds.dome_half_angle_deg",
     "design.leds.emission",
     "design.leds.emission_angle_deg",
     "design.leds.emission_intensity",
     "design.leds.green_wavelength_nm",
     "design.leds.height_mm",
+    "design.leds.light",
     "design.leds.one_wavelength_nm",
     "design.leds.package_mm",
     "design.leds.radiant_flux_mw",
     "design.leds.red_wavelength_nm",
+    "design.leds.white_wavelength_nm",
     "design.light_guide.leg_length_mm",
     "design.light_guide.thickness_mm",
     "guide.bend_ratio",
@@ -81,7 +84,7 @@ def light_scene(d: Lookup, profile: GuideProfile) -> LightScene:
 
 
 def led_rows(d: Lookup) -> tuple[LedRow, LedRow]:
-    """Red LEDs under the left leg, green under the right one; or LEDs of one wavelength."""
+    """LEDs of one colour under the left leg, of another or the same under the right one."""
     count, pitch = round(d["led.count"]), d["led.pitch_mm"]
     places = tuple((i + 0.5 - count / 2) * pitch for i in range(count))
     size, gap, law = (
@@ -129,6 +132,7 @@ def media(d: Lookup) -> dict[str, Medium]:
         d["material.acrylic.absorption_per_m"] / 1000,
         indices.get("red"),
         indices.get("green"),
+        indices.get("blue"),
     )
     return {"air": Medium(1.0), "acrylic": acrylic, "leg": acrylic, "gel": Medium(gel)}
 

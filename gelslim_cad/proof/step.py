@@ -10,6 +10,7 @@ from typing import Any
 
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof import ProofResult, at_most, equal
+from gelslim_cad.proof.validity import is_valid
 
 VOLUME_LIMIT = 1e-4
 
@@ -60,7 +61,7 @@ def prove_step(path: Path, parts: Part | Sequence[Part]) -> list[ProofResult]:
 
 
 def _prove_part(file: str, part: Part, shape: Any) -> list[ProofResult]:
-    good = shape.isValid() and len(shape.Solids()) == 1
+    good = is_valid(shape) and len(shape.Solids()) == 1
     exact, read = part.solid.Volume(), shape.Volume()
     error = abs(read / exact - 1.0) if exact > 0 else float("inf")
     detail = f"{part.name}: {read:.6g} mm3 read, {exact:.6g} mm3 built"

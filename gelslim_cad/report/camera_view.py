@@ -36,6 +36,12 @@ class CameraView:
 
 def camera_view(view: CameraView) -> str:
     """Draw each marker as its ellipse with its blur as a soft rim, and the gel's outline."""
+    if not view.markers_px:
+        return (
+            f'<div class="card camera"><div class="frame">{_drawing(view, (), [])}</div>'
+            f"<aside><dl>{_row('gel’s share of the image', _gel_share(view))}</dl>"
+            "<p class='soft'>The gel has no markers.</p></aside></div>"
+        )
     blur = view.blur_px
     areas = [math.sqrt(a * b) for a, b in view.marker_axes_px]
     return (
@@ -56,6 +62,8 @@ def colour(level: int) -> str:
 
 def levels(values: tuple[float, ...] | list[float]) -> list[int]:
     """Sort values into LEVELS equal steps from the smallest to the largest."""
+    if not values:
+        return []
     low, span = min(values), max(values) - min(values)
     if span <= 1e-9 * max(1.0, abs(low)):
         return [LEVELS // 2] * len(values)
@@ -85,10 +93,14 @@ def _drawing(view: CameraView, blur: tuple[float, ...], areas: list[float]) -> s
     )
     return (
         f'<svg class="view" viewBox="{box}" role="img" aria-labelledby="marker-view-title">'
-        f'<title id="marker-view-title">{len(areas)} markers in an image of {width} × {height} px'
+        f'<title id="marker-view-title">{_what(areas)} in an image of {width} × {height} px'
         f'</title><rect class="border" width="{width}" height="{height}"/>{outline}'
         f'<g stroke-opacity="0.4">{dots}</g>{_corners(view, pad)}</svg>'
     )
+
+
+def _what(areas: list[float]) -> str:
+    return f"{len(areas)} markers" if areas else "The gel's outline"
 
 
 def _dot(view: CameraView, index: int, by_blur: int, by_size: int) -> str:
@@ -146,17 +158,28 @@ def _numbers(view: CameraView, areas: list[float]) -> str:
     inside = sum(
         0 <= u <= view.image_width_px and 0 <= v <= view.image_height_px for u, v in view.markers_px
     )
-    share = _area(view.outline_px) / (view.image_width_px * view.image_height_px)
     rows += [
         ("inside the image", str(inside)),
-        ("largest dot, mean axis", f"{max(areas):.1f} px"),
-        ("smallest dot, mean axis", f"{min(areas):.1f} px"),
-        ("narrowest axis", f"{min(min(pair) for pair in view.marker_axes_px):.1f} px"),
-        ("largest blur", f"{max(view.blur_px):.2f} px"),
-        ("gel's share of the image", f"{100 * share:.0f} %"),
+        ("largest printed dot, mean axis", f"{max(areas):.1f} px"),
+        ("smallest printed dot, mean axis", f"{min(areas):.1f} px"),
+        (
+            "narrowest axis of a printed dot",
+            f"{min(min(pair) for pair in view.marker_axes_px):.1f} px",
+        ),
+        ("largest blur of a printed dot", f"{max(view.blur_px):.2f} px"),
+        ("gel's share of the image", _gel_share(view)),
     ]
-    body = "".join(f"<dt>{text(name)}</dt><dd>{text(value)}</dd>" for name, value in rows)
+    body = "".join(_row(*row) for row in rows)
     return f"<dl>{body}</dl><p class='soft'>The soft rim of a dot is its blur circle.</p>"
+
+
+def _row(name: str, value: str) -> str:
+    return f"<dt>{text(name)}</dt><dd>{text(value)}</dd>"
+
+
+def _gel_share(view: CameraView) -> str:
+    share = _area(view.outline_px) / (view.image_width_px * view.image_height_px)
+    return f"{100 * share:.0f} %"
 
 
 def _area(outline: Pairs) -> float:

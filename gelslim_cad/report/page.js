@@ -1,4 +1,4 @@
-// Search in the dimensions, filter of the rules, jumps to a dimension, and what print needs.
+// Search in the dimensions, filter of the rules, and jumps to a dimension.
 
 function wireDimensions() {
   const search = document.getElementById("dimension-search"), said = document.getElementById("dimension-count");
@@ -50,16 +50,6 @@ function wireRules() {
   }));
 }
 
-function wirePrint() {
-  let closed = [];
-  addEventListener("beforeprint", () => {
-    closed = [...document.querySelectorAll("details:not([open])")];
-    closed.forEach((element) => { element.open = true; });
-  });
-  addEventListener("afterprint", () => closed.forEach((element) => { element.open = false; }));
-}
-
 wireDimensions();
 wireRules();
-wirePrint();
 startViewer();

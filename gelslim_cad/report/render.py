@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import base64
-import hashlib
+import json
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
-from importlib import resources
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from gelslim_cad.ordering.cost import Cost
+from gelslim_cad.ordering.line import BomLine
 from gelslim_cad.report import tables
+from gelslim_cad.report.assembly import assembly_section
 from gelslim_cad.report.camera_view import CameraView, camera_view, ramp_style
 from gelslim_cad.report.markup import text
+from gelslim_cad.report.page import VIEWER_SCRIPTS, asset, fill, policy
+from gelslim_cad.report.printing import printing_section
 from gelslim_cad.report.rules import MARKS, pill, rules, verdict
-from gelslim_cad.report.tables import BomLine, Note
+from gelslim_cad.report.tables import Note
 from gelslim_cad.report.tolerance import tolerance_section
 
 if TYPE_CHECKING:
     from gelslim_cad.build.manifest import FileEntry
     from gelslim_cad.checks.rule import Check
-
-SCRIPTS = (
-    "viewer_glb.js",
-    "viewer_camera.js",
-    "viewer_draw.js",
-    "viewer.js",
-    "viewer_input.js",
-    "page.js",
-)
+    from gelslim_cad.printability.rules import PrintedPart
 
 
 @dataclass(frozen=True)
@@ -60,6 +56,9 @@ class ReportData:
     files: Mapping[str, FileEntry]
     """Files beside the report by path, with forward slashes."""
     bom: tuple[BomLine, ...]
+    cost: Cost
+    printed: tuple[PrintedPart, ...]
+    """Printed parts as they were measured."""
     light: tuple[Picture, ...]
     """Pictures of the light, each as wide as the page."""
     light_notes: tuple[Note, ...]
@@ -69,6 +68,10 @@ class ReportData:
     versions: tuple[tuple[str, str], ...]
     tolerance: Mapping[str, Any]
     """The study of the tolerances as plain data; empty where there is none."""
+    overlays: tuple[Mapping[str, Any], ...] = ()
+    """What the 3D view shows beside the parts, as `Overlay.record` gives it."""
+    assembly: Mapping[str, Any] = field(default_factory=dict)
+    """The proven order of assembly as plain data; empty where there is none."""
 
 
 def render_report(data: ReportData) -> bytes:
@@ -77,8 +80,13 @@ def render_report(data: ReportData) -> bytes:
     Style and script are inlined and named by their hash in the content security policy, which
     allows nothing else: text in `data` stays text even if it holds markup.
     """
-    style = _asset("style.css") + ramp_style()
-    script = "(() => {\n" + '"use strict";\n' + "\n".join(map(_asset, SCRIPTS)) + "})();\n"
+    style = asset("style.css") + ramp_style()
+    script = (
+        "(() => {\n"
+        + '"use strict";\n'
+        + "\n".join(map(asset, (*VIEWER_SCRIPTS, "page.js")))
+        + "})();\n"
+    )
     sections = _sections(data)
     body = "\n".join(
         f'<section id="{key}" aria-labelledby="{key}-title">'
@@ -86,10 +94,10 @@ def render_report(data: ReportData) -> bytes:
         for key, title, content in sections
     )
     links = "".join(f'<a href="#{key}">{_plain(title)}</a>' for key, title, _ in sections)
-    page = _fill(
-        _asset("page.html"),
+    page = fill(
+        asset("page.html"),
         {
-            "policy": text(_policy(style, script)),
+            "policy": text(policy(style, script)),
             "title": text(f"{data.name} – tactile finger"),
             "style": style,
             "header": _header(data),
@@ -97,6 +105,7 @@ def render_report(data: ReportData) -> bytes:
             "sections": body,
             "footer": _footer(data),
             "model": _model(data.glb),
+            "overlays": _overlays(data.overlays),
             "script": script,
         },
     )
@@ -114,11 +123,13 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
         ("camera", "What the camera sees", camera_view(data.camera_view) + projection),
         ("light", "How the gel is lit", light),
         ("tolerance", "What tolerances do", tolerance_section(data.tolerance)),
+        ("assembly", "How it goes together", assembly_section(data.assembly)),
         ("thickness", "What sets the thickness", _binding(data.binding)),
         ("rules", f"Design rules <small>{tally}</small>", rules(data.rules)),
+        ("printing", "Printing", printing_section(data.printed)),
         ("dimensions", "Dimensions", tables.dimensions(data.dimensions)),
         ("files", "Files", tables.files(data.files)),
-        ("bom", "Bill of materials", tables.bom(data.bom)),
+        ("bom", "Bill of materials", tables.bom(data.bom, data.cost)),
         ("spec", "Spec", tables.spec(data.spec_text, data.spec_hash)),
     ]
 
@@ -140,12 +151,17 @@ def _viewer(data: ReportData) -> str:
         "A picture instead:" if shown else "Open the STEP or GLB file of the list below instead."
     )
     picture = _image(shown[0]) if shown else ""
-    return _fill(_asset("viewer.html"), {"picture": picture, "instead": instead})
+    return fill(asset("viewer.html"), {"picture": picture, "instead": instead})
 
 
 def _model(glb: bytes) -> str:
     encoded = base64.b64encode(glb).decode("ascii")
     return f'<script type="application/octet-stream" id="model">{encoded}</script>'
+
+
+def _overlays(overlays: tuple[Mapping[str, Any], ...]) -> str:
+    encoded = json.dumps(overlays, separators=(",", ":")).replace("<", "\\u003c")
+    return f'<script type="application/json" id="overlays">{encoded}</script>'
 
 
 def _pictures(pictures: tuple[Picture, ...], look: str = "pictures") -> str:
@@ -181,26 +197,5 @@ def _footer(data: ReportData) -> str:
     )
 
 
-def _policy(style: str, script: str) -> str:
-    return (
-        "default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
-        f"style-src '{_digest(style)}'; script-src '{_digest(script)}'"
-    )
-
-
-def _digest(source: str) -> str:
-    digest = hashlib.sha256(source.encode()).digest()
-    return "sha256-" + base64.b64encode(digest).decode("ascii")
-
-
-def _fill(template: str, values: dict[str, str]) -> str:
-    """Replace every `{{name}}` once; a value may itself contain `{{`."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found.group(1)], template)
-
-
 def _plain(title: str) -> str:
     return re.sub(r"\s*<small>.*</small>", "", title)
-
-
-def _asset(name: str) -> str:
-    return resources.files("gelslim_cad.report").joinpath(name).read_text(encoding="utf-8")

@@ -7,23 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from gelslim_cad.ordering.cost import Cost, cost_sentence
+from gelslim_cad.ordering.line import BomLine, price_source
 from gelslim_cad.report.markup import Scalar, anchor, href, number, size, text, with_unit
 
 if TYPE_CHECKING:
     from gelslim_cad.build.manifest import FileEntry
-
-
-@dataclass(frozen=True)
-class BomLine:
-    """One line of the bill of materials."""
-
-    name: str
-    quantity: int
-    material: str
-    process: str
-    mass_g: float | None = None
-    note: str = ""
-    tooling: bool = False
 
 
 @dataclass(frozen=True)
@@ -134,19 +123,46 @@ def files(entries: Mapping[str, FileEntry]) -> str:
     )
 
 
-def bom(rows: tuple[BomLine, ...]) -> str:
-    """List what to make and to buy."""
+def bom(rows: tuple[BomLine, ...], cost: Cost) -> str:
+    """List what to make and to buy, with prices; makers and suppliers unfold below."""
     lines = "".join(
         f'<tr><td class="num">{row.quantity}</td><td>{text(row.name)}'
         f"{' (tooling)' if row.tooling else ''}</td>"
         f"<td>{text(row.material)}</td><td>{text(row.process)}</td>"
-        f'<td class="num">{text(number(row.mass_g, 3))}</td><td>{text(row.note)}</td></tr>'
+        f'<td class="num">{text(number(row.mass_g, 3))}</td>'
+        f'<td class="num">{text(_total(row))}</td><td>{text(row.note)}</td></tr>'
         for row in rows
     )
     return (
+        f'<p class="cost">{text(cost_sentence(cost))}</p>'
         '<div class="card bom scroll"><table><thead><tr><th class="num">Quantity</th><th>Part</th>'
-        '<th>Material</th><th>Process</th><th class="num">Mass, g</th><th>Note</th></tr></thead>'
-        f"<tbody>{lines}</tbody></table></div>"
+        '<th>Material</th><th>Process</th><th class="num">Mass, g</th>'
+        f'<th class="num">{text(cost.currency)}</th><th>Note</th></tr></thead>'
+        f"<tbody>{lines}</tbody></table></div>{_makers(rows)}"
+    )
+
+
+def _total(row: BomLine) -> str:
+    return "" if row.price is None else f"{row.price.total:.2f}"
+
+
+def _makers(rows: tuple[BomLine, ...]) -> str:
+    """Manufacturer, order number, supplier and origin of the price of each line, folded."""
+    lines = "".join(
+        f"<tr><td>{text(row.name)}</td><td>{text(maker)}</td><td>{text(part)}</td>"
+        f"<td>{text(supplier)}</td><td>{text(price_source(row))}</td></tr>"
+        for row in rows
+        for maker, part, supplier in (
+            (row.manufacturer, row.part_number, "")
+            if row.price is None
+            else (row.price.manufacturer, row.price.part_number, row.price.supplier),
+        )
+    )
+    return (
+        '<details class="card bom scroll"><summary>Makers, order numbers, suppliers, and where the '
+        "prices come from</summary><table><thead><tr><th>Part</th><th>Manufacturer</th>"
+        "<th>Part number</th><th>Supplier</th><th>Price</th></tr></thead>"
+        f"<tbody>{lines}</tbody></table></details>"
     )
 
 

@@ -80,6 +80,8 @@ def _bar(worst: Mapping[str, Any], group: str) -> str:
 
 def _forces(record: Mapping[str, Any]) -> str:
     forces = record["forces"]
+    if not forces:
+        return ""
     heads = [
         f"{f['component'].capitalize()}, {'' if f['calibrated'] else 'not '}calibrated"
         for f in forces

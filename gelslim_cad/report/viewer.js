@@ -1,5 +1,7 @@
 // The viewer's state and controls: orbit, zoom, explode, section, part list, view presets.
 
+const OPTICS = /^(light_guide|gel_pad|mirror|camera|camera_view|printed_dots|led_board_.*|light_(?!guide).*)$/;
+
 class Viewer {
   constructor(root, parts) {
     this.root = root;
@@ -7,7 +9,7 @@ class Viewer {
     this.canvas = root.querySelector("canvas");
     this.painter = new Painter(this.canvas, parts);
     this.camera = new Camera();
-    this.hidden = new Set();
+    this.hidden = new Set(parts.filter((part) => part.shown === false));
     this.hovered = this.selected = null;
     this.explode = 0;
     this.section = { axis: -1, at: 0, flip: false };
@@ -20,12 +22,30 @@ class Viewer {
     wireKeys(this);
     this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     this.canvas.addEventListener("webglcontextrestored", () => {
-      this.painter = new Painter(this.canvas, parts);
+      this.painter = new Painter(this.canvas, this.parts);
       this.redraw();
     });
     new ResizeObserver(() => this.redraw()).observe(this.canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
+    this.parts.forEach((part) => this.show(part, !this.hidden.has(part)));
     this.render();
+  }
+
+  // Show other parts from the same side; a part that was hidden stays hidden.
+  replace(parts) {
+    const hidden = new Set([...this.hidden].map((part) => part.name));
+    const selected = this.selected?.name;
+    this.painter.free();
+    this.parts = parts;
+    this.hidden = new Set(parts.filter((part) => hidden.has(part.name)));
+    this.hovered = null;
+    this.selected = parts.find((part) => part.name === selected) || null;
+    this.painter = new Painter(this.canvas, parts);
+    this.root.querySelector(".parts").replaceChildren();
+    this.listParts();
+    this.parts.forEach((part) => this.show(part, !this.hidden.has(part)));
+    this.setSection(this.section.axis, this.section.at);
+    this.redraw();
   }
 
   shift(part) {
@@ -192,7 +212,9 @@ class Viewer {
     on("perspective", (t) => { this.camera.perspective = t.checked; this.redraw(); });
     for (const button of this.root.querySelectorAll("[data-view]"))
       button.addEventListener("click", () => this.setView(button.dataset.view));
-    this.control("all").addEventListener("click", () => this.parts.forEach((p) => this.show(p, true)));
+    this.control("all").addEventListener("click", () => this.parts.forEach((p) => this.show(p, p.shown !== false)));
+    this.control("optics").addEventListener("click", () =>
+      this.parts.forEach((p) => this.show(p, OPTICS.test(p.name))));
     this.control("only").addEventListener("click", () => {
       if (this.selected) this.parts.forEach((p) => this.show(p, p === this.selected));
     });

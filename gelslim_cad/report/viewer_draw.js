@@ -1,5 +1,6 @@
 // Draws parts with WebGL 2: lit faces, crease edges, and a section whose cut solids are capped
-// (stencil count of back minus front faces) and hatched.
+// (stencil count of back minus front faces) and hatched. A part that is `open`, such as the camera's
+// view, has no inside: it is drawn whole.
 
 const FACE_VERTEX = `#version 300 es
 layout(location=0) in vec3 place; layout(location=1) in vec3 normal;
@@ -74,7 +75,9 @@ function vertexArray(gl, arrays, indices) {
     return buffer;
   });
   if (indices) {
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    const buffer = gl.createBuffer();
+    buffers.push(buffer);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
   }
   gl.bindVertexArray(null);
@@ -99,6 +102,17 @@ class Painter {
     return { part, edges: edges.length / 3, sharp, cut: null, cutKey: "",
       mesh: vertexArray(this.gl, [part.positions, part.normals || blank], part.indices),
       lines: vertexArray(this.gl, [edges]), cutLines: vertexArray(this.gl, [new Float32Array(6)]) };
+  }
+
+  // Give back what the parts take on the graphics card.
+  free() {
+    const { gl } = this;
+    for (const { mesh, lines, cutLines } of this.items)
+      for (const { vao, buffers } of [mesh, lines, cutLines]) {
+        gl.deleteVertexArray(vao);
+        buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+      }
+    for (const { program } of [this.face, this.line]) gl.deleteProgram(program);
   }
 
   makePickTarget() {
@@ -173,7 +187,7 @@ class Painter {
   faces(item, scene, bothSides) {
     const { gl } = this, { part } = item;
     this.use(this.face, { shift: scene.shift(part), colour: part.colour, tint: scene.tint(part),
-      flatShade: item.sharp ? 0 : 1 });
+      flatShade: item.sharp ? 0 : 1, plane: (!part.open && scene.plane) || OFF });
     gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(1, 1);
     gl.depthMask(!bothSides);
@@ -192,8 +206,10 @@ class Painter {
 
   edges(item, scene, strength) {
     const { gl } = this, { part } = item, bright = scene.tint(part)[3] > 0;
+    if (part.open && !bright) return;
     const ink = bright ? scene.accent : part.colour.slice(0, 3).map((v) => Math.min(0.32, 0.28 * v));
-    this.use(this.line, { shift: scene.shift(part), colour: [...ink, bright ? 1 : strength], hatch: 0 });
+    this.use(this.line, { shift: scene.shift(part), colour: [...ink, bright ? 1 : strength], hatch: 0,
+      plane: (!part.open && scene.plane) || OFF });
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     this.segments(item.lines.vao, item.edges);
@@ -207,7 +223,7 @@ class Painter {
   cap(item, scene, alpha) {
     const { gl } = this, { part } = item;
     item.cut = 0;
-    if (!scene.plane) return;
+    if (!scene.plane || part.open) return;
     const { axis, at } = scene.section, shift = scene.shift(part), local = at - shift[axis];
     if (local <= part.box.low[axis] || local >= part.box.high[axis]) return;
     this.cutContour(item, axis, local);

@@ -78,11 +78,21 @@ function wireKeys(viewer) {
   });
 }
 
+// Dots, camera's view and paths of light, which are no parts: open surfaces without normals.
+function readOverlays() {
+  const data = document.getElementById("overlays");
+  return JSON.parse(data ? data.textContent : "[]").map((overlay) => {
+    const positions = Float32Array.from(overlay.positions);
+    return { ...overlay, positions, indices: Uint32Array.from(overlay.indices), normals: null,
+      open: true, box: boxOf(positions) };
+  });
+}
+
 function startViewer() {
   const root = document.getElementById("viewer"), model = document.getElementById("model");
   if (!root || !model) return;
   try {
-    const parts = parseGlb(decodeBase64(model.textContent));
+    const parts = [...parseGlb(decodeBase64(model.textContent)), ...readOverlays()];
     root.dataset.state = "ready";  // shown before it is measured
     window.fingerViewer = new Viewer(root, parts);
   } catch (error) {

@@ -12,7 +12,9 @@ import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.layout import Hole, Layout
+from gelslim_cad.solids.cable import groove, notch_end_x_mm, notch_top_z_mm
+from gelslim_cad.solids.layout import Layout
+from gelslim_cad.solids.led_seat import locating_edges, uncrushed_ribs
 from gelslim_cad.solids.materials import BODY, PRINTED
 from gelslim_cad.solids.shapes import (
     box,
@@ -24,10 +26,12 @@ from gelslim_cad.solids.shapes import (
     subtract,
     union,
 )
+from gelslim_cad.solids.threads import film, roof_bosses, thread_cuts
 
 WEB_MM = 1.2
 CHAMFER_MM = 0.5
 FAR_MM = 1.0
+FILMS_TOLD = "; open the four films over the bores of the bezel's screws with a knife"
 
 
 def body(d: Dimensions) -> Part:
@@ -35,17 +39,21 @@ def body(d: Dimensions) -> Part:
     at = Layout(d)
     solid = single(_shell(d, at), "body")
     solid = chamfered(solid, _outer_top_edges(solid, at), CHAMFER_MM)
-    solid = single(union([solid, *_inner_walls(d, at)]), "body with its inner walls")
+    walls = [*_inner_walls(d, at), *locating_edges(d)]
+    solid = single(union([solid, *walls]), "body with its inner walls")
     solid = single(subtract(solid, _openings(d, at)), "body")
     process = d["manufacturing.print_process"]
+    films = [film(at, hole) for hole in at.bezel_holes()] if process == "fdm" else []
+    added = [*uncrushed_ribs(d), *films]
     return Part(
         name="body",
         solid=solid,
         material=PRINTED[process],
         process="print",
         colour=BODY,
-        note="print black or paint the inside matt black",
+        note="print black or paint the inside matt black" + (FILMS_TOLD if films else ""),
         print_rotation_deg=(180, 0, 0),
+        printed=single(union([solid, *added]), "body as printed") if added else None,
     )
 
 
@@ -56,15 +64,15 @@ def _shell(d: Dimensions, at: Layout) -> cq.Shape:
     r = d["design.housing.corner_radius_mm"]
     cover, bezel_z = d["cover.top_z_mm"], d["stack.gel_bottom_z_mm"]
     block = rounded_box((prox, tip), (-half, half), (at.back_z_mm, at.top_z_mm), (1, r, r, 1))
-    over = half + FAR_MM
+    over, fit = half + FAR_MM, d["design.housing.fit_clearance_mm"]
     pocket = at.pocket_x_mm
     inside = d["channel.outer_y_mm"]
     return subtract(
         block,
         [
-            box((at.cover_x_mm, tip + FAR_MM), (-over, over), (at.back_z_mm - FAR_MM, cover)),
+            box((at.cover_x_mm - fit, tip + FAR_MM), (-over, over), (at.back_z_mm - FAR_MM, cover)),
             box(
-                (d["bezel.proximal_x_mm"], tip + FAR_MM),
+                (bezel_end_x_mm(d), tip + FAR_MM),
                 (-over, over),
                 (bezel_z, at.top_z_mm + FAR_MM),
             ),
@@ -78,12 +86,17 @@ def _shell(d: Dimensions, at: Layout) -> cq.Shape:
     )
 
 
+def bezel_end_x_mm(d: Dimensions) -> float:
+    """Step of the roof before which the bezel lies, with the gap of a sliding fit."""
+    return float(d["bezel.proximal_x_mm"] - d["design.housing.fit_clearance_mm"])
+
+
 def _outer_top_edges(solid: cq.Solid, at: Layout) -> list[cq.Edge]:
     """Edges around the body's outer top face, except the one at the bezel."""
     faces = [f for f in solid.Faces() if abs(f.Center().z - at.top_z_mm) < 1e-6]
     if len(faces) != 1:
         return []
-    bezel_x = at.d["bezel.proximal_x_mm"]
+    bezel_x = bezel_end_x_mm(at.d)
     edges: list[cq.Edge] = faces[0].outerWire().Edges()
     return [e for e in edges if abs(e.Center().x - bezel_x) > 1e-6]
 
@@ -99,6 +112,7 @@ def _inner_walls(d: Dimensions, at: Layout) -> list[cq.Shape]:
     web_z = (cover, window + FAR_MM / 2)
     baffle_y = (d["baffle.inner_y_mm"], d["channel.inner_y_mm"])
     return [
+        *roof_bosses(at),
         box((at.beam_x_mm, d["ledge.edge_x_mm"]), (-flat, flat), ledge_z),
         box((d["ledge.distal_x_mm"], end + FAR_MM / 2), (-flat, flat), ledge_z),
         box((at.beam_x_mm, start), (-wall, wall), (window - low, window + FAR_MM / 2)),
@@ -108,31 +122,21 @@ def _inner_walls(d: Dimensions, at: Layout) -> list[cq.Shape]:
 
 
 def _openings(d: Dimensions, at: Layout) -> list[cq.Shape]:
-    """Wire notches, tongue slots, cable slot and screw holes."""
+    """Wire notches, tongue slots, groove of cable and wires, screw holes."""
     start = at.pocket_x_mm[0]
     cover, prox = d["cover.top_z_mm"], d["finger.proximal_x_mm"]
     fit = d["design.housing.fit_clearance_mm"]
     tongue_end = prox + d["design.mount.tongue_length_mm"] + fit
-    cable = d["design.housing.fit_clearance_mm"] + d["camera.cable_width_mm"] / 2
     slot_y = (d["tongue.inner_y_mm"] - fit, d["tongue.outer_y_mm"] + fit)
     channel = (d["channel.inner_y_mm"], d["channel.outer_y_mm"])
-    rear, middle = d["chamber.rear_x_mm"], d["tongue.z_mm"]
-    notch_x = (start - WEB_MM - FAR_MM / 2, start + 0.01)
+    notch_x = (notch_end_x_mm(d) - FAR_MM / 2, start + 0.01)
     return [
-        *pair(notch_x, channel, (cover - FAR_MM, d["led.top_z_mm"])),
+        *pair(notch_x, channel, (cover - FAR_MM, notch_top_z_mm(d))),
         *pair((prox - FAR_MM, tongue_end), slot_y, at.slot_z_mm),
-        box((prox - FAR_MM, rear + FAR_MM), (-cable, cable), (middle - 1.25, middle + 1.25)),
-        *(_pilot(at, hole) for hole in (*at.bezel_holes(), *at.cover_holes())),
+        *groove(d),
+        *(cut for hole in (*at.bezel_holes(), *at.cover_holes()) for cut in thread_cuts(at, hole)),
         *_bolt_holes(d, at),
     ]
-
-
-def _pilot(at: Layout, hole: Hole) -> cq.Solid:
-    """Threaded hole behind the clamped plate."""
-    start = hole.surface_z_mm + hole.inward * (hole.plate_mm - 0.05)
-    end = hole.surface_z_mm + hole.inward * (hole.plate_mm + hole.pilot_mm)
-    span = (min(start, end), max(start, end))
-    return rod(hole.x_mm, hole.y_mm, span, at.screw.pilot_mm)
 
 
 def _bolt_holes(d: Dimensions, at: Layout) -> list[cq.Shape]:

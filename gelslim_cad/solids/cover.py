@@ -5,9 +5,12 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.dimensions.cable import wires_under_board
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.camera import clamp_screw_positions
+from gelslim_cad.solids.cable import SOLDERED_MM, plug, plug_recess
+from gelslim_cad.solids.clamp import clamp_screw_positions
 from gelslim_cad.solids.layout import Layout
+from gelslim_cad.solids.led_seat import STOP_MM, board_middle_mm, stops
 from gelslim_cad.solids.materials import COVER, PRINTED
 from gelslim_cad.solids.mirror import recessed_footprint, seat_screw_positions
 from gelslim_cad.solids.shapes import (
@@ -34,7 +37,7 @@ def cover(d: Dimensions) -> Part:
     bottom = next(f for f in plate.Faces() if abs(f.Center().z - at.back_z_mm) < 1e-6)
     outside = [e for e in bottom.Edges() if abs(e.Center().x - at.cover_x_mm) > 1e-6]
     plate = chamfered(plate, outside, min(CHAMFER_MM, 0.4 * (top - at.back_z_mm)))
-    solid = union([plate, *_pedestals(d, top)])
+    solid = union([plate, *plug(d), *_pedestals(d, top)])
     solid = subtract(solid, _cuts(d, at))
     return Part(
         name="back_cover",
@@ -47,19 +50,21 @@ def cover(d: Dimensions) -> Part:
     )
 
 
-def _pedestals(d: Dimensions, top: float) -> tuple[cq.Solid, ...]:
-    """Bars that press the LED boards up against the legs."""
+def _pedestals(d: Dimensions, top: float) -> tuple[cq.Shape, ...]:
+    """Bars that press the LED boards up against the legs, with a stop at the tip end."""
     height = d["led.board_bottom_z_mm"] - top
     if height < LOWEST_PEDESTAL_MM:
         return ()
     half = d["led.board_width_mm"] / 2 - 0.1
-    middle = (d["guide.proximal_end_x_mm"] + d["guide.distal_end_x_mm"]) / 2
-    reach = d["led.board_length_mm"] / 2 - 1.0
-    return pair(
-        (middle - reach, middle + reach),
+    middle, reach = board_middle_mm(d), d["led.board_length_mm"] / 2
+    # Under the boards' proximal ends the wires are soldered.
+    wires = SOLDERED_MM[1] + d["design.leds.wire_diameter_mm"] if wires_under_board(d) else 1.0
+    bars = pair(
+        (middle - reach + wires, middle + reach + STOP_MM),
         (d["led.y_mm"] - half, d["led.y_mm"] + half),
         (top - 0.1, d["led.board_bottom_z_mm"]),
     )
+    return (*bars, *stops(d))
 
 
 def _cuts(d: Dimensions, at: Layout) -> list[cq.Shape]:
@@ -76,4 +81,4 @@ def _cuts(d: Dimensions, at: Layout) -> list[cq.Shape]:
         countersink(x, y, at.back_z_mm, 1, s.countersunk_head_mm, s.clearance_mm, wall + 0.5)
         for x, y in places
     ]
-    return [recess, *holes]
+    return [recess, *plug_recess(d), *holes]

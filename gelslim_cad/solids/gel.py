@@ -10,7 +10,7 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.geometry.gel_shape import GelShape
+from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.shapes import prism, single
 
@@ -28,8 +28,9 @@ def gel_pad(d: Dimensions) -> Part:
         colour=GEL,
         explode_mm=(0.0, 0.0, 22.0),
         note=(
-            f"cast, {shape.volume_mm3 / 1000:.2f} ml; markers go on the outer surface, "
-            "the back is bonded to the acrylic window"
+            f"cast, {shape.volume_mm3 / 1000:.2f} ml; "
+            + ("markers go on the outer surface, " if has_markers(d) else "")
+            + "the back is bonded to the acrylic window"
         ),
     )
 

@@ -5,7 +5,7 @@
   |  /                \\  |
   |_|                  |_|   LEDs shine up into the legs
 
-The LED boards lie under the legs: red at -y (left in the image), green at +y.
+The LED boards lie under the legs, one colour at -y (left in the image), one at +y.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import shared_light, strip_wavelengths_nm
 from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.materials import ACRYLIC, GREEN_BOARD, PLAIN_BOARD, RED_BOARD
+from gelslim_cad.solids.materials import ACRYLIC, BLUE_BOARD, GREEN_BOARD, PLAIN_BOARD, RED_BOARD
 from gelslim_cad.solids.shapes import Piece, box, closed_wire, single, union
 from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Point, Segment
 
@@ -74,16 +74,18 @@ def light_guide(d: Dimensions) -> Part:
 def guide_blank(d: Dimensions) -> Part:
     """Flat blank of the guide before bending, lying on z = 0."""
     width, t = d["guide.blank_width_mm"], d["design.light_guide.thickness_mm"]
-    start = cq.Vector(d["guide.proximal_end_x_mm"], -width / 2, 0)
+    length = d["guide.blank_length_mm"]
+    middle = (d["guide.proximal_end_x_mm"] + d["guide.distal_end_x_mm"]) / 2
+    start = cq.Vector(middle - length / 2, -width / 2, 0)
     return Part(
         name="light_guide_blank",
-        solid=cq.Solid.makeBox(d["guide.length_mm"], width, t, start),
+        solid=cq.Solid.makeBox(length, width, t, start),
         material=f"cast acrylic, {t:g} mm",
         process="laser",
         colour=ACRYLIC,
         quantity=0,
         in_assembly=False,
-        note="anneal after cutting, then bend",
+        note="anneal after cutting, bend, then trim the legs",
     )
 
 
@@ -112,15 +114,15 @@ def _board(d: Dimensions, side: int) -> cq.Solid:
 
 
 def led_boards(d: Dimensions) -> tuple[Part, Part]:
-    """The red and the green board, or two boards of one wavelength."""
+    """The boards of the two colours, or two boards alike."""
     model, count = d["design.leds.model"], round(d["led.count"])
-    one, (left, right) = d["design.leds.one_wavelength_nm"], strip_wavelengths_nm(d)
-    colours = {"red": RED_BOARD, "green": GREEN_BOARD}
+    alike, (left, right) = shared_light(d), strip_wavelengths_nm(d)
+    colours = {"red": RED_BOARD, "green": GREEN_BOARD, "blue": BLUE_BOARD}
     lower, upper = (
         Part(
             name=f"led_board_{name}",
             solid=_board(d, side),
-            material=f"{count} × {model} {name if one is None else f'{one:g} nm'}, "
+            material=f"{count} × {model} {alike or name}, "
             f"{d['design.leds.board_thickness_mm']:g} mm board",
             process="pcb",
             colour=colours.get(name, PLAIN_BOARD),

@@ -34,7 +34,9 @@ def mirror(d: Dimensions) -> Part:
         process="buy",
         colour=MIRROR,
         explode_mm=(0, 0, -26),
-        note="front-surface: a back-surface mirror ghosts; cut to size, edges masked",
+        note=f"{d['mirror.length_mm']:.2f} x {d['mirror.width_mm']:.2f} mm; front-surface: a "
+        "back-surface mirror ghosts; cut to size, edges masked",
+        tags=frozenset({"outline"}),
     )
 
 
@@ -85,6 +87,8 @@ def mirror_seat(d: Dimensions) -> Part:
         name="mirror_seat",
         solid=single(subtract(wedge, holes), "mirror_seat"),
         material=PRINTED[d["manufacturing.print_process"]],
+        # On its side: flat, the step for the cover's recess would hang 0.5 mm above the plate.
+        print_rotation_deg=(90.0, 0.0, 0.0),
         process="print",
         colour=SEAT,
         explode_mm=(0, 0, -40),

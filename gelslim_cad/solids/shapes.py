@@ -78,6 +78,17 @@ def rod(x: float, y: float, z: Point2, diameter: float) -> cq.Solid:
     )
 
 
+def pointed_rod(x: float, y: float, z: Point2, diameter: float) -> cq.Shape:
+    """Cylinder along z with a tip of 45° beyond its upper end: a blind hole that prints from below.
+
+    A flat end would be a ceiling in the hole, under which slicers put a support.
+    """
+    tip = cq.Solid.makeCone(
+        diameter / 2, 0.0, diameter / 2, cq.Vector(x, y, z[1]), cq.Vector(0, 0, 1)
+    )
+    return rod(x, y, z, diameter).fuse(tip)
+
+
 def countersink(
     x: float, y: float, surface_z: float, inward: int, head: float, hole: float, depth: float
 ) -> cq.Shape:

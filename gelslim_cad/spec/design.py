@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from gelslim_cad.spec.housing import Housing, Mount
+from gelslim_cad.spec.led_library import completed_leds
 from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
@@ -55,9 +57,14 @@ class LightGuide(Block):
 
 
 class Leds(Block):
-    """Two strips under the legs: red at -y (left in the image), green at +y, or both alike."""
+    """Two strips under the legs: one colour at -y (left in the image), one at +y, or both alike."""
 
-    model: str = Field(default="LUXEON CZ", max_length=80, description="LED type, for the BOM")
+    model: str = Field(
+        default="LUXEON CZ",
+        max_length=80,
+        description="LED type: one of the library, which gives package, height and wavelengths "
+        "that are left out here, or any other, for which `electronics` may give the own_ fields",
+    )
     package_mm: float = between(0.3, 10, "Package edge length", default=2.0)
     height_mm: float = between(0.1, 10, "Package height", default=0.7)
     max_pitch_mm: float = between(
@@ -69,15 +76,26 @@ class Leds(Block):
         0, 2, "Placement error of an LED on its board", default=0.15
     )
     board_thickness_mm: float = between(0.2, 5, "LED board thickness", default=0.8)
+    wire_diameter_mm: float = between(
+        0.2, 3, "Outer diameter of the LED boards' wires, two a board", default=0.8
+    )
     radiant_flux_mw: float = above(
-        0, 10000, "Radiant flux of one LED at its drive current", default=20.0
+        0, 10000, "Radiant flux of one LED at its drive current", default=10.0
+    )
+    light: Literal["red_green", "red_blue", "green_blue", "white"] = Field(
+        default="red_green",
+        description="Colours of the left and the right strip, or white light from both",
     )
     red_wavelength_nm: float = between(560, 760, "Wavelength of the red LEDs", default=625.0)
     green_wavelength_nm: float = between(480, 580, "Wavelength of the green LEDs", default=525.0)
+    blue_wavelength_nm: float = between(430, 490, "Wavelength of the blue LEDs", default=470.0)
+    white_wavelength_nm: float = between(
+        500, 620, "Mean wavelength of the white LEDs, for index and exposure", default=560.0
+    )
     one_wavelength_nm: float | None = between(
         400,
         1000,
-        "Wavelength of both strips, for a mono camera; red and green when left out",
+        "Wavelength of both strips, for a mono camera; those of `light` when left out",
         default=None,
     )
     emission: Literal["lambertian", "dome", "table"] = Field(
@@ -95,6 +113,17 @@ class Leds(Block):
     emission_intensity: tuple[float, ...] = Field(
         default=(), max_length=200, description="Relative intensity at each angle of the table"
     )
+
+    @model_validator(mode="after")
+    def _one_light(self) -> Leds:
+        if self.one_wavelength_nm is not None and self.light != "red_green":
+            raise FieldError(
+                "one_wavelength_nm",
+                f"both strips would have this wavelength, and light is {self.light}",
+                "leave one of the two out",
+                ("light",),
+            )
+        return self
 
     @model_validator(mode="after")
     def _table(self) -> Leds:
@@ -124,10 +153,19 @@ class Leds(Block):
 
 
 class Markers(Block):
-    """The regular grid printed on the gel's outer surface."""
+    """The regular grid printed on the gel's outer surface, or `none`: a gel without markers."""
 
+    pattern: Literal["grid", "none"] = Field(
+        default="grid",
+        description="A regular grid, or none: parts and light alone, without print and forces",
+    )
     pitch_mm: float = between(0.2, 10, "Marker spacing", default=1.2)
-    diameter_mm: float = between(0.05, 5, "Marker diameter", default=0.5)
+    diameter_mm: float = between(
+        0.05,
+        5,
+        "Marker diameter; without markers the size of the detail that the picture must show",
+        default=0.5,
+    )
     rows: int | None = between(
         5, 200, "Lattice rows along the finger; left out: fill the gel", default=None
     )
@@ -141,6 +179,11 @@ class Markers(Block):
         default="odd_sized",
         description="How lattice anchors stand out, so that tracking cannot slip by one pitch",
     )
+
+
+def without_markers(given: Any) -> Any:
+    """`markers: none` as the block that it stands for; anything else as it is."""
+    return {"pattern": "none"} if given == "none" else given
 
 
 class Mirror(Block):
@@ -168,62 +211,6 @@ class Optics(Block):
     image_margin: float = between(0, 0.3, "Part of the half field of view kept free", default=0.015)
     clearance_mm: float = between(
         0, 5, "Free space around the view and between optical parts", default=0.3
-    )
-
-
-class Housing(Block):
-    """Walls, fits and fasteners of the printed parts."""
-
-    side_wall_mm: float = between(0.4, 10, "Side wall thickness", default=1.5)
-    back_wall_mm: float = between(0.4, 10, "Back cover thickness", default=1.2)
-    tip_wall_mm: float = between(
-        2, 30, "Length of the tip block that holds the bezel screws", default=5.0
-    )
-    baffle_mm: float = between(
-        0.3, 5, "Light baffle between LED channel and camera view", default=0.8
-    )
-    ledge_mm: float = between(
-        0.5, 10, "Thickness of the ledge that carries the window", default=1.5
-    )
-    fit_clearance_mm: float = between(
-        0.02, 2, "Gap between parts that slide into each other", default=0.2
-    )
-    camera_play_mm: float | None = between(
-        0,
-        2,
-        "Gap on each side of the camera in its clamp; fit_clearance_mm when left out",
-        default=None,
-    )
-    gel_proud_mm: float = between(0, 10, "How far the gel stands above the bezel", default=0.6)
-    shim_thickness_mm: float = between(0.2, 5, "Free thickness of the elastic shims", default=1.0)
-    precompression_mm: float = between(
-        0, 4, "How much the bezel compresses the optical stack", default=0.45
-    )
-    screw: Literal["M1.6", "M2", "M2.5"] = Field(
-        default="M2", description="Countersunk screw that holds bezel and cover"
-    )
-    corner_radius_mm: float = between(
-        0, 20, "Corner radius of the finger seen from above", default=3.0
-    )
-
-
-class Mount(Block):
-    """How the finger sits on the gripper: tongues held by two cross bolts."""
-
-    gripper: str = Field(default="generic", max_length=80, description="Gripper, for the BOM")
-    bolt: Literal["M2", "M2.5", "M3", "M4"] = Field(default="M3", description="Cross bolt")
-    tongue_length_mm: float = between(5, 60, "Tongue length inside the finger", default=10.0)
-    tongue_thickness_mm: float = between(
-        2, 30, "Tongue thickness across the finger's thickness", default=5.0
-    )
-    flange_thickness_mm: float = between(
-        2, 30, "Thickness of the flange against the gripper", default=5.0
-    )
-    flange_bolt: Literal["M3", "M4", "M5", "M6"] = Field(
-        default="M4", description="Bolt from flange to gripper"
-    )
-    flange_bolt_spacing_mm: float = between(
-        5, 200, "Distance of the two gripper bolts", default=20.0
     )
 
 
@@ -271,8 +258,12 @@ class Design(Block):
 
     gel: Gel = Field(description="The gel pad")
     light_guide: LightGuide = Field(default=LightGuide(), description="The curved acrylic guide")
-    leds: Leds = Field(default=Leds(), description="The two LED strips")
-    markers: Markers = Field(default=Markers(), description="The printed marker grid")
+    leds: Annotated[Leds, BeforeValidator(completed_leds)] = Field(
+        default=Leds(), description="The two LED strips"
+    )
+    markers: Annotated[
+        Markers, BeforeValidator(without_markers, json_schema_input_type=Markers | Literal["none"])
+    ] = Field(default=Markers(), description="The printed marker grid, or none")
     mirror: Mirror = Field(default=Mirror(), description="The fold mirror")
     optics: Optics = Field(default=Optics(), description="What the picture must be worth")
     housing: Housing = Field(default=Housing(), description="Walls, fits and fasteners")
@@ -281,6 +272,8 @@ class Design(Block):
 
     @model_validator(mode="after")
     def _markers_fit(self) -> Design:
+        if self.markers.pattern == "none":
+            return self
         for axis, count, side in (
             ("rows", self.markers.rows, self.gel.length_mm),
             ("columns", self.markers.columns, self.gel.width_mm),

@@ -6,13 +6,17 @@ import difflib
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
 from gelslim_cad.spec.camera_library import lend_fields
+from gelslim_cad.spec.led_library import lend_led_fields
+from gelslim_cad.spec.parts import OwnPart, own_parts, require_files
 from gelslim_cad.spec.spec import Spec
 from gelslim_core.html_table import table_html
+from gelslim_core.yaml.document import Document
 from gelslim_core.yaml.fields import field_at
 from gelslim_core.yaml.reader import Loaded, read_model
 
@@ -24,6 +28,12 @@ class LoadedSpec(Loaded[Spec]):
     Attributes:
         spec: The spec.
     """
+
+    @property
+    def own_parts(self) -> tuple[OwnPart, ...]:
+        """Parts of the author's own, their files relative to that of the spec."""
+        folder = Path(self.path).parent
+        return own_parts(self.model.parts.given(), folder, self.path, self.source_map)
 
     @property
     def spec(self) -> Spec:
@@ -64,10 +74,18 @@ def read_spec(path: str | os.PathLike[str]) -> LoadedSpec:
         The spec with the lines of its fields.
 
     Raises:
-        InputError: Every problem of the file. A file with faults is not read in part.
+        InputError: Every problem of the file. A file with faults is not read in part. Files of
+            own parts that are not there count as problems; they are not read.
     """
-    loaded = read_model(path, Spec, lend_fields)
-    return LoadedSpec(**vars(loaded))
+    loaded = LoadedSpec(**vars(read_model(path, Spec, lend_from_libraries)))
+    require_files(loaded.own_parts)
+    return loaded
+
+
+def lend_from_libraries(document: Document) -> None:
+    """Give camera and LEDs of a spec's document the fields that the libraries lend them."""
+    lend_fields(document)
+    lend_led_fields(document)
 
 
 def suggestion(name: str, known: Iterable[str], otherwise: str) -> str:

@@ -25,9 +25,13 @@ RULES = (
     ("camera.distortion", "`tv_percent` is given without coefficients, for `brown`"),
     ("design.gel", "`corner_radius_mm` is at most half of the shorter side"),
     ("design.leds", "`emission: table` has two or more angles, as many intensities, rising from 0"),
+    ("design.leds", "`one_wavelength_nm` and a `light` of colours exclude each other"),
     ("design.markers", "`rows` and `columns`, where given, fit on the gel at `pitch_mm`"),
     ("design.markers", "`diameter_mm` is below `pitch_mm`, else dots merge"),
+    ("parts", "each names a `.step` file, or a `.py` file and a function after a colon"),
     ("material.gel", "`youngs_modulus_mpa` is at most 5 unless `material.allow_stiff_gel: true`"),
+    ("electronics", "the five `own_` fields are given together or not at all"),
+    ("electronics", "`own_forward_v` has two voltages between 0.5 and 10 V"),
     ("mesh", "`cells_along` and `cells_across` are given together or not at all"),
 )
 """What no single field can tell: block, rule. The reader enforces each."""

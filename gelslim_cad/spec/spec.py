@@ -9,9 +9,12 @@ from pydantic import BeforeValidator, Field, model_validator
 from gelslim_cad.spec.camera import Camera
 from gelslim_cad.spec.camera_library import completed
 from gelslim_cad.spec.design import Design
+from gelslim_cad.spec.electronics import Electronics
 from gelslim_cad.spec.limits import above, between
+from gelslim_cad.spec.parts import Parts
 from gelslim_cad.spec.tolerance import Tolerance
-from gelslim_core.yaml.base import Block, require_folder_name
+from gelslim_cad.spec.unsupported import UNSUPPORTED
+from gelslim_core.yaml.base import Block, Unsupported, require_folder_name
 from gelslim_core.yaml.errors import FieldError
 
 STIFF_GEL_MPA = 5.0
@@ -71,6 +74,16 @@ class Material(Block):
         return self
 
 
+class Kerf(Block):
+    """Width of the cut by kind of sheet, for which outlines are moved; 0 where the service or the
+    cutter's own software compensates it, as most services do."""
+
+    acrylic_mm: float = between(0, 1, "Laser in acrylic, commonly 0.1 to 0.25 mm", default=0.0)
+    metal_mm: float = between(0, 1, "Laser in sheet metal, commonly 0.1 to 0.3 mm", default=0.0)
+    film_mm: float = between(0, 1, "Laser in the stencil's film, commonly 0.05 mm", default=0.0)
+    soft_mm: float = between(0, 1, "Silicone and fabric; 0 for a knife", default=0.0)
+
+
 class Manufacturing(Block):
     """Processes, tolerances and stock."""
 
@@ -80,8 +93,26 @@ class Manufacturing(Block):
     print_tolerance_mm: float = between(
         0, 1, "Accuracy of the printed parts, plus or minus", default=0.1
     )
-    max_overhang_deg: float = between(
-        0, 90, "Steepest unsupported overhang from the vertical", default=45.0
+    max_overhang_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=90,
+        description="Steepest overhang from the vertical that prints without support; left out: "
+        "45° for fdm, 71° for sla, 90° for sls",
+    )
+    max_bridge_mm: float | None = Field(
+        default=None,
+        gt=0,
+        le=1000,
+        description="Widest span that prints without support; left out: 10 mm for fdm, 29 mm for "
+        "sla, any for sls",
+    )
+    nozzle_mm: float = above(0, 2, "Width of the line of an fdm printer", default=0.4)
+    printer_mm: tuple[Positive, ...] = Field(
+        default=(),
+        max_length=3,
+        description="Room of the printer, both sides of the plate and the height; left out: a "
+        "common printer of the process",
     )
     mould_process: Literal["acrylic", "sla", "fdm", "aluminium"] = Field(
         default="acrylic", description="What the gel mould is made of"
@@ -104,13 +135,53 @@ class Manufacturing(Block):
     acrylic_tolerance_ratio: float = between(
         0, 0.5, "How far stock acrylic may differ from nominal", default=0.1
     )
+    leg_trim_mm: float = between(
+        0, 30, "How much longer the legs are cut, to be trimmed after bending", default=5.0
+    )
+    bend_neutral_ratio: float = between(
+        0.3,
+        0.6,
+        "Depth of the fibre that keeps its length in a bend, from its inner face, over the "
+        "thickness (k-factor)",
+        default=0.5,
+    )
+    heat_shrinkage_percent: float = between(
+        0,
+        3,
+        "Shrinkage of the acrylic when it is heated for bending: up to 1.5 % for cast sheet that "
+        "is heated as a whole, 0 for strips heated along the bends; measure it on a strip",
+        default=0.0,
+    )
+    metal_stock_mm: tuple[Positive, ...] = Field(
+        default=(0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 3.0),
+        min_length=1,
+        max_length=50,
+        description="Thicknesses of aluminium and steel sheet on sale",
+    )
     mirror_stock_mm: tuple[Positive, ...] = Field(
         default=(0.7, 1.0, 1.5, 2.0, 3.0),
         min_length=1,
         max_length=50,
         description="Front-surface mirror thicknesses on sale",
     )
+    kerf: Kerf = Field(default=Kerf(), description="What the cutter takes away")
     fabric_skin: bool = Field(default=True, description="Make an outline for a fabric skin")
+    prices: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=300,
+        description="A price list of your own, as a path from the folder of the spec",
+    )
+
+    @model_validator(mode="after")
+    def _three_sides(self) -> Manufacturing:
+        if self.printer_mm and len(self.printer_mm) != 3:
+            raise FieldError(
+                "printer_mm",
+                "must be three lengths",
+                "give both sides of the plate and the height, such as [145, 145, 185]",
+            )
+        return self
 
 
 class Mesh(Block):
@@ -166,9 +237,12 @@ class Spec(Block):
         manufacturing: Processes, tolerances and stock.
         mesh: Finite-element mesh of the pad.
         tolerance: What making the finger varies.
+        electronics: Supply and circuit of the LED boards.
+        parts: Parts of the author's own in place of built-in ones.
     """
 
     starting_point: ClassVar[str] = "`gelslim new` writes a spec to start from"
+    unsupported: ClassVar[tuple[Unsupported, ...]] = UNSUPPORTED
 
     format: Literal["gelslim-spec/1"] = Field(description="Format of this file")
     name: str = Field(
@@ -187,6 +261,10 @@ class Spec(Block):
     )
     mesh: Mesh = Field(default=Mesh(), description="Finite-element mesh of the pad")
     tolerance: Tolerance = Field(default=Tolerance(), description="What making the finger varies")
+    electronics: Electronics = Field(
+        default=Electronics(), description="Supply and circuit of the LED boards"
+    )
+    parts: Parts = Field(default=Parts(), description="Parts of your own")
 
     @model_validator(mode="after")
     def _names_a_folder(self) -> Spec:

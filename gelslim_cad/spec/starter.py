@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from gelslim_cad.spec.camera_library import lend_fields, library_camera
+from gelslim_cad.spec.gripper_library import library_gripper
 from gelslim_cad.spec.spec import Spec
 from gelslim_core.yaml.document import RefusedScalarError, resolve
 from gelslim_core.yaml.errors import InputError
@@ -47,13 +48,14 @@ def starter_text(
     gel_width_mm: float = 22.0,
     camera: Mapping[str, Any] = SPY_CAMERA,
     model: str = "",
+    gripper: str = "",
 ) -> str:
     """A complete spec called `name`: required fields filled in, all others as comments.
 
     `camera` gives values by dotted path, unless `model` names a camera of the library, whose
-    figures are then the defaults. The text is read back before it is returned. Raises `InputError`
-    where it would be refused, as for a `name` with spaces, and `CameraLibraryError` for an unknown
-    model.
+    figures are then the defaults. `gripper` names a gripper of the library. The text is read back
+    before it is returned. Raises `InputError` where it would be refused, as for a `name` with
+    spaces, and `CameraLibraryError` or `GripperLibraryError` for an unknown model or gripper.
     """
     defaults: dict[str, Any] = {}
     if model:
@@ -61,11 +63,16 @@ def starter_text(
         defaults = {f"camera.{n}": v for n, v in library_camera(model).fields().items()}
         if defaults["camera.picture"] == "mono":
             camera = {**camera, "design.leds.one_wavelength_nm": MONO_LIGHT_NM}
+    if gripper:
+        library_gripper(gripper)
+        camera = {**camera, "design.mount.gripper": gripper}
     values = {
         "format": Spec.model_fields["format"].annotation.__args__[0],  # type: ignore[union-attr]
         "name": name,
         "design.gel.length_mm": gel_length_mm,
         "design.gel.width_mm": gel_width_mm,
+        # As bought, a sheet differs by more than any pre-compression of the shims.
+        "tolerance.acrylic": "measured",
         **camera,
     }
     text = _HEAD + "\n".join(_block(Spec, "", values, defaults, 0)) + "\n"

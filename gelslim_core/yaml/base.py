@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
@@ -11,6 +12,22 @@ from gelslim_core.yaml.errors import FieldError
 _DEVICES = {"con", "prn", "aux", "nul"} | {f"{p}{k}" for p in ("com", "lpt") for k in range(1, 10)}
 
 
+@dataclass(frozen=True)
+class Unsupported:
+    """Something that people ask a file for and that the program does not do.
+
+    Attributes:
+        pattern: Regular expression for `path: value` in small letters, such as
+            `design.gel.shape: dome`, of a field that is unknown or has an illegal value.
+        what: What is asked for, in words that begin the message.
+        remedy: What comes closest; empty where nothing does.
+    """
+
+    pattern: str
+    what: str
+    remedy: str = ""
+
+
 class Block(BaseModel):
     """A frozen block of an input file: strict types, no unknown keys, no NaN.
 
@@ -18,9 +35,12 @@ class Block(BaseModel):
 
     Attributes:
         starting_point: Remedy for a file that is empty or of another kind.
+        unsupported: What is refused in plain words instead of with a guess.
     """
 
     starting_point: ClassVar[str] = "start from an example of this kind of file"
+
+    unsupported: ClassVar[tuple[Unsupported, ...]] = ()
 
     model_config = ConfigDict(
         frozen=True,

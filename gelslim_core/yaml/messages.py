@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
+from gelslim_core.yaml.base import Unsupported
 from gelslim_core.yaml.document import (
     CORRECT_VALUE,
     Document,
@@ -156,6 +157,10 @@ class Translator:
     def problem(self, complaint: Complaint) -> tuple[Problem, tuple[str, ...]]:
         """The problem, and the fields that its remedy suggests."""
         path = complaint.path
+        refused = self._unsupported(complaint)
+        if refused is not None:
+            position = self.document.marks[path].key
+            return self._at(path, f"{refused.what} is not supported", refused.remedy, position), ()
         if complaint.kind == "extra_forbidden":
             parent, key = join_path(path[:-1]), str(path[-1])
             remedy, fields = suggest_key(self.model, parent, key, self.document.value(path))
@@ -172,6 +177,16 @@ class Translator:
         shape, unit = self._shape(join_path(path))
         message, remedy = self._bad_value(complaint, shape, unit)
         return self._at(path, message, remedy), ()
+
+    def _unsupported(self, complaint: Complaint) -> Unsupported | None:
+        """What the author asks for, where it is known not to be supported."""
+        ideas = getattr(self.model, "unsupported", ())
+        if not ideas or complaint.kind == "missing" or complaint.is_rule:
+            return None
+        value = self.document.value(complaint.path)
+        plain = "" if isinstance(value, Mapping) else str(value)
+        asked = f"{join_path(complaint.path)}: {plain}".lower()
+        return next((idea for idea in ideas if re.search(idea.pattern, asked)), None)
 
     def value_remedy(self, path: str) -> str:
         """What to write instead of the value at the dotted `path`."""

@@ -23,6 +23,7 @@ class Medium:
         absorption_per_mm: Absorption coefficient (Beer-Lambert law).
         red_index: Refractive index for red sources without a wavelength; None for `index`.
         green_index: Refractive index for green sources without a wavelength; None for `index`.
+        blue_index: Refractive index for blue sources without a wavelength; None for `index`.
         sellmeier: (B, C) of n² = 1 + B λ² / (λ² - C), λ in µm, for sources with a wavelength.
 
     Raises:
@@ -33,10 +34,11 @@ class Medium:
     absorption_per_mm: float = 0.0
     red_index: float | None = None
     green_index: float | None = None
+    blue_index: float | None = None
     sellmeier: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        for value in (self.index, self.red_index, self.green_index):
+        for value in (self.index, self.red_index, self.green_index, self.blue_index):
             if value is not None and not (math.isfinite(value) and 1 <= value <= 4):
                 raise ValueError(f"refractive index = {value!r}: must be between 1 and 4")
         if not (math.isfinite(self.absorption_per_mm) and self.absorption_per_mm >= 0):
@@ -48,7 +50,8 @@ class Medium:
             b, c = self.sellmeier
             square = wavelength_um**2
             return math.sqrt(1 + b * square / (square - c))
-        named = {"red": self.red_index, "green": self.green_index}.get(colour)
+        by_name = {"red": self.red_index, "green": self.green_index, "blue": self.blue_index}
+        named = by_name.get(colour)
         return self.index if named is None else named
 
 

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ifem_export.elements.hex8 import Formulation
+from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder, operator_label
 from ifem_export.operators.single_thread import single_threaded
 from ifem_export.operators.surface_operator import (
@@ -27,6 +28,7 @@ from ifem_export.operators.surface_operator import (
     Rung,
     SurfaceOperator,
     surface_operator,
+    system_operator,
 )
 
 Array = NDArray[np.float64]
@@ -89,14 +91,18 @@ def measure_ladder(
     motions, at_edge = bumps(mesh), edge_bumps(mesh)
     fields = [motion(points) for motion in motions]
     edge_fields = [motion(points) for motion in at_edge]
-    expected = [reference_force(mesh, material, motion, fine) for motion in motions]
-    edge_expected = [reference_force(mesh, material, motion, fine) for motion in at_edge]
-    exact = surface_operator(mesh, material, formulation, "pcg", rtol=REFERENCE_RTOL)
+    truth = reference_forces(mesh, material, [*motions, *at_edge], fine)
+    expected, edge_expected = truth[: len(motions)], truth[len(motions) :]
+    system = pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
+    exact = system_operator(system, "pcg", rtol=REFERENCE_RTOL)
     condensed = [exact.force(u) for u in fields]
     rungs = []
     for done, (rung, parameters) in enumerate(choices):
         report(rung, done + 1, len(choices) + 1)
-        operator = surface_operator(mesh, material, formulation, rung, **parameters)
+        if rung == "paper":
+            operator = surface_operator(mesh, material, formulation, rung)
+        else:
+            operator = system_operator(system, rung, **parameters)
         forces = [operator.force(u) for u in fields]
         edge_forces = [operator.force(u) for u in edge_fields]
         noise = noise_forces(operator, len(points))
@@ -183,17 +189,20 @@ def _bumps(
     ]
 
 
-def reference_force(
+def reference_forces(
     mesh: PadMesh,
     material: Material,
-    field: SurfaceMotion,
+    motions: Sequence[SurfaceMotion],
     fine: PadMesh | None = None,
-) -> Array:
-    """Forces (c, 3) in N on the surface nodes of `mesh`, computed on the finer mesh `fine`."""
+) -> list[Array]:
+    """Forces (c, 3) in N on the surface nodes of `mesh`, computed on the finer mesh `fine`.
+
+    One for each motion of the surface.
+    """
     fine = refined(mesh) if fine is None else fine
     operator = surface_operator(fine, material, REFERENCE_ELEMENT, "pcg", rtol=REFERENCE_RTOL)
-    force = operator.force(field(np.asarray(fine.nodes_mm)[fine.surface]))
-    return lumped(force, fine, mesh)
+    points = np.asarray(fine.nodes_mm)[fine.surface]
+    return [lumped(operator.force(motion(points)), fine, mesh) for motion in motions]
 
 
 def refined(mesh: PadMesh) -> PadMesh:

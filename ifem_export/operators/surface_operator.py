@@ -27,6 +27,7 @@ from ifem_export.operators.convolved_operator import (
     truncated,
 )
 from ifem_export.operators.crowned_system import pad_system
+from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.solver import Method, inner_solver
 
 Array = NDArray[np.float64]
@@ -122,6 +123,21 @@ def surface_operator(
     if rung == "paper":
         mesh, formulation = one_layer(mesh), "full"
     system = pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
+    return system_operator(system, rung, rtol=rtol, radius=radius, lumped=lumped)
+
+
+def system_operator(
+    system: PadSystem,
+    rung: Rung,
+    *,
+    rtol: float = DEFAULT_RTOL,
+    radius: int = DEFAULT_RADIUS,
+    lumped: bool | float = False,
+) -> SurfaceOperator:
+    """As `surface_operator`, for a system whose matrices several operators may share.
+
+    A system of one layer has the rung "paper" only, whatever `rung` is.
+    """
     if system.layers == 1:
         return PaperOperator(system)
     if rung == "fft":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from dataclasses import asdict
@@ -11,11 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gelslim.cli.answer import RULE_FAILED, print_json, progress_bar, say
-from gelslim.cli.commands.check import print_checks
+from gelslim.cli.commands.check import print_problems
 from gelslim.cli.options import AsJson, SpecFile, out_folder
 
 if TYPE_CHECKING:
     from gelslim_cad.build import BuildResult
+
+COST = "orders/cost.json"
+"""File of a build with what the finger costs."""
 
 
 def build(
@@ -53,7 +57,7 @@ def build(
             failures = [asdict(c) for c in failed]
             print_json({"ok": False, "message": str(refused), "failed": failures})
         elif failed:
-            print_checks(failed, brief=True)
+            print_problems(failed)
             print(f"{str(refused).splitlines()[0]}. `gelslim check {spec}` shows what would help.")
         else:
             print(refused, file=sys.stderr)
@@ -72,9 +76,18 @@ def _record(result: BuildResult) -> dict[str, Any]:
         "up_to_date": result.up_to_date,
         "rebuilt": result.rebuilt,
         "files": result.files,
+        "cost": _cost(result),
         "warnings": [asdict(c) for c in result.checks if c.status == "warn"],
         "binding": result.binding,
+        "left_out": result.left_out,
     }
+
+
+def _cost(result: BuildResult) -> dict[str, Any] | None:
+    """What the finger costs, as the build wrote it."""
+    if COST not in result.files:
+        return None
+    return dict(json.loads((result.folder / COST).read_text("utf-8")))
 
 
 def _report(result: BuildResult, seconds: float) -> None:
@@ -85,13 +98,19 @@ def _report(result: BuildResult, seconds: float) -> None:
     if result.up_to_date:
         print(f"Up to date: {len(result.files)} files in {shown} ({seconds:.1f} s)")
     else:
-        print_checks(warnings, brief=True)
+        print_problems(warnings)
         if result.binding:
             say(result.binding[0])
         print(f"Built {len(result.files)} files in {shown} ({seconds:.1f} s)")
+    for sentence in result.left_out:
+        say(sentence[0].upper() + sentence[1:] + ".")
+    cost = _cost(result)
+    if cost is not None:
+        say(cost["sentence"])
     for name, purpose in (
         ("report.html", "open this first"),
-        ("BUILD.md", "how to make the finger"),
+        ("BUILD.html", "how to make the finger, step by step"),
+        ("orders/ORDER.md", "what to order where"),
     ):
         if name in result.files:
             print(f"  {shown / name}  {purpose}")

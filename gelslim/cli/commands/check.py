@@ -24,15 +24,14 @@ MARK = {"fail": "FAIL", "warn": "warn", "pass": "ok"}
 def check(
     spec: SpecFile,
     as_json: AsJson = False,
-    brief: Annotated[
-        bool, typer.Option("--brief", help="Print only the rules that warn or fail.")
+    verbose: Annotated[
+        bool, typer.Option("-v", "--verbose", help="Print the rules that hold as well.")
     ] = False,
 ) -> int:
     """Check the design rules and say what limits the thickness.
 
-    Prints each rule that fails or warns with reason and remedy, a table of the others, and what
-    each concession would save. Makes no CAD and takes about a second. The exit status is 1 if a
-    rule fails.
+    Prints each rule that fails or warns with reason and remedy, and what each concession would
+    save. Makes no CAD and takes about a second. The exit status is 1 if a rule fails.
     """
     from gelslim_cad.checks import check as apply_rules
     from gelslim_cad.checks.binding import binding_sentences
@@ -55,7 +54,9 @@ def check(
             }
         )
     else:
-        print_checks(checks, brief=brief)
+        print_problems(checks)
+        if verbose:
+            print_held(checks)
         for sentence in binding:
             say(sentence)
         say(summary(loaded.spec.name, checks), style=STYLE["fail" if failed else "pass"])
@@ -73,28 +74,33 @@ def summary(name: str, checks: Sequence[Check]) -> str:
     return f"{name}: {some}{warnings if count['warn'] else ''}."
 
 
-def print_checks(checks: Sequence[Check], *, brief: bool) -> None:
-    """Print failures and warnings with reason and remedy, then a table of the other rules."""
-    from rich.table import Table
+def print_problems(checks: Sequence[Check]) -> None:
+    """Print the rules that fail, then those that warn, each with reason and remedy."""
     from rich.text import Text
 
     screen = console()
-    ordered = sorted(checks, key=lambda c: ORDER[c.status])
-    for c in (c for c in ordered if c.status != "pass"):
+    for c in sorted(checks, key=lambda c: ORDER[c.status]):
+        if c.status == "pass":
+            continue
         head = Text(f"{MARK[c.status]:<5}", style=STYLE[c.status])
         head.append(f"{c.title} ({c.id})", style="bold")
         screen.print(head)
         screen.print(indented(f"{c.reason}.", 5))
         screen.print(indented(f"To do: {c.advice}. Change {c.parameter}.", 5))
-    passed = [c for c in ordered if c.status == "pass"]
-    if brief or not passed:
-        return
+
+
+def print_held(checks: Sequence[Check]) -> None:
+    """Print a table of the rules that hold."""
+    from rich.table import Table
+    from rich.text import Text
+
     table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 1))
     table.add_column("")
     table.add_column("rules that hold", overflow="fold")
     for column in ("value", "limit", "margin"):
         table.add_column(column, justify="right", no_wrap=True)
-    for group, rows in groupby(passed, lambda c: c.group):
+    held = [c for c in checks if c.status == "pass"]
+    for group, rows in groupby(held, lambda c: c.group):
         table.add_row("", Text(group, style="bold"), "", "", "")
         for c in rows:
             free = c.limit is None
@@ -106,4 +112,4 @@ def print_checks(checks: Sequence[Check], *, brief: bool) -> None:
                 "no limit" if free else f"{sign} {number(c.limit, c.unit)}",
                 "" if free else number(c.margin, c.unit),
             )
-    screen.print(table)
+    console().print(table)

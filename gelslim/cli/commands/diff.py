@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from gelslim_cad.compare import Change, Comparison, PartChanges, RuleChange
 
-LEAST_WIDTH = 22
+LEAST_WIDTH = 17
 """Of the names of rules; longer ones are folded."""
 STYLE = {"gets worse": "bold red", "gets better": "green", "moves": ""}
 FIRST = ("finger.thickness_mm", "finger.width_mm", "finger.length_mm")
@@ -112,7 +112,7 @@ def _report(first: str, second: str, found: Comparison) -> None:
         rows.add_column("", no_wrap=True)
         order = list(STYLE)
         shown = [c for c in found.rules if _shows(c)]
-        for c in sorted(shown, key=lambda c: order.index(c.verdict)):
+        for c in sorted(shown, key=lambda c: (order.index(c.verdict), c.after.status != "fail")):
             b, a = c.before, c.after
             rows.add_row(
                 c.id,

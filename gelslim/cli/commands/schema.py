@@ -9,6 +9,9 @@ import typer
 
 from gelslim.cli.output import replace_file, require_own_file
 
+SCHEMA_FILES = {False: "gelslim-spec-1.schema.json", True: "gelslim-scene-1.schema.json"}
+"""Usual names of the files, by whether the schema is that of scenes."""
+
 
 def schema(
     out: Annotated[
@@ -27,26 +30,28 @@ def schema(
 
     Editors use it to check and to complete the YAML.
     """
-    text = _page(scene) if markdown else _schema(scene)
+    text = _page(scene) if markdown else schema_text(scene)
     if out is None:
         print(text, end="")
         return 0
 
     require_own_file(out, b"gelslim-", "schema of gelslim")
     replace_file(out, text.encode())
-    use = "" if markdown else " In VS Code, name it in the setting yaml.schemas."
+    line = f"# yaml-language-server: $schema={out.name}"
+    use = "" if markdown else f' Name it in the first line of a file beside it: "{line}"'
     print(f"Wrote {out}.{use}")
     return 0
 
 
-def _schema(scene: bool) -> str:
+def schema_text(scene: bool) -> str:
+    """The JSON Schema of specs, or of scenes."""
     if scene:
         from gelslim_twin.scene.reader import scene_schema_text
 
         return scene_schema_text()
-    from gelslim_cad.spec.reference import schema_text
+    from gelslim_cad.spec.reference import schema_text as spec_schema_text
 
-    return schema_text()
+    return spec_schema_text()
 
 
 def _page(scene: bool) -> str:
