@@ -52,8 +52,9 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "effects", "scene", "planning", "contact", "render", "simulation", "validation",
     ),
     "gelslim_cad": (
-        "spec", "markers", "pictures", "geometry", "light", "dimensions", "checks", "export",
-        "proof", "solids", "report", "sensor", "tolerance", "build", "compare", "explore", "family",
+        "spec", "markers", "pictures", "geometry", "light", "electronics", "dimensions", "checks",
+        "export", "proof", "printability", "solids", "assembly", "ordering", "report", "sensor",
+        "tolerance", "robot", "build", "live", "compare", "explore", "family",
     ),
     "gelslim": (
         "ending", "examples", "scene_sensor", "design", "contacts", "doctor", "cli", "__main__",
@@ -77,8 +78,8 @@ FORBIDDEN = {
     },
 }
 CAD_FREE = (
-    "spec", "geometry", "dimensions", "markers", "light", "checks", "sensor", "tolerance",
-    "explore",
+    "spec", "geometry", "dimensions", "markers", "light", "electronics", "checks", "sensor",
+    "tolerance", "explore",
 )  # fmt: skip
 
 
@@ -181,5 +182,8 @@ def test_light_modules_load_no_cad(module: str) -> None:
 
 
 def test_no_module_is_longer_than_350_lines() -> None:
-    lengths = {module_name(p): len(p.read_text(encoding="utf-8").splitlines()) for p in SOURCES}
-    assert {name: n for name, n in lengths.items() if n > 350} == {}
+    texts = {module_name(p): p.read_text(encoding="utf-8") for p in SOURCES}
+    lengths = {name: len(text.splitlines()) for name, text in texts.items()}
+    written = {name for name, text in texts.items() if "do not edit by hand" in text[:200]}
+    assert written == {"gelslim_cad.checks.rule_ids", "gelslim_cad.geometry.names"}
+    assert {name: n for name, n in lengths.items() if n > 350 and name not in written} == {}

@@ -78,7 +78,9 @@ def solved(spec: Spec, words: str) -> tuple[float, bool]:
     return d["finger.thickness_mm"], d.feasible()
 
 
-@pytest.mark.parametrize("limit", [17.5, 17.0, 16.0])
+@pytest.mark.parametrize(
+    "limit", [17.5, *(pytest.param(v, marks=pytest.mark.slow) for v in (17.0, 16.0))]
+)
 def test_a_finger_too_thick_is_told_what_makes_it_fit(limit: float) -> None:
     spec = varied(shipped("mini20"), {"design.envelope.max_thickness_mm": limit})
     found = sentences(spec)
@@ -138,3 +140,48 @@ def test_a_gel_full_of_given_markers_is_not_told_to_shrink() -> None:
     paths = {s.path for s in relaxations(spec)}
     assert "design.gel.length_mm" not in paths
     assert "design.gel.width_mm" in paths
+
+
+LEAST = {
+    "shortest": (lambda d: d["finger.length_mm"], r"(.*) saves (\d+\.\d\d) mm of length\."),
+    "best_picture": (
+        lambda d: -min(d["view.marker_across_px"], d["view.marker_along_px"]),
+        r"(.*) gains (\d+\.\d\d) px per marker\.",
+    ),
+}
+
+
+@pytest.mark.parametrize("goal", sorted(LEAST))
+def test_each_gain_of_another_goal_is_what_solving_again_gives(goal: str) -> None:
+    """The price of a limit is in the unit of the goal, and the envelope is kept."""
+    cost, pattern = LEAST[goal]
+    envelope = {"design.envelope.goal": goal, "design.envelope.max_thickness_mm": 18.2}
+    spec = varied(shipped("mini20"), envelope)
+    here = cost(derive(spec))
+    found = sentences(spec)
+    by_words = {s.words[0].upper() + s.words[1:]: s for s in relaxations(spec)}
+    gains = [re.fullmatch(pattern, s) for s in found[1:]]
+    assert len(gains) >= 3
+    assert "Allowing 1 mm more thickness" in [m[1] for m in gains if m is not None]
+    for match in gains:
+        assert match is not None
+        step = by_words[match[1]]
+        again = derive(varied(spec, {step.path: step.value}))
+        assert float(match[2]) == pytest.approx(here - cost(again), abs=0.006)
+        limit = step.value if step.path.endswith("max_thickness_mm") else 18.2
+        assert again["finger.thickness_mm"] <= limit + 1e-6
+
+
+def test_a_weighted_goal_prices_the_weighted_sum() -> None:
+    worth = {"design.envelope.length_worth": 0.3, "design.envelope.max_thickness_mm": None}
+    spec = varied(shipped("mini20"), worth)
+    here = derive(spec)
+    words = "Allowing 0.1 mm more blur"
+    found = next(s for s in sentences(spec) if s.startswith(words))
+    step = next(s for s in relaxations(spec) if s.words == "allowing 0.1 mm more blur")
+    again = derive(varied(spec, {step.path: step.value}))
+    gain = here["finger.thickness_mm"] - again["finger.thickness_mm"]
+    gain += 0.3 * (here["finger.length_mm"] - again["finger.length_mm"])
+    stated = re.fullmatch(rf"{words} is worth (\d+\.\d\d) mm of thickness\.", found)
+    assert stated is not None
+    assert float(stated[1]) == pytest.approx(gain, abs=0.006)

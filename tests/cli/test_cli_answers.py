@@ -43,7 +43,7 @@ def test_check_as_json_holds_every_rule(capsys: pytest.CaptureFixture[str]) -> N
 def test_check_puts_failures_first_and_says_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", str(too_long(tmp_path))]) == 1
+    assert main(["check", str(too_long(tmp_path)), "-v"]) == 1
     shown = capsys.readouterr().out
     marks = re.findall(r"^(FAIL|warn|ok) ", shown, re.MULTILINE)
     assert marks == sorted(marks, key=("FAIL", "warn", "ok").index)
@@ -56,11 +56,15 @@ def test_check_puts_failures_first_and_says_what_to_do(
     assert f"{len(failed)} of {len(RULES)}" in joined
 
 
-def test_check_brief_leaves_out_what_holds(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", str(MINI20), "--brief"]) == 0
+def test_check_lists_what_holds_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    held = re.compile(r"^ok ", re.MULTILINE)
+    assert main(["check", str(MINI20)]) == 0
     shown = capsys.readouterr().out
-    assert not re.search(r"^ok ", shown, re.MULTILINE)
+    assert not held.search(shown)
     assert str(len(RULES)) in shown
+    assert main(["check", str(MINI20), "--verbose"]) == 0
+    passed = [c for c in check(derive(read_spec(MINI20).spec)) if c.status == "pass"]
+    assert len(held.findall(capsys.readouterr().out)) == len(passed)
 
 
 def test_a_failing_check_as_json_keeps_its_status(

@@ -111,6 +111,7 @@ def test_a_time_budget_uses_this_machines_times(
     assert "bench" not in said.err
 
 
+@pytest.mark.slow
 def test_times_never_change_the_forces_of_an_error_budget(
     sensor: Path, laddered: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -123,6 +123,7 @@ def test_missing_reference_and_wrong_frames(sensor: Path, tmp_path: Path, capsys
     assert "320 x 240 px" in read_run(tmp_path / "run").wrenches.problems[0]
 
 
+@pytest.mark.slow
 def test_an_earlier_run_is_kept_unless_told(sensor: Path, tmp_path: Path, capsys) -> None:
     given = ("-o", str(tmp_path / "run"), "--pictures", "0", "--frames", "1")
     assert run(sensor, *given) == 0

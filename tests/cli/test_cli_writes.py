@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from cli_samples import MINI20, altered
+from jsonschema import Draft202012Validator
+from ruamel.yaml import YAML
 
 import gelslim_cad.build as build_package
 from gelslim.cli import main
@@ -35,6 +38,28 @@ def test_new_writes_a_spec_that_checks(
     assert "gelslim check mine.yaml" in capsys.readouterr().out
     assert read_spec("mine.yaml").spec.name == "mine"
     assert main(["check", "mine.yaml"]) == 0
+
+
+@pytest.mark.parametrize("source", ["mini20", "tilt"])
+def test_new_names_a_schema_for_editors(source: str, tmp_path: Path) -> None:
+    """The file that the first line names is there, and accepts what was written."""
+    assert main(["new", "mine", "-o", str(tmp_path), "--from", source]) == 0
+    text = (tmp_path / "mine.yaml").read_text(encoding="utf-8")
+    named = re.match(r"# yaml-language-server: \$schema=(\S+)\n", text)
+    assert named is not None
+    schema = json.loads((tmp_path / named[1]).read_text(encoding="utf-8"))
+    check_schema = Draft202012Validator(schema)
+    content = YAML(typ="safe").load(text)
+    assert list(check_schema.iter_errors(content)) == []
+    assert list(check_schema.iter_errors({**content, "nmae": "mine"})) != []
+
+
+def test_new_leaves_a_schema_of_somebody_else_alone(tmp_path: Path) -> None:
+    other = tmp_path / "gelslim-spec-1.schema.json"
+    other.write_text("{}")
+    assert main(["new", "mine", "-o", str(tmp_path)]) == 2
+    assert other.read_text() == "{}"
+    assert not (tmp_path / "mine.yaml").exists()
 
 
 def test_new_takes_sizes_and_a_folder(tmp_path: Path) -> None:
@@ -186,7 +211,9 @@ def test_build_passes_its_options_on_and_points_to_the_report(
     answer = json.loads(capsys.readouterr().out)
     assert answer["folder"] == str(tmp_path / "there")
     assert answer["files"] == ["BUILD.md", "report.html"]
-    assert [c["id"] for c in answer["warnings"]] == ["blur.image_px"]
+    warned = [c.id for c in check(derive(read_spec(MINI20).spec)) if c.status == "warn"]
+    assert [c["id"] for c in answer["warnings"]] == warned
+    assert "blur.image_px" in warned
 
 
 def test_build_says_when_nothing_changed(

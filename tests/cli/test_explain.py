@@ -34,7 +34,7 @@ def test_each_value_follows_from_its_inputs(name: str) -> None:
                 ("design.light_guide.bend_radius_ratio", node.value)
             ]
             continue
-        given = [DIMENSIONS.fold if c.kind == "solver" else c.value for c in node.inputs]
+        given = [DIMENSIONS.solved[c.name] if c.kind == "solver" else c.value for c in node.inputs]
         again = definition(node.name).compute(*given)
         assert float(again if not hasattr(again, "flat") else again.flat[0]) == pytest.approx(
             node.value, rel=1e-12, abs=1e-12

@@ -395,7 +395,7 @@ class Layout:
         top = self.pinhole + (bar - self.face) * self.ahead + p.module_height_mm / 2 * self.above
         rear = min(foot.real, top.real, *(c.real for c in self.corners))
         bezel = self.ledge_x - p.end_support_mm - fit - p.tip_wall_mm
-        chamber = min(rear - p.cable_bend_radius_mm - fit, bezel - 1.0)
+        chamber = min(rear - p.cable_behind_mm - fit, bezel - 1.0)
         return tip - chamber + p.mount_length_mm
 
     def beyond(self) -> dict[str, float]:

@@ -62,7 +62,7 @@ def test_guide_by_hand() -> None:
     assert d["guide.flat_width_mm"] == 21
     assert d["guide.outer_width_mm"] == 39
     assert d["guide.leg_end_z_mm"] == -12
-    assert d["guide.blank_width_mm"] == pytest.approx(21 + 2 + math.pi * 7.5)
+    assert d["guide.blank_width_mm"] == pytest.approx(21 + 2 + 2 * 5 + math.pi * 7.5)
     assert d["led.y_mm"] == pytest.approx(10.5 + 7.5)
     assert d["stack.window_bottom_z_mm"] == -5
     # R + leg + two gaps of 0.2 + LED 0.7 + board 0.8.

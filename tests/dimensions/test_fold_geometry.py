@@ -66,7 +66,7 @@ SPANS = {
     "fit_clearance_mm": (0.1, 0.5),
     "end_support_mm": (0.5, 3.0),
     "tip_wall_mm": (2.0, 8.0),
-    "cable_bend_radius_mm": (0.0, 6.0),
+    "cable_behind_mm": (0.0, 6.0),
     "mount_length_mm": (8.0, 20.0),
     "baffle_inner_y_mm": (8.0, 20.0),
     "clamp_width_mm": (10.0, 30.0),

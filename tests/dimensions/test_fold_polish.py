@@ -74,6 +74,7 @@ def solutions(
         return found[-1][1]
 
     monkeypatch.setattr(view_module, "solve_fold", spy)
+    view_module._solved_alone.cache_clear()
     index = 0
     while len(found) < count:
         drawn = sample(seed, index)

@@ -50,6 +50,7 @@ def problem() -> FoldProblem:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(view_module, "solve_fold", spy)
+        view_module._solved_alone.cache_clear()
         derive_batch(shipped("mini20"), {path: rng.uniform(*s, COUNT) for path, s in SPANS.items()})
     order = np.arange(COUNT)[:, None, None]
     bent = np.where(order < IDEAL, 0.0, rng.normal(0, 1, (COUNT, 1, 1)))
@@ -140,6 +141,7 @@ def batch(count: int, jobs: int | None) -> Dimensions:
     return derive_batch(shipped("mini20"), overrides, jobs=jobs)
 
 
+@pytest.mark.slow
 def test_jobs_do_not_change_a_bit() -> None:
     count = solver.COMPILED_FROM + 37
     one = batch(count, 1)
@@ -157,6 +159,7 @@ class Refused:
         raise AssertionError("a thread pool was started")
 
 
+@pytest.mark.slow
 def test_small_batches_and_one_job_start_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("concurrent.futures.ThreadPoolExecutor", Refused)
     batch(COUNT, 2)

@@ -47,6 +47,7 @@ def solved(changes: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> tuple[An
         return original(problem)
 
     monkeypatch.setattr(view_module, "solve_fold", spy)
+    view_module._solved_alone.cache_clear()
     return mini20(changes), asked[0]
 
 
@@ -143,3 +144,19 @@ def test_ten_thousand_designs_at_once() -> None:
     assert d["finger.thickness_mm"].shape == (10_000,)
     assert all(np.isfinite(v).all() for v in d.values.values())
     check_kept(d)
+
+
+def test_a_fold_that_was_solved_before_is_taken_again_but_no_other() -> None:
+    _solved_alone = view_module._solved_alone
+    spec = shipped("mini20")
+    first = derive(spec)
+    before = _solved_alone.cache_info()
+    # What the fold does not read leaves it as it is; what it reads gives another.
+    again = derive(changed(spec, {"design.leds.radiant_flux_mw": 3.0}))
+    other = derive(changed(spec, {"design.optics.image_margin": 0.05}))
+    after = _solved_alone.cache_info()
+    assert (after.hits - before.hits, after.misses - before.misses) == (1, 1)
+    assert again["mirror.angle_deg"] == first["mirror.angle_deg"]
+    assert other["mirror.angle_deg"] != first["mirror.angle_deg"]
+    with pytest.raises(ValueError, match="read-only"):
+        again.fold.depth_mm[...] = 0.0

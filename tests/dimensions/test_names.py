@@ -14,6 +14,8 @@ from gelslim_cad.checks.rule import RULES, rule
 from gelslim_cad.dimensions.dimensions import PATHS
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, UNITS, Real, dimension
+from gelslim_cad.electronics.circuit import Circuit
+from gelslim_cad.geometry.frame_plate import Deflection
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
@@ -81,6 +83,10 @@ def test_every_unit_of_a_length_or_angle_is_known() -> None:
         "x",
         "y",
         "layout",
+        "preloaded",
+        "circuit",
+        "series",
+        "frame",
         "k1",
         "tan",
     }
@@ -126,8 +132,11 @@ def test_cyclic_or_open_dimensions_are_refused(monkeypatch: pytest.MonkeyPatch) 
 
 def expected_type(parameter: str) -> object:
     """The type of a parameter's values: of one design, or arrays of n designs."""
-    if parameter == "fold_layout":
-        return Fold
+    internal = {"fold_layout": Fold, "bezel_frame": Deflection}
+    if parameter in internal:
+        return internal[parameter]
+    if parameter.endswith("_circuit"):
+        return Circuit | None
     if parameter in REGISTRY:
         return Real
     kind = dimension_names._kind(PATHS[parameter])
@@ -149,7 +158,7 @@ def test_parameters_of_dimensions_and_rules_have_the_types_of_their_values() -> 
     for function in functions:
         hints = get_type_hints(function)
         returned = hints.pop("return")
-        assert returned in (Real, Fold, Finding), function
+        assert returned in (Real, Fold, Deflection, Circuit | None, Finding), function
         if "values" in hints:  # one mapping of many inputs
             continue
         for parameter, annotation in hints.items():

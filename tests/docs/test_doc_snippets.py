@@ -24,10 +24,10 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.records import COLUMNS, FrameTruth, fields_npz, wrench_csv
 
-FORCE, TWIN = DOCS / "force_pipeline.md", DOCS / "digital_twin.md"
-"""Their blocks need frames and simulated data, and run in tests of their own."""
+FORCE, TWIN, OWN = (DOCS / f"{n}.md" for n in ("force_pipeline", "digital_twin", "own_parts"))
+"""Their blocks need frames, simulated data or a solid, and run in tests of their own."""
 LATER = ("budget.md",)
-PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN)]
+PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN, OWN)]
 YAML = [(p, k) for p in PAGES for k in range(len(blocks(p, "yaml")))]
 SMALL = """\
 format: gelslim-spec/1
@@ -51,6 +51,9 @@ def test_yaml_blocks_are_legal(page: Path, number: int, tmp_path: Path) -> None:
         scene = read_scene(file)
         assert scene.sensor_path.is_file(), "the sensor that the block names"
     else:
+        if page == OWN:
+            for name in ("my_adapter.step", "my_parts.py"):
+                (file.parent / name).write_bytes(b"")
         # A part of a spec is completed by what every spec needs.
         file.write_text(text if "gelslim-spec/1" in text else SMALL + text, encoding="utf-8")
         assert read_spec(file).spec.name
@@ -107,6 +110,7 @@ def _run_blocks(page: Path, names: dict[str, object]) -> None:
         exec(compile(block, f"{page.name}, snippet {number}", "exec"), names)
 
 
+@pytest.mark.slow
 def test_the_guide_of_the_force_pipeline_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -40,8 +40,8 @@ SMALLER = (
     ("designs/*.yaml", "designs/mini20.yaml designs/thin.yaml"),
 )
 """The same work, less of it."""
-ELSEWHERE = ("--scheduler", "--install-completion")
-"""Needs a cluster, or a shell of one's own."""
+ELSEWHERE = ("--scheduler", "--install-completion", "gelslim view")
+"""Needs a cluster, a shell of one's own, or goes on until it is interrupted."""
 PRESS = """\
 format: gelslim-scene/1
 name: frames

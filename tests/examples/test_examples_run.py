@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-SLOW = ("frames_to_forces",)
+SLOW = ("frames_to_forces", "data_set")
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 

@@ -13,7 +13,7 @@ from gelslim_cad.explore.force_error import Patch, PatchError, patch_error
 from gelslim_cad.explore.space import changed
 from ifem_export.elements.material import Material
 from ifem_export.mesh.pad_mesh import PadMesh
-from ifem_export.operators.ladder import reference_force
+from ifem_export.operators.ladder import reference_forces
 from ifem_export.operators.surface_operator import surface_operator
 
 COARSE = Patch(2.0, 1.2, 1.2, 4, "bbar", 0.3223, 1.2)
@@ -43,7 +43,7 @@ def test_the_mesh_error_is_that_of_a_pad_of_any_modulus() -> None:
             squares = (np.asarray(p)[:, :2] ** 2).sum(axis=1)
             return 0.1 * np.exp(-squares / (2 * width**2))[:, None] * np.array(way)
 
-        truth = reference_force(mesh, gel, bump)
+        (truth,) = reference_forces(mesh, gel, [bump])
         operator = surface_operator(mesh, gel, "bbar", "factor")
         found = operator.force(bump(np.asarray(mesh.nodes_mm)[mesh.surface]))
         errors.append(np.linalg.norm(found - truth) / np.linalg.norm(truth))

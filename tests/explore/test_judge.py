@@ -15,6 +15,7 @@ from gelslim_cad.spec import Spec
 from gelslim_core.yaml.fields import field_at, field_table
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "vary",
     [

@@ -75,6 +75,7 @@ def holds(spec: Spec) -> bool:
     return not [c for c in check(derive(spec)) if c.status == "fail" and c.id != LIMIT_RULE]
 
 
+@pytest.mark.slow
 def test_each_concession_just_reaches_the_thickness(offer: Offer) -> None:
     reached = [c for c in offer.concessions if c.reaches]
     assert {c.path for c in reached} >= {"camera.f_number", "design.gel.length_mm"}
@@ -86,6 +87,7 @@ def test_each_concession_just_reaches_the_thickness(offer: Offer) -> None:
         assert not holds(less) or derive(less)["finger.thickness_mm"] > 16.9
 
 
+@pytest.mark.slow
 def test_what_reaches_comes_first_and_what_is_forbidden_last(offer: Offer) -> None:
     order = [(not c.reaches, bool(c.breaks)) for c in offer.concessions]
     assert order == sorted(order)
@@ -95,6 +97,7 @@ def test_what_reaches_comes_first_and_what_is_forbidden_last(offer: Offer) -> No
         assert c.thickness_mm < offer.present_mm
 
 
+@pytest.mark.slow
 def test_no_field_reaches_beyond_its_rules(offer: Offer) -> None:
     alone = next(c for c in offer.concessions if c.path == "design.gel.thickness_mm")
     assert not alone.reaches

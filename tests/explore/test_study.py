@@ -116,6 +116,7 @@ def test_a_second_run_takes_everything_over(tmp_path: Path, small_chunks: None) 
     assert len(list((tmp_path / "x" / "chunks").iterdir())) == other.done
 
 
+@pytest.mark.slow
 def test_a_damaged_chunk_is_done_again(tmp_path: Path, small_chunks: None) -> None:
     first = explore(request(), tmp_path / "x", Engine(1))
     chunks = sorted((tmp_path / "x" / "chunks").iterdir())

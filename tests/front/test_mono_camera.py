@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from functools import cache
 from pathlib import Path
@@ -13,7 +11,9 @@ import numpy as np
 import pytest
 
 import gelslim
-from gelslim_cad.build.documents import bill_of_materials, bom_csv
+from gelslim_cad.assembly.finger_order import finger_order
+from gelslim_cad.assembly.order import Step
+from gelslim_cad.build.bill import bill_of_materials
 from gelslim_cad.build.instructions import build_guide
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.explore.brightness import light_columns, trace
@@ -91,20 +91,24 @@ def test_light_of_one_wavelength_is_that_of_its_index_and_its_photons() -> None:
     )
 
 
+def order(d: Dimensions) -> tuple[Step, ...]:
+    names = [p.name for p in (*led_boards(d), camera(d))]
+    return finger_order(d, ["body", "back_cover", *names])
+
+
 def test_the_documents_name_one_wavelength() -> None:
     d, two = finger("mono", 850.0)[1], finger("colour", None)[1]
     parts = (*led_boards(d), camera(d))
     bom = bill_of_materials(parts, 1020.0)
-    rows = list(csv.DictReader(io.StringIO(bom_csv(bom).decode())))
-    boards = [row for row in rows if row["part"].startswith("led_board")]
-    assert [row["part"] for row in boards] == ["led_board_left", "led_board_right"]
-    assert all("850 nm" in row["material"] for row in boards)
-    assert "mono" in rows[-1]["material"]
-    guide = build_guide(d, marker_grid(d), bom, "one").decode()
+    boards = [line for line in bom if line.name.startswith("led_board")]
+    assert [line.name for line in boards] == ["led_board_left", "led_board_right"]
+    assert all("850 nm" in line.material for line in boards)
+    assert "mono" in bom[-1].material
+    guide = build_guide(d, marker_grid(d), bom, "one", order(d)).decode()
     assert guide.count("850 nm") >= 3
     assert not {"red", "green"} & {word.strip(".,:;)(") for word in guide.split()}
     assert [p.name for p in led_boards(two)] == ["led_board_red", "led_board_green"]
-    assert "850 nm" not in build_guide(two, marker_grid(two), bom[:0], "two").decode()
+    assert "850 nm" not in build_guide(two, marker_grid(two), bom[:0], "two", order(two)).decode()
 
 
 @pytest.mark.parametrize(("wavelength_nm", "with_light"), [(525.0, True), (None, False)])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gelslim_cad.assembly.finger_order import finger_order
 from gelslim_cad.build.instructions import build_guide
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.explore.space import changed
@@ -86,7 +87,8 @@ def test_a_camera_of_the_library_is_turned_as_a_whole(finger: Dimensions) -> Non
     other = changed(load().model, {"camera.orientation": "landscape"})
     assert other.camera.image_width_px == 640
     assert derive(other)["finger.thickness_mm"] > finger["finger.thickness_mm"] + 0.5
-    assert "at the left" in build_guide(finger, marker_grid(finger), (), "tall").decode()
+    steps = finger_order(finger, ["body", "back_cover", "camera_clamp", "camera"])
+    assert "at the left" in build_guide(finger, marker_grid(finger), (), "tall", steps).decode()
 
 
 @pytest.mark.parametrize(

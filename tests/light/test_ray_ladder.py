@@ -121,6 +121,7 @@ def test_an_error_picks_the_rays_whatever_the_clock_says(
     assert again == first
 
 
+@pytest.mark.slow
 def test_an_answer_keeps_the_error_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
     asked = 0.05
     found, said = light(capsys, "--error", f"{asked}", "--seed", "3")

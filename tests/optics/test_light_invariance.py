@@ -52,7 +52,9 @@ def test_scaling_by_a_thousand_with_absorption_per_length() -> None:
         if isinstance(row, LedRow)
     )
     media = {
-        name: Medium(m.index, m.absorption_per_mm / f, m.red_index, m.green_index, m.sellmeier)
+        name: Medium(
+            m.index, m.absorption_per_mm / f, m.red_index, m.green_index, m.blue_index, m.sellmeier
+        )
         for name, m in scene.media.items()
     }
     big = LightScene(
@@ -113,6 +115,7 @@ def test_the_seed_decides() -> None:
     assert not np.array_equal(trace_light(scene, RAYS, seed=4).tallies, again)
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_truth() -> None:
     """Of 40 runs about 38 intervals hold the value of a run of many more rays."""
     scene = finger(1.5)

@@ -14,9 +14,11 @@ from trimesh.creation import box, cylinder, torus
 
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.checks import Check
+from gelslim_cad.ordering.cost import Cost
+from gelslim_cad.ordering.line import BomLine
 from gelslim_cad.report.camera_view import CameraView
 from gelslim_cad.report.render import Picture, ReportData
-from gelslim_cad.report.tables import BomLine, Note
+from gelslim_cad.report.tables import Note
 
 Piece = tuple[
     str,
@@ -310,6 +312,8 @@ def report(name: str = "gelslim2", pictures: tuple[Picture, ...] = ()) -> Report
             BomLine("body", 1, "PA12", "print", 24.1, "sand the mirror seat <flat>"),
             BomLine("screw M2×8", 4, "steel A2", "buy", None),
         ),
+        cost=Cost(12.0, 3.0, 20.0, 8.0, "EUR", ("2025-01", "2025-02"), 1, 1, ("screw M2×8",)),
+        printed=(),
         light=(),
         light_notes=(Note("Light guide", "12 LEDs a side; all flux within 3 % of even."),),
         projection=(),

@@ -93,7 +93,8 @@ def test_viewer_draws_every_triangle_and_the_page_is_silent(tmp_path, page):
     assert complaints(done.stderr) == []
 
 
-@pytest.mark.parametrize("size", [(1280, 1000), pytest.param((500, 900), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(1280, 1000), (500, 900)])
 def test_screenshot_shows_the_coloured_parts(tmp_path, page, size):
     shot = tmp_path / "shot.png"
     browse(tmp_path, page, f"--screenshot={shot}", f"--window-size={size[0]},{size[1] + 600}")

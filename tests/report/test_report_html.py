@@ -16,8 +16,9 @@ import report_sample
 
 from gelslim_cad.build.manifest import FileEntry
 from gelslim_cad.checks import Check
+from gelslim_cad.ordering.line import BomLine
 from gelslim_cad.report.render import Picture, ReportData, render_report
-from gelslim_cad.report.tables import BomLine, Note
+from gelslim_cad.report.tables import Note
 
 VOID = {"meta", "link", "input", "img", "br", "hr"}
 PNG = base64.b64decode(
@@ -60,7 +61,8 @@ class Document(HTMLParser):
     def handle_data(self, data):
         self.words.append(data)
         if self.stack and self.stack[-1] in {"script", "style"}:
-            kind = self.stack[-1] + (":model" if self.found[-1][1].get("id") == "model" else "")
+            name = self.found[-1][1].get("id")
+            kind = self.stack[-1] + (f":{name}" if name else "")
             self.content[kind] = self.content.get(kind, "") + data
 
     def elements(self, tag: str) -> list[dict[str, str | None]]:

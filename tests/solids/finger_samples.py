@@ -93,7 +93,14 @@ def part(name: str, wanted: str) -> Part:
     return next(p for p in parts_of(name) if p.name == wanted)
 
 
-LATER = ("thin", "wide", "long50", *[n for n in fingers() if n.startswith("random")][1:])
+LATER = (
+    "gelslim2",
+    "gelslim3_lens",
+    "long50",
+    "thin",
+    "wide",
+    *[n for n in fingers() if n.startswith("random")][1:],
+)
 each_finger = pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow if n in LATER else ()) for n in fingers()]
 )

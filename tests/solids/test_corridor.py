@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from finger_samples import each_finger, fingers, parts_of
 
-from gelslim_cad.build.solid_checks import blocked_volumes, corner_rays, view_corridor
+from gelslim_cad.build.solid_checks import blocked_volumes, view_corridor
+from gelslim_cad.geometry.optics import corner_rays
 from gelslim_cad.geometry.part import Part
 
 

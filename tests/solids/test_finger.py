@@ -10,6 +10,7 @@ from finger_samples import each_finger, fingers, part, parts_of
 
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
+from gelslim_cad.geometry.thread import hole_diameter_mm
 from gelslim_cad.proof.solids import interferences
 from gelslim_cad.solids.guide import led_positions_mm
 from gelslim_cad.solids.layout import Layout
@@ -62,8 +63,10 @@ def test_guide_mirror_and_gel_have_the_volume_of_their_closed_forms(name: str) -
     profile = t * flat + bends + 2 * t * d["design.light_guide.leg_length_mm"]
     guide = part(name, "light_guide").solid.Volume()
     assert guide == pytest.approx(profile * d["guide.length_mm"], rel=1e-9)
-    # Thickness is the same all along, so the flat blank holds as much acrylic (neutral fibre t/2).
-    blank = d["guide.blank_width_mm"] * t * d["guide.length_mm"]
+    # Thickness is the same all along, so the flat blank without what is trimmed from its legs holds
+    # as much acrylic (neutral fibre t/2).
+    trimmed = 2 * d["manufacturing.leg_trim_mm"]
+    blank = (d["guide.blank_width_mm"] - trimmed) * t * d["guide.length_mm"]
     assert guide == pytest.approx(blank, rel=1e-9)
 
     plate = d["mirror.length_mm"] * d["mirror.width_mm"] * d["design.mirror.thickness_mm"]
@@ -81,8 +84,9 @@ def test_the_finger_is_as_large_as_its_dimensions_say(name: str) -> None:
     assert y[1] - y[0] == pytest.approx(d["finger.width_mm"], abs=1e-4)
     assert z[1] - z[0] == pytest.approx(d["finger.thickness_mm"], abs=1e-4)
     assert z[1] == pytest.approx(0, abs=1e-4)
-    # Nothing but the adapter and the gripper's bolts reaches out of the case.
-    inner = [p for p in parts_of(name) if p.name != "gripper_adapter"]
+    # Nothing but the adapter, the gripper's bolts, cable and wires reaches out of the case.
+    out = ("gripper_adapter", "camera_cable", "led_wire_")
+    inner = [p for p in parts_of(name) if not p.name.startswith(out)]
     for axis, limits in zip("xyz", (x, y, z), strict=True):
         low, high = span(inner, axis)
         assert low >= limits[0] - 0.02, axis
@@ -135,9 +139,10 @@ def test_screws_reach_into_their_pilots_and_do_not_bottom_out(name: str) -> None
             depth = abs((box.zmin if hole.inward < 0 else box.zmax) - hole.surface_z_mm)
             assert depth == pytest.approx(hole.screw_length_mm, abs=1e-3)
             assert hole.plate_mm < depth < hole.plate_mm + hole.pilot_mm
-            # Body all around the thread, none within it.
-            z = hole.surface_z_mm + hole.inward * (hole.plate_mm + depth) / 2
-            radius = at.screw.pilot_mm / 2
+            # Body all around the insert, under its head, none within it.
+            z = hole.surface_z_mm + hole.inward * (hole.plate_mm + 1.0)
+            process = d["manufacturing.print_process"]
+            radius = hole_diameter_mm(at.thread, at.screw_name, process) / 2
             for turn in range(8):
                 c, s = math.cos(turn * math.pi / 4), math.sin(turn * math.pi / 4)
                 for share, expected in ((0.97, False), (1.15, True)):

@@ -7,7 +7,7 @@ import math
 import pytest
 from tooling_samples import gelslim2
 
-from gelslim_cad.build.instructions import Casting
+from gelslim_cad.build.casting import Casting
 
 
 def test_masses_by_hand() -> None:

@@ -32,6 +32,10 @@ observe: [force]
 """
 
 
+OWN_LED = """\
+electronics: {own_forward_v: [2, 3], own_test_current_ma: 20, own_max_current_ma: 30,
+              own_thermal_k_per_w: 200, own_max_junction_c: 100}
+"""
 SPEC_FAULTS: tuple[tuple[str, Callable[[str], str]], ...] = (
     ("camera", lambda t: t.replace("image_width_px: 640, ", "model: ov9821, ")),
     ("camera", lambda t: t.replace("image_width_px: 640", "mode: 640x480, image_width_px: 640")),
@@ -44,9 +48,13 @@ SPEC_FAULTS: tuple[tuple[str, Callable[[str], str]], ...] = (
     ("camera.distortion", lambda t: t.replace("2.9}", "2.9, distortion: {k1: 1, tv_percent: 1}}")),
     ("design.gel", lambda t: t.replace("width_mm: 22}", "width_mm: 22, corner_radius_mm: 11.5}")),
     ("design.leds", lambda t: t + "  leds: {emission: table}\n"),
+    ("design.leds", lambda t: t + "  leds: {light: white, one_wavelength_nm: 850}\n"),
     ("design.markers", lambda t: t + "  markers: {rows: 40}\n"),
     ("design.markers", lambda t: t + "  markers: {pitch_mm: 0.4}\n"),
+    ("parts", lambda t: t + "parts: {body: mine.stl}\n"),
     ("material.gel", lambda t: t + "material: {gel: {youngs_modulus_mpa: 147}}\n"),
+    ("electronics", lambda t: t + "electronics: {own_max_current_ma: 30}\n"),
+    ("electronics", lambda t: t + OWN_LED.replace("[2, 3]", "[2, 30]")),
     ("mesh", lambda t: t + "mesh: {cells_along: 30}\n"),
 )
 SCENE_FAULTS: tuple[tuple[str, Callable[[str], str]], ...] = (

@@ -110,6 +110,18 @@ def _edge(rng: np.random.Generator, values: Values) -> None:
     ratio = values["camera.image_height_px"] / values["camera.image_width_px"]
     values["camera.sensor_height_mm"] = short(values["camera.sensor_width_mm"] * ratio, 8)
     _both_cell_counts(values, 17)
+    _own_led(rng, values)
+
+
+def _own_led(rng: np.random.Generator, values: Values) -> None:
+    """The fields of an LED that the library does not have: all of them, or none."""
+    own = [path for path in LEAVES if path.startswith("electronics.own_")]
+    volts, *rest = own
+    given = rng.random() < 0.3
+    values[volts] = [short(v) for v in rng.uniform(1.3, 4.0, 2)] if given else []
+    for path in rest:
+        drawn = anywhere(rng, LEAVES[path])
+        values[path] = (80.0 if drawn is None else drawn) if given else None
 
 
 def _of_library(rng: np.random.Generator) -> Values:
@@ -139,6 +151,10 @@ def _wild(rng: np.random.Generator) -> Values:
         if values[path] is not None:
             values[path] = min(values[path], most) if most >= 5 else None
     _both_cell_counts(values, int(rng.integers(1, 401)))
+    _own_led(rng, values)
+    if values["design.leds.one_wavelength_nm"] is not None:
+        values["design.leds.light"] = "red_green"
+    values["manufacturing.printer_mm"] = [short(v) for v in rng.uniform(50, 1000, 3)]
     if values["material.gel.youngs_modulus_mpa"] > STIFF_GEL_MPA:
         values["material.allow_stiff_gel"] = True
     return values

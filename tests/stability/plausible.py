@@ -35,7 +35,17 @@ def plausible(rng: np.random.Generator) -> Values:
     values: Values = {
         path: near_default(rng, leaf) for path, leaf in LEAVES.items() if not leaf.required
     }
-    return values | _camera(rng) | _gel(rng) | _housing(rng, values)
+    return values | _camera(rng) | _gel(rng) | _housing(rng, values) | _boards(rng)
+
+
+def _boards(rng: np.random.Generator) -> Values:
+    """A supply that suits the driver, and current that the LED bears."""
+    driven = bool(rng.random() < 0.3)
+    return {
+        "electronics.driver": "constant_current" if driven else "resistor",
+        "electronics.supply_v": 60.0 if driven else float(rng.choice([5.0, 5.0, 12.0])),
+        "electronics.current_ma": None,
+    }
 
 
 def _camera(rng: np.random.Generator) -> Values:

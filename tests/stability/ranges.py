@@ -101,9 +101,10 @@ def _leaves(model: type[BaseModel], prefix: str = "") -> Iterator[Leaf]:
 LEAVES: dict[str, Leaf] = {
     leaf.path: leaf
     for leaf in _leaves(Spec)
-    if leaf.path not in ("format", "name") and not leaf.path.startswith("camera.distortion.")
+    if leaf.path not in ("format", "name", "manufacturing.prices")
+    and not leaf.path.startswith(("camera.distortion.", "parts."))
 }
-"""All leaf fields but format and name, by path.
+"""All leaf fields but format, name, and names of files, by path.
 
 Coefficients of a distortion are drawn by `legal_specs.distorted`: few of their range make a lens.
 """

@@ -129,6 +129,7 @@ def test_pressed_to_half_in_a_few_steps(friction: float) -> None:
     assert not states[-1].force_n.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_rounding_does_not_decide_how_many_steps_it_takes(friction: float) -> None:
     """Poses off by some hundred roundings: as few steps, and forces off by as little."""
