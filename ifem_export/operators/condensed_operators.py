@@ -16,6 +16,7 @@ from scipy import sparse
 
 from ifem_export.assembly.occupancy_table import occupancy_table
 from ifem_export.operators.pad_system import PadSystem, checked_field
+from ifem_export.operators.rigid_answer import RigidAnswer
 from ifem_export.operators.solver import Solver, SparseFactor, pad_solver
 
 Array = NDArray[np.float64]
@@ -84,18 +85,23 @@ class PaperOperator(_WithCompliance):
 
 @dataclass(frozen=True, eq=False)
 class CondensedOperator(_WithCompliance):
-    """Exact condensation that solves for the inner nodes at each call, to a residual `rtol`."""
+    """Exact condensation that solves for the inner nodes at each call, to a residual `rtol`.
+
+    With `rigid` force and torque are exact whatever the residual.
+    """
 
     name: str
     inner_solver: Solver
     rtol: float
+    rigid: RigidAnswer | None = None
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """F = K_ss u + K_si u_i, where K_ii u_i = -K_is u."""
         u = checked_field(displacement_mm, self.system.columns).ravel()
         inner = self.inner_solver.solve(-(self.system.surface_to_inner @ u), self.rtol).x
-        force = self.system.surface @ u + self.system.inner_to_surface @ inner
-        return np.asarray(force.reshape(-1, 3))
+        force = np.asarray(self.system.surface @ u + self.system.inner_to_surface @ inner)
+        force = force.reshape(-1, 3)
+        return force if self.rigid is None else self.rigid.completed(force, u)
 
     @cached_property
     def pad_solver(self) -> Solver:
@@ -110,7 +116,8 @@ class CondensedOperator(_WithCompliance):
         kept = sum(map(_matrix_bytes, parts))
         if isinstance(self.inner_solver, SparseFactor):
             return int(kept + 12 * self.inner_solver.factor.nnz)
-        return int(kept + s.inner_preconditioner.blocks.nbytes)
+        rigid = 0 if self.rigid is None else self.rigid.n_bytes
+        return int(kept + s.inner_preconditioner.blocks.nbytes + rigid)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from ifem_export.errors import IfemError
 from ifem_export.operators.layered_operator import LayeredOperator
 from ifem_export.operators.pad_system import PadSystem, checked_field
-from ifem_export.operators.solver import inner_solver
+from ifem_export.operators.rigid_answer import RigidAnswer
 
 Array = NDArray[np.float64]
-RESULTANT_RTOL = 1e-10
 
 
 class ComplianceProducts:
@@ -57,12 +56,14 @@ class ConvolvedOperator:
         system: Equations of the pad.
         stiffness: Surface stiffness of the infinite pad, complete or truncated.
         missing: (c, 3, 3) in N/mm, added node by node so that the resultant is exact; or None.
+        rigid: Answer of the pad that makes the torque exact too; or None.
     """
 
     name: str
     system: PadSystem
     stiffness: LayeredOperator
     missing: Array | None = None
+    rigid: RigidAnswer | None = None
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """Convolution with the surface stiffness."""
@@ -70,7 +71,7 @@ class ConvolvedOperator:
         force = np.asarray(self.stiffness(u[None])[0])
         if self.missing is not None:
             force += np.matmul(self.missing, u[:, :, None])[:, :, 0]
-        return force
+        return force if self.rigid is None else self.rigid.completed(force, u)
 
     def displacement(self, force_n: ArrayLike) -> Array:
         """Convolution with the compliance of the infinite pad, which is not truncated."""
@@ -86,7 +87,8 @@ class ConvolvedOperator:
     def n_bytes(self) -> int:
         """Bytes of the blocks."""
         missing = 0 if self.missing is None else self.missing.nbytes
-        return int(self.stiffness.blocks.nbytes + missing)
+        rigid = 0 if self.rigid is None else self.rigid.n_bytes
+        return int(self.stiffness.blocks.nbytes + missing + rigid)
 
 
 def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
@@ -109,7 +111,7 @@ def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
     return LayeredOperator(blocks, stiffness.columns, stiffness.shape)
 
 
-def missing_resultant(system: PadSystem, stiffness: LayeredOperator) -> Array:
+def missing_resultant(answer: RigidAnswer, stiffness: LayeredOperator) -> Array:
     """What the convolution lacks of the exact resultant, node by node.
 
     The resultant of a motion u is Σ_j (Σ_i S_ij) u_j, and S is symmetric. Therefore the three
@@ -119,13 +121,5 @@ def missing_resultant(system: PadSystem, stiffness: LayeredOperator) -> Array:
     Returns:
         (c, 3, 3) in N/mm, force component by displacement component.
     """
-    solver = inner_solver(system)
-    missing = np.empty((system.columns, 3, 3))
-    for axis in range(3):
-        uniform = np.zeros((system.columns, 3))
-        uniform[:, axis] = 1.0
-        u = uniform.ravel()
-        inner = solver.solve(-(system.surface_to_inner @ u), RESULTANT_RTOL).x
-        exact = system.surface @ u + system.inner_to_surface @ inner
-        missing[:, axis, :] = exact.reshape(uniform.shape) - stiffness(uniform[None])[0]
-    return missing
+    uniform = zip(answer.motions[:3], answer.forces[:3], strict=True)
+    return np.stack([force - stiffness(motion[None])[0] for motion, force in uniform], axis=1)

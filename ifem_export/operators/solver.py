@@ -179,7 +179,8 @@ class SparseFactor:
 class GradientsThenFactor:
     """Conjugate gradients, replaced by a factor from the first failure on.
 
-    The infinite pad is a poor preconditioner for cut cells of a nearly incompressible gel.
+    Rounding keeps the residual of a nearly incompressible gel large, and the infinite pad is a
+    poor preconditioner for its cut cells.
     """
 
     first: ConjugateGradients
@@ -204,9 +205,11 @@ class GradientsThenFactor:
 def pad_solver(system: PadSystem, method: Method = "auto") -> Solver:
     """Solver of the free unknowns, K_ff u = f. Raises IfemError for an unknown method."""
     direct = _direct(system.stiffness, method)
-    return direct or ConjugateGradients(
-        system.stiffness, system.preconditioner, system.preconditioner_layers[0]
-    )
+    if direct is not None:
+        return direct
+    layers = system.preconditioner_layers[0]
+    gradients = ConjugateGradients(system.stiffness, system.preconditioner, layers)
+    return GradientsThenFactor(gradients) if method == "auto" else gradients
 
 
 def inner_solver(system: PadSystem, method: Method = "auto") -> Solver:
@@ -223,7 +226,7 @@ def inner_solver(system: PadSystem, method: Method = "auto") -> Solver:
         return direct
     layers = system.preconditioner_layers[1]
     gradients = ConjugateGradients(system.inner, system.inner_preconditioner, layers)
-    return GradientsThenFactor(gradients) if method == "auto" and system.is_cut else gradients
+    return GradientsThenFactor(gradients) if method == "auto" else gradients
 
 
 def _direct(matrix: sparse.csr_array, method: Method) -> SparseFactor | None:

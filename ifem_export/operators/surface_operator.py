@@ -28,6 +28,7 @@ from ifem_export.operators.convolved_operator import (
 )
 from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.rigid_answer import rigid_answer
 from ifem_export.operators.solver import Method, inner_solver
 
 Array = NDArray[np.float64]
@@ -36,6 +37,9 @@ RUNGS: tuple[Rung, ...] = get_args(Rung)
 CROWNED_RUNGS: tuple[Rung, ...] = ("pcg", "factor", "dense32")
 DEFAULT_RTOL = 1e-4
 DEFAULT_RADIUS = 6
+FACTOR_RTOL = 1e-10
+EXACT_RTOL = 1e-7
+"""From this residual of the inner solution on, force and torque need no completion."""
 
 
 class SurfaceOperator(Protocol):
@@ -97,10 +101,10 @@ def surface_operator(
             "pcg" or "factor" (exact condensation) or "dense32" (S as a dense matrix).
         rtol: Relative residual of the inner solution ("pcg").
         radius: Reach of the convolution in nodes ("truncated").
-        lumped: Whether the resultant of "fft" is corrected; that of "truncated" always is.
+        lumped: Whether force and torque of "fft" are corrected; those of "truncated" always are.
 
     Returns:
-        The operator.
+        The operator. Force and torque of a motion are exact for all but "paper" and "fft" alone.
 
     Raises:
         IfemError: The rung is unknown or the radius is below 1.
@@ -142,16 +146,24 @@ def system_operator(
         return PaperOperator(system)
     if rung == "fft":
         infinite = system.infinite_stiffness
-        missing = missing_resultant(system, infinite) if lumped else None
-        return ConvolvedOperator("fft", system, infinite, missing)
+        if not lumped:
+            return ConvolvedOperator("fft", system, infinite)
+        rigid = rigid_answer(system)
+        missing = missing_resultant(rigid, infinite)
+        return ConvolvedOperator("fft", system, infinite, missing, rigid)
     if rung == "truncated":
+        rigid = rigid_answer(system)
         near = truncated(system.infinite_stiffness, radius)
-        return ConvolvedOperator("truncated", system, near, missing_resultant(system, near))
+        missing = missing_resultant(rigid, near)
+        return ConvolvedOperator("truncated", system, near, missing, rigid)
     if rung == "dense32":
         return DenseOperator(system)
     iterative: Method = "auto" if system.is_cut else "pcg"
     solver = inner_solver(system, "direct" if rung == "factor" else iterative)
-    return CondensedOperator(system, rung, solver, rtol if rung == "pcg" else 1e-10)
+    if rung == "factor":
+        return CondensedOperator(system, rung, solver, FACTOR_RTOL)
+    completed = rigid_answer(system) if rtol > EXACT_RTOL else None
+    return CondensedOperator(system, rung, solver, rtol, completed)
 
 
 def one_layer(mesh: PadMesh) -> PadMesh:

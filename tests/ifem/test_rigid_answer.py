@@ -1,0 +1,135 @@
+"""Force and torque are exact for every operator that is completed by the rigid answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ifem_shapes import Polygon, Sphere, disc
+
+from ifem_export.elements.hex8 import hex8_stiffness
+from ifem_export.elements.material import Material
+from ifem_export.mesh.outline import Outline, RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.operators.condensed_operators import CondensedOperator
+from ifem_export.operators.crowned_system import pad_system
+from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.rigid_answer import rigid_answer, rigid_motions
+from ifem_export.operators.surface_operator import surface_operator, system_operator
+
+OUTLINES: dict[str, Outline] = {
+    "rectangle": RoundedRectangle(12.0, 10.0, 2.0),
+    "disc": disc(6.0),
+    "polygon": Polygon([(-6, -5), (6, -5), (6, 1), (1, 1), (1, 5), (-6, 5)]),
+}
+COMPLETED = (
+    ("truncated", {"radius": 3}),
+    ("fft", {"lumped": True}),
+    ("pcg", {"rtol": 1e-2}),
+    ("pcg", {"rtol": 1e-4}),
+)
+
+
+def gel(nu: float) -> Material:
+    return Material(0.147, nu, 1020.0)
+
+
+def pad(outline: Outline) -> PadMesh:
+    return build_pad_mesh(outline, 2.0, pitch_mm=(0.8, 0.7), layers=4)[0]
+
+
+def system(mesh: PadMesh, nu: float) -> PadSystem:
+    return pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, gel(nu), "bbar"))
+
+
+def wrench(points: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Force and torque about a point that is not the middle of the surface."""
+    arms = points - np.array([3.0, -2.0, 5.0])
+    return np.concatenate([force.sum(axis=0), np.cross(arms, force).sum(axis=0)])
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+@pytest.mark.parametrize("nu", [0.3223, 0.49, 0.4999])
+@pytest.mark.parametrize(("rung", "options"), COMPLETED)
+def test_force_and_torque_of_any_motion_are_exact(name, nu, rung, options) -> None:
+    mesh = pad(OUTLINES[name])
+    u = np.random.default_rng(3).normal(size=(len(mesh.surface), 3))
+    exact = wrench(mesh.surface_mm, surface_operator(mesh, gel(nu), "bbar", "factor").force(u))
+    found = surface_operator(mesh, gel(nu), "bbar", rung, **options).force(u)
+    error = np.abs(wrench(mesh.surface_mm, found) - exact)
+    rounding = 1e-8 if nu < 0.4999 else 1e-5
+    assert error.max() < rounding * np.abs(exact).max()
+
+
+def test_without_completion_they_are_not() -> None:
+    mesh = pad(OUTLINES["disc"])
+    u = np.random.default_rng(3).normal(size=(len(mesh.surface), 3))
+    exact = wrench(mesh.surface_mm, surface_operator(mesh, gel(0.49), "bbar", "factor").force(u))
+    found = wrench(mesh.surface_mm, surface_operator(mesh, gel(0.49), "bbar", "fft").force(u))
+    assert np.abs(found - exact).max() > 1e-3 * np.abs(exact).max()
+
+
+def test_rigid_motions_themselves_are_answered_exactly() -> None:
+    """Also at a point of the surface, not only in their resultants."""
+    mesh = pad(OUTLINES["polygon"])
+    whole = system(mesh, 0.45)
+    inner = np.linalg.solve(whole.inner.toarray(), whole.surface_to_inner.toarray())
+    dense = whole.surface.toarray() - whole.inner_to_surface.toarray() @ inner
+    answer = rigid_answer(whole)
+    rough = system_operator(whole, "pcg", rtol=0.5)
+    for motion, force in zip(answer.motions, answer.forces, strict=True):
+        expected = (dense @ motion.ravel()).reshape(-1, 3)
+        np.testing.assert_allclose(force, expected, atol=1e-8 * np.abs(expected).max())
+        found = wrench(mesh.surface_mm, rough.force(motion))
+        np.testing.assert_allclose(found, wrench(mesh.surface_mm, expected), atol=1e-7)
+
+
+def test_motions_are_rigid_independent_and_of_order_one() -> None:
+    points = np.random.default_rng(5).normal(size=(40, 3)) * [10.0, 6.0, 0.2] + [50.0, 0.0, 3.0]
+    motions = rigid_motions(points)
+    for motion in motions:
+        shift = 1e-6 * motion
+        before = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        after = np.linalg.norm((points + shift)[:, None] - (points + shift)[None], axis=-1)
+        np.testing.assert_allclose(after, before, atol=1e-10)
+    flat = motions.reshape(6, -1)
+    assert np.linalg.cond(flat) < 10.0
+    assert 0.1 < np.abs(flat).max() < 5.0
+
+
+def test_a_loose_iteration_loses_no_resultant_of_a_nearly_incompressible_gel() -> None:
+    """A press of 0.1 mm: a residual of 1 % is a sixth of the normal force."""
+    mesh = pad(RoundedRectangle(24.0, 20.0, 1.0))
+    square = (mesh.surface_mm[:, :2] ** 2).sum(axis=1)
+    u = np.exp(-square / 8)[:, None] * [0.0, 0.0, -0.1]
+    whole = system(mesh, 0.49)
+    exact = system_operator(whole, "factor").force(u)
+    loose = system_operator(whole, "pcg", rtol=1e-2)
+    assert isinstance(loose, CondensedOperator)
+    kept, lost = loose.force(u), replace(loose, rigid=None).force(u)
+    normal = [force[:, 2].sum() / exact[:, 2].sum() - 1 for force in (kept, lost)]
+    assert abs(normal[0]) < 1e-9
+    assert abs(normal[1]) > 0.1
+    error = [np.linalg.norm(force - exact) / np.linalg.norm(exact) for force in (kept, lost)]
+    assert error[0] < 0.85 * error[1]
+
+
+def test_a_crowned_surface_turns_where_it_is() -> None:
+    """Forces act on the true surface, between two nodes of each column."""
+    crown = Sphere(12.0)
+    mesh = build_pad_mesh(
+        RoundedRectangle(8.0, 7.0, 2.3), 2.0, cells=(8, 9, 4), crown=crown,
+        weighting="volume_fraction",
+    )[0]  # fmt: skip
+    assert np.ptp(mesh.surface_mm[:, 2]) > 0.3
+    u = np.random.default_rng(3).normal(size=(len(mesh.surface), 3))
+    exact = wrench(mesh.surface_mm, surface_operator(mesh, gel(0.45), "bbar", "factor").force(u))
+    found = surface_operator(mesh, gel(0.45), "bbar", "pcg", rtol=1e-2).force(u)
+    error = np.abs(wrench(mesh.surface_mm, found) - exact)
+    assert error.max() < 1e-8 * np.abs(exact).max()
+
+
+def test_the_answer_of_a_system_is_computed_once() -> None:
+    whole = system(pad(OUTLINES["disc"]), 0.4)
+    assert rigid_answer(whole) is rigid_answer(whole)
