@@ -236,7 +236,9 @@ def groove(d: Dimensions) -> list[cq.Shape]:
     roof = d["cable.level_z_mm"] + d["cable.thickness_mm"] / 2 + SLIP_MM
     flare = FLARE_RATIO * d["design.leds.wire_diameter_mm"]
     front = rear + FAR_MM
-    if roof > d["stack.window_bottom_z_mm"]:
+    # A bend above the camera reaches forward, below the roof and the beam of the window's ledge.
+    under_beam = roof > beam_bottom_z_mm(d) and foremost_x_mm(d) > at.beam_x_mm
+    if under_beam or roof > d["stack.window_bottom_z_mm"]:
         front = max(front, foremost_x_mm(d) + 0.5)
     low, top, outer = at.back_z_mm - FAR_MM, d["wire.lane_top_z_mm"], d["cable.slot_half_mm"]
     return [
@@ -256,9 +258,13 @@ def notch_top_z_mm(d: Dimensions) -> float:
 def notch_end_x_mm(d: Dimensions) -> float:
     """Gripper side of the notches: of the web, or of the beam where that reaches down to them."""
     at = Layout(d)
-    beam_z = d["stack.window_bottom_z_mm"] - d["ledge.depth_mm"]
     web = at.pocket_x_mm[0] - CHANNEL_WALL_MM
-    return min(web, at.beam_x_mm) if beam_z < notch_top_z_mm(d) else web
+    return min(web, at.beam_x_mm) if beam_bottom_z_mm(d) < notch_top_z_mm(d) else web
+
+
+def beam_bottom_z_mm(d: Dimensions) -> float:
+    """Lower side of the beam under the window's end near the camera."""
+    return float(d["stack.window_bottom_z_mm"] - d["ledge.depth_mm"])
 
 
 def foremost_x_mm(d: Dimensions) -> float:

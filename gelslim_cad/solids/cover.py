@@ -53,8 +53,8 @@ def cover(d: Dimensions) -> Part:
 def _pedestals(d: Dimensions, top: float) -> tuple[cq.Shape, ...]:
     """Bars that press the LED boards up against the legs, with a stop at the tip end."""
     height = d["led.board_bottom_z_mm"] - top
-    if height < LOWEST_PEDESTAL_MM:
-        return ()
+    if height < LOWEST_PEDESTAL_MM:  # the boards lie on the cover itself
+        return (*stops(d),)
     half = d["led.board_width_mm"] / 2 - 0.1
     middle, reach = board_middle_mm(d), d["led.board_length_mm"] / 2
     # Under the boards' proximal ends the wires are soldered.

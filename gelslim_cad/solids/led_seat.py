@@ -79,13 +79,13 @@ def _bars(d: Dimensions, x: Point2, wall_mm: float, face_mm: float) -> list[cq.S
 
 
 def stops(d: Dimensions) -> list[cq.Shape]:
-    """Stops at the tip ends of the boards."""
+    """Stops at the tip ends of the boards, up from the cover."""
     end = board_middle_mm(d) + d["led.board_length_mm"] / 2
     half = d["led.board_width_mm"] / 2 - 0.1
     bottom = d["led.board_bottom_z_mm"]
     top = bottom + 0.75 * d["design.leds.board_thickness_mm"]
     across = (d["led.y_mm"] - half, d["led.y_mm"] + half)
-    return [*pair((end, end + STOP_MM), across, (bottom - OVERLAP_MM, top))]
+    return [*pair((end, end + STOP_MM), across, (d["cover.top_z_mm"] - OVERLAP_MM, top))]
 
 
 def _places_mm(d: Dimensions) -> tuple[float, float]:

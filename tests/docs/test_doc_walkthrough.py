@@ -31,7 +31,7 @@ SMALLER = (
     ("gel.length_mm=10:30:0.5", "gel.length_mm=10:30:10"),
     ("gel.length_mm=16:24:1", "gel.length_mm=16:24:4"),
     ("gel.length_mm=16:24:2", "gel.length_mm=16:24:8"),
-    ("gel.length_mm=16:22:2", "gel.length_mm=16:22:6"),
+    ("gel.length_mm=16:22:2", "gel.length_mm=18:20:2"),
     ("gel.thickness_mm=0.5:5:0.25", "gel.thickness_mm=1:5:2"),
     ("gel.thickness_mm=1.5:3:0.5", "gel.thickness_mm=1.5:3:1.5"),
     ("f_number=2,2.9,4", "f_number=2,4"),

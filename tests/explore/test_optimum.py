@@ -22,9 +22,9 @@ from gelslim_core.jobs import Engine
 
 @pytest.mark.slow
 def test_the_thinnest_is_no_thicker_than_brute_force(tmp_path: Path) -> None:
-    asked = Request(space("gel.length_mm=16:20:2", "gel.thickness_mm=1.5:3:0.5"))
+    asked = Request(space("gel.length_mm=18:22:2", "gel.thickness_mm=1.5:3:0.5"))
     best = optimise(asked, "thin", tmp_path / "o", Engine(1), rounds=3)
-    length, thickness = np.meshgrid(np.linspace(16, 20, 9), np.linspace(1.5, 3, 31))
+    length, thickness = np.meshgrid(np.linspace(18, 22, 9), np.linspace(1.5, 3, 31))
     batch = derive_batch(
         mini20(),
         {
@@ -37,7 +37,7 @@ def test_the_thinnest_is_no_thicker_than_brute_force(tmp_path: Path) -> None:
     assert 0 < good.sum() < good.size
     found = best.row["finger.thickness_mm"]
     assert found <= batch["finger.thickness_mm"][good].min() + 0.02
-    assert best.values["design.gel.length_mm"] == 16.0
+    assert best.values["design.gel.length_mm"] == 18.0
     assert best.at_end == ("design.gel.length_mm",)
     below = next(
         n for n in best.neighbours if n.path == "design.gel.thickness_mm" and n.value == 1.5

@@ -116,5 +116,6 @@ def _housing(rng: np.random.Generator, values: Values) -> Values:
         "design.housing.tip_wall_mm": short(rng.uniform(4.7, 7), 3),
         "design.housing.screw": str(rng.choice(["M1.6", "M2", "M2"])),
         "manufacturing.acrylic_tolerance_ratio": 0.1,
+        "tolerance.acrylic": "measured",
         "design.mount.tongue_thickness_mm": short(rng.uniform(3, 5), 3),
     }
