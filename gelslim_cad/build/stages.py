@@ -25,7 +25,7 @@ from ifem_export.markers.grid import MarkerGrid
 
 @dataclass(frozen=True)
 class Plan:
-    """Parts, units of work, and the results of all design rules, also of those on solids."""
+    """Parts, units of work, and the results of the design rules that have been checked so far."""
 
     finger: tuple[Part, ...]
     tooling: tuple[Part, ...]
@@ -101,21 +101,22 @@ class Stages:
         )
 
     def plan(self) -> Plan:
-        """Make the solids, check them and lay out the work. Loads the CAD kernel."""
+        """Make the solids and lay out the work. Loads the CAD kernel."""
         with interrupts_held():
             import cadquery  # noqa: F401
 
-        from gelslim_cad.build.solid_checks import check_mould, check_solids
         from gelslim_cad.solids.finger import finger_parts, tooling_parts
 
         finger = finger_parts(self.dimensions, self.loaded.own_parts)
         tooling = tooling_parts(self.dimensions, self.grid)
-        checks = (
-            *self.checks,
-            *check_solids(self.dimensions, finger),
-            *check_mould(self.dimensions),
-        )
-        return Plan(finger, tooling, self._units(finger, tooling), checks)
+        return Plan(finger, tooling, self._units(finger, tooling), self.checks)
+
+    def with_solid_checks(self, plan: Plan) -> Plan:
+        """The plan with the results of the rules on solids."""
+        from gelslim_cad.build.solid_checks import check_mould, check_solids
+
+        found = (*check_solids(self.dimensions, plan.finger), *check_mould(self.dimensions))
+        return replace(plan, checks=(*plan.checks, *found))
 
     def _units(self, finger: tuple[Part, ...], tooling: tuple[Part, ...]) -> tuple[Unit, ...]:
         packed = {p.name: PackedPart.of(p) for p in (*finger, *tooling)}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -130,14 +130,13 @@ def _build(
     kept = _reusable(previous, target, {unit.name: unit.key() for unit in early})
     with _begun([u for u in early if u.name not in kept], jobs) as begun:
         plan = stages.plan()
-        _require_rules(stages.name, plan.checks)
         keys = {unit.name: unit.key() for unit in plan.units}
         reused = _reusable(previous, target, keys)
         todo = [u for u in plan.units if u.name not in reused]
-        written = _run_all([u for u in todo if u.name not in begun], jobs, notify)
-        for name, future in begun.items():
-            notify(name, 0, 1)
-            written[name] = future.result()
+        with _doing([u for u in todo if u.name not in begun], jobs) as doing:
+            plan = stages.with_solid_checks(plan)
+            _require_rules(stages.name, plan.checks)
+            written = {**_results(doing, notify), **_results(begun, notify)}
     _require_proofs(stages.name, plan.checks, written)
     with staged(target, () if previous is None else {*previous.files, NAME}) as folder:
         contents, files = _gathered(list(keys), target, previous, reused, written)
@@ -252,9 +251,13 @@ def _reusable(
     }
 
 
+Doing = dict[str, Callable[[], Written]]
+"""What waits for each unit of work, by its name."""
+
+
 @contextmanager
-def _begun(units: list[Unit], jobs: int) -> Iterator[dict[str, Future[Written]]]:
-    """Units that one more worker does while this process makes the solids, by name.
+def _begun(units: list[Unit], jobs: int) -> Iterator[Doing]:
+    """Units that one more worker does while this process makes the solids.
 
     There are none if only one process is wanted.
     """
@@ -263,26 +266,36 @@ def _begun(units: list[Unit], jobs: int) -> Iterator[dict[str, Future[Written]]]
         return
     # Forked before the CAD kernel is loaded: it is not needed here, nor are its threads.
     with worker_pool(1, "fork" if _forks() else "spawn") as pool:
-        yield {unit.name: pool.submit(run, unit) for unit in sorted(units, key=lambda u: -u.cost)}
+        yield {u.name: pool.submit(run, u).result for u in _by_cost(units)}
 
 
-def _run_all(todo: list[Unit], jobs: int, notify: Progress) -> dict[str, Written]:
-    """Run the units in worker processes, those with the highest cost first; results by name."""
-    queue = sorted(todo, key=lambda u: -u.cost)
-    results: dict[str, Written] = {}
-    if jobs <= 1 or len(queue) <= 1:
-        for done, unit in enumerate(queue):
-            notify(unit.name, done, len(queue))
-            results[unit.name] = run(unit)
-        return results
+@contextmanager
+def _doing(units: list[Unit], jobs: int) -> Iterator[Doing]:
+    """Units that worker processes do while this process checks the solids.
+
+    With one process each unit is done when its result is asked for.
+    """
+    if jobs <= 1 or len(units) <= 1:
+        yield {u.name: partial(run, u) for u in _by_cost(units)}
+        return
     # A forked worker starts with the CAD kernel loaded; a spawned one must load it first.
     # A fork loses the kernel's threads, which Booleans use: units only write and read files.
-    with worker_pool(min(jobs, len(queue)), "fork" if _forks() else "spawn") as pool:
-        futures = [(unit, pool.submit(run, unit)) for unit in queue]
-        for done, (unit, future) in enumerate(futures):
-            notify(unit.name, done, len(queue))
-            results[unit.name] = future.result()
-    return results
+    with worker_pool(min(jobs, len(units)), "fork" if _forks() else "spawn") as pool:
+        yield {u.name: pool.submit(run, u).result for u in _by_cost(units)}
+
+
+def _by_cost(units: list[Unit]) -> list[Unit]:
+    """Those with the highest cost first."""
+    return sorted(units, key=lambda u: -u.cost)
+
+
+def _results(doing: Doing, notify: Progress) -> dict[str, Written]:
+    """What the units wrote, by name."""
+    found: dict[str, Written] = {}
+    for done, (name, result) in enumerate(doing.items()):
+        notify(name, done, len(doing))
+        found[name] = result()
+    return found
 
 
 def _forks() -> bool:

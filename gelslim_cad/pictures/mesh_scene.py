@@ -195,6 +195,7 @@ class MeshScene:
         return plane
 
     def _close(self, poly: Any, plane: Any, rgba: tuple[float, ...], hatch_up: bool) -> None:
+        from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonDataModel import vtkPlane
         from vtkmodules.vtkFiltersCore import vtkCutter
         from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
@@ -215,13 +216,14 @@ class MeshScene:
         stripes.SetOrigin(0.0, 0.0, 0.0)
         stripes.SetNormal(*((right + (up if hatch_up else -up)) / math.sqrt(2)))
         step = HATCH_SPACING * 2 * self._scale_mm
-        reach = math.ceil(3 * float(np.abs([self._low, self._high]).max()) / step)
+        heights = vtk_to_numpy(face.GetOutput().GetPoints().GetData()) @ stripes.GetNormal()
+        first, last = math.ceil(heights.min() / step), math.floor(heights.max() / step)
         hatch = vtkCutter()
         hatch.SetInputConnection(face.GetOutputPort())
         hatch.SetCutFunction(stripes)
-        hatch.SetNumberOfContours(2 * reach + 1)
-        for number in range(-reach, reach + 1):
-            hatch.SetValue(number + reach, number * step)
+        hatch.SetNumberOfContours(max(last - first + 1, 0))
+        for number in range(first, last + 1):
+            hatch.SetValue(number - first, number * step)
         self._lines(hatch, tuple(0.55 * channel for channel in light), 1.5, 0.9)
         self._lines(contour, INK, 3.4, 1.0)
 

@@ -67,7 +67,7 @@ def picture_steps(
     if not scenes:
         return []
     drawn = draw(window, [_scene(s) for s in scenes], width_px, oversampling=1)
-    return [png_bytes(image, optimize=False) for image in drawn]
+    return [png_bytes(image) for image in drawn]
 
 
 def _scene(step: StepScene) -> MeshScene:

@@ -95,12 +95,12 @@ def draw(
     return [np.ascontiguousarray(whole[low:high][::-1]) for low, high in itertools.pairwise(ends)]
 
 
-def png_bytes(image: np.ndarray, optimize: bool = True) -> bytes:
-    """An image, uint8 (height, width, 3), as PNG; `optimize` makes it smaller and takes longer."""
+def png_bytes(image: np.ndarray) -> bytes:
+    """An image, uint8 (height, width, 3), as PNG."""
     from PIL import Image
 
     buffer = io.BytesIO()
-    Image.fromarray(image).save(buffer, format="PNG", optimize=optimize)
+    Image.fromarray(image).save(buffer, format="PNG")
     return buffer.getvalue()
 
 

@@ -238,7 +238,7 @@ def test_a_build_that_dies_leaves_the_old_output(
     def die(*args: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(variant_module, "_run_all", die)
+    monkeypatch.setattr(variant_module, "_results", die)
     with pytest.raises(KeyboardInterrupt):
         build_variant(spec, built)
     assert digests(built) == before

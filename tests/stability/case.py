@@ -75,7 +75,7 @@ def _build(spec_path: Path, last: Stage, enter: Callable[[str], None]) -> Outcom
     if last == "rules":
         return Outcome("built", "rules")
     enter("solids")
-    plan = stages.plan()
+    plan = stages.with_solid_checks(stages.plan())
     solids = len(plan.finger) + len(plan.tooling)
     failed = {c.id: c.reason for c in plan.checks if c.status == "fail"}
     if failed:
@@ -87,7 +87,7 @@ def _build(spec_path: Path, last: Stage, enter: Callable[[str], None]) -> Outcom
 
 
 def _write(stages: Any, plan: Any, solids: int, enter: Callable[[str], None]) -> Outcome:
-    """Write and prove every file in memory; pictures are left out, being slow and not proved."""
+    """Write and prove every file in memory."""
     from gelslim_cad.build.documents import documents
     from gelslim_cad.build.manifest import FileEntry, entry
     from gelslim_cad.build.work import run
@@ -96,8 +96,6 @@ def _write(stages: Any, plan: Any, solids: int, enter: Callable[[str], None]) ->
     files: dict[str, FileEntry] = {}
     proofs: list[dict[str, Any]] = []
     for unit in plan.units:
-        if unit.kind == "pictures":
-            continue
         enter(f"unit {unit.name}")
         written = run(unit)
         for path, (data, purpose) in written.files.items():
