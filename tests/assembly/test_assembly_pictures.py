@@ -70,9 +70,10 @@ def test_parts_are_drawn_on_their_way_and_not_at_their_seat() -> None:
             np.testing.assert_allclose(first, way * np.array(step.way[0].direction), atol=1e-5)
 
 
-def test_what_moves_is_seen_in_every_picture() -> None:
+@pytest.mark.parametrize("stride", [4, pytest.param(1, marks=pytest.mark.slow)])
+def test_what_moves_is_seen_in_every_picture(stride: int) -> None:
     """At least 0.2 % of each picture has the hue of moving parts or of fasteners."""
-    steps, drawn = scenes()
+    steps, drawn = (every[::stride] for every in scenes())
     try:
         with offscreen_window() as window:
             pictures = picture_steps(window, drawn, 320)

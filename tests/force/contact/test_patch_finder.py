@@ -49,11 +49,12 @@ def rim_height(radius):
     return BALL_MM - np.sqrt(BALL_MM**2 - radius**2) - contact(radius, BALL_MM).depth_mm
 
 
-def test_place_and_size_of_a_sphere_within_the_stated_error():
+@pytest.mark.parametrize("count", [4, pytest.param(16, marks=pytest.mark.slow)])
+def test_place_and_size_of_a_sphere_within_the_stated_error(count):
     """Monte Carlo over place, size, noise and blur: errors over their standard deviations."""
     rng = np.random.default_rng(4)
     scores, errors = [], []
-    for k in range(16):
+    for k in range(count):
         radius = (1.4, 2.0, 2.6, 3.2)[k % 4]
         centre = rng.uniform(-5, 5, 2)
         sx, sy, _ = pressed_heights(centre, radius, BALL_MM)
