@@ -27,13 +27,20 @@ class RigidAnswer:
     """What the pad answers to rigid motions of its surface.
 
     Attributes:
-        motions: (6, c, 3), three translations and three rotations about the middle of the surface.
-            Rotations are divided by the surface's size, so that all are of order one.
-        forces: (6, c, 3) in N for motions in mm.
+        arms: (c, 3) places of the surface's points about their middle, divided by the root
+            of their mean square, so that all six motions are of order one.
+        forces: (6, c, 3) in N per mm: for three translations, then for three rotations.
     """
 
-    motions: Array
+    arms: Array
     forces: Array
+
+    @property
+    def motions(self) -> Array:
+        """The motions (6, c, 3): a unit of translation or of rotation, ω × arm, about each axis."""
+        axes = np.eye(3)
+        moved = [np.broadcast_to(axis, self.arms.shape) for axis in axes]
+        return np.array(moved + [np.cross(axis, self.arms) for axis in axes])
 
     def completed(self, force_n: Array, displacement_mm: Array) -> Array:
         """Forces (c, 3) of a motion, with exact force and torque.
@@ -43,23 +50,28 @@ class RigidAnswer:
             displacement_mm: (c, 3) to which they belong.
         """
         due = self._forces @ displacement_mm.ravel()
-        lacking = due - self.motions.reshape(6, -1) @ force_n.ravel()
-        share = np.linalg.solve(self._stiffness, lacking)
+        share = self._compliance @ (due - self._resultants(force_n))
         return np.asarray(force_n + (share @ self._forces).reshape(-1, 3))
 
     @property
     def n_bytes(self) -> int:
         """Bytes that a call reads."""
-        return int(self.motions.nbytes + self.forces.nbytes)
+        return int(self.arms.nbytes + self.forces.nbytes)
+
+    def _resultants(self, force: Array) -> Array:
+        """Force and torque (6,), the products with the six motions."""
+        moments = self.arms.T @ force
+        torque = [moments[k - 2, k - 1] - moments[k - 1, k - 2] for k in range(3)]
+        return np.array([*force.sum(axis=0), *torque])
 
     @property
     def _forces(self) -> Array:
         return self.forces.reshape(6, -1)
 
     @cached_property
-    def _stiffness(self) -> Array:
-        """Resultants (6, 6) of the six motions, symmetric and positive definite."""
-        return np.asarray(self.motions.reshape(6, -1) @ self._forces.T)
+    def _compliance(self) -> Array:
+        """Motions (6, 6) for unit resultants, symmetric and positive definite."""
+        return np.linalg.inv(np.array([self._resultants(force) for force in self.forces]).T)
 
 
 _KNOWN: WeakKeyDictionary[PadSystem, RigidAnswer] = WeakKeyDictionary()
@@ -77,22 +89,15 @@ def rigid_answer(system: PadSystem) -> RigidAnswer:
     return known
 
 
-def rigid_motions(points_mm: Array) -> Array:
-    """Rigid motions (6, n, 3) of points (n, 3), see `RigidAnswer.motions`."""
-    arms = points_mm - points_mm.mean(axis=0)
-    arms = arms / np.sqrt((arms**2).sum(axis=1).mean())
-    axes = np.eye(3)
-    moved = [np.broadcast_to(axis, arms.shape) for axis in axes]
-    turned = [np.cross(axis, arms) for axis in axes]
-    return np.array(moved + turned)
-
-
 def _computed(system: PadSystem) -> RigidAnswer:
-    motions = rigid_motions(system.mesh.surface_mm)
+    points = system.mesh.surface_mm
+    arms = points - points.mean(axis=0)
+    arms = arms / np.sqrt((arms**2).sum(axis=1).mean())
+    forces = np.empty((6, *arms.shape))
+    answer = RigidAnswer(arms, forces)
     solver = inner_solver(system)
-    forces = np.empty_like(motions)
-    for motion, force in zip(motions, forces, strict=True):
+    for motion, force in zip(answer.motions, forces, strict=True):
         u = motion.ravel()
         inner = solver.solve(-(system.surface_to_inner @ u), RIGID_RTOL).x
         force[:] = (system.surface @ u + system.inner_to_surface @ inner).reshape(-1, 3)
-    return RigidAnswer(motions, forces)
+    return answer

@@ -15,7 +15,7 @@ from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.operators.condensed_operators import CondensedOperator
 from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.rigid_answer import rigid_answer, rigid_motions
+from ifem_export.operators.rigid_answer import rigid_answer
 from ifem_export.operators.surface_operator import surface_operator, system_operator
 
 OUTLINES: dict[str, Outline] = {
@@ -86,16 +86,22 @@ def test_rigid_motions_themselves_are_answered_exactly() -> None:
 
 
 def test_motions_are_rigid_independent_and_of_order_one() -> None:
-    points = np.random.default_rng(5).normal(size=(40, 3)) * [10.0, 6.0, 0.2] + [50.0, 0.0, 3.0]
-    motions = rigid_motions(points)
+    mesh = pad(OUTLINES["polygon"])
+    points = mesh.surface_mm
+    motions = rigid_answer(system(mesh, 0.3)).motions
     for motion in motions:
-        shift = 1e-6 * motion
+        moved = points + 1e-6 * motion
         before = np.linalg.norm(points[:, None] - points[None], axis=-1)
-        after = np.linalg.norm((points + shift)[:, None] - (points + shift)[None], axis=-1)
+        after = np.linalg.norm(moved[:, None] - moved[None], axis=-1)
         np.testing.assert_allclose(after, before, atol=1e-10)
     flat = motions.reshape(6, -1)
     assert np.linalg.cond(flat) < 10.0
     assert 0.1 < np.abs(flat).max() < 5.0
+
+
+def test_memory_is_that_of_arms_and_forces() -> None:
+    mesh = pad(OUTLINES["disc"])
+    assert rigid_answer(system(mesh, 0.3)).n_bytes == 8 * (3 + 18) * len(mesh.surface)
 
 
 def test_a_loose_iteration_loses_no_resultant_of_a_nearly_incompressible_gel() -> None:
