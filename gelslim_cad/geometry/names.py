@@ -397,6 +397,7 @@ OptionalFloatName = Literal[
     "design.envelope.max_width_mm",
     "design.envelope.max_length_mm",
     "design.envelope.least_yield",
+    "manufacturing.elephant_foot_mm",
     "manufacturing.max_overhang_deg",
     "manufacturing.max_bridge_mm",
     "tolerance.print_flatness_mm",

@@ -22,6 +22,8 @@ class PrintLimits:
         overhang_deg: Steepest angle from the vertical without support.
         bridge_mm: Widest span without support.
         printer_mm: Room of the printer.
+        foot_mm: How far the first layer stands out along sharp edges on the plate.
+        gap_mm: Gap between parts that slide into each other.
     """
 
     process: str
@@ -32,18 +34,21 @@ class PrintLimits:
     overhang_deg: float
     bridge_mm: float
     printer_mm: tuple[float, float, float]
+    foot_mm: float
+    gap_mm: float = 0.2
 
 
 LIMITS = {
-    "fdm": PrintLimits("fdm", 0.8, 0.4, 1.5, 0.5, 45.0, 10.0, (250.0, 210.0, 210.0)),
-    "sla": PrintLimits("sla", 0.4, 0.2, 0.5, 0.3, 71.0, 29.0, (145.0, 145.0, 185.0)),
-    "sls": PrintLimits("sls", 0.7, 0.4, 1.5, 0.5, 90.0, math.inf, (165.0, 165.0, 300.0)),
+    "fdm": PrintLimits("fdm", 0.8, 0.4, 1.5, 0.5, 45.0, 10.0, (250.0, 210.0, 210.0), 0.2),
+    "sla": PrintLimits("sla", 0.4, 0.2, 0.5, 0.3, 71.0, 29.0, (145.0, 145.0, 185.0), 0.15),
+    "sls": PrintLimits("sls", 0.7, 0.4, 1.5, 0.5, 90.0, math.inf, (165.0, 165.0, 300.0), 0.0),
 }
 """By process. FDM: two and one line of a nozzle of 0.4 mm; 45° and 10 mm as in the design charts of
 Hubs ("Key design considerations for 3D printing"); holes of the pilots in use; Prusa MK4. SLA:
 Formlabs, design guide: walls, holes of 0.5 mm, 19° from level, bridges of 29 mm; Form 3. SLS: Hubs:
 walls of 0.7 mm, holes of 1.5 mm, no supports; Fuse 1. The least sizes are taken at about half of
-the advised ones (assumed)."""
+the advised ones (assumed). First layer: what PrusaSlicer takes off by default on FDM (0.2 mm);
+0.15 mm for SLA is assumed; SLS has no plate."""
 
 
 def print_process(d: Lookup, part: Part) -> str:
@@ -55,7 +60,7 @@ def print_process(d: Lookup, part: Part) -> str:
 
 def print_limits(d: Lookup, process: str) -> PrintLimits:
     """The limits of a process with the spec's own figures."""
-    limits = LIMITS[process]
+    limits = replace(LIMITS[process], gap_mm=d["design.housing.fit_clearance_mm"])
     if process == "fdm":
         line = d["manufacturing.nozzle_mm"]
         limits = replace(limits, wall_mm=2 * line, least_wall_mm=line)
@@ -63,6 +68,8 @@ def print_limits(d: Lookup, process: str) -> PrintLimits:
         limits = replace(limits, overhang_deg=d["manufacturing.max_overhang_deg"])
     if d["manufacturing.max_bridge_mm"] is not None:
         limits = replace(limits, bridge_mm=d["manufacturing.max_bridge_mm"])
+    if d["manufacturing.elephant_foot_mm"] is not None:
+        limits = replace(limits, foot_mm=d["manufacturing.elephant_foot_mm"])
     if d["manufacturing.printer_mm"]:
         x, y, z = d["manufacturing.printer_mm"]
         limits = replace(limits, printer_mm=(x, y, z))

@@ -14,6 +14,7 @@ GROUP = GROUPS["making"]
 PROCESS = "manufacturing.print_process"
 TESTS_WALLS = "fit_coupon"
 """The part whose thin walls show what the printer can make."""
+SAME_MM = 1e-9
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ def print_checks(parts: tuple[PrintedPart, ...]) -> tuple[Check, ...]:
     """Rules on all printed parts together; each shows the part with the least margin."""
     if not parts:
         return ()
-    return (_walls(parts), _holes(parts), _spans(parts), _sizes(parts))
+    return _walls(parts), _holes(parts), _spans(parts), _first_layers(parts), _sizes(parts)
 
 
 def _walls(parts: tuple[PrintedPart, ...]) -> Check:
@@ -123,6 +124,34 @@ def _spans(parts: tuple[PrintedPart, ...]) -> Check:
     )
 
 
+def _first_layers(parts: tuple[PrintedPart, ...]) -> Check:
+    """Warns only, as slicers compensate it and a file takes it off."""
+
+    def room(p: PrintedPart) -> float:
+        return p.limits.gap_mm - (p.limits.foot_mm if p.measures.sharp_mm > 0 else 0.0)
+
+    tight = [p.name for p in parts if room(p) < -SAME_MM]
+    worst = min(parts, key=room)
+    gap = worst.limits.gap_mm
+    return Check(
+        id="print.first_layer_mm",
+        title="The first layer stands out by less than the gap of the fits",
+        value=gap - room(worst),
+        limit=gap,
+        unit="mm",
+        margin=room(worst),
+        status="warn" if tight else "pass",
+        reason=f"{', '.join(tight)}: the first layer stands out along sharp edges on the plate "
+        "(elephant foot); openings there are too narrow, and tongues too wide"
+        if tight
+        else "sharp edges on the plate; a chamfer there would have none",
+        parameter="manufacturing.elephant_foot_mm",
+        advice="compensate it in the slicer and give what is left, or file it off" if tight else "",
+        sense="max",
+        group=GROUP,
+    )
+
+
 def _sizes(parts: tuple[PrintedPart, ...]) -> Check:
     def excess(p: PrintedPart) -> float:
         room, size = p.limits.printer_mm, p.measures.size_mm
@@ -162,6 +191,7 @@ def hint(part: PrintedPart) -> str:
         said.append(f"supports under {m.overhang_mm2:.0f} mm2 of overhangs{where}")
     if m.openings and part.limits.process != "sls":
         said.append(
-            f"{m.openings} openings begin at the plate: compensate the elephant foot, about 0.15 mm"
+            f"{m.openings} openings begin at the plate: compensate the elephant foot, about "
+            f"{part.limits.foot_mm:g} mm"
         )
     return "; ".join(said)

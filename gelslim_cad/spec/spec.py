@@ -93,6 +93,13 @@ class Manufacturing(Block):
     print_tolerance_mm: float = between(
         0, 1, "Accuracy of the printed parts, plus or minus", default=0.1
     )
+    elephant_foot_mm: float | None = Field(
+        default=None,
+        ge=0,
+        le=1,
+        description="How far the first layer of a print stands out after what the slicer takes "
+        "off; left out: 0.2 for fdm, 0.15 for sla, 0 for sls",
+    )
     max_overhang_deg: float | None = Field(
         default=None,
         ge=0,

@@ -35,7 +35,8 @@ def rules(process: str, *changes: dict[str, Any], name: str = "body") -> dict[st
 @pytest.mark.parametrize("process", LIMITS)
 def test_a_good_part_passes_in_every_process(process: str) -> None:
     found = rules(process, {})
-    assert set(found) == {"print.wall_mm", "print.hole_mm", "print.span_mm", "print.size_mm"}
+    named = ("wall_mm", "hole_mm", "span_mm", "first_layer_mm", "size_mm")
+    assert set(found) == {f"print.{name}" for name in named}
     assert {c.status for c in found.values()} == {"pass"}
     assert all(c.margin is None or c.margin >= 0 for c in found.values())
     assert print_checks(()) == ()
@@ -75,6 +76,28 @@ def test_each_rule_has_its_limits(
         assert found.margin < 0
 
 
+@pytest.mark.parametrize(
+    ("process", "gap", "sharp", "value", "status"),
+    [
+        ("fdm", 0.2, 180.0, 0.2, "pass"),
+        ("fdm", 0.19, 180.0, 0.2, "warn"),
+        ("fdm", 0.1, 0.0, 0.0, "pass"),
+        ("sla", 0.1, 180.0, 0.15, "warn"),
+        ("sls", 0.02, 180.0, 0.0, "pass"),
+    ],
+)
+def test_the_first_layer_must_fit_the_gap(
+    process: str, gap: float, sharp: float, value: float, status: str
+) -> None:
+    """A part with a chamfer on the plate has no elephant foot."""
+    limits = replace(LIMITS[process], gap_mm=gap)
+    part = PrintedPart("body", replace(GOOD, sharp_mm=sharp), limits)
+    (found,) = (c for c in print_checks((part,)) if c.id == "print.first_layer_mm")
+    assert (found.status, found.value, found.limit) == (status, pytest.approx(value), gap)
+    assert found.margin == pytest.approx(gap - value)
+    assert ("body" in found.reason) is (status == "warn")
+
+
 def test_the_part_that_tests_walls_may_have_thin_ones() -> None:
     assert rules("fdm", {"wall_mm": 0.2}, name=TESTS_WALLS)["print.wall_mm"].status == "pass"
 
@@ -103,12 +126,17 @@ def test_fields_of_the_spec_replace_the_limits() -> None:
         assert print_limits(plain, process) == limits
     d = derive(
         spec(
-            nozzle_mm=0.25, max_overhang_deg=50.0, max_bridge_mm=7.0, printer_mm=(100.0, 90.0, 80.0)
-        )
+            nozzle_mm=0.25,
+            max_overhang_deg=50.0,
+            max_bridge_mm=7.0,
+            elephant_foot_mm=0.05,
+            printer_mm=(100.0, 90.0, 80.0),
+        )  # fmt: skip
     )
     fdm = print_limits(d, "fdm")
     assert (fdm.wall_mm, fdm.least_wall_mm) == (0.5, 0.25)
     assert (fdm.overhang_deg, fdm.bridge_mm, fdm.printer_mm) == (50.0, 7.0, (100.0, 90.0, 80.0))
+    assert fdm.foot_mm == 0.05
     assert print_limits(d, "sls").wall_mm == LIMITS["sls"].wall_mm
     assert math.isinf(print_limits(plain, "sls").bridge_mm)
 
