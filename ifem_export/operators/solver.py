@@ -89,7 +89,9 @@ def factored(matrix: sparse.csr_array) -> SuperLU:
         )
     except MemoryError as error:
         raise IfemError(
-            f"no memory to factor {matrix.shape[0]} unknowns: use method 'pcg'", field="matrix"
+            f"no memory to factor {matrix.shape[0]} unknowns: take the operator 'pcg', which needs "
+            "none",
+            field="matrix",
         ) from error
     except RuntimeError as error:
         raise IfemError(
@@ -297,8 +299,8 @@ def _no_convergence(
     elif iterations >= 20 and norms[-1] > 0.5 * norms[-20]:
         cause = "stagnation"
         why = (
-            "it hardly decreases any more, the matrix is ill-conditioned: use method 'direct', "
-            "cells of an aspect nearer 1 or a Poisson's ratio further from 0.5"
+            "it hardly decreases any more, the matrix is ill-conditioned: take the operator "
+            "'factor', cells of an aspect nearer 1 or a Poisson's ratio further from 0.5"
         )
     else:
         cause = "limit"

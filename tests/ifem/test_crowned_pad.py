@@ -296,3 +296,20 @@ def test_the_trace_of_the_test_is_a_partition_of_one():
     rows = traced(domed())
     assert rows.sum(axis=1) == pytest.approx(np.ones(len(rows)))
     assert sparse.csr_array(rows).nnz > len(rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nu", [0.45, 0.4999])
+def test_thin_cells_under_a_crown_are_solved_for_a_nearly_incompressible_gel(nu):
+    """Conjugate gradients give up here, and a factor takes their place."""
+    mesh = build_pad_mesh(
+        RoundedRectangle(14.0, 12.0, 2.3), 2.0, cells=(24, 24, 6), crown=Sphere(40.0),
+        weighting="volume_fraction",
+    )[0]  # fmt: skip
+    force = np.zeros((len(mesh.surface), 3))
+    force[len(force) // 2] = [0.03, 0.0, -0.1]
+    iterated, factored = (
+        surface_operator(mesh, Material(0.147, nu, 1020.0), "bbar", rung).displacement(force)
+        for rung in ("pcg", "factor")
+    )
+    np.testing.assert_allclose(iterated, factored, atol=1e-6 * np.abs(factored).max())

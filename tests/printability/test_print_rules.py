@@ -131,7 +131,7 @@ def test_fields_of_the_spec_replace_the_limits() -> None:
             max_bridge_mm=7.0,
             elephant_foot_mm=0.05,
             printer_mm=(100.0, 90.0, 80.0),
-        )  # fmt: skip
+        )
     )
     fdm = print_limits(d, "fdm")
     assert (fdm.wall_mm, fdm.least_wall_mm) == (0.5, 0.25)
