@@ -36,7 +36,8 @@ BELOW: dict[str, tuple[str, ...]] = {
 
 ROOMS: dict[str, tuple[str, ...]] = {
     "gelslim_core": (
-        "errors", "lazy", "optional_library", "figure", "html_table", "kernel_cache", "files",
+        "errors", "lazy", "optional_library", "uncertainty", "figure", "html_table", "kernel_cache",
+        "files",
         "budget", "jobs", "yaml",
     ),
     "gelslim_optics": ("camera", "guide", "light"),

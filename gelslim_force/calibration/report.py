@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.uncertainty import with_sigma
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 
 if TYPE_CHECKING:
@@ -16,19 +17,19 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _WORDS = {
-    "rotation_x_deg": ("rotation about x", "°", 2),
-    "rotation_y_deg": ("rotation about y", "°", 2),
-    "rotation_z_deg": ("rotation about z, print included", "°", 2),
-    "shift_x_mm": ("shift along x, print included", " mm", 3),
-    "shift_y_mm": ("shift along y, print included", " mm", 3),
-    "shift_z_mm": ("shift along z", " mm", 3),
-    "focal_percent": ("focal length", " %", 2),
-    "k1": ("distortion k1", "", 4),
-    "k2": ("distortion k2", "", 4),
-    "p1": ("distortion p1", "", 5),
-    "p2": ("distortion p2", "", 5),
-    "principal_x_px": ("lens axis from the picture's middle, along its rows", " px", 1),
-    "principal_y_px": ("lens axis from the picture's middle, along its columns", " px", 1),
+    "rotation_x_deg": ("rotation about x", "°"),
+    "rotation_y_deg": ("rotation about y", "°"),
+    "rotation_z_deg": ("rotation about z, print included", "°"),
+    "shift_x_mm": ("shift along x, print included", " mm"),
+    "shift_y_mm": ("shift along y, print included", " mm"),
+    "shift_z_mm": ("shift along z", " mm"),
+    "focal_percent": ("focal length", " %"),
+    "k1": ("distortion k1", ""),
+    "k2": ("distortion k2", ""),
+    "p1": ("distortion p1", ""),
+    "p2": ("distortion p2", ""),
+    "principal_x_px": ("lens axis from the picture's middle, along its rows", " px"),
+    "principal_y_px": ("lens axis from the picture's middle, along its columns", " px"),
 }
 _MOST_IDS = 12
 _LEAST_PART = 0.3
@@ -61,9 +62,9 @@ def diagnosis_lines(
         "where the design has it.",
     ]
     for name, value, sigma, usual in zip(PARAMETERS, d.values, d.sigma, d.tolerance, strict=True):
-        words, unit, places = _WORDS[name]
+        words, unit = _WORDS[name]
         lines.append(
-            f"{words}: {value:+.{places}f} ± {sigma:.{places}f}{unit} "
+            f"{words}: {with_sigma(value, sigma)}{unit} "
             f"({abs(value) / usual:.1f} of its tolerance {usual:g}{unit})"
         )
     lines.append(

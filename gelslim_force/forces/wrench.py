@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_core.uncertainty import two_digits, with_sigma
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 from ifem_export.operators.surface_operator import SurfaceOperator
 
@@ -61,7 +62,7 @@ class Wrench:
         """One line: value and standard deviation of each component."""
         names = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
         parts = [
-            f"{name} unknown" if np.isnan(value) else f"{name} {value:+.3f} ± {sigma:.3f} {unit}"
+            f"{name} unknown" if np.isnan(value) else f"{name} {with_sigma(value, sigma)} {unit}"
             for name, (_, unit), value, sigma in zip(
                 names, _ROWS, self.vector, self.standard_deviation, strict=True
             )
@@ -71,7 +72,8 @@ class Wrench:
     def _repr_html_(self) -> str:
         """Table of the six components for a notebook."""
         rows = [
-            f"<tr><td>{name}</td><td>{_shown(value)}</td><td>{_shown(sigma)}</td>"
+            f"<tr><td>{name}</td><td>{with_sigma(value, sigma).split(' ±')[0]}</td>"
+            f"<td>{two_digits(sigma)}</td>"
             f"<td>{unit}</td></tr>"
             for (name, unit), value, sigma in zip(
                 _ROWS, self.vector, self.standard_deviation, strict=True
@@ -158,7 +160,3 @@ def rigid_motions(points_mm: Array) -> Array:
     motions = [np.broadcast_to(axis, (count, 3)) for axis in np.eye(3)]
     motions += [np.cross(axis, points_mm) for axis in np.eye(3)]
     return np.stack(motions)
-
-
-def _shown(value: float) -> str:
-    return f"{value:.3f}" if np.isfinite(value) else "unknown"

@@ -6,6 +6,7 @@ import textwrap
 
 import numpy as np
 
+from gelslim_core.uncertainty import with_sigma
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.arrow_scale import ArrowScale, round_step
 from gelslim_force.outputs.canvas import Canvas, Colour, Image, arrow
@@ -79,16 +80,6 @@ def _rule(canvas: Canvas, y: float) -> None:
     canvas.line((_LEFT, y), (_RIGHT, y), _RULE, 1)
 
 
-def value_text(value: float, sigma: float, full: float) -> str:
-    """Return value ± standard deviation, rounded to 1 % of the full bar or one digit of σ."""
-    decimals = max(0, min(3, 2 - int(np.floor(np.log10(full)))))
-    if not np.isfinite(sigma):
-        return f"{value:+.{decimals}f}"
-    if 1e-4 <= sigma < 0.5 * 10.0**-decimals:
-        decimals = -int(np.floor(np.log10(sigma)))
-    return f"{value:+.{decimals}f} ± {sigma:.{decimals}f}"
-
-
 def _wrench(canvas: Canvas, result: FrameResult, scale: ArrowScale, y: float) -> float:
     _rule(canvas, y - 12)
     wrench = result.wrench
@@ -102,7 +93,7 @@ def _wrench(canvas: Canvas, result: FrameResult, scale: ArrowScale, y: float) ->
         if not np.isfinite(values[k]):
             canvas.text((_LEFT + 34, row), "unknown", GREY, 16)
         else:
-            text = value_text(float(values[k]), float(sigma[k]), full)
+            text = with_sigma(float(values[k]), float(sigma[k]))
             canvas.text((_LEFT + 34, row), f"{text} {unit}", WHITE, 16)
         _bar(canvas, values[k], sigma[k], full, row + 9)
     canvas.text((_LEFT, y + 214), _range(scale), GREY, 13)

@@ -30,12 +30,12 @@ def cells(table: str) -> list[list[str]]:
 
 def test_a_wrench_is_a_table_with_its_uncertainty_and_units() -> None:
     assert cells(wrench()._repr_html_()) == [
-        ["Fx", "0.300", "0.010", "N"],
+        ["Fx", "+0.300", "0.010", "N"],
         ["Fy", "-0.200", "0.020", "N"],
         ["Fz", "-1.000", "0.030", "N"],
-        ["Tx", "4.000", "0.400", "N mm"],
-        ["Ty", "-5.000", "0.500", "N mm"],
-        ["Tz", "0.250", "0.600", "N mm"],
+        ["Tx", "+4.00", "0.40", "N mm"],
+        ["Ty", "-5.00", "0.50", "N mm"],
+        ["Tz", "+0.25", "0.60", "N mm"],
     ]
 
 

@@ -25,7 +25,7 @@ from gelslim_force.outputs.arrow_scale import (
     scale_for,
     scale_of_run,
 )
-from gelslim_force.outputs.legend import LEAST_HEIGHT_PX, ORANGE, RED, WIDTH_PX, YELLOW, value_text
+from gelslim_force.outputs.legend import LEAST_HEIGHT_PX, ORANGE, RED, WIDTH_PX, YELLOW
 from gelslim_force.outputs.overlay import Overlay, SurfaceView, write_overlay
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
@@ -229,17 +229,3 @@ def test_words_of_the_scales_are_of_what_is_drawn() -> None:
     # 20 mm per MPa at 10 px/mm: an arrow of 90 px is 450 kPa, and a round value is below it.
     (shear,) = (w for w in RecordedText.words if w.endswith("kPa shear"))
     assert 0.3 * 450 < float(shear.split()[0]) <= 450
-
-
-@pytest.mark.parametrize(
-    ("value", "sigma", "shown"),
-    [
-        (0.5441, 0.0041, "+0.544 ± 0.004"),
-        (-1.1, 0.06, "-1.10 ± 0.06"),
-        (0.25, 0.0, "+0.25 ± 0.00"),
-        (0.25, 1e-7, "+0.25 ± 0.00"),
-        (0.25, float("nan"), "+0.25"),
-    ],
-)
-def test_a_deviation_is_not_rounded_to_nothing(value: float, sigma: float, shown: str) -> None:
-    assert value_text(value, sigma, 2.0) == shown
