@@ -91,4 +91,4 @@ class PipelineSettings:
         if ladder is None or self.budget is None:
             return False
         fast = ladder.named(_FAST)
-        return fast is not None and not self.budget.allows_error(fast.error_field)
+        return fast is not None and not self.budget.allows_error(fast.error)

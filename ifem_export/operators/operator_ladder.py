@@ -71,6 +71,11 @@ class MeasuredRung:
         return math.nan if self.milliseconds is None else self.milliseconds
 
     @property
+    def error(self) -> float:
+        """The larger of the errors of field and resultant, which a budget is about."""
+        return max(self.error_field, self.error_resultant)
+
+    @property
     def label(self) -> str:
         """Name with parameters."""
         return operator_label(self.rung, self.parameters)
@@ -101,7 +106,7 @@ class OperatorLadder:
         The work of an operator is the memory that a call reads. It is counted rather than timed,
         and orders the operators as their times do (`docs/data/stiffness_ladder.json`).
         """
-        rungs = tuple(Rung(r.label, r.error_field, r.time_ms, r.n_bytes) for r in self.rungs)
+        rungs = tuple(Rung(r.label, r.error, r.time_ms, r.n_bytes) for r in self.rungs)
         return Ladder(rungs, WORDING)
 
     def choose(self, budget: Budget) -> Choice:
@@ -129,8 +134,8 @@ class OperatorLadder:
         Small is an error of at most 3 %, or of at most 1.1 times the smallest error of the ladder.
         With markers a millimetre apart the interpolation alone has an error above 3 %.
         """
-        most = max(ENOUGH, BALANCE * min(r.error_field for r in self.rungs))
-        return next(r for r in self._by_work() if r.error_field <= most)
+        most = max(ENOUGH, BALANCE * min(r.error for r in self.rungs))
+        return next(r for r in self._by_work() if r.error <= most)
 
     def untimed(self) -> OperatorLadder:
         """Return the ladder as every machine finds it: without times, errors and gains rounded.
@@ -170,7 +175,7 @@ class OperatorLadder:
         )
         edges = [(r.error_edge, r) for r in self._by_work() if r.error_edge is not None]
         for error, other in edges:
-            if budget.allows(max(error, other.error_field), other.time_ms):
+            if budget.allows(max(error, other.error), other.time_ms):
                 return (f"{remark}; {other.label} keeps the budget there too",)
         least, best = min(edges, key=lambda pair: pair[0])
         return (f"{remark}; {best.label} has the smallest error there, {shown_share(least)}",)

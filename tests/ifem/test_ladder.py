@@ -299,19 +299,19 @@ def test_an_altered_ladder_is_refused(ladder: OperatorLadder, tmp_path: Path) ->
 
 
 def test_a_bundle_starts_with_the_least_work_near_the_best(ladder: OperatorLadder) -> None:
-    allowed = max(0.03, 1.1 * min(r.error_field for r in ladder.rungs))
+    allowed = max(0.03, 1.1 * min(r.error for r in ladder.rungs))
     start = ladder.balanced()
-    assert start.error_field <= allowed
+    assert start.error <= allowed
     lighter = [r for r in ladder.rungs if r.n_bytes < start.n_bytes]
     assert lighter
-    assert all(r.error_field > allowed for r in lighter)
+    assert all(r.error > allowed for r in lighter)
 
 
 def test_a_coarse_mesh_takes_a_tenth_above_its_smallest_error(ladder: OperatorLadder) -> None:
     rungs = sorted(ladder.rungs, key=lambda r: r.n_bytes)[:3]
     for middle, expected in ((0.109, 1), (0.111, 2)):
         made = [
-            replace(r, error_field=error)
+            replace(r, error_field=error, error_resultant=0.01)
             for r, error in zip(rungs, (0.2, middle, 0.1), strict=True)
         ]
         assert replace(ladder, rungs=tuple(made)).balanced().label == rungs[expected].label

@@ -11,8 +11,13 @@ from ifem_export.errors import IfemError
 from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder, chosen_rung
 
 
-def rung(name: str, error: float, n_bytes: int, edge: float | None = None) -> MeasuredRung:
-    return MeasuredRung("pcg", {name: 1}, error, 0.1234567, 0.2, 12.3456, 1.0, 2.5, n_bytes, edge)
+def rung(
+    name: str, error: float, n_bytes: int, edge: float | None = None, resultant: float = 0.0012344
+) -> MeasuredRung:
+    gains = (12.3456, 1.0)
+    return MeasuredRung(
+        "pcg", {name: 1}, error, 0.1234567, resultant, *gains, 2.5, n_bytes, edge
+    )  # fmt: skip
 
 
 def made(*rungs: MeasuredRung) -> OperatorLadder:
@@ -35,6 +40,16 @@ def test_the_default_has_the_least_work_among_small_errors(
     names = zip("abc", errors, (10, 20, 30), strict=True)
     rungs = [rung(*entry) for entry in names]
     assert made(*rungs[::-1]).balanced().label == f"pcg ({expected} 1)"
+
+
+def test_a_budget_is_about_the_resultant_too() -> None:
+    """A rung whose field is right and whose resultant is not is no small error."""
+    rungs = (rung("a", 0.02, 10, resultant=0.2), rung("b", 0.025, 20), rung("c", 0.01, 30))
+    ladder = made(*rungs)
+    assert ladder.rungs[0].error == 0.2
+    assert ladder.balanced().label == "pcg (b 1)"
+    assert ladder.choose(Budget(0.03)).rung.name == "pcg (b 1)"
+    assert ladder.choose(Budget(0.3)).rung.name == "pcg (a 1)"
 
 
 def test_the_remark_names_the_least_work_that_keeps_the_edge() -> None:
