@@ -323,6 +323,7 @@ def test_nuts_slide_into_their_slots(name: str) -> None:
     prove(samples.order(d, made), samples.meshes(d, made))
 
 
+@pytest.mark.slow
 def test_nuts_rise_through_the_ceiling_over_thick_acrylic() -> None:
     """The slot lies 0.7 mm above the ceiling there; its end is open below."""
     d = derive(samples.random_spec(2))

@@ -17,7 +17,7 @@ def sentences(spec: Spec) -> tuple[str, ...]:
     return binding_sentences(spec, derive(spec))
 
 
-@pytest.mark.parametrize("name", ["mini20", "gelslim2"])
+@pytest.mark.parametrize("name", ["mini20", pytest.param("gelslim2", marks=pytest.mark.slow)])
 def test_each_saving_is_what_solving_again_gives(name: str) -> None:
     spec = shipped(name)
     thickness = derive(spec)["finger.thickness_mm"]
@@ -47,7 +47,9 @@ def test_blur_at_the_far_edge_binds_the_smallest_finger() -> None:
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"design.light_guide.leg_length_mm": 12.0}, "light guide"),
+        pytest.param(
+            {"design.light_guide.leg_length_mm": 12.0}, "light guide", marks=pytest.mark.slow
+        ),
         ({"camera.module_height_mm": 16.0, "camera.module_width_mm": 16.0}, "camera housing"),
     ],
 )
@@ -114,6 +116,7 @@ def test_a_50_mm_gel_in_18_mm_is_refused_with_the_limit_and_a_way_out() -> None:
         assert thickness > 18.0
 
 
+@pytest.mark.slow
 def test_a_hopeless_design_is_told_so() -> None:
     hopeless = {
         "design.gel.length_mm": 120.0,

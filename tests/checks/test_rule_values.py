@@ -147,7 +147,7 @@ def test_caution_is_judged_only_where_the_limit_holds() -> None:
 
 def test_a_batch_fails_where_single_designs_fail() -> None:
     rng = np.random.default_rng(8)
-    count = 24
+    count = 16
     overrides = {
         "design.gel.length_mm": rng.uniform(12, 45, count),
         "design.gel.width_mm": rng.uniform(12, 40, count),

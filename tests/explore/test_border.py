@@ -25,8 +25,8 @@ def failed(**values: float) -> set[str]:
     [
         ("design.gel.thickness_mm", 2.0, 1.0, -0.002),
         ("design.gel.length_mm", 20.0, 26.0, 0.02),
-        ("design.housing.back_wall_mm", 1.2, 0.5, -0.002),
-        ("design.light_guide.leg_length_mm", 1.0, 0.4, -0.002),
+        pytest.param("design.housing.back_wall_mm", 1.2, 0.5, -0.002, marks=pytest.mark.slow),
+        pytest.param("design.light_guide.leg_length_mm", 1.0, 0.4, -0.002, marks=pytest.mark.slow),
     ],
 )
 def test_a_hair_beyond_the_border_the_rule_breaks(
@@ -39,6 +39,7 @@ def test_a_hair_beyond_the_border_the_rule_breaks(
     assert found.stops in failed(**{name: found.value + hair})
 
 
+@pytest.mark.slow
 def test_a_border_of_the_spec_itself_says_why() -> None:
     path = "design.markers.diameter_mm"
     found = border(mini20(), {path: 0.56}, path, 1.3)

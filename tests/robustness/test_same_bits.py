@@ -65,6 +65,7 @@ def test_a_spline_is_the_same_whatever_the_threads() -> None:
     assert one == two
 
 
+@pytest.mark.slow
 def test_calibration_and_forces_are_the_same_whatever_the_threads() -> None:
     bundle, dots = sensor_bundle(), np.asarray(sensor_grid().positions_mm)
     rest = render(sensor_grid(), finger_view(), Look(noise=2.0))

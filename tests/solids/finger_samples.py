@@ -99,7 +99,7 @@ LATER = (
     "long50",
     "thin",
     "wide",
-    *[n for n in fingers() if n.startswith("random")][1:],
+    *[n for n in fingers() if n.startswith("random")],
 )
 each_finger = pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow if n in LATER else ()) for n in fingers()]

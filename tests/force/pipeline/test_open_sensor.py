@@ -63,6 +63,7 @@ def test_objects_and_settings_are_taken_as_they_are(reference) -> None:
     assert opened.operator_name.startswith("fft")
 
 
+@pytest.mark.slow
 def test_an_indenter_makes_the_normal_force_known() -> None:
     still = shaded(seed=99).image
     pressed = shaded(pressed_heights((1.0, -1.0), 2.4, 10.0)[:2], seed=3).image
