@@ -213,6 +213,7 @@ def test_all_limits_are_those_of_plane_geometry(candidates: Compared) -> None:
         assert 0 < np.mean(expected > 0) < 1, name
 
 
+@pytest.mark.slow
 def test_the_objective_is_that_of_plane_geometry(candidates: Compared) -> None:
     ours, layouts, problem = candidates
     compare(ours.worst(), [v.worst() for v in layouts], problem, "missed parts")

@@ -120,6 +120,7 @@ def solved(problem: FoldProblem, monkeypatch: pytest.MonkeyPatch, compiled_from:
     return solver.solve_fold(problem)
 
 
+@pytest.mark.slow
 def test_folds_are_those_of_the_reference(
     problem: FoldProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -226,6 +226,7 @@ def test_the_proof_refuses_meshes_in_millimetres_and_hollow_ones(
     assert ("finger.usda", "readable") in proofs(written, folder)
 
 
+@pytest.mark.slow
 def test_bytes_repeat(written: WrittenFinger) -> None:
     from gelslim_cad.robot.files import robot_files
     from gelslim_cad.robot.model import robot_finger, robot_inputs

@@ -224,6 +224,7 @@ def test_compliance_of_every_operator_is_its_own(rung):
     np.testing.assert_allclose(motion.w_mm, w, atol=1e-4 * motion.depth_mm)
 
 
+@pytest.mark.slow
 def test_uncertainty_is_that_of_drawn_patches():
     model = wide_model()
     sigma = np.array([0.05, 0.03, 0.04])

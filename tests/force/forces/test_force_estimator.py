@@ -180,6 +180,7 @@ def test_neo_hookean_inner_nodes_are_in_balance(case) -> None:
     assert np.linalg.norm(law.force(u) - exact) < 2e-3 * np.linalg.norm(exact)
 
 
+@pytest.mark.slow
 def test_masked_fit_holds_pressure_between_the_nodes(case) -> None:
     """Truth from half the pitch and eight layers: its rim loads nodes outside the contact."""
     bundle, operator, _, _ = case
