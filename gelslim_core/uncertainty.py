@@ -1,4 +1,4 @@
-"""Figures with their standard deviation as text: two significant digits of it, never a zero.
+"""Figures with their standard deviation as text, which is never rounded to zero.
 
 A deviation printed as 0.000 looks like certainty, and more digits than two are not known.
 """

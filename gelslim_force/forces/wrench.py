@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_core.uncertainty import two_digits, with_sigma
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
+from ifem_export.operators.rigid_answer import rigid_motions
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
@@ -152,11 +153,3 @@ def resultant(points_mm: ArrayLike, force_n: ArrayLike) -> tuple[Array, Array]:
     """Sum of forces (c, 3) and their torque about the origin, acting at points (c, 3)."""
     points, force = np.asarray(points_mm, dtype=float), np.asarray(force_n, dtype=float)
     return force.sum(axis=0), np.cross(points, force).sum(axis=0)
-
-
-def rigid_motions(points_mm: Array) -> Array:
-    """Motions (6, c, 3): unit translations, then unit rotations e × p, of points (c, 3)."""
-    count = len(points_mm)
-    motions = [np.broadcast_to(axis, (count, 3)) for axis in np.eye(3)]
-    motions += [np.cross(axis, points_mm) for axis in np.eye(3)]
-    return np.stack(motions)

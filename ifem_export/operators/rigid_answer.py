@@ -38,9 +38,7 @@ class RigidAnswer:
     @property
     def motions(self) -> Array:
         """The motions (6, c, 3): a unit of translation or of rotation, ω × arm, about each axis."""
-        axes = np.eye(3)
-        moved = [np.broadcast_to(axis, self.arms.shape) for axis in axes]
-        return np.array(moved + [np.cross(axis, self.arms) for axis in axes])
+        return rigid_motions(self.arms)
 
     def completed(self, force_n: Array, displacement_mm: Array) -> Array:
         """Forces (c, 3) of a motion, with exact force and torque.
@@ -72,6 +70,13 @@ class RigidAnswer:
     def _compliance(self) -> Array:
         """Motions (6, 6) for unit resultants, symmetric and positive definite."""
         return np.linalg.inv(np.array([self._resultants(force) for force in self.forces]).T)
+
+
+def rigid_motions(points: Array) -> Array:
+    """Motions (6, c, 3): unit translations, then unit rotations e × p, of points p (c, 3)."""
+    axes = np.eye(3)
+    moved = [np.broadcast_to(axis, points.shape) for axis in axes]
+    return np.stack(moved + [np.cross(axis, points) for axis in axes])
 
 
 _KNOWN: WeakKeyDictionary[PadSystem, RigidAnswer] = WeakKeyDictionary()

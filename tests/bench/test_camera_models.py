@@ -116,9 +116,11 @@ def test_a_better_model_errs_less(design: str) -> None:
     places = [by[name]["error_px"] for name in chain]
     assert places == sorted(places, reverse=True)
     ours = by["calibrated with distortion"]
+    # One picture of mini20 leaves pose and lens open in part, which its forces show.
+    factor = 1.5 if design == "mini20" else 3.0
     for key in ("error_um", "error_n", "error_field"):
         for name in ("pinhole at f", "pinhole at v", "calibrated pose and scale"):
-            assert by[name][key] > 1.5 * ours[key], (name, key)
+            assert by[name][key] > factor * ours[key], (name, key)
     assert by["pinhole at v"]["error_px"] < 0.1 * by["pinhole at f"]["error_px"]
     assert by["straight rays, v"]["error_px"] > 5 * by["pinhole at v"]["error_px"]
     assert by["pinhole at f"]["error_px"] > 10
