@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from twin_rig import SCENES, turns_ms
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
@@ -25,6 +24,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.mesh.pad_mesh import PadMesh
 
 Array = NDArray[np.float64]

@@ -20,7 +20,6 @@ from twin_rig import SCENES, TwinSensor
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.outputs.canvas import encoded
 from gelslim_optics.camera.virtual_camera import VirtualCamera
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.planning.question import bundle_figures, plan_scene
@@ -34,6 +33,7 @@ from gelslim_twin.simulation.run_folder import LEDGER, PLAN, RunFolder
 from gelslim_twin.simulation.scene_task import job_of
 from gelslim_twin.simulation.sensor import BUNDLE
 from gelslim_twin.simulation.simulate import Ledger, simulate
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
 
 SCENE = "shear_sphere"

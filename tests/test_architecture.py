@@ -43,7 +43,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (
         "errors", "mesh", "assembly", "elements", "finite_strain", "operators", "inverse",
-        "markers", "bundle",
+        "markers", "bundle", "compliance",
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from gelslim_twin.contact.gel_state import ContactError
-from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.row_factor import LinAlgError, RowFactor
 from ifem_export.elements.material import Material
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 

@@ -22,7 +22,6 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.coulomb_contact import STICK
 from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState, anchor_mm
 from gelslim_twin.contact.plane_iteration import (
@@ -33,6 +32,7 @@ from gelslim_twin.contact.plane_iteration import (
 )
 from gelslim_twin.contact.tool import Tool, ToolSurface, clearance_mm, tool_surface
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]

@@ -85,8 +85,8 @@ def mechanics_of(
     """
     chosen = {choice.effect: choice for choice in plan.included}
     solver = import_module(chosen["normal_contact"].implementation)
-    from gelslim_twin.contact.compliance import SurfaceCompliance
     from gelslim_twin.contact.tool import Tool
+    from ifem_export.compliance.columns import SurfaceCompliance
 
     tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:

@@ -14,7 +14,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact, unfit
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
@@ -22,6 +21,7 @@ from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.mesh.pad_mesh import PadMesh
 
 FRICTION = 0.8

@@ -21,8 +21,8 @@ from synthetic import Look, render
 
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.pipeline import ForcePipeline
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.thin_plate import thin_plate
 
 

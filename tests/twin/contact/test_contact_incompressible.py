@@ -10,13 +10,13 @@ import pytest
 from contact_pads import small_pad
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.elements.material import Material
 from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
 from ifem_export.mesh.pad_mesh import PadMesh

@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gelslim_twin.contact.compliance_kernel import add_motion, gather_block
 from gelslim_twin.contact.coulomb_kernel import (
     FREE,
     SLIP,
@@ -17,6 +16,7 @@ from gelslim_twin.contact.coulomb_kernel import (
     node_force,
     sweep,
 )
+from ifem_export.compliance.columns_kernel import add_motion, gather_block
 
 Array = NDArray[np.float64]
 NODES, FRICTION = 9, 0.7

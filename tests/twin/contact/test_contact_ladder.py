@@ -12,7 +12,6 @@ from contact_pads import small_pad
 from numpy.typing import NDArray
 from sampled import quick
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
@@ -20,6 +19,7 @@ from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Ring, Sphere, TexturedPlane
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import build_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.elements.material import Material
 from ifem_export.mesh.crown import Paraboloid
 from ifem_export.mesh.outline import RoundedRectangle

@@ -11,7 +11,6 @@ from contact_pads import YOUNGS_MPA, small_pad
 from numpy.typing import NDArray
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.coulomb_contact import solve_contact_forces
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
@@ -20,6 +19,7 @@ from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ import pytest
 from sim_rig import SCENE, small_sensor
 from threadpoolctl import threadpool_limits
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
@@ -18,6 +17,7 @@ from gelslim_twin.effects.contact import FRICTION, NONLINEARITY, NORMAL_CONTACT,
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import read_scene
 from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 
 BALL = "- shape: sphere\n    radius_mm: 6"
 TOOLS = {

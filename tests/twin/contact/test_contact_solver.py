@@ -11,7 +11,6 @@ from contact_pads import dense_compliance, small_pad
 from numpy.typing import NDArray
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import ContactError, ContactStatus, GelState
 from gelslim_twin.contact.solver import (
     ContactSettings,
@@ -23,6 +22,7 @@ from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, FlatPunch, Indenter, Ring, Sphere, Wedge
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 BALL = Sphere(shape="sphere", radius_mm=6)

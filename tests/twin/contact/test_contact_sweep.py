@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from contact_pads import small_pad
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import (
@@ -22,6 +21,7 @@ from gelslim_twin.scene.indenter import (
     Wedge,
 )
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.columns import SurfaceCompliance
 
 SHAPES: dict[str, Indenter] = {
     "sphere": Sphere(shape="sphere", radius_mm=5),

@@ -11,12 +11,12 @@ from contact_pads import small_pad
 from random_contact_scenes import random_contact
 from sampled import quick
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool, clearance_mm, tool_surface
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.columns import SurfaceCompliance
 
 PUNCH = FlatPunch(shape="flat_punch", length_mm=4, width_mm=4)
 CONE = Cone(shape="cone", included_angle_deg=60, tip_radius_mm=2.0)

@@ -12,12 +12,12 @@ from contact_pads import small_pad
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_state import AnchoredState, GelState, anchor_mm
 from gelslim_twin.contact.solver import Candidates, ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Sphere
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 RADIUS_MM, CELL_MM = 5.0, 1.2

@@ -11,7 +11,6 @@ import pytest
 from contact_pads import small_pad
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.compliance import SurfaceCompliance
 from gelslim_twin.contact.gel_body import SPRINGS, GelBody
 from gelslim_twin.contact.gel_state import ContactStatus
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
@@ -20,6 +19,7 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool, clearance_mm
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 BALL_MM, TOLERANCE = 5.0, 1e-4

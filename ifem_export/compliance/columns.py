@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU
 
 from gelslim_core.files.replaced_file import replacement
-from gelslim_twin.contact.gel_state import ContactError
-from gelslim_twin.contact.row_factor import RowFactor
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.row_factor import RowFactor
+from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.solver import factored
@@ -44,14 +44,14 @@ class SurfaceCompliance:
     not computed yet. The file is memory-mapped, so that only the rows used are read. Without a
     folder nothing is stored. An instance must not be used by two threads at once.
 
-    Raises ContactError for a pad whose table would not fit.
+    Raises MeshError for a pad whose table would not fit.
     """
 
     def __init__(self, bundle: Bundle, folder: Path | None = None) -> None:
         self.bundle = bundle
         self.nodes = len(bundle.mesh.surface)
         if 36 * self.nodes**2 > MOST_BYTES:
-            raise ContactError(
+            raise MeshError(
                 f"{self.nodes} surface nodes: the compliance would take "
                 f"{36 * self.nodes**2 / 1e9:.0f} GB, the limit is {MOST_BYTES / 1e9:.0f} GB; mesh "
                 "the pad with larger cells"
@@ -143,7 +143,7 @@ class SurfaceCompliance:
         `known` is the block of the first of the nodes, which is not read again.
         """
         self.require(nodes)
-        from gelslim_twin.contact.compliance_kernel import gather_block
+        from ifem_export.compliance.columns_kernel import gather_block
 
         block = np.empty((3 * len(nodes), 3 * len(nodes)), dtype=np.float32)
         kept = 0 if known is None else len(known)
@@ -159,7 +159,7 @@ class SurfaceCompliance:
         `known_mm` (n, 3) is the displacement of `nodes`, where it is known.
         """
         self.require(nodes)
-        from gelslim_twin.contact.compliance_kernel import add_motion
+        from ifem_export.compliance.columns_kernel import add_motion
 
         moved = np.zeros(3 * self.nodes)
         sought = np.ones(self.nodes + 2, dtype=bool)

@@ -11,12 +11,12 @@ from contact_pads import YOUNGS_MPA, dense_compliance, small_pad
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gelslim_twin.contact import compliance as module
-from gelslim_twin.contact.compliance import SurfaceCompliance, symmetries
-from gelslim_twin.contact.gel_state import ContactError
-from gelslim_twin.contact.row_factor import LinAlgError, RowFactor
 from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.compliance import columns as module
+from ifem_export.compliance.columns import SurfaceCompliance, symmetries
+from ifem_export.compliance.row_factor import LinAlgError, RowFactor
 from ifem_export.elements.material import Material
+from ifem_export.errors import MeshError
 from ifem_export.mesh.crown import Paraboloid
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
@@ -158,7 +158,7 @@ def test_a_folder_that_cannot_be_written_does_not_matter(tmp_path: Path) -> None
 
 def test_too_large_a_pad_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_BYTES", 1000)
-    with pytest.raises(ContactError, match="larger cells"):
+    with pytest.raises(MeshError, match="larger cells"):
         SurfaceCompliance(small_pad(0.49, 6, 2, 6.0))
 
 

@@ -1,0 +1,1 @@
+"""Columns of a pad's surface compliance, exact up to its edge."""
