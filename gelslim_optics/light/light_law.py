@@ -1,0 +1,98 @@
+"""How the picture of the gel's coat changes with the slope of its surface.
+
+The coat reflects as Lambert's law says. Light of source k whose irradiance changes by the
+sensitivity g_k per unit slope gives, relative to the level surface,
+
+    E_k(s) = a + (1 - a) m(1 - h_k·s) / sqrt(1 + s·s),    m(t) = (t + sqrt(t² + p²)) / M
+
+with the ambient share a that the coat scatters back. m is the positive part of t with a penumbra p,
+because the light of a guide comes from a range of directions; M and h_k are such that E_k(0) = 1
+and dE_k/ds = -g_k. For the traced light of gelslim2 the law with a = 0.3 and p = 0.25 differs from
+the sum over all rays by 0.03 at most up to the slope 1.5 on the lit side, and by 0.07 in the
+attached shadow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_optics.light.light_map import LightMap
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LightLaw:
+    """Irradiance of k sources as a function of the slope.
+
+    Attributes:
+        sensitivity: (k, 2) relative change of the irradiance per unit slope along x and y, with
+            the sign of the light's direction: light that travels towards +y loses by a rise
+            along y.
+        ambient: Share of the light that does not depend on the slope.
+        penumbra: Width of the transition into attached shadow, relative to the level irradiance.
+        gamma: Exponent of the camera: grey value ∝ light^(1/gamma).
+    """
+
+    sensitivity: Array
+    ambient: float = 0.3
+    penumbra: float = 0.25
+    gamma: float = 1.8
+
+    @classmethod
+    def of(cls, light: LightMap, gamma: float = 1.8) -> LightLaw:
+        """The law of a light map: light of the elevation e changes by cot e per unit slope."""
+        directions = light.directions
+        return cls(directions[:, :2] / directions[:, 2:], gamma=gamma)
+
+    def irradiance(self, slope: Array) -> tuple[Array, Array]:
+        """Irradiance relative to the level surface, and its derivative.
+
+        Args:
+            slope: (n, 2) slopes along x and y.
+
+        Returns:
+            (k, n) and (k, n, 2).
+        """
+        width = self.penumbra
+        root = np.sqrt(1 + width * width)
+        unit = (1 + root) / 2
+        steepness = (1 + 1 / root) / 2 / unit
+        towards = self.sensitivity / ((1 - self.ambient) * steepness)
+        lit = 1 - towards @ slope.T
+        smooth = np.sqrt(lit * lit + width * width)
+        part, part_slope = (lit + smooth) / 2 / unit, (1 + lit / smooth) / 2 / unit
+        length = np.sqrt(1 + (slope * slope).sum(axis=1))
+        value = self.ambient + (1 - self.ambient) * part / length
+        by_slope = -(part_slope / length)[:, :, None] * towards[:, None, :]
+        by_slope -= (part / length**3)[:, :, None] * slope
+        return value, (1 - self.ambient) * by_slope
+
+    def change(
+        self, slope: Array, share: Array, level: Array, gain: float
+    ) -> tuple[Array, Array, Array]:
+        """Logarithmic change of the grey values of c channels.
+
+        Args:
+            slope: (n, 2) slopes of the surface.
+            share: (k, c, n) share of each source in the light of a channel on the level surface;
+                the shares of a channel sum to 1.
+            level: (c, n) grey value of the reference over itself plus the floor that was added
+                before the logarithm.
+            gain: Factor on the logarithm of the light; 1 for light as traced.
+
+        Returns:
+            (c, n) change, (c, n, 2) its derivative by the slopes, (c, n) by the gain.
+        """
+        value, by_slope = self.irradiance(slope)
+        light = np.einsum("kcn,kn->cn", share, value)
+        light_slope = np.einsum("kcn,knd->cnd", share, by_slope)
+        exponent = gain / self.gamma
+        grey = light**exponent
+        seen = 1 + level * (grey - 1)
+        outer = level * exponent * grey / (seen * light)
+        by_gain = level * grey * np.log(light) / (seen * self.gamma)
+        return np.log(seen), outer[:, :, None] * light_slope, by_gain
