@@ -47,7 +47,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",
-        "forces", "dot_tracking", "outputs", "settings", "pipeline", "sensor", "run",
+        "forces", "joint", "dot_tracking", "outputs", "settings", "pipeline", "sensor", "run",
     ),
     "gelslim_twin": (
         "effects", "scene", "planning", "contact", "render", "simulation", "validation",

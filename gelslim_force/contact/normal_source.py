@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,25 @@ from numpy.typing import NDArray
 from gelslim_force.contact.patch import ContactPatch
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FoundForces:
+    """Forces that a source found together with the motion.
+
+    Attributes:
+        force_n: (c, 3) on the surface nodes.
+        displacement_mm: (c, 3) of the surface nodes.
+        covariance: (6, 6) of force and torque about the origin.
+        gain: Gain of the light over the light as traced.
+        unexplained: Share of the change of the light that the forces do not explain.
+    """
+
+    force_n: Array
+    displacement_mm: Array
+    covariance: Array
+    gain: float
+    unexplained: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +43,7 @@ class NormalReading:
         patch: The contact patch found in the picture; None where nothing touches.
         depth_mm: Depth of the indenter's lowest point below the rest surface.
         problem: Why the motion is unknown; the arrays are then NaN. Empty otherwise.
+        forces: Forces found together with the motion; None where they follow from it.
     """
 
     w_mm: Array
@@ -32,6 +52,7 @@ class NormalReading:
     patch: ContactPatch | None = None
     depth_mm: float = 0.0
     problem: str = ""
+    forces: FoundForces | None = None
 
     @classmethod
     def unknown(cls, count: int, problem: str) -> NormalReading:
@@ -45,7 +66,14 @@ class NormalReading:
         return not self.problem
 
     def summary(self) -> dict[str, object]:
-        """Patch and depth as plain numbers."""
+        """What was found of the contact, as plain numbers."""
+        if self.forces is not None:
+            return {
+                "touched": True,
+                "depth_mm": float(self.depth_mm),
+                "gain": self.forces.gain,
+                "unexplained": self.forces.unexplained,
+            }
         if self.patch is None:
             return {"touched": False}
         return {
@@ -84,3 +112,11 @@ class NormalSource(Protocol):
             seen: What `look` returned for this frame.
             lateral_mm: (2,) lateral motion of the gel where it is touched; None if unknown.
         """
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """A normal source that keeps something from frame to frame."""
+
+    def reset(self) -> None:
+        """Forget the last frame."""

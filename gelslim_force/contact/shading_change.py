@@ -67,16 +67,16 @@ class ShadingReference:
         bin_sums(self.image, bin_px, self._sums[0], self._glaring[0])
         self._ratios = np.ones((channels, *self.shape), dtype=np.float32)
         self._counts = np.zeros(self.shape, dtype=np.int64)
-        levels = self._levels()
+        levels = self.levels()
         level = self.image.reshape(-1, channels).mean(axis=0)
-        self._used = np.flatnonzero(level >= LEAST_LEVEL)
-        if not len(self._used):
+        self.used = np.flatnonzero(level >= LEAST_LEVEL)
+        if not len(self.used):
             raise ValueError(
                 f"the reference picture is dark (mean {level.max():.0f} of 255) and has no shading"
             )
-        self._noise_level = _noise_level(levels[self._used])
+        self._noise_level = _noise_level(levels[self.used])
 
-    def _levels(self) -> NDArray[np.float32]:
+    def levels(self) -> NDArray[np.float32]:
         """Mean grey value (c, rows, columns) of the free pixels of each bin; 0 without any."""
         rows, columns = self.shape
         size = self.bin_px
@@ -130,7 +130,7 @@ class ShadingReference:
         share = np.sqrt(np.float32(self.bin_px**2) / np.maximum(self._counts, 1))
         noise_level = self._noise_level * share.astype(np.float32)
         return _relative_to_median(
-            _combined(np.log(self._ratios[self._used])), free & self.on_pad, noise_level
+            _combined(np.log(self._ratios[self.used])), free & self.on_pad, noise_level
         )
 
 

@@ -168,16 +168,21 @@ class ForceEstimator:
             touched = _above_noise(smoothed, normal_known)
         if not normal_known:
             force[:, 2] = np.nan
+        found = self.field_of(force, displacement_mm, touched)
+        width = None if smoothed is None else smoothed.width_mm
+        return replace(found, misfit=misfit, low_pass_mm=width)
+
+    def field_of(self, force_n: Array, displacement_mm: Array, touched: Mask | None) -> ForceField:
+        """Field of forces (c, 3) at a motion (c, 3); without `touched` all that press touch."""
+        contact = np.asarray(force_n[:, 2] < 0) if touched is None else touched
         return ForceField(
             points_mm=self.points_mm,
             displacement_mm=displacement_mm,
-            force_n=force,
-            traction_mpa=force / self.area_mm2[:, None],
-            contact=touched,
-            centre_of_pressure_mm=self._centre(force),
-            slip_margin=self._slip_margin(force),
-            misfit=misfit,
-            low_pass_mm=None if smoothed is None else smoothed.width_mm,
+            force_n=force_n,
+            traction_mpa=force_n / self.area_mm2[:, None],
+            contact=contact,
+            centre_of_pressure_mm=self._centre(force_n),
+            slip_margin=self._slip_margin(force_n),
         )
 
     def _masked(self, touched: Mask | None) -> bool:

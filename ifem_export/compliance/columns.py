@@ -153,6 +153,11 @@ class SurfaceCompliance:
         gather_block(rows, np.asarray(nodes), block, kept // 3)
         return block
 
+    def columns(self, nodes: Nodes) -> NDArray[np.float32]:
+        """Displacement (n, 3, c, 3) of all nodes under 1 N along each axis on nodes (n,)."""
+        self.require(nodes)
+        return np.asarray(self._rows.reshape(self.nodes, 3, self.nodes, 3)[nodes])
+
     def displacement(self, nodes: Nodes, force_n: Array, known_mm: Array | None = None) -> Array:
         """Displacement (c, 3) under forces (n, 3) on `nodes` (n,).
 

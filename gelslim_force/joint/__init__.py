@@ -1,0 +1,1 @@
+"""Contact forces of an object of unknown shape, from light and markers together."""

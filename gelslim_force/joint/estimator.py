@@ -1,0 +1,248 @@
+"""Contact forces that explain the markers and the light of a frame, without a known shape.
+
+Nodal forces on the region where the light changed are fitted to the motion of the markers in the
+picture and to the change of the light. A marker shows height too, as the camera looks at the gel
+at an angle; light shows the slope. The forces push, keep within a friction cone, and their
+traction is smooth. The model is linearised at the last estimate and solved again a few times; the
+nodes that hardly press are then removed, and the rest is solved once more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from gelslim_force.joint.light_rows import LightRows, placed_bins
+from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_force.joint.normal_equations import NormalEquations, huber
+from gelslim_force.joint.region import contact_nodes
+from gelslim_force.joint.responses import Responses
+from gelslim_force.joint.settings import JointSettings
+from gelslim_force.motion.marker_motion import MarkerView
+from gelslim_optics.light.light_law import LightLaw
+from ifem_export.operators.rigid_answer import rigid_motions
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Nodes = NDArray[np.intp]
+_STEP_MM = 1e-3
+_MARKER_LIMIT = 3.0
+"""Standard deviations beyond which a marker counts linearly."""
+_LEAST_NODES = 3
+_LEAST_ACROSS = 0.1
+"""Difference of the sensitivities of two channels that shows a slope across."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointForces:
+    """Forces of one frame.
+
+    Attributes:
+        force_n: (c, 3) on the surface nodes.
+        displacement_mm: (c, 3) of the surface nodes.
+        region: (c,) nodes in contact.
+        covariance: (6, 6) of force and torque about the origin; the gel is taken as specified.
+        gain: Gain of the light found in this frame.
+        unexplained: Share of the change of light in the region that the forces do not explain.
+    """
+
+    force_n: Array
+    displacement_mm: Array
+    region: Mask
+    covariance: Array
+    gain: float
+    unexplained: float
+
+
+@dataclass(frozen=True, eq=False)
+class JointEstimator:
+    """Estimates forces on one pad.
+
+    Attributes:
+        points_mm: (c, 3) surface nodes at rest.
+        area_mm2: (c,) their shares of the surface.
+        neighbours: (c, c) with 1 where nodes share an edge of a cell.
+        lattice: Their lattice.
+        responses: Of markers and heights to nodal forces.
+        markers: The followed markers as seen at rest.
+        nodes_to_markers: (n, c) interpolation.
+        light: The bins of the picture.
+        law: Change of light with the slope.
+        youngs_modulus_mpa: Of the gel.
+        settings: What is assumed.
+        strained: Another law of the gel, from motion (c, 3) to forces (c, 3), and None for the
+            linear one.
+    """
+
+    points_mm: Array
+    area_mm2: Array
+    neighbours: sparse.csr_array
+    lattice: NodeLattice
+    responses: Responses
+    markers: MarkerView
+    nodes_to_markers: Any
+    light: LightView
+    law: LightLaw
+    youngs_modulus_mpa: float
+    settings: JointSettings
+    strained: Any = None
+
+    def estimate(
+        self,
+        image: NDArray[np.uint8],
+        markers_px: Array,
+        noise_px: float,
+        last: JointForces | None = None,
+    ) -> JointForces | None:
+        """Forces of a frame.
+
+        Args:
+            image: (h, w, 3) uint8.
+            markers_px: (n, 2) followed markers; NaN for lost ones.
+            noise_px: Standard deviation of their positions.
+            last: Forces of the frame before.
+
+        Returns:
+            The forces; None where the light shows no contact.
+        """
+        seen = self.light.look(image, markers_px)
+        region = contact_nodes(seen.shading, self._rise(seen), self.light.rest_mm, self.lattice)
+        if region.sum() < _LEAST_NODES:
+            return None
+        known = last is not None and bool((last.region & region).any())
+        rounds = self.settings.following_rounds if known else self.settings.rounds
+        force = last.force_n if known and last is not None else np.zeros_like(self.points_mm)
+        moved = last.displacement_mm if known and last is not None else np.zeros_like(force)
+        state = _State(force, moved, 1.0 if last is None else last.gain)
+        frame = _Frame(seen, markers_px, noise_px)
+        for number, count in enumerate(rounds):
+            nodes = self._nodes(region, state.force_n, cut=number == 1)
+            for _ in range(count):
+                state = self._round(frame, nodes, state)
+        return self._found(nodes, state)
+
+    def _rise(self, seen: SeenLight) -> Array | None:
+        """(rows, columns) change that grows with a rise along y; None where no light tells it."""
+        if len(self.light.channels) < 2:
+            return None
+        apart = self.light.share[:, 0] - self.light.share[:, 1]
+        falling = float(self.law.sensitivity[:, 1] @ apart.mean(axis=(1, 2)))
+        if abs(falling) < _LEAST_ACROSS:
+            return None
+        return np.asarray(-np.sign(falling) * (seen.log_change[0] - seen.log_change[1]))
+
+    def _nodes(self, region: Mask, force_n: Array, *, cut: bool) -> Nodes:
+        if not cut:
+            return np.flatnonzero(region)
+        pressure = -force_n[:, 2] / self.area_mm2
+        pressing = pressure > self.settings.least_pressure * pressure.max()
+        return np.flatnonzero(pressing) if pressing.any() else np.flatnonzero(region)
+
+    def _round(self, frame: _Frame, nodes: Nodes, state: _State) -> _State:
+        """Linearise at the state, and solve."""
+        start, offset = state.force_n[nodes].ravel(), self._offset(state)
+        equations = self._marker_rows(NormalEquations.of(len(start)), frame, nodes, state, offset)
+        light = self._light_rows(frame, nodes, state)
+        chosen = self.settings
+        if len(light.values):
+            equations = equations.with_heights(
+                light.slopes,
+                light.heights,
+                light.values,
+                light.weight,
+                light.by_gain,
+                (1 - state.gain, chosen.gain_sigma),
+            )
+        young = self.youngs_modulus_mpa
+        equations = equations.with_prior(
+            self.neighbours[nodes][:, nodes].toarray(),
+            self.area_mm2[nodes],
+            chosen.roughness * young,
+            chosen.normal_stress * young,
+            chosen.tangential_stress * young,
+        )
+        found = equations.solved(start, chosen.friction)
+        force = np.zeros_like(state.force_n)
+        force[nodes] = found.reshape(-1, 3)
+        moved = self.responses.displacement(nodes, force[nodes]) + offset
+        gain = light.gain(found, chosen.gain_sigma) if len(light.values) else state.gain
+        return _State(force, moved, gain, equations, light.unexplained(found))
+
+    def _offset(self, state: _State) -> Array:
+        """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
+        if self.strained is None or not state.displacement_mm.any():
+            return np.zeros_like(state.force_n)
+        whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
+        return np.asarray(state.displacement_mm - whole)
+
+    def _marker_rows(
+        self, equations: NormalEquations, frame: _Frame, nodes: Nodes, state: _State, offset: Array
+    ) -> NormalEquations:
+        """With the markers: lateral motion as it follows from the picture and the height."""
+        height = self.nodes_to_markers @ state.displacement_mm[:, 2]
+        lateral = self.markers.lateral_motion(frame.markers_px, height)
+        above = self.markers.lateral_motion(frame.markers_px, height + _STEP_MM)
+        seen = np.isfinite(lateral).all(axis=1)
+        by_height = ((above - lateral) / _STEP_MM)[seen]
+        response = self.responses.of_markers(nodes)[seen]
+        rows = response[:, :2] - by_height[:, :, None] * response[:, 2:3]
+        base = (self.nodes_to_markers @ offset)[seen]
+        values = lateral[seen] - by_height * (height[seen] - base[:, 2])[:, None] - base[:, :2]
+        rows, values = rows.reshape(-1, rows.shape[2]), values.ravel()
+        moved = np.abs(lateral[seen]).ravel() * self.settings.marker_share
+        scale = np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px[seen])))
+        noise = np.repeat(frame.noise_px * scale, 2)
+        sigma = np.sqrt(self.settings.marker_mm**2 + moved**2 + noise**2)
+        residual = values - rows @ state.force_n[nodes].ravel()
+        return equations.with_rows(rows, values, huber(residual, sigma, _MARKER_LIMIT))
+
+    def _light_rows(self, frame: _Frame, nodes: Nodes, state: _State) -> LightRows:
+        """The change of light near the nodes, linearised."""
+        inside = np.zeros(len(self.points_mm), dtype=bool)
+        inside[nodes] = True
+        near = self.lattice.widened(inside, self.settings.light_reach)
+        bins = placed_bins(self.light, frame.seen, self.lattice, state.displacement_mm, near)
+        heights = self.responses.of_heights(nodes, bins.nodes)
+        return bins.linearised(
+            self.law,
+            heights,
+            heights @ state.force_n[nodes].ravel(),
+            state.displacement_mm[:, 2],
+            state.gain,
+            self.settings.light_error,
+        )
+
+    def _found(self, nodes: Nodes, state: _State) -> JointForces:
+        assert state.equations is not None
+        sums = np.reshape(rigid_motions(self.points_mm[nodes]), (6, -1))
+        region = np.zeros(len(self.points_mm), dtype=bool)
+        region[nodes] = True
+        return JointForces(
+            state.force_n,
+            state.displacement_mm,
+            region,
+            state.equations.covariance_of(sums, state.force_n[nodes].ravel()),
+            state.gain,
+            state.unexplained,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    seen: SeenLight
+    markers_px: Array
+    noise_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    force_n: Array
+    displacement_mm: Array
+    gain: float
+    equations: NormalEquations | None = None
+    unexplained: float = 0.0

@@ -1,0 +1,151 @@
+"""The light of a frame relative to a picture without contact, in bins whose places are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.contact.shading_change import (
+    FLOOR,
+    ShadingChange,
+    ShadingReference,
+    as_picture,
+    bin_positions,
+    bin_sizes,
+)
+from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_optics.camera.virtual_camera import VirtualCamera
+from gelslim_optics.light.light_map import LightMap
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_BINS_ACROSS = 160
+_SATURATED = 250
+_DISC, _RIM_PX = 1.5, 1.0
+"""A marker's pixels, over its radius and beyond it, that are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeenLight:
+    """What one frame shows in the bins of the gel.
+
+    Attributes:
+        shading: Change of the light in all bins of the picture.
+        log_change: (c, rows, columns) of the grey values of each channel.
+        noise: (c, rows, columns) its standard deviation.
+        saturated: (c, rows, columns) whether a pixel may be saturated.
+    """
+
+    shading: ShadingChange
+    log_change: Array
+    noise: Array
+    saturated: Mask
+
+
+class LightView:
+    """Bins of the pictures of one camera, where they are on the gel, and what lights them.
+
+    Args:
+        camera: The sensor's camera.
+        reference: (h, w, 3) uint8 picture without contact.
+        markers_px: (m, 2) markers in it.
+        radius_px: (m,) their radii.
+        lattice: The surface nodes; bins beyond them are not used.
+        light: Light on the untouched gel.
+
+    Attributes:
+        rest_mm: (rows, columns, 2) where the bins meet the gel at rest.
+        lean: (rows, columns, 2) motion of that place along the line of sight per mm of height.
+        area_mm2: (rows, columns) of a bin on the gel.
+        level: (c, rows, columns) grey value of the reference over itself plus the floor.
+        share: (k, c, rows, columns) share of each source in the light of each channel.
+
+    Raises:
+        ValueError: The reference is dark, of another size, or no picture.
+    """
+
+    def __init__(
+        self,
+        camera: VirtualCamera,
+        reference: NDArray[np.uint8],
+        markers_px: Array,
+        radius_px: Array,
+        lattice: NodeLattice,
+        light: LightMap,
+    ) -> None:
+        picture = as_picture(reference)
+        self._radius = np.ascontiguousarray(radius_px * _DISC + _RIM_PX)
+        bin_px = max(2, round(picture.shape[1] / _BINS_ACROSS))
+        self._light = ShadingReference(picture, markers_px, self._radius, bin_px)
+        x, y, self.lean, _ = bin_positions(self._light, camera)
+        self.rest_mm = np.stack([x, y], axis=-1)
+        self.area_mm2 = bin_sizes(x, y) ** 2
+        places = self.rest_mm.reshape(-1, 2)
+        self._light.on_pad &= lattice.on(places).reshape(x.shape)
+        self.channels = source_channels(light)
+        self.level, self.share = self._references(light)
+
+    def _references(self, light: LightMap) -> tuple[Array, Array]:
+        grey = np.stack([self._light.levels()[c] for c in self.channels]).astype(float)
+        falling = light.at(self.rest_mm[..., 0], self.rest_mm[..., 1])
+        share = light.colour[:, None, None, self.channels] * np.moveaxis(falling, -1, 0)[..., None]
+        share = np.moveaxis(share, -1, 1)
+        return grey / (grey + FLOOR), share / np.maximum(share.sum(axis=0), 1e-12)
+
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenLight:
+        """Compare a frame with the reference.
+
+        Args:
+            image: The frame.
+            markers_px: (m, 2) its markers, of which lost ones are NaN.
+
+        Returns:
+            The changes.
+
+        Raises:
+            ValueError: The frame has another shape.
+        """
+        radius = self._radius if len(markers_px) == len(self._radius) else None
+        shading = self._light.change(image, markers_px, radius)
+        logs, noise = _by_channel(shading, self._light.used, self.channels)
+        return SeenLight(shading, logs, noise, self._saturated(as_picture(image)))
+
+    def _saturated(self, picture: NDArray[np.uint8]) -> Mask:
+        (rows, columns), size = self._light.shape, self._light.bin_px
+        cut = picture[: rows * size, : columns * size][..., self.channels]
+        bins = cut.reshape(rows, size, columns * size, -1).max(axis=1)
+        most = bins.reshape(rows, columns, size, -1).max(axis=2)
+        return np.asarray(np.moveaxis(most, -1, 0) >= _SATURATED)
+
+
+def source_channels(light: LightMap) -> list[int]:
+    """The channels of the camera in which one of the sources is brightest."""
+    return sorted({int(np.argmax(colour)) for colour in light.colour})
+
+
+def _by_channel(
+    shading: ShadingChange, used: NDArray[np.intp], channels: list[int]
+) -> tuple[Array, Array]:
+    """Logarithmic changes of single channels, and their noise, from those of combinations.
+
+    The combinations are those of `ShadingChange`: difference and mean of the first two channels,
+    then each further channel less that mean. Raises ValueError for a channel that is dark.
+    """
+    change, noise = shading.change, shading.noise
+    logs, sigma = [], []
+    for channel in channels:
+        found = np.flatnonzero(used == channel)
+        if not len(found):
+            raise ValueError(f"channel {channel} of the reference picture is dark")
+        number = int(found[0])
+        if len(used) == 1:
+            logs.append(change[0])
+            sigma.append(noise[0])
+            continue
+        part = (0.5, -0.5)[number] * change[0] if number < 2 else change[number]
+        own = noise[0] / 2 if number < 2 else noise[number]
+        logs.append(change[1] + part)
+        sigma.append(np.hypot(noise[1], own))
+    return np.asarray(logs, dtype=float), np.asarray(sigma, dtype=float)

@@ -1,0 +1,128 @@
+"""The lattice of the surface nodes: values and slopes between them, and regions of nodes.
+
+Slopes come from cubic convolution (Keys, IEEE Trans. ASSP 29, 1981), which has continuous slopes
+and is exact for quadratic heights; at the edge of the lattice the outermost values are repeated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Nodes = NDArray[np.intp]
+_TAPS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class NodeLattice:
+    """Nodes (c,) on a regular lattice, of which some places may be empty.
+
+    Attributes:
+        origin_mm: (2,) the first place.
+        step_mm: (2,) spacing along x and y.
+        place: (c, 2) index of each node along x and y.
+        number: (nx, ny) number of the node at each place; -1 where there is none.
+    """
+
+    origin_mm: Array
+    step_mm: Array
+    place: NDArray[np.intp]
+    number: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, points_mm: Array, step_mm: Array) -> NodeLattice:
+        """The lattice of nodes (c, 2 or 3) with the given spacing (2,)."""
+        step = np.asarray(step_mm, dtype=float)
+        origin = points_mm[:, :2].min(axis=0)
+        place = np.rint((points_mm[:, :2] - origin) / step).astype(np.intp)
+        number = np.full(place.max(axis=0) + 1, -1, dtype=np.intp)
+        number[place[:, 0], place[:, 1]] = np.arange(len(place))
+        return cls(origin, step, place, number)
+
+    def on(self, points_mm: Array) -> Mask:
+        """Whether (n,) points (n, 2) lie in cells that have nodes at all corners."""
+        cell = np.floor((points_mm - self.origin_mm) / self.step_mm)
+        last = np.array(self.number.shape) - 2
+        inside = ((cell >= 0) & (cell <= last)).all(axis=1)
+        i, j = np.clip(np.nan_to_num(cell), 0, last).astype(np.intp).T
+        corners = [self.number[i + di, j + dj] >= 0 for di in (0, 1) for dj in (0, 1)]
+        return np.asarray(inside & np.all(corners, axis=0))
+
+    def values_at(self, values: Array, points_mm: Array) -> Array:
+        """Bilinear interpolation (n, ...) of nodal values (c, ...) at points (n, 2)."""
+        at = (points_mm - self.origin_mm) / self.step_mm
+        cell = np.clip(np.floor(at), 0, np.array(self.number.shape) - 2).astype(np.intp)
+        (u, v), (i, j) = np.clip(at - cell, 0, 1).T, cell.T
+        found = np.zeros((len(points_mm), *values.shape[1:]))
+        for di, wx in ((0, 1 - u), (1, u)):
+            for dj, wy in ((0, 1 - v), (1, v)):
+                node = self.number[i + di, j + dj]
+                weight = np.where(node >= 0, wx * wy, 0.0)
+                found += weight.reshape(-1, *(1,) * (values.ndim - 1)) * values[node]
+        return found
+
+    def slopes_at(self, points_mm: Array) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Matrices (n, c) from heights of the nodes to slopes along x and along y at (n, 2)."""
+        at = (points_mm - self.origin_mm) / self.step_mm
+        last = np.array(self.number.shape) - 1
+        cell = np.clip(np.floor(at), 0, last - 1).astype(np.intp)
+        part = at - cell
+        taps = np.arange(_TAPS) - 1
+        places = [np.clip(cell[:, k, None] + taps, 0, last[k]) for k in (0, 1)]
+        nodes = self.number[places[0][:, :, None], places[1][:, None, :]]
+        weight = [_cubic(part[:, k]) for k in (0, 1)]
+        steep = [_cubic_slope(part[:, k]) / self.step_mm[k] for k in (0, 1)]
+        by_x = steep[0][:, :, None] * weight[1][:, None, :]
+        by_y = weight[0][:, :, None] * steep[1][:, None, :]
+        row = np.broadcast_to(np.arange(len(at))[:, None, None], nodes.shape)
+        held = nodes >= 0
+        where, shape = (row[held], nodes[held]), (len(at), len(self.place))
+        return tuple(sparse.csr_array((w[held], where), shape=shape) for w in (by_x, by_y))
+
+    def picture(self, nodes: Mask) -> Mask:
+        """(nx, ny) places of nodes (c,)."""
+        places = np.zeros(self.number.shape, dtype=bool)
+        places[self.place[:, 0], self.place[:, 1]] = nodes
+        return places
+
+    def widened(self, nodes: Mask, rings: int) -> Mask:
+        """(c,) the nodes and those up to `rings` steps along the lattice away."""
+        if rings < 1:
+            return nodes
+        wide = ndimage.binary_dilation(self.picture(nodes), iterations=rings)
+        return np.asarray(wide[self.place[:, 0], self.place[:, 1]])
+
+    def nearest(self, points_mm: Array) -> Mask:
+        """(c,) nodes that are nearest to one of the points (n, 2), and those they enclose."""
+        at = np.rint((points_mm - self.origin_mm) / self.step_mm).astype(np.intp)
+        kept = at[((at >= 0) & (at < self.number.shape)).all(axis=1)]
+        places = np.zeros(self.number.shape, dtype=bool)
+        places[kept[:, 0], kept[:, 1]] = True
+        return np.asarray(ndimage.binary_fill_holes(places)[self.place[:, 0], self.place[:, 1]])
+
+
+def _cubic(t: Array) -> Array:
+    """(n, 4) weights of cubic convolution at the fraction t (n,) of a cell."""
+    t2, t3 = t * t, t * t * t
+    return np.stack(
+        [
+            -0.5 * t + t2 - 0.5 * t3,
+            1 - 2.5 * t2 + 1.5 * t3,
+            0.5 * t + 2 * t2 - 1.5 * t3,
+            -0.5 * t2 + 0.5 * t3,
+        ],
+        axis=1,
+    )
+
+
+def _cubic_slope(t: Array) -> Array:
+    """(n, 4) derivatives of `_cubic` by t."""
+    t2 = t * t
+    return np.stack(
+        [-0.5 + 2 * t - 1.5 * t2, -5 * t + 4.5 * t2, 0.5 + 4 * t - 4.5 * t2, -t + 1.5 * t2], axis=1
+    )

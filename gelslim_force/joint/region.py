@@ -1,0 +1,90 @@
+"""Where the gel is touched, from the change of its light.
+
+A contact tilts the surface, and the light changes with the slope. Where the change exceeds the
+noise of the frame, the gel is touched or bends beside a contact. The middle of a dent is level and
+hardly changes: it lies where the slope, summed along the line between the lights from either end,
+leads below the surface. The region is an upper estimate: the fit then removes nodes that hardly
+press.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from gelslim_force.contact.shading_change import ShadingChange
+from gelslim_force.joint.node_lattice import NodeLattice
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+LEAST_POWER = 6.0
+"""Smallest squared change over the noise, averaged over 3 x 3 bins."""
+_LEAST_VALID = 0.2
+_CLOSED, _OPENED = 4, 1
+"""Steps by which gaps, such as dots, are closed, and by which specks are removed."""
+_DENT, _LEAST_DENT = 0.25, 0.1
+"""Share of a line's depth from which it is in the dent, and of the greatest depth from which a
+line counts."""
+
+
+def contact_nodes(
+    shading: ShadingChange, rise: Array | None, places_mm: Array, lattice: NodeLattice
+) -> Mask:
+    """(c,) nodes that may be in contact.
+
+    Args:
+        shading: Change of the light.
+        rise: (rows, columns) change that grows with a rise of the surface along y; None where no
+            light tells it.
+        places_mm: (rows, columns, 2) of the bins on the gel.
+        lattice: The surface nodes.
+    """
+    changed = changed_bins(shading)
+    region = lattice.nearest(places_mm[changed])
+    if rise is None or not region.any():
+        return region
+    seen = changed & shading.valid
+    dent = _dent(lattice, places_mm[seen], rise[seen])
+    picture = ndimage.binary_closing(np.pad(lattice.picture(region) | dent, 2), iterations=1)
+    filled = ndimage.binary_fill_holes(picture)[2:-2, 2:-2]
+    return np.asarray(filled[lattice.place[:, 0], lattice.place[:, 1]])
+
+
+def changed_bins(shading: ShadingChange) -> Mask:
+    """(rows, columns) bins in which the gel is touched, or bends.
+
+    Args:
+        shading: Change of the light.
+
+    Returns:
+        The bins; none where nothing exceeds the noise.
+    """
+    layers = slice(0, 2)
+    power = np.square(shading.change[layers] / shading.noise[layers]).sum(axis=0)
+    valid = shading.valid.astype(float)
+    seen = ndimage.uniform_filter(valid, 3)
+    mean = ndimage.uniform_filter(power * valid, 3) / np.maximum(seen, _LEAST_VALID / 2)
+    changed = (mean > LEAST_POWER) & (seen > _LEAST_VALID)
+    wide = np.pad(changed, 2 * _CLOSED)
+    closed = ndimage.binary_closing(wide, iterations=_CLOSED)
+    inner = slice(2 * _CLOSED, -2 * _CLOSED)
+    filled = ndimage.binary_fill_holes(closed[inner, inner])
+    return np.asarray(ndimage.binary_opening(filled, iterations=_OPENED))
+
+
+def _dent(lattice: NodeLattice, places_mm: Array, rise: Array) -> Mask:
+    """(nx, ny) places below the surface by the rise (n,) along y, to a scale, at places (n, 2)."""
+    shape = lattice.number.shape
+    at = np.rint((places_mm - lattice.origin_mm) / lattice.step_mm).astype(np.intp)
+    kept = ((at >= 0) & (at < shape)).all(axis=1)
+    flat = np.ravel_multi_index(tuple(at[kept].T), shape)
+    size = shape[0] * shape[1]
+    count = np.bincount(flat, minlength=size)
+    slope = (np.bincount(flat, rise[kept], size) / np.maximum(count, 1)).reshape(shape)
+    from_first = np.cumsum(slope, axis=1)
+    from_last = from_first - from_first[:, -1:]
+    depth = np.minimum(-from_first, -from_last)
+    deepest = depth.max(axis=1, keepdims=True)
+    clear = deepest > _LEAST_DENT * max(float(depth.max()), 1e-12)
+    return np.asarray((depth > _DENT * deepest) & clear)

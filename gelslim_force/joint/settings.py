@@ -1,0 +1,65 @@
+"""What is assumed of contact, light and gel where the shape of the object is not known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class JointSettings:
+    """Weights of the data and of what is known beforehand.
+
+    Stresses are relative to Young's modulus, so that they serve any gel.
+
+    Attributes:
+        friction: Coulomb coefficient of the cone that the forces keep.
+        marker_mm: Standard deviation of a marker's place beyond the noise of its image: print,
+            blur and interpolation.
+        marker_share: The same as a share of the marker's motion.
+        light_error: Standard deviation of the mean logarithmic change over 1 mm² of the coat: law
+            of the light, and what the mesh does not resolve.
+        gain_sigma: Standard deviation of the gain of the light.
+        gamma: Exponent of the camera's response.
+        roughness: Difference of the traction of neighbouring nodes.
+        normal_stress: Size of the pressure.
+        tangential_stress: Size of the tangential traction.
+        unseen_force: Normal force of a contact that the light may not show, over Young's modulus,
+            in mm². On drawn pictures contacts of half this force are not seen, and those of twice
+            it are.
+        least_pressure: Share of the largest pressure below which a node is taken to be free.
+        light_reach: Steps along the lattice around the region whose light is used.
+        rounds: Linearisations on the region seen, and on the region that presses, for a contact
+            without a frame before.
+        following_rounds: The same where the frame before had this contact.
+
+    Raises:
+        ValueError: A value is impossible.
+    """
+
+    friction: float = 1.2
+    marker_mm: float = 0.004
+    marker_share: float = 0.02
+    light_error: float = 0.05
+    gain_sigma: float = 0.2
+    gamma: float = 1.8
+    roughness: float = 0.2
+    normal_stress: float = 1.4
+    tangential_stress: float = 0.07
+    unseen_force: float = 0.2
+    least_pressure: float = 0.08
+    light_reach: int = 4
+    rounds: tuple[int, int] = (4, 4)
+    following_rounds: tuple[int, int] = (1, 1)
+
+    def __post_init__(self) -> None:
+        positive = (
+            "friction", "marker_mm", "light_error", "gain_sigma", "gamma", "roughness",
+            "normal_stress", "tangential_stress",
+        )  # fmt: skip
+        for name in positive:
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be > 0")
+        if not 0 <= self.least_pressure < 1:
+            raise ValueError(f"least_pressure = {self.least_pressure!r}: must be in 0 ... 1")
+        if min(*self.rounds, *self.following_rounds) < 1:
+            raise ValueError("rounds and following_rounds must be at least 1")

@@ -1,0 +1,145 @@
+"""A source of the normal motion for objects of unknown shape: light and markers together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.calibration.design import marker_heights_mm
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.contact.normal_source import FoundForces, NormalReading
+from gelslim_force.forces.estimator import neighbour_matrix, surface_share_mm2
+from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.frames.upright import upright
+from gelslim_force.joint.estimator import JointEstimator, JointForces
+from gelslim_force.joint.light_view import LightView
+from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_force.joint.responses import Responses
+from gelslim_force.joint.settings import JointSettings
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
+from gelslim_force.motion.marker_motion import MarkerView
+from gelslim_force.tracking.marker_noise import noise_px
+from gelslim_optics.light.light_law import LightLaw
+from gelslim_optics.light.light_map import LightMap
+from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.markers.interpolation import marker_to_node
+
+if TYPE_CHECKING:
+    from ifem_export.bundle.bundle import Bundle
+
+Array = NDArray[np.float64]
+_LARGEST_UNEXPLAINED = 0.7
+_UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the light unexplained"
+
+
+class UnknownShape:
+    """Finds forces and motion of each frame; `NormalSource` for `ForcePipeline`.
+
+    It keeps the forces of the last frame, from which the next estimate starts.
+
+    Attributes:
+        estimator: Does the work.
+        reference: Lattice of the followed markers.
+        unseen_mm: Standard deviation of the height where no contact is seen.
+    """
+
+    def __init__(
+        self, estimator: JointEstimator, reference: ReferenceLattice, unseen_mm: float = 0.0
+    ) -> None:
+        self.estimator, self.reference, self.unseen_mm = estimator, reference, unseen_mm
+        self._last: JointForces | None = None
+
+    def reset(self) -> None:
+        """Forget the last frame."""
+        self._last = None
+
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> JointForces | None:
+        """Estimate the forces of a frame whose markers are at (n, 2); None without contact."""
+        noise = noise_px(self.reference, markers_px - self.reference.positions_px)
+        self._last = self.estimator.estimate(image, markers_px, noise, self._last)
+        return self._last
+
+    def motion(self, seen: JointForces | None, lateral_mm: Array | None = None) -> NormalReading:
+        """Motion and forces of what `look` saw; zero without contact."""
+        count = len(self.estimator.points_mm)
+        if seen is None:
+            unseen = np.full(count, self.unseen_mm)
+            return NormalReading(np.zeros(count), unseen, np.zeros(count, dtype=bool))
+        if seen.unexplained > _LARGEST_UNEXPLAINED:
+            return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
+        height = seen.displacement_mm[:, 2]
+        forces = FoundForces(
+            seen.force_n, seen.displacement_mm, seen.covariance, seen.gain, seen.unexplained
+        )
+        depth = max(0.0, -float(height.min()))
+        return NormalReading(height, np.zeros(count), seen.region, depth_mm=depth, forces=forces)
+
+
+def unknown_shape(
+    bundle: Bundle,
+    calibration: Calibration,
+    reference: NDArray[np.uint8],
+    *,
+    strained: bool = False,
+    settings: JointSettings | None = None,
+) -> UnknownShape:
+    """Make the source for one calibrated sensor.
+
+    Args:
+        bundle: The sensor, with markers and light.
+        calibration: Its camera, and its markers at rest.
+        reference: (h, w, 3) uint8 picture without contact.
+        strained: Take the gel as neo-Hookean.
+        settings: What is assumed; the defaults if None.
+
+    Returns:
+        The source.
+
+    Raises:
+        ValueError: The reference is dark or of another size.
+        MeshError: The pad has too many surface nodes.
+    """
+    chosen = settings or JointSettings()
+    followed = calibration.reference
+    points_mm = np.asarray(bundle.mesh.surface_mm)
+    cell_mm = np.asarray(bundle.mesh.cell_size_mm[:2])
+    lattice = NodeLattice.of(points_mm, cell_mm)
+    heights_mm = marker_heights_mm(bundle)[followed.markers]
+    view = MarkerView(calibration.camera, followed.positions_px, heights_mm)
+    to_markers = marker_to_node(points_mm, view.rest_mm)
+    radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
+    light = LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
+    estimator = JointEstimator(
+        points_mm,
+        surface_share_mm2(bundle.mesh),
+        neighbour_matrix(points_mm, cell_mm),
+        lattice,
+        Responses(SurfaceCompliance(bundle), to_markers),
+        view,
+        to_markers,
+        LightView(
+            calibration.camera,
+            upright(reference, calibration.camera),
+            followed.positions_px,
+            radius_px[np.searchsorted(calibration.markers, followed.markers)],
+            lattice,
+            light,
+        ),
+        LightLaw.of(light, chosen.gamma),
+        bundle.material.youngs_modulus_mpa,
+        chosen,
+        FiniteStrainForce(bundle) if strained else None,
+    )
+    unseen_n = chosen.unseen_force * bundle.material.youngs_modulus_mpa
+    return UnknownShape(estimator, followed, unseen_n / _stiffness_n_mm(bundle, estimator))
+
+
+def _stiffness_n_mm(bundle: Bundle, estimator: JointEstimator) -> float:
+    """Normal force of a wide bonded layer per mm by which its whole surface sinks."""
+    mesh, gel = bundle.mesh, bundle.material
+    ratio = gel.poissons_ratio
+    modulus = gel.youngs_modulus_mpa * (1 - ratio) / ((1 + ratio) * (1 - 2 * ratio))
+    thickness_mm = mesh.layers * mesh.cell_size_mm[2]
+    return float(modulus * estimator.area_mm2.sum() / thickness_mm)

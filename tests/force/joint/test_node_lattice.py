@@ -1,0 +1,75 @@
+"""Values and slopes between the nodes of a lattice, and regions of nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from gelslim_force.joint.node_lattice import NodeLattice
+
+Array = NDArray[np.float64]
+STEP_MM = np.array([0.7, 0.5])
+X, Y = np.arange(9) * 0.7 - 2.0, np.arange(11) * 0.5 - 1.0
+
+
+def lattice(missing: int = 0) -> tuple[NodeLattice, Array]:
+    """9 x 11 nodes in random order, without some at the first corner."""
+    points = np.column_stack([a.ravel() for a in np.meshgrid(X, Y, indexing="ij")])[missing:]
+    points = np.random.default_rng(3).permutation(points)
+    return NodeLattice.of(np.column_stack([points, np.zeros(len(points))]), STEP_MM), points
+
+
+def inner(count: int) -> Array:
+    rng = np.random.default_rng(5)
+    return np.column_stack([rng.uniform(a[2], a[-3], count) for a in (X, Y)])
+
+
+def test_slopes_of_a_quadratic_height_are_exact() -> None:
+    found, nodes = lattice()
+    at = inner(60)
+    height = 0.3 + nodes @ [0.2, -0.1] + 0.5 * nodes[:, 0] ** 2 - nodes[:, 0] * nodes[:, 1]
+    along, across = (m @ height for m in found.slopes_at(at))
+    np.testing.assert_allclose(along, 0.2 + at[:, 0] - at[:, 1], atol=1e-12)
+    np.testing.assert_allclose(across, -0.1 - at[:, 0], atol=1e-12)
+
+
+def test_slopes_of_a_wave_converge_with_the_square_of_the_spacing() -> None:
+    errors = []
+    for count in (12, 24, 48):
+        axis = np.linspace(0, 6, count)
+        nodes = np.column_stack([a.ravel() for a in np.meshgrid(axis, axis, indexing="ij")])
+        found = NodeLattice.of(nodes, np.full(2, axis[1]))
+        at = np.random.default_rng(1).uniform(1.5, 4.5, (200, 2))
+        along = found.slopes_at(at)[0] @ np.sin(nodes[:, 0])
+        errors.append(np.sqrt(np.mean((along - np.cos(at[:, 0])) ** 2)))
+    rate = np.polyfit(np.log([12, 24, 48]), np.log(errors), 1)[0]
+    assert rate < -1.8
+
+
+def test_values_agree_with_scipy() -> None:
+    found, nodes = lattice()
+    values = np.random.default_rng(2).normal(size=(len(nodes), 3))
+    table = np.zeros((len(X), len(Y), 3))
+    place = [np.searchsorted(a, nodes[:, k] - 1e-9) for k, a in enumerate((X, Y))]
+    table[place[0], place[1]] = values
+    at = inner(50)
+    expected = RegularGridInterpolator((X, Y), table)(at)
+    np.testing.assert_allclose(found.values_at(values, at), expected, atol=1e-12)
+
+
+def test_points_are_on_cells_with_all_corners_only() -> None:
+    found, _ = lattice(missing=1)
+    points = np.array([[X[0] + 0.1, Y[0] + 0.1], [X[1] + 0.1, Y[0] + 0.1], [X[-1] + 0.1, 0.0]])
+    assert found.on(np.vstack([points, [[np.nan, 0.0]]])).tolist() == [False, True, False, False]
+
+
+def test_regions_widen_and_are_filled() -> None:
+    found, nodes = lattice()
+    ring = [(x, y) for x in X[2:6] for y in Y[2:7] if x in X[[2, 5]] or y in Y[[2, 6]]]
+    region = found.nearest(np.array(ring) + 0.1)
+    assert region.sum() == 4 * 5
+    wider = found.widened(region, 1)
+    apart = np.abs((nodes[wider][:, None] - nodes[region][None]) / STEP_MM).sum(axis=2).min(axis=1)
+    assert apart.max() <= 1 + 1e-9
+    assert wider.sum() == 4 * 5 + 2 * 4 + 2 * 5

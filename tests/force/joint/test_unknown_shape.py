@@ -1,0 +1,158 @@
+"""Forces of unknown objects from drawn pictures whose forces are known.
+
+The truth is another discretisation, another renderer and given tractions; see `pressed_samples`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pressed_samples import FRICTION, calibration, lit_bundle, pressed, reference
+from sensor_samples import sensor_bundle
+from shaded_frames import shaded
+
+from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.unknown_shape import unknown_shape
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.sensor import SensorError, open_sensor
+
+Array = NDArray[np.float64]
+LINEAR_CAMERA = JointSettings(gamma=1.0)
+
+
+@cache
+def pipeline(sources: int = 2, gamma: float = 1.0) -> ForcePipeline:
+    source = unknown_shape(
+        lit_bundle(sources),
+        calibration(),
+        reference().image,
+        settings=replace(LINEAR_CAMERA, gamma=gamma),
+    )
+    return ForcePipeline(lit_bundle(sources), calibration(), normal=source)
+
+
+def processed(image: NDArray[np.uint8], sources: int = 2, gamma: float = 1.0) -> FrameResult:
+    found = pipeline(sources, gamma)
+    found.reset()
+    return found.process(image)
+
+
+@pytest.mark.parametrize("seed", [13, pytest.param(20, marks=pytest.mark.slow)])
+def test_six_components_of_an_unknown_object(seed: int) -> None:
+    truth = pressed(seed)
+    found = processed(truth.image)
+    assert found.normal_known
+    assert not found.problems
+    assert found.wrench is not None
+    assert found.field is not None
+    off = found.wrench.vector - truth.wrench
+    assert abs(off[2]) < 0.1 * abs(truth.wrench[2])
+    assert np.hypot(*off[:2]) < 0.01
+    assert (np.abs(off) < 3 * found.wrench.standard_deviation).all()
+    size = np.linalg.norm(truth.force_n)
+    assert np.linalg.norm(found.field.force_n - truth.force_n) < 0.3 * size
+    push = -found.field.force_n[:, 2]
+    assert (push >= 0).all()
+    assert (np.hypot(*found.field.force_n[:, :2].T) <= 1.2 * push + 1e-9).all()
+
+
+def test_the_next_frame_starts_from_the_last() -> None:
+    truth = pressed(13)
+    first = processed(truth.image)
+    again = pipeline().process(truth.image)
+    assert first.wrench is not None
+    assert again.wrench is not None
+    apart = np.abs(again.wrench.vector - first.wrench.vector)
+    assert (apart < 0.5 * first.wrench.standard_deviation).all()
+
+
+def test_no_contact_is_no_force() -> None:
+    found = processed(shaded(camera=calibration().camera, seed=9).image)
+    assert found.wrench is not None
+    assert not found.problems
+    assert found.wrench.force_n[2] == 0
+    unseen_n = LINEAR_CAMERA.unseen_force * lit_bundle().material.youngs_modulus_mpa
+    assert found.wrench.standard_deviation[2] == pytest.approx(unseen_n, rel=0.1)
+    assert (np.abs(found.wrench.force_n) <= 4 * found.wrench.standard_deviation[:3] + 1e-12).all()
+
+
+@pytest.mark.slow
+def test_a_press_that_grows_and_fades() -> None:
+    """Each frame starts from the last; what is too faint to see is within its deviation."""
+    for seed in (13, 21):
+        pipeline().reset()
+        for number, share in enumerate((0.1, 0.2, 0.4, 0.7, 1.0, 0.7, 0.3, 0.0)):
+            truth = pressed(seed, share=share, frame=number)
+            found = pipeline().process(truth.image)
+            assert found.wrench is not None
+            if found.normal_known:
+                off = found.wrench.force_n - truth.wrench[:3]
+                assert (np.abs(off) < 3.5 * found.wrench.standard_deviation[:3]).all(), share
+            else:
+                assert share <= 0.2
+
+
+@pytest.mark.slow
+def test_rest_is_no_force_in_any_frame() -> None:
+    for seed in range(40):
+        found = processed(shaded(camera=calibration().camera, seed=900 + seed, noise=2.5).image)
+        assert not found.normal_known or found.wrench.force_n[2] == 0  # type: ignore[union-attr]
+
+
+@pytest.mark.slow
+def test_a_gain_off_by_a_fifth_is_found() -> None:
+    """The camera's exponent is assumed 1.2 times too large, so that the light seems too strong."""
+    errors, gains = [], []
+    for seed in range(30, 42):
+        truth = pressed(seed)
+        found = processed(truth.image, gamma=1.2)
+        assert found.wrench is not None
+        errors.append(abs(found.wrench.force_n[2] / truth.wrench[2] - 1))
+        gains.append(found.extra["normal"]["gain"])
+    assert np.median(errors) < 0.08
+    assert 1.05 < np.median(gains) < 1.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sources", [2, 3])
+def test_random_tractions(sources: int) -> None:
+    """Errors and coverage over random presses, with two lights and with three."""
+    errors, fields, shear, scores = [], [], [], []
+    for seed in range(60):
+        truth = pressed(seed)
+        found = processed(truth.image, sources)
+        assert found.normal_known, (seed, found.problems)
+        assert found.wrench is not None
+        assert found.field is not None
+        off = found.wrench.vector - truth.wrench
+        scores.append(off / found.wrench.standard_deviation)
+        shear.append(np.hypot(*off[:2]))
+        size = np.linalg.norm(truth.force_n)
+        fields.append(np.linalg.norm(found.field.force_n - truth.force_n) / size)
+        if abs(truth.wrench[2]) >= 0.2:
+            errors.append(off[2] / truth.wrench[2])
+    assert np.median(np.abs(errors)) < 0.04
+    assert np.percentile(np.abs(errors), 95) < 0.10
+    assert np.median(fields) < 0.22
+    assert np.median(shear) < 0.004
+    spread = np.sqrt(np.mean(np.square(scores), axis=0))
+    assert (spread < 1.3).all()
+
+
+def test_light_and_colour_are_needed() -> None:
+    with pytest.raises(SensorError, match="no light"):
+        open_sensor(sensor_bundle(), reference=reference().image, indenter="unknown")
+    mono = replace(lit_bundle(), camera={**lit_bundle().camera, "picture": "mono"})
+    with pytest.raises(SensorError, match="mono"):
+        open_sensor(mono, reference=reference().image, indenter="unknown")
+    with pytest.raises(SensorError, match="depth"):
+        open_sensor(lit_bundle(), reference=reference().image, indenter="unknown", depth_mm=0.2)
+
+
+def test_the_friction_of_the_samples_is_within_the_cone() -> None:
+    assert JointSettings().friction > FRICTION

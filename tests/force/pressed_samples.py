@@ -1,0 +1,146 @@
+"""Pictures of a pad under known tractions, for forces without a known shape.
+
+Tractions are given, not solved for: random patches that push and shear within the friction cone.
+The pad of the truth has half the pitch and eight layers, slopes come from splines through its
+surface, and the light is that of `shaded_frames`: Lambert's law at 40 degrees over a third of
+ambient light, red from -y, green from +y and blue from the tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from camera_rig import off_centre_view
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
+from sensor_samples import sensor_bundle, sensor_grid
+from shaded_frames import AMBIENT, ELEVATION, lines_of_sight, shaded
+from synthetic import Frame
+
+from gelslim_force.calibration.calibration import calibrate
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_optics.light.light_map import LightMap, light_arrays
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.ladder import lumped, refined
+from ifem_export.operators.surface_operator import SurfaceOperator, surface_operator
+
+Array = NDArray[np.float64]
+FRICTION = 0.6
+SIZE_MM = (22.0, 20.5)
+_TIP = 0.4
+"""Of the blue light: its slope over that of the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A picture with the forces that it shows."""
+
+    image: NDArray[np.uint8]
+    force_n: Array
+    """(c, 3) on the nodes of the bundle."""
+    wrench: Array
+    """(6,) about the origin."""
+
+
+@cache
+def lit_bundle(sources: int = 2) -> Bundle:
+    """The sensor with its light: two sides, or also the tip."""
+    return replace(sensor_bundle(), light=light_arrays(light_map(sources)))
+
+
+def light_map(sources: int = 2) -> LightMap:
+    """Even light whose effective elevation gives the slope sensitivity of the drawn pictures."""
+    steep = (1 - AMBIENT) / np.tan(ELEVATION) * np.array([1.0, 1.0, _TIP])[:sources]
+    x, y = (np.linspace(-s / 2, s / 2, 5) for s in SIZE_MM)
+    return LightMap(
+        x,
+        y,
+        np.ones((5, 5, sources)),
+        np.array([90.0, -90.0, 180.0])[:sources],
+        np.degrees(np.arctan(1 / steep)),
+        np.eye(3)[:sources],
+    )
+
+
+@cache
+def reference() -> Frame:
+    """The picture without contact."""
+    return shaded(camera=off_centre_view(), seed=5)
+
+
+@cache
+def calibration() -> Calibration:
+    """Of the sensor, by that picture."""
+    return calibrate(lit_bundle(), reference().image)
+
+
+@cache
+def _fine() -> tuple[PadMesh, SurfaceOperator, Array]:
+    bundle = sensor_bundle()
+    mesh = refined(bundle.mesh)
+    return mesh, surface_operator(mesh, bundle.material, "bbar", "pcg"), np.asarray(mesh.surface_mm)
+
+
+def tractions(points_mm: Array, rng: np.random.Generator) -> Array:
+    """Tractions (n, 3) in MPa: one or two patches, round or long, with hard or soft rims."""
+    total = np.zeros((len(points_mm), 3))
+    x0, y0 = rng.uniform(-5, 5, 2)
+    for number in range(1 if rng.random() < 0.7 else 2):
+        angle, away = rng.uniform(0, np.pi), 5.0 * number
+        x = points_mm[:, 0] - x0 - away * np.cos(angle)
+        y = points_mm[:, 1] - y0 - away * np.sin(angle)
+        along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+        half = np.array([rng.uniform(1.3, 3.5), rng.uniform(1.3, 2.5)])
+        inside = 1 - (along / half[0]) ** 2 - (across / half[1]) ** 2
+        pressure = rng.uniform(0.008, 0.03) * np.maximum(inside, 0) ** rng.choice([0.25, 0.5, 1.0])
+        shear, turn = rng.uniform(0, 0.5 * FRICTION), rng.uniform(0, 2 * np.pi)
+        twist = rng.uniform(-0.1, 0.1)
+        total[:, 0] += pressure * (shear * np.cos(turn) - twist * y)
+        total[:, 1] += pressure * (shear * np.sin(turn) + twist * x)
+        total[:, 2] -= pressure
+    return total
+
+
+def pressed(
+    seed: int, *, share: float = 1.0, frame: int = 0, noise: float = 2.5, brightness: float = 1.0
+) -> Pressed:
+    """The picture of a share of random tractions; frames differ by their noise."""
+    rng = np.random.default_rng([11, seed])
+    mesh, operator, points = _fine()
+    cell = float(np.prod(mesh.cell_size_mm[:2]))
+    force = tractions(points, rng) * cell * share
+    moved = operator.displacement(force)
+    return drawn(force, moved, seed + 1000 * frame, noise=noise, brightness=brightness)
+
+
+def drawn(
+    force_n: Array, moved_mm: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
+) -> Pressed:
+    """The picture of a motion (n, 3) of the finer pad's nodes under forces (n, 3)."""
+    mesh, _, points = _fine()
+    x, y = (np.unique(np.round(points[:, k], 9)) for k in (0, 1))
+    filled = np.zeros((3, len(x), len(y)))
+    place = [np.searchsorted(axis, np.round(points[:, k], 9)) for k, axis in enumerate((x, y))]
+    filled[:, place[0], place[1]] = moved_mm.T
+    splines = [RectBivariateSpline(x, y, part, kx=3, ky=3) for part in filled]
+    rest, lean = lines_of_sight(off_centre_view())
+    material = rest.copy()
+    for _ in range(8):
+        u, v, w = (s.ev(*material.T) for s in splines)
+        material = rest + lean * w[:, None] - np.column_stack([u, v])
+    inside = (np.abs(material) < np.array(SIZE_MM) / 2).all(axis=1)
+    slopes = [np.where(inside, splines[2].ev(*material.T, *d), 0.0) for d in ((1, 0), (0, 1))]
+    dots = np.column_stack([s.ev(*sensor_grid().positions_mm.T) for s in splines])
+    frame = shaded(
+        (slopes[0], slopes[1]),
+        noise=noise,
+        seed=seed + 100,
+        moved_mm=dots,
+        brightness=brightness,
+        camera=off_centre_view(),
+    )
+    wrench = np.concatenate([force_n.sum(axis=0), np.cross(points, force_n).sum(axis=0)])
+    return Pressed(frame.image, lumped(force_n, mesh, sensor_bundle().mesh), wrench)
