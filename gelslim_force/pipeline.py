@@ -8,7 +8,6 @@ reported in its result, and the pipeline goes on with the next one.
 from __future__ import annotations
 
 import copy
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -17,9 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.contact.normal_source import NormalReading, NormalSource
+from gelslim_force.contact.normal_source import (
+    FoundForces,
+    NormalReading,
+    NormalSource,
+    Remembering,
+)
 from gelslim_force.forces.estimator import ContactForces, ForceEstimator
 from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.frames.frame import Frame
@@ -134,6 +139,8 @@ class ForcePipeline:
         self._index = 0
         self._last_force: Array | None = None
         self._last_lateral: Array | None = None
+        if isinstance(self.normal, Remembering):
+            self.normal.reset()
 
     def unreadable(self, problem: str, *, time_s: float | None = None) -> FrameResult:
         """Result of a frame that could not be read; it is counted as a frame."""
@@ -279,6 +286,8 @@ class ForcePipeline:
         self, motion: Array, reading: NormalReading | None, noise: float, clock: FrameClock
     ) -> dict[str, Any]:
         """Force field and wrench for a motion (n, 3) of the markers. Raises IfemError."""
+        if reading is not None and reading.forces is not None:
+            return self._found(reading.forces, reading.touched)
         interpolation, displacement = self._motion.of_nodes(motion, reading)
         clock.stage("interpolate")
         touched = reading.touched if reading is not None and reading.known else None
@@ -288,6 +297,11 @@ class ForcePipeline:
         wrench = self._wrench.wrench(field.force_n, covariance)
         clock.stage("wrench")
         return {"field": field, "wrench": wrench}
+
+    def _found(self, forces: FoundForces, touched: NDArray[np.bool_] | None) -> dict[str, Any]:
+        """Force field and wrench of forces that the normal source found itself."""
+        field = self._forces.direct.field_of(forces.force_n, forces.displacement_mm, touched)
+        return {"field": field, "wrench": self._wrench.wrench(forces.force_n, forces.covariance)}
 
     def _covariance(
         self,
@@ -310,20 +324,6 @@ class ForcePipeline:
         if self._kept_gains is None or self._kept_gains[0] != lost:
             self._kept_gains = lost, self._wrench.gains(interpolation)
         return self._kept_gains[1]
-
-
-class FrameClock:
-    """Measures the stages of one frame in ms, one after the other."""
-
-    def __init__(self) -> None:
-        self.stages: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def stage(self, name: str) -> None:
-        """End a stage, which began at the end of the stage before."""
-        now = time.perf_counter()
-        self.stages[name] = self.stages.get(name, 0.0) + (now - self._last) * 1000
-        self._last = now
 
 
 def _findings(field: ForceField, reading: NormalReading | None) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from gelslim_force.contact.indenter import Indenter, parse_indenter
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.frames.upright import upright
+from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.settings import PipelineSettings
 from gelslim_optics.camera.record import is_mono
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 Picture = NDArray[np.uint8]
 FileName = str | os.PathLike[str]
+UNKNOWN = "unknown"
+"""Argument for an indenter whose shape is not known."""
 
 
 class SensorError(GelslimError, ValueError):
@@ -62,7 +65,7 @@ def open_sensor(
         calibration: A calibration of this sensor, or its file, in place of the reference. With an
             indenter both are needed: the contact patch shows in comparison with the reference.
         indenter: The known shape that touches the gel, such as `"sphere:10"` (mm), which makes
-            the normal force known.
+            the normal force known; `"unknown"` finds it for any shape from light and markers.
         depth_mm: Known depth of the indenter in mm, which a flat punch needs.
         normal: Another source of the normal motion, in place of an indenter.
         settings: Choices of the pipeline; the defaults if None.
@@ -80,8 +83,8 @@ def open_sensor(
     """
     _require_consistent(reference, calibration, indenter, depth_mm, normal)
     sensor = bundle if isinstance(bundle, Bundle) else load_bundle(Path(bundle))
-    shape = None if indenter is None else _shape(indenter)
-    if shape is not None:
+    shape = None if indenter is None or indenter == UNKNOWN else _shape(indenter)
+    if indenter is not None:
         require_colour(sensor)
     picture = reference
     if picture is not None and not isinstance(picture, np.ndarray):
@@ -91,9 +94,12 @@ def open_sensor(
         calibration = calibrate(sensor, picture)
     elif not isinstance(calibration, Calibration):
         calibration = read_calibration(calibration)
-    if shape is not None:
+    if indenter is not None:
         assert picture is not None
-        normal = indenter_source(sensor, calibration, picture, shape, depth_mm, settings)
+        if shape is None:
+            normal = unknown_source(sensor, calibration, picture, settings)
+        else:
+            normal = indenter_source(sensor, calibration, picture, shape, depth_mm, settings)
     return ForcePipeline(sensor, calibration, settings, normal)
 
 
@@ -142,6 +148,41 @@ def indenter_source(
     return IndenterSource(finder, NormalModel(operator, points_mm), shape, depth_mm)
 
 
+def unknown_source(
+    bundle: Bundle,
+    calibration: Calibration,
+    reference: Picture,
+    settings: PipelineSettings | None = None,
+) -> UnknownShape:
+    """Make a normal source for objects of unknown shape, from light and markers together.
+
+    Args:
+        bundle: The sensor.
+        calibration: Its camera, and its markers at rest.
+        reference: (h, w, 3) uint8 picture without contact.
+        settings: Choose the law of the gel; the defaults if None.
+
+    Returns:
+        The source, for the constructor of `ForcePipeline`.
+
+    Raises:
+        SensorError: The sensor's camera is mono, or its bundle has no light.
+        CalibrationError: The calibration belongs to another bundle.
+        MeshError: The pad has too many surface nodes.
+        ValueError: The reference is dark or of another size.
+    """
+    require_colour(bundle)
+    if not bundle.light:
+        raise SensorError(
+            "indenter",
+            "the bundle has no light, by which the contact of an unknown shape is seen: make it "
+            "with `gelslim build` or `gelslim bundle`",
+        )
+    calibration.require_bundle(bundle)
+    strained = settings is not None and settings.gel == "neo_hookean"
+    return unknown_shape(bundle, calibration, reference, strained=strained)
+
+
 def require_colour(bundle: Bundle) -> None:
     """Raise SensorError for a mono camera, in whose pictures no contact patch is found.
 
@@ -170,6 +211,8 @@ def _require_consistent(
 ) -> None:
     if indenter is not None and normal is not None:
         raise SensorError("normal", "give an indenter or another normal source, not both")
+    if depth_mm is not None and indenter == UNKNOWN:
+        raise SensorError("depth_mm", "depth_mm is the depth of an indenter of known shape")
     if depth_mm is not None and indenter is None:
         raise SensorError("depth_mm", "depth_mm is the depth of an indenter: give the indenter too")
     if reference is None and calibration is None:

@@ -138,7 +138,10 @@ Calibration = Annotated[
 RunFolder = Annotated[Path | None, out_folder("out/NAME-force", "Run folder to write")]
 KnownIndenter = Annotated[
     str | None,
-    typer.Option(help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm)."),
+    typer.Option(
+        help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm); or unknown, which "
+        "finds the forces of any shape from light and markers."
+    ),
 ]
 KnownDepth = Annotated[
     float | None,

@@ -60,13 +60,13 @@ def force(
     Follows the markers, corrects their motion for projection, and applies the stiffness of the
     bundle. Writes a run folder with the wrench of each frame and its standard deviation
     (wrenches.csv), the force at every node (fields), and overlay pictures. Without an indenter or
-    depth maps the normal force stays unknown.
+    depth maps the normal force stays unknown; `--indenter unknown` finds it for any shape.
     """
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
     from ifem_export.bundle.files import load_bundle
 
-    _require_consistent(fields, indenter, depth_maps)
+    _require_consistent(fields, indenter, depth_mm, depth_maps)
     budget = budget_of(error, within)
     sensor = load_bundle(bundle)
     if not budget.unlimited and operator is None:
@@ -94,9 +94,13 @@ def force(
     return 0 if summary.with_forces else BAD_INPUT
 
 
-def _require_consistent(fields: str, indenter: str | None, depth_maps: Path | None) -> None:
+def _require_consistent(
+    fields: str, indenter: str | None, depth_mm: float | None, depth_maps: Path | None
+) -> None:
     if fields not in ("npz", "parquet", "none"):
         raise CommandError(f"--fields {fields}: give npz, parquet or none")
+    if indenter == "unknown" and depth_mm is not None:
+        raise CommandError("--depth-mm is the depth of a known indenter: leave it out")
     if indenter and depth_maps:
         raise CommandError("give --indenter or --depth-maps, not both")
 
@@ -188,7 +192,9 @@ def _normal_source(
         return DepthMapSource(built.camera, sensor.mesh.surface_mm, read_depth_maps(depth_maps))
     if indenter is None:
         return None
-    from gelslim_force.sensor import indenter_source
+    from gelslim_force.sensor import UNKNOWN, indenter_source, unknown_source
 
     assert picture is not None
+    if indenter == UNKNOWN:
+        return unknown_source(sensor, built, picture, settings)
     return indenter_source(sensor, built, picture, indenter, depth_mm, settings)
