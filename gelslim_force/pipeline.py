@@ -23,7 +23,6 @@ from gelslim_force.contact.normal_source import (
     Remembering,
 )
 from gelslim_force.forces.estimator import ContactForces, ForceEstimator
-from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import WrenchNoise
@@ -91,7 +90,7 @@ class ForcePipeline:
         reference = self._tracker.reference
         markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
         operator = self.settings.operator(bundle)
-        law = FiniteStrainForce(bundle) if self.settings.gel == "neo_hookean" else None
+        law = self.settings.law(bundle, operator)
         self._wrench = WrenchNoise.of(operator, points_mm)
         self._motion = SurfaceMotion(
             MarkerView(

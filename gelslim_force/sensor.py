@@ -179,8 +179,8 @@ def unknown_source(
             "with `gelslim build` or `gelslim bundle`",
         )
     calibration.require_bundle(bundle)
-    strained = settings is not None and settings.gel == "neo_hookean"
-    return unknown_shape(bundle, calibration, reference, strained=strained)
+    gel = "linear" if settings is None else settings.gel
+    return unknown_shape(bundle, calibration, reference, gel=gel)
 
 
 def require_colour(bundle: Bundle) -> None:

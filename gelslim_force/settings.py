@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 from gelslim_core.budget.budget import Budget
 from gelslim_force.forces.estimator import ForceSettings
+from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
 from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.errors import IfemError
@@ -15,7 +16,8 @@ from ifem_export.operators.surface_operator import RUNGS, Rung, SurfaceOperator
 
 _FAST = operator_label("fft", {"lumped": 1})
 Interpolation = Literal["sparse", "thin_plate"]
-Gel = Literal["linear", "neo_hookean"]
+Gel = Literal["linear", "neo_hookean", "auto"]
+GELS: tuple[Gel, ...] = get_args(Gel)
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class PipelineSettings:
             which the operator is chosen from the ladder measured in the bundle.
         compensation: How the apparent motion of pressed markers is corrected, see `marker_motion`.
         interpolation: From markers to surface nodes.
-        gel: Law of the gel.
+        gel: Law of the gel; `auto` takes the neo-Hookean one from a tenth of the thickness on.
         force: How forces are estimated from the motion.
         noise_px: Standard deviation of a marker's position; None estimates it in each frame.
         unknown_normal_mm: Depth in mm that may remain unnoticed without a normal source. Its
@@ -60,8 +62,8 @@ class PipelineSettings:
             )
         if self.interpolation not in ("sparse", "thin_plate"):
             raise ValueError(f"interpolation {self.interpolation!r}: sparse or thin_plate")
-        if self.gel not in ("linear", "neo_hookean"):
-            raise ValueError(f"gel {self.gel!r}: linear or neo_hookean")
+        if self.gel not in GELS:
+            raise ValueError(f"gel {self.gel!r}: must be one of {', '.join(GELS)}")
         if self.noise_px is not None and not self.noise_px >= 0:
             raise ValueError(f"noise_px = {self.noise_px:g}: must be >= 0")
         if not 0 <= self.least_coverage <= 1:
@@ -86,6 +88,15 @@ class PipelineSettings:
             return bundle.surface_operator("fft", lumped=1)
         except IfemError:
             return self.operator(bundle)
+
+    def law(self, bundle: Bundle, operator: SurfaceOperator) -> FiniteStrainForce | DepthLaw | None:
+        """The law of the gel, where it is not that of the operator alone."""
+        if self.gel == "linear":
+            return None
+        strained = FiniteStrainForce(bundle)
+        if self.gel == "neo_hookean":
+            return strained
+        return DepthLaw(operator, strained, deep_mm(bundle))
 
     def _too_coarse(self, ladder: OperatorLadder | None) -> bool:
         if ladder is None or self.budget is None:

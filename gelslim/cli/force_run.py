@@ -157,7 +157,7 @@ Compensation = Annotated[
     str, typer.Option(help="Correction for projection: exact, arctan, printed or none.")
 ]
 Interpolation = Annotated[str, typer.Option(help="From markers to nodes: sparse or thin_plate.")]
-GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear or neo_hookean.")]
+GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear, neo_hookean or auto.")]
 Friction = Annotated[float, typer.Option(min=0, help="Coefficient of Coulomb friction.")]
 FieldFormat = Annotated[str, typer.Option(help="Format of the force fields: npz, parquet or none.")]
 OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video to write, .mp4 or .avi.")]

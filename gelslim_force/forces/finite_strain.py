@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,15 @@ from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
 
 Array = NDArray[np.float64]
+DEEP_SHARE = 0.1
+"""Depth over the thickness from which `DepthLaw` takes the gel as neo-Hookean."""
+
+
+class Linear(Protocol):
+    """A law from the surface motion to the forces."""
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """Forces (c, 3) in N that hold the surface in a motion (c, 3) in mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +98,35 @@ class FiniteStrainForce:
             f"steps (residuals {shown} N): the strain is too large for steps with the linear "
             "stiffness"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class DepthLaw:
+    """The linear law for shallow contacts, and the neo-Hookean one from a depth on.
+
+    At a tenth of the thickness the linear law errs by about 5 % in the resultant, and the error
+    grows with the depth; the neo-Hookean law takes about ten times as long.
+
+    Attributes:
+        linear: Linear law, from motion (c, 3) to forces (c, 3).
+        strained: The neo-Hookean one.
+        from_mm: Depth from which it is used.
+    """
+
+    linear: Linear
+    strained: FiniteStrainForce
+    from_mm: float
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """Forces that hold the surface in a motion (c, 3); raises as both laws."""
+        motion = np.asarray(displacement_mm, dtype=float)
+        deep = -float(motion[:, 2].min(initial=0.0)) >= self.from_mm
+        return (self.strained if deep else self.linear).force(motion)
+
+
+def deep_mm(bundle: Bundle) -> float:
+    """Depth from which the gel of a bundle is taken as neo-Hookean."""
+    return float(DEEP_SHARE * bundle.mesh.layers * bundle.mesh.cell_size_mm[2])
 
 
 class Anderson:

@@ -77,6 +77,7 @@ class JointEstimator:
         settings: What is assumed.
         strained: Another law of the gel, from motion (c, 3) to forces (c, 3), and None for the
             linear one.
+        strained_from_mm: Depth from which it is used.
     """
 
     points_mm: Array
@@ -91,6 +92,7 @@ class JointEstimator:
     youngs_modulus_mpa: float
     settings: JointSettings
     strained: Any = None
+    strained_from_mm: float = 0.0
 
     def estimate(
         self,
@@ -109,6 +111,9 @@ class JointEstimator:
 
         Returns:
             The forces; None where the light shows no contact.
+
+        Raises:
+            IfemError: The strained law does not converge.
         """
         seen = self.light.look(image, markers_px)
         region = contact_nodes(seen.shading, self._rise(seen), self.light.rest_mm, self.lattice)
@@ -175,7 +180,8 @@ class JointEstimator:
 
     def _offset(self, state: _State) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
-        if self.strained is None or not state.displacement_mm.any():
+        depth = -float(state.displacement_mm[:, 2].min(initial=0.0))
+        if self.strained is None or depth <= self.strained_from_mm:
             return np.zeros_like(state.force_n)
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
         return np.asarray(state.displacement_mm - whole)

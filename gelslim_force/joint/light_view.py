@@ -85,6 +85,9 @@ class LightView:
         places = self.rest_mm.reshape(-1, 2)
         self._light.on_pad &= lattice.on(places).reshape(x.shape)
         self.channels = source_channels(light)
+        dark = [c for c in self.channels if c not in self._light.used]
+        if dark:
+            raise ValueError(f"channel {dark[0]} of the reference picture is dark")
         self.level, self.share = self._references(light)
 
     def _references(self, light: LightMap) -> tuple[Array, Array]:
@@ -131,15 +134,12 @@ def _by_channel(
     """Logarithmic changes of single channels, and their noise, from those of combinations.
 
     The combinations are those of `ShadingChange`: difference and mean of the first two channels,
-    then each further channel less that mean. Raises ValueError for a channel that is dark.
+    then each further channel less that mean.
     """
     change, noise = shading.change, shading.noise
     logs, sigma = [], []
     for channel in channels:
-        found = np.flatnonzero(used == channel)
-        if not len(found):
-            raise ValueError(f"channel {channel} of the reference picture is dark")
-        number = int(found[0])
+        number = int(np.flatnonzero(used == channel)[0])
         if len(used) == 1:
             logs.append(change[0])
             sigma.append(noise[0])

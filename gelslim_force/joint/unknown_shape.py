@@ -11,7 +11,7 @@ from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.forces.estimator import neighbour_matrix, surface_share_mm2
-from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
 from gelslim_force.joint.light_view import LightView
@@ -24,6 +24,7 @@ from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_optics.light.light_law import LightLaw
 from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.errors import IfemError
 from ifem_export.markers.interpolation import marker_to_node
 
 if TYPE_CHECKING:
@@ -55,15 +56,27 @@ class UnknownShape:
         """Forget the last frame."""
         self._last = None
 
-    def look(self, image: NDArray[np.uint8], markers_px: Array) -> JointForces | None:
-        """Estimate the forces of a frame whose markers are at (n, 2); None without contact."""
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> JointForces | str | None:
+        """Estimate the forces of a frame whose markers are at (n, 2).
+
+        Returns:
+            The forces, None without contact, or why there are no forces.
+        """
         noise = noise_px(self.reference, markers_px - self.reference.positions_px)
-        self._last = self.estimator.estimate(image, markers_px, noise, self._last)
+        last, self._last = self._last, None
+        try:
+            self._last = self.estimator.estimate(image, markers_px, noise, last)
+        except IfemError as error:
+            return str(error)
         return self._last
 
-    def motion(self, seen: JointForces | None, lateral_mm: Array | None = None) -> NormalReading:
+    def motion(
+        self, seen: JointForces | str | None, lateral_mm: Array | None = None
+    ) -> NormalReading:
         """Motion and forces of what `look` saw; zero without contact."""
         count = len(self.estimator.points_mm)
+        if isinstance(seen, str):
+            return NormalReading.unknown(count, seen)
         if seen is None:
             unseen = np.full(count, self.unseen_mm)
             return NormalReading(np.zeros(count), unseen, np.zeros(count, dtype=bool))
@@ -82,7 +95,7 @@ def unknown_shape(
     calibration: Calibration,
     reference: NDArray[np.uint8],
     *,
-    strained: bool = False,
+    gel: str = "linear",
     settings: JointSettings | None = None,
 ) -> UnknownShape:
     """Make the source for one calibrated sensor.
@@ -91,7 +104,7 @@ def unknown_shape(
         bundle: The sensor, with markers and light.
         calibration: Its camera, and its markers at rest.
         reference: (h, w, 3) uint8 picture without contact.
-        strained: Take the gel as neo-Hookean.
+        gel: Law of the gel as in `PipelineSettings`.
         settings: What is assumed; the defaults if None.
 
     Returns:
@@ -130,7 +143,8 @@ def unknown_shape(
         LightLaw.of(light, chosen.gamma),
         bundle.material.youngs_modulus_mpa,
         chosen,
-        FiniteStrainForce(bundle) if strained else None,
+        None if gel == "linear" else FiniteStrainForce(bundle),
+        deep_mm(bundle) if gel == "auto" else 0.0,
     )
     unseen_n = chosen.unseen_force * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / _stiffness_n_mm(bundle, estimator))

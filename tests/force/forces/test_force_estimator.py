@@ -8,7 +8,7 @@ from pad_samples import hertz_like, small_bundle
 from scipy.spatial import cKDTree
 
 from gelslim_force.forces.estimator import ForceEstimator, ForceSettings, surface_share_mm2
-from gelslim_force.forces.finite_strain import FiniteStrainForce
+from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
 from gelslim_force.forces.wrench import WrenchNoise, resultant, rigid_motions
 from ifem_export.inverse.contact_inverse import masked_force
 from ifem_export.operators.ladder import lumped, refined
@@ -156,6 +156,17 @@ def test_neo_hookean_equals_linear_for_small_motion_and_differs_for_large(case) 
     assert np.linalg.norm(small - force) < 2e-3 * np.linalg.norm(force)
     large = law.force(0.5 * moved)
     assert large[:, 2].sum() < 0.51 * force[:, 2].sum()
+
+
+def test_the_law_follows_the_depth(case) -> None:
+    bundle, operator, _, moved = case
+    strained = FiniteStrainForce(bundle)
+    law = DepthLaw(operator, strained, deep_mm(bundle))
+    thickness = bundle.mesh.layers * bundle.mesh.cell_size_mm[2]
+    assert law.from_mm == pytest.approx(0.1 * thickness)
+    unit = moved / -moved[:, 2].min() * law.from_mm
+    assert (law.force(0.99 * unit) == operator.force(0.99 * unit)).all()
+    assert (law.force(1.01 * unit) == strained.force(1.01 * unit)).all()
 
 
 @pytest.mark.slow
