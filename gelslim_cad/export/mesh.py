@@ -5,7 +5,7 @@ A solid is triangulated face by face; the topology joins the patches into one cl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -52,7 +52,7 @@ def tessellate(shape: Any, linear_mm: float, angular_deg: float) -> TriangleMesh
     Raises:
         ExportError: a tolerance is not positive, or a face could not be triangulated.
     """
-    return welded(face_patches(shape, linear_mm, angular_deg))
+    return welded(_patches(shape, linear_mm, angular_deg, with_normals=False))
 
 
 def welded(patches: Sequence[Patch]) -> TriangleMesh:
@@ -186,6 +186,13 @@ def face_patches(shape: Any, linear_mm: float, angular_deg: float) -> list[Patch
     Raises:
         ExportError: a tolerance is not positive, or a face could not be triangulated.
     """
+    return _patches(shape, linear_mm, angular_deg, with_normals=True)
+
+
+def _patches(
+    shape: Any, linear_mm: float, angular_deg: float, *, with_normals: bool
+) -> list[Patch]:
+    """As `face_patches`; without normals, which take as long as the nodes, those are empty."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp
@@ -203,10 +210,11 @@ def face_patches(shape: Any, linear_mm: float, angular_deg: float) -> list[Patch
         TopExp.MapShapes_s(bare.wrapped, kind, found)
         maps.append(found)
     faces = [face.wrapped for face in bare.Faces()]
-    return [_patch(face, number, *maps) for number, face in enumerate(faces)]
+    vertices, edges = maps
+    return [_patch(f, n, vertices, edges, with_normals) for n, f in enumerate(faces)]
 
 
-def _patch(face: Any, number: int, vertices: Any, edges: Any) -> Patch:
+def _patch(face: Any, number: int, vertices: Any, edges: Any, with_normals: bool) -> Patch:
     from OCP.BRep import BRep_Tool
     from OCP.StdPrs import StdPrs_ToolTriangulatedShape
     from OCP.TopAbs import TopAbs_Orientation
@@ -219,11 +227,12 @@ def _patch(face: Any, number: int, vertices: Any, edges: Any) -> Patch:
             f"face {number} could not be triangulated; check the solid with isValid() and rebuild "
             "the fillet or cut that made the face"
         )
-    StdPrs_ToolTriangulatedShape.ComputeNormals_s(face, mesh)
-    transform = placement.Transformation()
     count = mesh.NbNodes()
-    nodes = np.array([_xyz(mesh.Node(i).Transformed(transform)) for i in range(1, count + 1)])
-    normals = np.array([_xyz(mesh.Normal(i).Transformed(transform)) for i in range(1, count + 1)])
+    nodes = _coordinates(mesh.Node, count, placement)
+    normals = np.zeros((0, 3))
+    if with_normals:
+        StdPrs_ToolTriangulatedShape.ComputeNormals_s(face, mesh)
+        normals = _coordinates(mesh.Normal, count, placement)
     triangles = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]) - 1
     if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
         triangles, normals = triangles[:, [0, 2, 1]], -normals
@@ -231,8 +240,13 @@ def _patch(face: Any, number: int, vertices: Any, edges: Any) -> Patch:
     return Patch(nodes, normals, triangles.astype(np.int64), keys)
 
 
-def _xyz(point: Any) -> tuple[float, float, float]:
-    return point.X(), point.Y(), point.Z()
+def _coordinates(found: Callable[[int], Any], count: int, placement: Any) -> NDArray[np.float64]:
+    """Coordinates (count, 3) of points or directions that are numbered from 1, once placed."""
+    numbered: Iterable[Any] = map(found, range(1, count + 1))
+    if not placement.IsIdentity():
+        transform = placement.Transformation()
+        numbered = (each.Transformed(transform) for each in numbered)
+    return np.array([each.Coord() for each in numbered])
 
 
 def _keys(

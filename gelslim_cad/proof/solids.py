@@ -32,10 +32,13 @@ def interferences(parts: Sequence[Part]) -> list[Interference]:
     """
     found = []
     boxes = [_box(p.solid) for p in parts]
-    for (a, box_a), (b, box_b) in combinations(zip(parts, boxes, strict=True), 2):
+    volumes = [float(p.solid.Volume()) for p in parts]
+    for (a, box_a, all_a), (b, box_b, all_b) in combinations(
+        zip(parts, boxes, volumes, strict=True), 2
+    ):
         if box_a.IsOut(box_b):
             continue
-        volume = common_volume(a.solid, b.solid)
+        volume = _common_volume(a.solid, b.solid, min(all_a, all_b))
         if not volume <= TOLERANCE_MM3:  # a volume that is not a number counts too
             found.append(Interference(a.name, b.name, volume))
     return found
@@ -56,7 +59,11 @@ def common_volume(first: Any, second: Any) -> float:
     A Boolean of the exact solids gives it. Where that fails or gives more than the smaller
     solid's volume, fine meshes of both are intersected instead.
     """
-    most = min(first.Volume(), second.Volume())
+    return _common_volume(first, second, min(first.Volume(), second.Volume()))
+
+
+def _common_volume(first: Any, second: Any, most: float) -> float:
+    """As `common_volume`, of which no more than the volume `most` can be common."""
     for fuzzy_mm in (0.0, 1e-5):
         volume = _boolean(first, second, fuzzy_mm)
         if volume is not None and -1e-6 * most <= volume <= most * (1 + 1e-6):

@@ -23,7 +23,7 @@ Circles = NDArray[np.float64]
 
 def is_valid(shape: Any) -> bool:
     """Whether a shape (`cadquery.Shape`, mm) is valid: as `shape.isValid()`, in less time."""
-    crowded = [f for f in shape.Faces() if f.geomType() == "PLANE" and len(f.innerWires()) > MANY]
+    crowded = [f for f in shape.Faces() if _is_crowded(f)]
     circles = [_circles(face) for face in crowded]
     if not crowded or not all(
         found is not None and _lie_apart(face, found)
@@ -32,6 +32,14 @@ def is_valid(shape: Any) -> bool:
         return bool(shape.isValid())
     others = (f for f in shape.Faces() if not any(f.isSame(c) for c in crowded))
     return all(map(_is_closed, shape.Shells())) and all(f.isValid() for f in others)
+
+
+def _is_crowded(face: Any) -> bool:
+    """Whether a face is plane and has many inner boundaries."""
+    # The number of children is known at once and is at least that of the boundaries.
+    if face.wrapped.NbChildren() <= MANY:
+        return False
+    return face.geomType() == "PLANE" and len(face.innerWires()) > MANY
 
 
 def _is_closed(shell: Any) -> bool:

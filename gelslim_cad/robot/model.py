@@ -22,7 +22,7 @@ from gelslim_cad.robot.frames import (
     vertical_fov_rad,
 )
 from gelslim_cad.robot.mass import MassProperties, PartMass, combined_mass, part_mass
-from gelslim_cad.robot.pieces import Piece, collision_pieces, visual_pieces
+from gelslim_cad.robot.pieces import Piece, collision_pieces, part_meshes, visual_pieces
 
 NAMES: tuple[Name, ...] = (
     "camera.focal_length_mm",
@@ -127,12 +127,13 @@ def robot_finger(name: str, parts: Sequence[Part], d: Lookup) -> RobotFinger:
     )
     mass = combined_mass(m.properties for m in moved)
     optical = optical_frame(d)
+    meshes = part_meshes(parts)
     return RobotFinger(
         name=name,
         mass=mass,
         part_masses=moved,
-        visuals=visual_pieces(parts, origin_mm),
-        collisions=collision_pieces(parts, origin_mm, _cuts_x_mm(d)),
+        visuals=visual_pieces(parts, meshes, origin_mm),
+        collisions=collision_pieces(parts, meshes, origin_mm, _cuts_x_mm(d)),
         frames=Frames(gel_frame(d), optical, graphics_frame(optical)),
         fov_y_rad=vertical_fov_rad(d),
         image_px=(int(d["camera.image_width_px"]), int(d["camera.image_height_px"])),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,36 +39,48 @@ class Piece:
     volume_mm3: float
 
 
-def visual_pieces(parts: Sequence[Part], origin_mm: NDArray[np.float64]) -> tuple[Piece, ...]:
-    """One mesh for each colour of the finger, named after its first part, about `origin_mm`."""
+def part_meshes(parts: Sequence[Part]) -> dict[str, TriangleMesh]:
+    """Meshes of parts by their names, from which all pieces are made."""
+    return {part.name: tessellate(part.solid, LINEAR_MM, ANGULAR_DEG) for part in parts}
+
+
+def visual_pieces(
+    parts: Sequence[Part], meshes: Mapping[str, TriangleMesh], origin_mm: NDArray[np.float64]
+) -> tuple[Piece, ...]:
+    """One mesh for each colour of the finger, named after its first part, about `origin_mm`.
+
+    `meshes` are those of the parts, as `part_meshes` gives them.
+    """
     groups: dict[Colour, list[Part]] = {}
     for part in parts:
         groups.setdefault(part.colour, []).append(part)
     pieces = []
     for colour, group in groups.items():
-        meshes = [tessellate(part.solid, LINEAR_MM, ANGULAR_DEG) for part in group]
-        mesh = _joined(meshes, origin_mm)
+        mesh = _joined([meshes[part.name] for part in group], origin_mm)
         pieces.append(Piece(f"visual_{group[0].name}", mesh, colour, volume_mm3(mesh)))
     return tuple(pieces)
 
 
 def collision_pieces(
-    parts: Sequence[Part], origin_mm: NDArray[np.float64], cuts_x_mm: Sequence[float]
+    parts: Sequence[Part],
+    meshes: Mapping[str, TriangleMesh],
+    origin_mm: NDArray[np.float64],
+    cuts_x_mm: Sequence[float],
 ) -> tuple[Piece, ...]:
     """Convex hulls that together are the outside of the finger, about `origin_mm`.
 
-    The case is one piece: what is within it cannot be touched, and cable and wires, which leave it,
-    yield. The gel is one of its own. The
-    adapter is cut at `cuts_x_mm`, rising positions along the finger, into pieces whose hulls
-    follow it; what lies beyond the last cut, its tongues, is inside the case.
+    `meshes` are those of the parts, as `part_meshes` gives them. The case is one piece: what is
+    within it cannot be touched, and cable and wires, which leave it, yield. The gel is one of its
+    own. The adapter is cut at `cuts_x_mm`, rising positions along the finger, into pieces whose
+    hulls follow it; what lies beyond the last cut, its tongues, is inside the case.
     """
     inside = [p for p in parts if p.name not in (ADAPTER, GEL, CABLE) and "wire" not in p.tags]
-    points = {"case": np.concatenate([_points(p) for p in inside])}
+    points = {"case": np.concatenate([meshes[p.name].vertices_mm for p in inside])}
     for part in parts:
         if part.name == GEL:
-            points["gel"] = _points(part)
+            points["gel"] = meshes[part.name].vertices_mm
         elif part.name == ADAPTER:
-            points |= _slices(part, cuts_x_mm)
+            points |= _slices(meshes[part.name], cuts_x_mm)
     pieces = []
     for name, found in points.items():
         hull = convex_hull(found - origin_mm)
@@ -89,15 +101,10 @@ def convex_hull(points_mm: NDArray[np.float64]) -> TriangleMesh:
     return stored(TriangleMesh(rounded, faces))
 
 
-def _points(part: Part) -> NDArray[np.float64]:
-    return tessellate(part.solid, LINEAR_MM, ANGULAR_DEG).vertices_mm
-
-
-def _slices(adapter: Part, cuts_x_mm: Sequence[float]) -> dict[str, NDArray[np.float64]]:
+def _slices(mesh: TriangleMesh, cuts_x_mm: Sequence[float]) -> dict[str, NDArray[np.float64]]:
     """Points of the adapter between neighbouring cuts, those on the cuts among them."""
     from trimesh.intersections import slice_faces_plane
 
-    mesh = tessellate(adapter.solid, LINEAR_MM, ANGULAR_DEG)
     limits = (-np.inf, *cuts_x_mm)
     pieces = {}
     for number in range(len(cuts_x_mm)):
