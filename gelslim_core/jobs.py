@@ -6,6 +6,7 @@ Worker processes end with their parent, and at once when the parent is interrupt
 from __future__ import annotations
 
 import contextlib
+import gc
 import multiprocessing
 import os
 import signal
@@ -193,7 +194,7 @@ def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[Proc
     that are left. Workers also end when their parent is killed.
     """
     context = multiprocessing.get_context(method)
-    with interrupts_held() as let_through:
+    with interrupts_held() as let_through, _shared_objects(method):
         pool = _Pool(workers, mp_context=context, initializer=begin_worker)
         try:
             with let_through():
@@ -202,6 +203,21 @@ def worker_pool(workers: int, method: Literal["fork", "spawn"]) -> Iterator[Proc
         except BaseException:
             _stop(pool)
             raise
+
+
+@contextlib.contextmanager
+def _shared_objects(method: str) -> Iterator[None]:
+    """Keep the garbage collector off the objects that forked workers share with this process.
+
+    It would write to each of them, so that every worker gets a copy of their memory.
+    """
+    if method == "fork":
+        gc.freeze()
+    try:
+        yield
+    finally:
+        if method == "fork":
+            gc.unfreeze()
 
 
 class _Pool(ProcessPoolExecutor):

@@ -15,6 +15,7 @@ from gelslim_cad.build.fingerprint import code_hash, combined, versions
 from gelslim_cad.build.folder import locked, require_ours, staged
 from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
 from gelslim_cad.build.work import Unit, Written, run
+from gelslim_cad.build.writers import load_libraries
 from gelslim_cad.checks import Check
 from gelslim_cad.spec.parts import files_key
 from gelslim_core.errors import GelslimError
@@ -278,8 +279,10 @@ def _doing(units: list[Unit], jobs: int) -> Iterator[Doing]:
     if jobs <= 1 or len(units) <= 1:
         yield {u.name: partial(run, u) for u in _by_cost(units)}
         return
-    # A forked worker starts with the CAD kernel loaded; a spawned one must load it first.
-    # A fork loses the kernel's threads, which Booleans use: units only write and read files.
+    # A forked worker starts with the libraries loaded; a spawned one must load them first.
+    # A fork loses the CAD kernel's threads, which Booleans use: units only write and read files.
+    if _forks():
+        load_libraries({unit.kind for unit in units})
     with worker_pool(min(jobs, len(units)), "fork" if _forks() else "spawn") as pool:
         yield {u.name: pool.submit(run, u).result for u in _by_cost(units)}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -314,3 +314,14 @@ WRITERS: dict[str, Callable[..., Written]] = {
     "robot": write_robot,
 }
 """The function that does each kind of unit."""
+
+
+def load_libraries(kinds: Collection[str]) -> None:
+    """Import what units of these kinds share and what takes long to import.
+
+    A process that does this before it forks its workers spares each of them the import.
+    """
+    if not {"part", "glb", "robot"}.isdisjoint(kinds):
+        import trimesh  # noqa: F401
+    if "part" in kinds:
+        import gelslim_cad.printability.thickness_kernel  # noqa: F401

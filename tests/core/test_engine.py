@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_tasks
 
-from gelslim_core.jobs import Engine, EngineError
+from gelslim_core.jobs import Engine, EngineError, worker_pool
 
 
 @pytest.fixture(autouse=True)
@@ -57,3 +58,15 @@ def test_a_local_cluster_gives_the_same() -> None:
     ) as cluster:
         found = dict(Engine(scheduler=cluster.scheduler_address).run(pool_tasks.square, [3, 4]))
     assert found == {0: 9, 1: 16}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="forks")
+def test_objects_shared_with_forks_are_left_to_them_by_the_collector() -> None:
+    """Frozen objects are not looked through; afterwards all are collected as before."""
+    assert gc.get_freeze_count() == 0
+    with worker_pool(1, "fork") as pool:
+        assert gc.get_freeze_count() > 10_000
+        assert pool.submit(gc.get_freeze_count).result() > 10_000
+    assert gc.get_freeze_count() == 0
+    with worker_pool(1, "spawn"):
+        assert gc.get_freeze_count() == 0
