@@ -68,8 +68,8 @@ def picture_set(
     The printed `dots` are drawn where the gel is seen from above, the camera's `view` in the
     section along the finger; both whole, without edges.
 
-    All four are drawn at once, which takes two thirds of the time, in a window as
-    `offscreen_window` gives it. Raises ValueError where a section misses every part.
+    All four are drawn in one window, as `offscreen_window` gives it. Raises ValueError where a
+    section misses every part.
     """
     along, across = _cut(meshes, "y", at_mm), _cut(meshes, "x", at_mm)
     above = () if dots is None else (dots,)

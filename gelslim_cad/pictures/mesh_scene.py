@@ -19,6 +19,9 @@ MARGIN = 1.06
 CUT_OFFSET_MM = 1.3e-4
 """Shifts the cut, so that it avoids vertices and faces that lie exactly in its plane."""
 OPAQUE = 0.999
+PEELS = 2
+"""Each peel draws two layers of what light passes through; more of them change no pixel by more
+than 14 of 255."""
 INK = (0.09, 0.11, 0.14)
 
 
@@ -86,8 +89,8 @@ class MeshScene:
         """Height of an image of `width_px`."""
         return round(width_px * self._shape())
 
-    def placed(self, low: float, high: float) -> Any:
-        """The renderer with all that was added, for the part of a window from low to high."""
+    def placed(self, top: float) -> Any:
+        """The renderer with all that was added, for a window from its lower edge up to `top`."""
         self._aim(self._shape())
         plane = self._plane()
         for poly, rgba in self._surfaces():
@@ -101,9 +104,9 @@ class MeshScene:
         # Lines alone need no peeling, which draws the scene once for each layer.
         colours = [rgba for _, rgba, _ in self._solids] + [rgba for _, rgba in self._overlays]
         self._renderer.SetUseDepthPeeling(any(rgba[3] < OPAQUE for rgba in colours))
-        self._renderer.SetMaximumNumberOfPeels(4)
+        self._renderer.SetMaximumNumberOfPeels(PEELS)
         self._renderer.SetOcclusionRatio(0.0)
-        self._renderer.SetViewport(0.0, low, 1.0, high)
+        self._renderer.SetViewport(0.0, 0.0, 1.0, top)
         return self._renderer
 
     def _surfaces(self) -> list[tuple[Any, tuple[float, ...]]]:
@@ -235,6 +238,9 @@ class MeshScene:
         look.SetSpecular(0.16)
         look.SetSpecularPower(28.0)
         look.SetInterpolationToGouraud() if smooth else look.LightingOff()
+        if smooth and rgba[3] >= OPAQUE:
+            # A closed solid hides the inner side of its surface, and a cut is closed.
+            look.BackfaceCullingOn()
 
     def _flat(self, poly: Any, rgba: tuple[float, ...]) -> None:
         from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer

@@ -1,10 +1,9 @@
-"""The off-screen window: it draws scenes, one above the other, and gives their pixels."""
+"""The off-screen window: it draws scenes, one after the other, and gives their pixels."""
 
 from __future__ import annotations
 
 import ctypes
 import io
-import itertools
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -55,7 +54,7 @@ def offscreen_window() -> Iterator[Any]:
 def draw(
     window: Any, scenes: Sequence[MeshScene], width_px: int, oversampling: int
 ) -> list[np.ndarray]:
-    """Draw scenes, one above the other. A window compiles its shaders only once.
+    """Draw scenes, one after the other. A window compiles its shaders only once.
 
     Args:
         window: Off-screen window, as `offscreen_window` gives it.
@@ -66,33 +65,38 @@ def draw(
     Returns:
         An image for each scene, uint8 (height, width, 3).
     """
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
-
-    k = oversampling
+    if not scenes:
+        return []
     heights = [scene.height_px(width_px) for scene in scenes]
-    ends = np.cumsum([0, *heights])
-    window.SetSize(width_px * k, int(ends[-1]) * k)
+    # One size for all: a window that changes its size makes its buffers anew.
+    window.SetSize(width_px * oversampling, max(heights) * oversampling)
     window.SetMultiSamples(0)
     window.SetAlphaBitPlanes(1)
-    placed = [s.placed(low / ends[-1], high / ends[-1])
-              for s, low, high in zip(scenes, ends, ends[1:], strict=False)]  # fmt: skip
-    for renderer in placed:
+    drawn = []
+    for scene, height in zip(scenes, heights, strict=True):
+        renderer = scene.placed(height / max(heights))
         window.AddRenderer(renderer)
-    window.Render()
-    grab = vtkWindowToImageFilter()
-    grab.SetInput(window)
-    grab.ReadFrontBufferOff()
-    grab.ShouldRerenderOff()
-    grab.SetInputBufferTypeToRGB()
-    grab.Update()
-    for renderer in placed:
+        window.Render()
+        drawn.append(_pixels(window, width_px, height, oversampling))
         window.RemoveRenderer(renderer)
-    flat = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars())
-    drawn = flat.reshape(ends[-1] * k, width_px * k, 3)
-    whole = sum(drawn[i::k, j::k].astype(np.uint16) for i in range(k) for j in range(k))
-    whole = ((whole + k * k // 2) // (k * k)).astype(np.uint8)
-    return [np.ascontiguousarray(whole[low:high][::-1]) for low, high in itertools.pairwise(ends)]
+    return drawn
+
+
+def _pixels(window: Any, width_px: int, height_px: int, oversampling: int) -> np.ndarray:
+    """The lower part of a window as an image (height_px, width_px, 3), whose first row is its top.
+
+    Each pixel is the mean of those that were drawn for it.
+    """
+    from PIL import Image
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+    columns, rows = width_px * oversampling, height_px * oversampling
+    found = vtkUnsignedCharArray()
+    back_buffer = 0
+    window.GetPixelData(0, 0, columns - 1, rows - 1, back_buffer, found, 0)
+    image = Image.fromarray(vtk_to_numpy(found).reshape(rows, columns, 3))
+    return np.ascontiguousarray(np.asarray(image.reduce(oversampling))[::-1])
 
 
 def png_bytes(image: np.ndarray) -> bytes:
