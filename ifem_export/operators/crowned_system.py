@@ -113,6 +113,10 @@ class CrownedSystem(PadSystem):
         return sparse.csr_array((transformed + transformed.T) / 2)
 
     @cached_property
+    def _holder(self) -> tuple[sparse.csr_array, int]:
+        return self.stiffness, 0
+
+    @cached_property
     def preconditioner(self) -> EmbeddedPreconditioner:
         """Inverse of the full infinite pad, restricted to the existing nodes."""
         share, at, other = self._shares

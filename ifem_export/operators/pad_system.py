@@ -89,33 +89,45 @@ class PadSystem:
     @cached_property
     def stiffness(self) -> sparse.csr_array:
         """Free-free stiffness (3Lc, 3Lc) in N/mm."""
-        all_nodes = mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
-        bonded = 3 * self.columns
-        return sparse.csr_array(all_nodes[bonded:, bonded:])
+        matrix, first = self._holder
+        return sparse.csr_array(matrix[first:, first:])
 
     @cached_property
     def inner(self) -> sparse.csr_array:
         """Inner-inner block; empty for one layer."""
-        n = self._inner_size
-        return sparse.csr_array(self.stiffness[:n, :n])
+        matrix, first = self._holder
+        end = first + self._inner_size
+        return sparse.csr_array(matrix[first:end, first:end])
 
     @cached_property
     def surface(self) -> sparse.csr_array:
         """Surface-surface block."""
-        n = self._inner_size
-        return sparse.csr_array(self.stiffness[n:, n:])
+        matrix, first = self._holder
+        end = first + self._inner_size
+        return sparse.csr_array(matrix[end:, end:])
 
     @cached_property
     def inner_to_surface(self) -> sparse.csr_array:
         """Surface-inner block, K_si."""
-        n = self._inner_size
-        return sparse.csr_array(self.stiffness[n:, :n])
+        matrix, first = self._holder
+        end = first + self._inner_size
+        return sparse.csr_array(matrix[end:, first:end])
 
     @cached_property
     def surface_to_inner(self) -> sparse.csr_array:
         """Inner-surface block, K_is."""
-        n = self._inner_size
-        return sparse.csr_array(self.stiffness[:n, n:])
+        matrix, first = self._holder
+        end = first + self._inner_size
+        return sparse.csr_array(matrix[first:end, end:])
+
+    @cached_property
+    def _holder(self) -> tuple[sparse.csr_array, int]:
+        """The matrix that all blocks are cut from, and its first free unknown.
+
+        It is that of all nodes: what needs no more than the inner block of a fine pad is spared
+        the copy without the bonded nodes.
+        """
+        return mesh_stiffness(self.mesh, np.asarray(self.element_matrix)), 3 * self.columns
 
     @property
     def _inner_size(self) -> int:
