@@ -8,6 +8,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
+import itertools
+import math
 import re
 from typing import Any
 
@@ -61,16 +63,69 @@ def only_solid(shape: Any, name: str = "shape") -> Any:
 
 
 def bounds_mm(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Low and high corner `(3,)` of the tight bounding box, independent of any cached mesh."""
+    """Low and high corner `(3,)` of the tight bounding box, independent of any cached mesh.
+
+    The kernel searches the extremes of a torus by trial, in 15 ms; they have a closed form.
+    """
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
 
     box = Bnd_Box()
-    BRepBndLib.AddOptimal_s(shape.wrapped, box, False, False)
-    box.SetGap(0.0)
-    corners = (box.CornerMin(), box.CornerMax())
-    low, high = (np.array([c.X(), c.Y(), c.Z()]) for c in corners)
+    corners = []
+    faces = shape.Faces()
+    for face in faces:
+        torus = _torus_bounds_mm(face)
+        if torus is None:
+            BRepBndLib.AddOptimal_s(face.wrapped, box, False, False)
+        else:
+            corners.append(torus)
+    if not faces:
+        BRepBndLib.AddOptimal_s(shape.wrapped, box, False, False)
+    if not box.IsVoid():
+        box.SetGap(0.0)
+        ends = (box.CornerMin(), box.CornerMax())
+        corners.append(np.array([end.Coord() for end in ends]))
+    low, high = np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
     return low, high
+
+
+def _torus_bounds_mm(face: Any) -> NDArray[np.float64] | None:
+    """Low and high corner (2, 3) of a face of a torus; None unless two pairs of circles bound it.
+
+    A point of the torus is O + (R + r cos v)(cos u X + sin u Y) + r sin v Z. Along any direction
+    the extreme over u is that of a sinusoid, and so is then the extreme over v, as R > r.
+    """
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepTools import BRepTools
+    from OCP.GeomAbs import GeomAbs_SurfaceType
+
+    surface = BRepAdaptor_Surface(face.wrapped, True)
+    if surface.GetType() != GeomAbs_SurfaceType.GeomAbs_Torus:
+        return None
+    torus = surface.Torus()
+    large, small = torus.MajorRadius(), torus.MinorRadius()
+    u0, u1, v0, v1 = BRepTools.UVBounds_s(face.wrapped)
+    area = small * (u1 - u0) * (large * (v1 - v0) + small * (math.sin(v1) - math.sin(v0)))
+    if large <= small or not math.isclose(face.Area(), area, rel_tol=1e-9):
+        return None
+    place = torus.Position()
+    axes = np.array([d.Coord() for d in (place.XDirection(), place.YDirection())])
+    along = np.array(place.Axis().Direction().Coord())
+    found = np.empty((2, 3))
+    for k, sign in itertools.product(range(3), (-1.0, 1.0)):
+        across = _greatest(sign * axes[0, k], sign * axes[1, k], (u0, u1))
+        reach = large * across + small * _greatest(across, sign * along[k], (v0, v1))
+        found[int(sign > 0), k] = place.Location().Coord()[k] + sign * reach
+    return found
+
+
+def _greatest(a: float, b: float, interval: tuple[float, float]) -> float:
+    """Greatest value of a cos t + b sin t for t in an interval."""
+    low, high = interval
+    peak = math.atan2(b, a)
+    peak += math.tau * math.ceil((low - peak) / math.tau)
+    ends = (a * math.cos(t) + b * math.sin(t) for t in interval)
+    return math.hypot(a, b) if peak <= high else max(ends)
 
 
 def shape_to_bytes(shape: Any) -> bytes:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from gelslim_cad.export.brep import bounds_mm
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.pictures.finger_pictures import ISO
 
@@ -66,11 +67,10 @@ class _Scene:
         screen = np.stack([right, up])
         outlines, heights = [], []
         for part in parts:
-            box = part.solid.BoundingBox()
-            ends = ((box.xmin, box.xmax), (box.ymin, box.ymax), (box.zmin, box.zmax))
-            corners = np.array(np.meshgrid(*ends)).reshape(3, -1).T
+            low, high = bounds_mm(part.solid)
+            corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
             corners[:, :2] += part.explode_mm[:2]
-            heights.append(box.zmax - box.zmin)
+            heights.append(float(high[2] - low[2]))
             seen = corners @ screen.T
             outlines.append(seen[ConvexHull(seen, qhull_options="QJ").vertices])
         every = np.concatenate(outlines)
