@@ -19,7 +19,6 @@ from gelslim_cad.ordering.price_list import Prices, read_prices
 from gelslim_cad.report.view_figures import view_inputs
 from gelslim_cad.sensor import printed_grid, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
-from gelslim_core.files.held_interrupt import interrupts_held
 from ifem_export.markers.grid import MarkerGrid
 
 
@@ -102,9 +101,9 @@ class Stages:
 
     def plan(self) -> Plan:
         """Make the solids and lay out the work. Loads the CAD kernel."""
-        with interrupts_held():
-            import cadquery  # noqa: F401
+        from gelslim_cad.export.cad_kernel import load_cad_kernel
 
+        load_cad_kernel()
         from gelslim_cad.solids.finger import finger_parts, tooling_parts
 
         finger = finger_parts(self.dimensions, self.loaded.own_parts)
