@@ -276,13 +276,15 @@ def _doing(units: list[Unit], jobs: int) -> Iterator[Doing]:
 
     With one process each unit is done when its result is asked for.
     """
-    if jobs <= 1 or len(units) <= 1:
+    # A forked worker starts with the CAD kernel loaded; a spawned one must load it first, which
+    # does not pay for a single unit.
+    least = 1 if _forks() else 2
+    if jobs <= 1 or len(units) < least:
         yield {u.name: partial(run, u) for u in _by_cost(units)}
         return
-    # A forked worker starts with the libraries loaded; a spawned one must load them first.
-    # A fork loses the CAD kernel's threads, which Booleans use: units only write and read files.
-    if _forks():
+    if _forks() and len(units) > 1:
         load_libraries({unit.kind for unit in units})
+    # A fork loses the kernel's threads, which Booleans use: units only write and read files.
     with worker_pool(min(jobs, len(units)), "fork" if _forks() else "spawn") as pool:
         yield {u.name: pool.submit(run, u).result for u in _by_cost(units)}
 
