@@ -1,9 +1,9 @@
-"""Tables, bill of materials, instructions and report of a build."""
+"""Instructions, orders and report of a build, which tell of its other files."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelslim_cad.assembly.record import read_steps
 from gelslim_cad.build.assembly_steps import ToldStep, fasteners_told, motion, told_steps
-from gelslim_cad.build.bill import finger_bill
+from gelslim_cad.build.draft import Draft
 from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.instructions import after_assembly, before_assembly, build_guide
 from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
@@ -26,20 +26,14 @@ from gelslim_cad.build.writers import (
     step_picture,
 )
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.electronics.finger import finger_boards
-from gelslim_cad.electronics.order import circuit_record, order_files
 from gelslim_cad.geometry.gel_shape import has_markers
 from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.geometry.overlay import Overlay, light_paths
 from gelslim_cad.markers.outline import Outline
 from gelslim_cad.markers.process import MARKING_PROCESSES
-from gelslim_cad.markers.write import render_marker_files
-from gelslim_cad.ordering.cost import Cost, cost_record
+from gelslim_cad.ordering.cost import Cost
 from gelslim_cad.ordering.line import BomLine
 from gelslim_cad.ordering.orders import OrderInput, order_archives
-from gelslim_cad.ordering.pricing import priced
-from gelslim_cad.ordering.shopping import total_cost
-from gelslim_cad.ordering.tables import bom_csv
 from gelslim_cad.ordering.texts import PrintOrder
 from gelslim_cad.printability.rules import PrintedPart
 from gelslim_cad.report.build_page import PageStep, render_build_page
@@ -47,8 +41,6 @@ from gelslim_cad.report.camera_view import CameraView
 from gelslim_cad.report.render import Picture, ReportData, render_report
 from gelslim_cad.report.tables import Note
 from gelslim_cad.report.view_figures import projection_sentence
-from gelslim_cad.sensor import marker_print
-from gelslim_cad.spec.parts import OwnPart
 from ifem_export.markers.grid import MarkerGrid
 
 OF_MARKERS = ("marker_grid.", "pad_mesh.")
@@ -78,50 +70,27 @@ LIGHT_PICTURES = {
 def documents(
     stages: Stages,
     plan: Plan,
+    drafted: Draft,
     contents: Mapping[str, bytes],
     files: Mapping[str, FileEntry],
     missing: str,
 ) -> Files:
-    """Everything that is quick to write: markers, LED boards, tables, instructions, report.
+    """Everything that is quick to write: the draft, instructions, orders, report.
 
     `contents` are those of the built files by path, `files` their entries; `missing` says why
     there are no pictures, where there are none.
     """
     d, grid = stages.dimensions, stages.grid
     parts = (*plan.finger, *plan.tooling)
-    boards = finger_boards(d)
-    prices = stages.prices.entries
-    bom = priced(finger_bill(d, parts, boards), prices)
-    cost = total_cost(bom, prices)
+    boards, bom, cost = drafted.boards, drafted.bom, drafted.cost
     steps = read_steps(json.loads(contents[ASSEMBLY_JSON]))
-    dimensions = {
-        "format": "gelslim-dimensions/1",
-        "name": stages.name,
-        "spec_hash": stages.spec_hash,
-        "binding": stages.binding,
-        "dimensions": {name: d.record(name) for name in d.values},
-    }
-    made = {} if grid is None else marker_files(d, grid)
-    made |= own_files(stages.loaded.own_parts)
-    made |= {f"electronics/{n}": entries for n, entries in order_files(boards, d).items()}
-    made |= {
-        "electronics/circuits.json": (
-            json_bytes(circuit_record(boards)),
-            "circuits of the LED boards",
-        ),
-        "spec.yaml": (stages.loaded.text.encode(), "the spec this was built from"),
-        "dimensions.json": (
-            json_bytes(dimensions),
-            "dependent dimensions with formulas and inputs",
-        ),
+    made = drafted.files | {
         "checks.json": (json_bytes([asdict(c) for c in plan.checks]), "design rules with margins"),
-        "orders/cost.json": (json_bytes(cost_record(cost)), "what the finger costs"),
         "BUILD.md": (build_guide(d, grid, bom, stages.name, steps), "how to make and assemble it"),
         "BUILD.html": (
             build_page(stages, bom, told_steps(d, boards, steps), contents),
             "the same with a picture of each step, to tick off or to print; offline",
         ),
-        "BOM.csv": (bom_csv(bom, cost), "bill of materials with prices"),
     }
     printed = printed_parts(d, parts, contents)
     given = OrderInput(
@@ -133,7 +102,7 @@ def documents(
         tuple(item.board.name for item in boards.boards),
         stencil_layers(d),
     )
-    made |= order_archives(given, cost, prices)
+    made |= order_archives(given, cost, stages.prices.entries)
     own = {path: entry(data, purpose, "documents") for path, (data, purpose) in made.items()}
     page = render_report(
         report_data(stages, plan, (bom, cost), printed, contents, {**files, **own}, missing)
@@ -165,22 +134,6 @@ def build_page(
     ]
     before = before_assembly(d, stages.grid, bom, stages.name, told)
     return render_build_page(stages.name, stages.spec_hash, before, steps, after_assembly(d))
-
-
-def own_files(own: Iterable[OwnPart]) -> Files:
-    """Copies of the files of the author's own parts, so that the folder tells what it is of."""
-    return {
-        f"own_parts/{part.file.name}": (part.file.read_bytes(), f"own part: {part.name}")
-        for part in own
-    }
-
-
-def marker_files(d: Dimensions, grid: MarkerGrid) -> Files:
-    """The marker print in every format."""
-    markers = render_marker_files(
-        grid, *marker_print(d, grid), film_kerf_mm=d["manufacturing.kerf.film_mm"]
-    )
-    return {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
 
 
 def stencil_layers(d: Dimensions) -> tuple[str, ...]:

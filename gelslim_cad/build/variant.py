@@ -125,6 +125,7 @@ def _build(
     stages: Stages, target: Path, previous: Manifest | None, key: str, jobs: int, notify: Progress
 ) -> BuildResult:
     from gelslim_cad.build.documents import documents
+    from gelslim_cad.build.draft import draft
 
     notify("solids", 0, 1)
     early = stages.units_without_solids
@@ -137,13 +138,16 @@ def _build(
         with _doing([u for u in todo if u.name not in begun], jobs) as doing:
             plan = stages.with_solid_checks(plan)
             _require_rules(stages.name, plan.checks)
+            drafted = draft(stages, plan)
             written = {**_results(doing, notify), **_results(begun, notify)}
     _require_proofs(stages.name, plan.checks, written)
     with staged(target, () if previous is None else {*previous.files, NAME}) as folder:
         contents, files = _gathered(list(keys), target, previous, reused, written)
         plan = _with_print_checks(stages, plan, contents)
         note = " ".join(w.note for w in written.values() if w.note)
-        for path, (data, purpose) in documents(stages, plan, contents, files, note).items():
+        for path, (data, purpose) in documents(
+            stages, plan, drafted, contents, files, note
+        ).items():
             contents[path] = data
             files[path] = entry(data, purpose, "documents")
         # A unit that could not be done on this machine is tried again by the next build.

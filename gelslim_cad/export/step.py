@@ -109,7 +109,8 @@ def _write(parts: Sequence[Part], solids: Sequence[Any], title: str, single: boo
         raise ExportError(f"STEP: OCCT could not translate {title!r}; check that it is valid")
     model = writer.Writer().Model(False)
     _add_colours(writer.Writer().WS(), model, parts, solids)
-    _number_occurrences(model)
+    if not single:
+        _number_occurrences(model)
     _set_header(model, title)
     stream = io.BytesIO()
     if writer.WriteStream(stream) != IFSelect_ReturnStatus.IFSelect_RetDone:

@@ -89,6 +89,7 @@ def _build(spec_path: Path, last: Stage, enter: Callable[[str], None]) -> Outcom
 def _write(stages: Any, plan: Any, solids: int, enter: Callable[[str], None]) -> Outcome:
     """Write and prove every file in memory."""
     from gelslim_cad.build.documents import documents
+    from gelslim_cad.build.draft import draft
     from gelslim_cad.build.manifest import FileEntry, entry
     from gelslim_cad.build.work import run
 
@@ -108,5 +109,5 @@ def _write(stages: Any, plan: Any, solids: int, enter: Callable[[str], None]) ->
         detail = "; ".join(f"{p['file']}: {p['check']} {p['detail']}" for p in bad)
         return Outcome("failed", "files", kinds, detail[:600], solids, len(files), len(proofs))
     enter("documents")
-    made = documents(stages, plan, contents, files, "no pictures in this run")
+    made = documents(stages, plan, draft(stages, plan), contents, files, "no pictures in this run")
     return Outcome("built", "files", (), "", solids, len(files) + len(made), len(proofs))
