@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.pictures.mesh_scene import MeshScene, View
+from gelslim_cad.pictures.shaded_mesh import shaded_mesh
 from gelslim_cad.pictures.window import draw, offscreen_window
 from gelslim_cad.sensor import marker_grid
 from gelslim_core.figure import as_png
@@ -195,7 +196,7 @@ def _row(
         first = 0
         for mesh in m.meshes:
             last = first + len(mesh.vertices_mm)
-            scene.add(points[first:last] + along, mesh.faces, mesh.rgba)
+            scene.add(shaded_mesh(points[first:last], mesh.faces), mesh.rgba, along)
             first = last
     half = max(float(np.ptp(p @ FRONT.axes()[0])) for p in (shapes[0], shapes[-1])) / 2
     # Both rows as wide as the wider one, so that they come out at one scale.

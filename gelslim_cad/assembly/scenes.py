@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.assembly.order import Step, Way
-from gelslim_cad.export.mesh import TriangleMesh
 from gelslim_cad.pictures.mesh_scene import View
+from gelslim_cad.pictures.shaded_mesh import ShadedMesh
 from gelslim_cad.pictures.step_pictures import Arrow, Colour, Drawn, StepScene
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ BEHIND = View(-124.0, -24.0)
 
 
 def step_scene(
-    step: Step, meshes: Mapping[str, TriangleMesh], colours: Mapping[str, Colour]
+    step: Step, meshes: Mapping[str, ShadedMesh], colours: Mapping[str, Colour]
 ) -> StepScene:
     """The picture of a step.
 
@@ -49,13 +49,13 @@ def step_scene(
     Returns:
         What to draw.
     """
-    drawn = [_drawn(meshes[n], np.zeros(3), _mixed(colours[n], PALE, PALE_SHARE, 1.0))
+    drawn = [Drawn(meshes[n], np.zeros(3), _mixed(colours[n], PALE, PALE_SHARE, 1.0))
              for n in step.stays]  # fmt: skip
     arrows: list[Arrow] = []
     if step.moves:
         back, way_arrows = _on_its_way([meshes[n] for n in step.moves], step.way)
         arrows += way_arrows
-        drawn += [_drawn(meshes[n], back, _mixed(colours[n], MOVING, STRONG_SHARE, 1.6))
+        drawn += [Drawn(meshes[n], back, _mixed(colours[n], MOVING, STRONG_SHARE, 1.6))
                   for n in step.moves]  # fmt: skip
     for fastener in step.fasteners:
         mesh = meshes[fastener.part]
@@ -63,7 +63,7 @@ def step_scene(
         if step.moves and fastener.way[-1].direction == step.way[-1].direction:
             # The screws follow the part: they are drawn behind it.
             back = back + _on_its_way([meshes[n] for n in step.moves], step.way)[0]
-        drawn.append(_drawn(mesh, back, (*FASTENER, 1.0)))
+        drawn.append(Drawn(mesh, back, (*FASTENER, 1.0)))
         if not step.moves:
             arrows += screw_arrows
     return StepScene(tuple(drawn), tuple(arrows), _view(step))
@@ -83,7 +83,7 @@ def _view(step: Step) -> View:
 
 
 def _on_its_way(
-    meshes: Sequence[TriangleMesh], way: Way, length_mm: float | None = None
+    meshes: Sequence[ShadedMesh], way: Way, length_mm: float | None = None
 ) -> tuple[Floats, list[Arrow]]:
     """How far parts are drawn back from their seat, and the arrows behind them."""
     points = np.concatenate([m.vertices_mm for m in meshes])
@@ -106,10 +106,6 @@ def _on_its_way(
             length = min(max(0.25 * size, 4.0), 14.0)
             arrows.append(Arrow(rear + back, along, length, 0.14 * length))
     return back, arrows
-
-
-def _drawn(mesh: TriangleMesh, shift: Floats, colour: Colour) -> Drawn:
-    return Drawn(mesh.vertices_mm + shift, mesh.faces, colour)
 
 
 def _mixed(own: Colour, other: tuple[float, float, float], share: float, solid: float) -> Colour:

@@ -97,7 +97,8 @@ def write_order(
     from gelslim_cad.assembly.proof import prove
     from gelslim_cad.assembly.record import assembly_record, read_steps
     from gelslim_cad.assembly.scenes import step_scene
-    from gelslim_cad.pictures.finger_pictures import picture_set
+    from gelslim_cad.pictures.finger_pictures import Shown, picture_set
+    from gelslim_cad.pictures.shaded_mesh import shaded_mesh
     from gelslim_cad.pictures.step_pictures import picture_steps
     from gelslim_cad.pictures.window import PictureError, offscreen_window
 
@@ -107,7 +108,8 @@ def write_order(
     files: Files = {ASSEMBLY_JSON: (data, "order of assembly with ways, fasteners and drivers")}
     colours = {part.name: part.colour for part in parts}
     known = read_steps(record)
-    shown = [(p.name, *meshes[p.name], p.colour, p.explode_mm) for p in parts]
+    shaded = {part: shaded_mesh(*mesh) for part, mesh in meshes.items()}
+    shown = [Shown(shaded[p.name], p.colour, p.explode_mm) for p in parts]
     explode = {part.name: part.explode_mm for part in parts}
     view, dots = (
         None if packed is None else _drawn(Overlay.unpacked(packed), explode)
@@ -115,7 +117,7 @@ def write_order(
     )
     try:
         with offscreen_window() as window:
-            drawn = picture_steps(window, [step_scene(s, meshes, colours) for s in known])
+            drawn = picture_steps(window, [step_scene(s, shaded, colours) for s in known])
             whole = picture_set(window, shown, SECTION_MM, dots, view)
     except PictureError as error:
         return Written(files, note=str(error))

@@ -6,11 +6,13 @@ VTK is used without PyVista's plotter, whose import alone takes longer than all 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from gelslim_cad.pictures.mesh_scene import MeshScene, View
+from gelslim_cad.pictures.shaded_mesh import ShadedMesh, shaded_mesh
 from gelslim_cad.pictures.window import draw, offscreen_window, png_bytes
 
 Mesh = tuple[
@@ -21,6 +23,16 @@ Mesh = tuple[
     tuple[float, float, float],
 ]
 """Name, vertices (n, 3) in mm, faces (m, 3), sRGB colour with opacity, explode vector in mm."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A part as pictures show it: mesh, sRGB colour with opacity, explode vector in mm."""
+
+    mesh: ShadedMesh
+    colour: tuple[float, float, float, float]
+    explode_mm: tuple[float, float, float]
+
 
 Axis = Literal["x", "y", "z"]
 
@@ -38,12 +50,12 @@ def picture_whole(meshes: Sequence[Mesh]) -> bytes:
     Raises:
         PictureError: VTK or a system library that it needs is missing.
     """
-    return _alone(lambda: _scene(meshes, ISO))
+    return _alone(lambda: _scene(_shown(meshes), ISO))
 
 
 def picture_exploded(meshes: Sequence[Mesh], explode: float = 1.0) -> bytes:
     """Draw the parts moved by `explode` times their explode vectors; raises as picture_whole."""
-    return _alone(lambda: _scene(meshes, ISO, explode))
+    return _alone(lambda: _scene(_shown(meshes), ISO, explode))
 
 
 def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0) -> bytes:
@@ -52,13 +64,18 @@ def picture_section(meshes: Sequence[Mesh], axis: Axis = "y", at_mm: float = 0.0
     Everything between the plane and the viewer is removed. Raises as picture_whole, and
     ValueError where the plane misses every part.
     """
-    cut = _cut(meshes, axis, at_mm)
-    return _alone(lambda: _scene(meshes, SECTIONS[axis], 0.0, cut))
+    shown = _shown(meshes)
+    cut = _cut(shown, axis, at_mm)
+    return _alone(lambda: _scene(shown, SECTIONS[axis], 0.0, cut))
+
+
+def _shown(meshes: Sequence[Mesh]) -> list[Shown]:
+    return [Shown(shaded_mesh(v, f), colour, explode) for _, v, f, colour, explode in meshes]
 
 
 def picture_set(
     window: Any,
-    meshes: Sequence[Mesh],
+    parts: Sequence[Shown],
     at_mm: float = 0.0,
     dots: Mesh | None = None,
     view: Mesh | None = None,
@@ -71,23 +88,24 @@ def picture_set(
     All four are drawn in one window, as `offscreen_window` gives it. Raises ValueError where a
     section misses every part.
     """
-    along, across = _cut(meshes, "y", at_mm), _cut(meshes, "x", at_mm)
+    along, across = _cut(parts, "y", at_mm), _cut(parts, "x", at_mm)
     above = () if dots is None else (dots,)
     beside = () if view is None else (view,)
     scenes = [
-        _scene(meshes, ISO, overlays=above),
-        _scene(meshes, ISO, 1.0, overlays=above),
-        _scene(meshes, SECTIONS["y"], 0.0, along, beside),
-        _scene(meshes, SECTIONS["x"], 0.0, across),
+        _scene(parts, ISO, overlays=above),
+        _scene(parts, ISO, 1.0, overlays=above),
+        _scene(parts, SECTIONS["y"], 0.0, along, beside),
+        _scene(parts, SECTIONS["x"], 0.0, across),
     ]
     whole, exploded, section, section_across = map(png_bytes, _images(window, scenes))
     return whole, exploded, section, section_across
 
 
-def _cut(meshes: Sequence[Mesh], axis: Axis, at_mm: float) -> tuple[int, float]:
+def _cut(parts: Sequence[Shown], axis: Axis, at_mm: float) -> tuple[int, float]:
     """Axis and place of a section. Raises ValueError where it misses every part."""
     index = "xyz".index(axis)
-    spans = [(mesh[1][:, index].min(), mesh[1][:, index].max()) for mesh in meshes]
+    along = [part.mesh.vertices_mm[:, index] for part in parts]
+    spans = [(places.min(), places.max()) for places in along]
     if not any(low < at_mm < high for low, high in spans):
         low, high = min(s[0] for s in spans), max(s[1] for s in spans)
         raise ValueError(
@@ -97,15 +115,16 @@ def _cut(meshes: Sequence[Mesh], axis: Axis, at_mm: float) -> tuple[int, float]:
 
 
 def _scene(
-    meshes: Sequence[Mesh],
+    parts: Sequence[Shown],
     view: View,
     explode: float = 0.0,
     cut: tuple[int, float] | None = None,
     overlays: Sequence[Mesh] = (),
 ) -> MeshScene:
     scene = MeshScene(view, cut)
-    for number, (_, vertices, faces, rgba, shift) in enumerate(meshes):
-        scene.add(vertices + explode * np.asarray(shift), faces, rgba, hatch_up=number % 2 == 0)
+    for number, part in enumerate(parts):
+        moved = explode * np.asarray(part.explode_mm)
+        scene.add(part.mesh, part.colour, moved, hatch_up=number % 2 == 0)
     for _, vertices, faces, rgba, shift in overlays:
         scene.add_overlay(vertices + explode * np.asarray(shift), faces, rgba)
     return scene

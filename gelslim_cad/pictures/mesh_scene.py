@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-CREASE_DEG = 24.0
+from gelslim_cad.pictures.shaded_mesh import CREASE_DEG, ShadedMesh, joined
+from gelslim_cad.pictures.vtk_data import appended, line_data, poly_data, producer
+
 HATCH_SPACING = 0.035
 """Distance of the hatch lines as a fraction of the picture's width."""
 BRIGHTENING = 0.07
@@ -41,6 +44,22 @@ class View:
         return np.array([right, up, back])
 
 
+@dataclass(frozen=True)
+class _Solid:
+    mesh: ShadedMesh
+    shift_mm: np.ndarray
+    rgba: tuple[float, ...]
+    hatch_up: bool
+
+    def ends(self, edges: np.ndarray) -> np.ndarray:
+        """Ends (k, 2, 3) in mm of edges (k, 2)."""
+        return np.asarray(self.mesh.vertices_mm[edges] + self.shift_mm)
+
+    def poly(self) -> Any:
+        """VTK's mesh with one point for each vertex."""
+        return poly_data(self.mesh.vertices_mm + self.shift_mm, None, self.mesh.faces)
+
+
 class MeshScene:
     """Collects meshes, which a window draws once.
 
@@ -56,28 +75,29 @@ class MeshScene:
         self._low = np.full(3, np.inf)
         self._high = np.full(3, -np.inf)
         self._overlays: list[tuple[Any, tuple[float, ...]]] = []
-        self._solids: list[tuple[Any, tuple[float, ...], bool]] = []
+        self._solids: list[_Solid] = []
         self._renderer = vtkRenderer()
         self._renderer.SetBackground(1.0, 1.0, 1.0)
 
     def add(
         self,
-        vertices: np.ndarray,
-        faces: np.ndarray,
+        mesh: ShadedMesh,
         rgba: tuple[float, float, float, float],
+        shift_mm: ArrayLike = (0.0, 0.0, 0.0),
         hatch_up: bool = True,
     ) -> None:
-        """Add a mesh: vertices (n, 3) in mm, faces (m, 3), sRGB colour with opacity."""
-        self.include(vertices)
+        """Add a mesh, moved by `shift_mm`, in an sRGB colour with opacity."""
+        shift = np.asarray(shift_mm, dtype=float)
+        self.include(mesh.vertices_mm + shift)
         shown = (*(BRIGHTENING + (1 - BRIGHTENING) * channel for channel in rgba[:3]), rgba[3])
-        self._solids.append((_poly_data(vertices, faces), shown, hatch_up))
+        self._solids.append(_Solid(mesh, shift, shown, hatch_up))
 
     def add_overlay(
         self, vertices: np.ndarray, faces: np.ndarray, rgba: tuple[float, float, float, float]
     ) -> None:
         """Add a surface that is drawn whole, flat and without edges, also in a section."""
         self.include(vertices)
-        self._overlays.append((_poly_data(vertices, faces), rgba))
+        self._overlays.append((poly_data(vertices, None, faces), rgba))
 
     def include(self, points: np.ndarray) -> None:
         """Make the picture large enough to hold points (n, 3) in mm, without drawing them."""
@@ -93,28 +113,28 @@ class MeshScene:
         """The renderer with all that was added, for a window from its lower edge up to `top`."""
         self._aim(self._shape())
         plane = self._plane()
-        for poly, rgba in self._surfaces():
-            self._show(poly, rgba, plane)
+        for rgba, solids in self._by_colour().items():
+            self._show(solids, rgba, plane)
         if plane is not None:
-            for poly, rgba, hatch_up in self._solids:
-                self._close(poly, plane, rgba, hatch_up)
+            for solid in self._solids:
+                self._close(solid, plane)
         for poly, rgba in self._overlays:
             self._flat(poly, rgba)
         self._light()
         # Lines alone need no peeling, which draws the scene once for each layer.
-        colours = [rgba for _, rgba, _ in self._solids] + [rgba for _, rgba in self._overlays]
+        colours = [solid.rgba for solid in self._solids] + [rgba for _, rgba in self._overlays]
         self._renderer.SetUseDepthPeeling(any(rgba[3] < OPAQUE for rgba in colours))
         self._renderer.SetMaximumNumberOfPeels(PEELS)
         self._renderer.SetOcclusionRatio(0.0)
         self._renderer.SetViewport(0.0, 0.0, 1.0, top)
         return self._renderer
 
-    def _surfaces(self) -> list[tuple[Any, tuple[float, ...]]]:
-        """Solids of one colour as one, which are drawn in a fraction of the time."""
-        joined: dict[tuple[float, ...], list[Any]] = {}
-        for poly, rgba, _ in self._solids:
-            joined.setdefault(rgba, []).append(poly)
-        return [(_appended(polys), rgba) for rgba, polys in joined.items()]
+    def _by_colour(self) -> dict[tuple[float, ...], list[_Solid]]:
+        """Solids of one colour, which are drawn together in a fraction of the time."""
+        found: dict[tuple[float, ...], list[_Solid]] = {}
+        for solid in self._solids:
+            found.setdefault(solid.rgba, []).append(solid)
+        return found
 
     def pixel_positions(self, points: np.ndarray, width_px: int) -> np.ndarray:
         """Pixel positions (n, 2), right and down, of points (n, 3) in mm."""
@@ -149,39 +169,32 @@ class MeshScene:
         camera.SetParallelScale(self._scale_mm)
         camera.SetClippingRange(reach, 5 * reach)
 
-    def _show(self, poly: Any, rgba: tuple[float, ...], plane: Any) -> None:
-        from vtkmodules.vtkFiltersCore import vtkClipPolyData, vtkFeatureEdges, vtkPolyDataNormals
-        from vtkmodules.vtkFiltersHybrid import vtkPolyDataSilhouette
+    def _show(self, solids: Sequence[_Solid], rgba: tuple[float, ...], plane: Any) -> None:
+        from vtkmodules.vtkFiltersCore import vtkClipPolyData, vtkPolyDataNormals
 
-        faces = vtkPolyDataNormals()
-        faces.SetFeatureAngle(CREASE_DEG)
         if plane is None:
-            faces.SetInputData(poly)
+            source = producer(poly_data(*joined([(s.mesh, s.shift_mm) for s in solids])))
         else:  # cut first: the clipper merges points, which would mix normals across an edge
             clipped = vtkClipPolyData()
-            clipped.SetInputData(poly)
+            clipped.SetInputData(appended([solid.poly() for solid in solids]))
             clipped.SetClipFunction(plane)
-            faces.SetInputConnection(clipped.GetOutputPort())
-        self._actor(faces, rgba, smooth=True)
-        edges = vtkFeatureEdges()
-        edges.SetInputData(poly)
-        edges.SetFeatureAngle(CREASE_DEG)
-        edges.ManifoldEdgesOff()
-        edges.NonManifoldEdgesOff()
-        edges.ColoringOff()
-        rim = vtkPolyDataSilhouette()
-        rim.SetInputData(poly)
-        rim.SetCamera(self._renderer.GetActiveCamera())
-        rim.SetEnableFeatureAngle(0)
+            source = vtkPolyDataNormals()
+            source.SetFeatureAngle(CREASE_DEG)
+            source.SetInputConnection(clipped.GetOutputPort())
+        self._actor(source, rgba, smooth=True)
         dark = tuple(min(0.32, 0.45 * channel) for channel in rgba[:3])
         strength = 1.0 if rgba[3] >= OPAQUE else 0.55
-        for lines, width in ((edges, 2.0), (rim, 2.6)):
-            source: Any = lines
+        back = self._view.axes()[2]
+        creases = [solid.ends(solid.mesh.creases) for solid in solids]
+        outlines = [solid.ends(solid.mesh.outline(back)) for solid in solids]
+        for lines, width in ((creases, 2.0), (outlines, 2.6)):
+            drawn: Any = producer(line_data(lines))
             if plane is not None:
-                source = vtkClipPolyData()
-                source.SetInputConnection(lines.GetOutputPort())
-                source.SetClipFunction(plane)
-            self._lines(source, dark, width, strength)
+                cut = vtkClipPolyData()
+                cut.SetInputConnection(drawn.GetOutputPort())
+                cut.SetClipFunction(plane)
+                drawn = cut
+            self._lines(drawn, dark, width, strength)
 
     def _plane(self) -> Any:
         from vtkmodules.vtkCommonDataModel import vtkPlane
@@ -197,14 +210,14 @@ class MeshScene:
         plane.SetNormal(*normal)
         return plane
 
-    def _close(self, poly: Any, plane: Any, rgba: tuple[float, ...], hatch_up: bool) -> None:
+    def _close(self, solid: _Solid, plane: Any) -> None:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonDataModel import vtkPlane
         from vtkmodules.vtkFiltersCore import vtkCutter
         from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
 
         contour = vtkCutter()
-        contour.SetInputData(poly)
+        contour.SetInputData(solid.poly())
         contour.SetCutFunction(plane)
         contour.Update()
         if not contour.GetOutput().GetNumberOfCells():
@@ -212,12 +225,12 @@ class MeshScene:
         face = vtkContourTriangulator()
         face.SetInputConnection(contour.GetOutputPort())
         face.Update()
-        light = tuple(0.22 + 0.78 * channel for channel in rgba[:3])
-        self._actor(face, (*light, max(0.85, rgba[3])), smooth=False)
+        light = tuple(0.22 + 0.78 * channel for channel in solid.rgba[:3])
+        self._actor(face, (*light, max(0.85, solid.rgba[3])), smooth=False)
         right, up, _ = self._view.axes()
         stripes = vtkPlane()
         stripes.SetOrigin(0.0, 0.0, 0.0)
-        stripes.SetNormal(*((right + (up if hatch_up else -up)) / math.sqrt(2)))
+        stripes.SetNormal(*((right + (up if solid.hatch_up else -up)) / math.sqrt(2)))
         step = HATCH_SPACING * 2 * self._scale_mm
         heights = vtk_to_numpy(face.GetOutput().GetPoints().GetData()) @ stripes.GetNormal()
         first, last = math.ceil(heights.min() / step), math.floor(heights.max() / step)
@@ -243,11 +256,7 @@ class MeshScene:
             look.BackfaceCullingOn()
 
     def _flat(self, poly: Any, rgba: tuple[float, ...]) -> None:
-        from vtkmodules.vtkCommonExecutionModel import vtkTrivialProducer
-
-        source = vtkTrivialProducer()
-        source.SetOutput(poly)
-        self._actor(source, rgba, smooth=False)
+        self._actor(producer(poly), rgba, smooth=False)
 
     def _lines(
         self, source: Any, colour: tuple[float, ...], width_px: float, opacity: float
@@ -292,40 +301,3 @@ def view_box(vertices: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Extent of points (n, 3) along right, up and depth of a view, in mm."""
     seen = vertices @ view.axes().T
     return seen.min(axis=0), seen.max(axis=0)
-
-
-def _appended(polys: Sequence[Any]) -> Any:
-    """Meshes as one; their vertices stay apart."""
-    from vtkmodules.vtkFiltersCore import vtkAppendPolyData
-
-    together = vtkAppendPolyData()
-    for poly in polys:
-        together.AddInputData(poly)
-    together.Update()
-    return together.GetOutput()
-
-
-def _poly_data(vertices: np.ndarray, faces: np.ndarray) -> Any:
-    """Build VTK's mesh; equal vertices are merged, so that every edge knows its two faces."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkFiltersCore import vtkCleanPolyData
-
-    points = vtkPoints()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(vertices, dtype=float), deep=True))
-    cells = vtkCellArray()
-    offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=np.int64)
-    cells.SetData(
-        numpy_to_vtkIdTypeArray(offsets, deep=True),
-        numpy_to_vtkIdTypeArray(np.ascontiguousarray(faces, dtype=np.int64).ravel(), deep=True),
-    )
-    poly = vtkPolyData()
-    poly.SetPoints(points)
-    poly.SetPolys(cells)
-    merge = vtkCleanPolyData()
-    merge.SetInputData(poly)
-    merge.SetToleranceIsAbsolute(True)
-    merge.SetAbsoluteTolerance(1e-5)
-    merge.Update()
-    return merge.GetOutput()

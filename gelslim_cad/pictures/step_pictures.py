@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.pictures.mesh_scene import MeshScene, View
+from gelslim_cad.pictures.shaded_mesh import ShadedMesh, shaded_mesh
 from gelslim_cad.pictures.window import draw, png_bytes
 
 Floats = NDArray[np.float64]
@@ -25,10 +26,10 @@ HEAD_RATIO = 2.4
 
 @dataclass(frozen=True)
 class Drawn:
-    """A mesh with its colour: vertices (n, 3) in mm, faces (m, 3), sRGB with opacity."""
+    """A mesh, moved by `shift_mm` (3,), with its sRGB colour and opacity."""
 
-    vertices_mm: Floats
-    faces: NDArray[np.int64]
+    mesh: ShadedMesh
+    shift_mm: Floats
     colour: Colour
 
 
@@ -72,10 +73,10 @@ def picture_steps(
 
 def _scene(step: StepScene) -> MeshScene:
     scene = MeshScene(step.view)
-    for mesh in step.meshes:
-        scene.add(mesh.vertices_mm, mesh.faces, mesh.colour)
+    for drawn in step.meshes:
+        scene.add(drawn.mesh, drawn.colour, drawn.shift_mm)
     for arrow in step.arrows:
-        scene.add(*arrow_mesh(arrow), ARROW)
+        scene.add(shaded_mesh(*arrow_mesh(arrow)), ARROW)
     return scene
 
 

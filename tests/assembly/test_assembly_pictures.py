@@ -13,6 +13,7 @@ from PIL import Image
 from gelslim_cad.assembly.order import Step
 from gelslim_cad.assembly.scenes import FASTENER, MOVING, step_scene
 from gelslim_cad.export.mesh import TriangleMesh, bad_edges, volume_mm3
+from gelslim_cad.pictures.shaded_mesh import shaded_mesh
 from gelslim_cad.pictures.step_pictures import (
     HEAD_LENGTH,
     HEAD_RATIO,
@@ -46,7 +47,7 @@ def scenes() -> tuple[tuple[Step, ...], list[StepScene]]:
     made = samples.parts(NAME)
     steps = samples.order(samples.dimensions(NAME), made)
     colours = {p.name: p.colour for p in made}
-    meshes = samples.drawn(NAME)
+    meshes = {name: shaded_mesh(*mesh) for name, mesh in samples.drawn(NAME).items()}
     return steps, [step_scene(s, meshes, colours) for s in steps]
 
 
@@ -57,9 +58,9 @@ def test_parts_are_drawn_on_their_way_and_not_at_their_seat() -> None:
         for name in step.moves:
             seated = meshes[name].vertices_mm
             (shift,) = {
-                tuple(np.round((m.vertices_mm - seated).mean(axis=0), 6).tolist())
+                tuple(m.shift_mm)
                 for m in scene.meshes
-                if len(m.vertices_mm) == len(seated) and m.faces is meshes[name].faces
+                if np.array_equal(m.mesh.vertices_mm, seated)
             }
             back = sum(
                 (np.multiply(leg.direction, -leg.length_mm) for leg in step.way[1:]), np.zeros(3)

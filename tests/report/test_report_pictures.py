@@ -163,8 +163,8 @@ def test_a_window_draws_scenes_of_several_sizes_as_windows_of_their_own_do():
     """Nothing of the pictures that were drawn first is left in those after them."""
     box = [mesh(hollow())]
     with window.offscreen_window() as shared:
-        large = window.draw(shared, [pictures._scene(box, pictures.ISO)], 600, 1)
-        after = pictures.picture_set(shared, box)
+        large = window.draw(shared, [pictures._scene(pictures._shown(box), pictures.ISO)], 600, 1)
+        after = pictures.picture_set(shared, pictures._shown(box))
     assert large[0].shape[1] == 600
     for png, alone in zip(
         after[::2], (pictures.picture_whole(box), pictures.picture_section(box)), strict=True
