@@ -45,10 +45,8 @@ def least_wall(surface: Surface) -> Wall | None:
     count = int(max(LEAST_RAYS, min(area / AREA_OF_RAY_MM2, MOST_PAIRS / len(surface.areas_mm2))))
     points, facets = surface.samples(count, SEED)
     inwards = -surface.normals[facets]
-    middles = surface.corners_mm.mean(axis=1)
-    radii = np.linalg.norm(surface.corners_mm - middles[:, None], axis=2).max(axis=1)
     distances, hits = first_hits(
-        points + SKIN_MM * inwards, inwards, surface.corners_mm, middles, radii, LONGEST_MM
+        points + SKIN_MM * inwards, inwards, surface.corners_mm, LONGEST_MM
     )
     facing = np.einsum("nd,nd->n", surface.normals[hits], surface.normals[facets]) < FACING
     found = np.flatnonzero((hits >= 0) & facing)
