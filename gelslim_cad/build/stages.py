@@ -39,7 +39,6 @@ class Stages:
     loaded: LoadedSpec
     dimensions: Dimensions
     checks: tuple[Check, ...]
-    binding: tuple[str, ...]
     spec_hash: str
     prices: Prices
 
@@ -51,10 +50,17 @@ class Stages:
             loaded,
             d,
             check(d),
-            binding_sentences(loaded.spec, d),
             spec_hash(loaded.spec),
             read_prices(loaded.spec.manufacturing.prices, loaded.path),
         )
+
+    @cached_property
+    def binding(self) -> tuple[str, ...]:
+        """Sentences that say what sets the finger's thickness.
+
+        They are made on demand, as they take as long as all dimensions and no unit needs them.
+        """
+        return binding_sentences(self.loaded.spec, self.dimensions)
 
     @cached_property
     def grid(self) -> MarkerGrid | None:
