@@ -39,6 +39,7 @@ LIGHT_NAMES: tuple[Name, ...] = (
     "design.leds.blue_wavelength_nm",
     "design.leds.white_wavelength_nm",
     "design.leds.light",
+    "design.leds.tip",
     "design.leds.one_wavelength_nm",
     "design.housing.fit_clearance_mm",
     "design.housing.side_wall_mm",

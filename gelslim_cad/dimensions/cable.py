@@ -11,6 +11,7 @@ import numpy as np
 
 from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM
 from gelslim_cad.dimensions.registry import Real, dimension
+from gelslim_cad.geometry.led_strips import NO_TIP
 from gelslim_cad.geometry.lookup import Lookup
 
 LEAST_RADIUS_MM = 0.2
@@ -48,16 +49,23 @@ def cable_radius_mm(camera_cable_bend_radius_mm: Real, cable_thickness_mm: Real)
     return np.maximum(camera_cable_bend_radius_mm, LEAST_RADIUS_MM) + cable_thickness_mm / 2
 
 
-@dimension("cable.behind_mm", formula="max(bend radius, middle radius - fit, wire + 0.4)")
+@dimension("wire.beside_mm", formula="1.15 wire, for those of the strip at the tip; 0 without")
+def wire_beside_mm(leds_wire_diameter_mm: Real, leds_tip: str) -> Real:
+    """Distance of the wires of the strip at the tip from the others, beside which they run."""
+    return STACK_RATIO * leds_wire_diameter_mm * float(leds_tip != NO_TIP)
+
+
+@dimension("cable.behind_mm", formula="max(bend radius, middle radius - fit, wires + 0.4)")
 def cable_behind_mm(
     camera_cable_bend_radius_mm: Real,
     cable_radius_mm: Real,
     housing_fit_clearance_mm: Real,
     leds_wire_diameter_mm: Real,
+    wire_beside_mm: Real,
 ) -> Real:
     """Free length behind camera and clamp, for the cable's bend and for the wires that cross it."""
     bend = np.maximum(camera_cable_bend_radius_mm, cable_radius_mm - housing_fit_clearance_mm)
-    return np.maximum(bend, leds_wire_diameter_mm + 0.4)
+    return np.maximum(bend, leds_wire_diameter_mm + wire_beside_mm + 0.4)
 
 
 @dimension(
@@ -137,34 +145,42 @@ def cable_inside_mm(
     return straight + arc + cable_bend_end_x_mm - outside
 
 
-@dimension("cable.slot_half_mm", formula="cable width / 2 + fit + wire + 0.3")
+@dimension("cable.slot_half_mm", formula="cable width / 2 + fit + wires + 0.3")
 def cable_slot_half_mm(
-    camera_cable_width_mm: Real, housing_fit_clearance_mm: Real, leds_wire_diameter_mm: Real
+    camera_cable_width_mm: Real,
+    housing_fit_clearance_mm: Real,
+    leds_wire_diameter_mm: Real,
+    wire_beside_mm: Real,
 ) -> Real:
     """Half the width of the mount's groove: the cable, and a lane of wires on each side."""
-    lane = leds_wire_diameter_mm + 2 * LANE_GAP_MM
+    lane = leds_wire_diameter_mm + wire_beside_mm + 2 * LANE_GAP_MM
     return camera_cable_width_mm / 2 + housing_fit_clearance_mm + lane
 
 
-@dimension("wire.lane_y_mm", formula="cable width / 2 + fit + gap + wire / 2")
+@dimension("wire.lane_y_mm", formula="cable width / 2 + fit + gap + wire / 2 + wires of the tip")
 def wire_lane_y_mm(
-    camera_cable_width_mm: Real, housing_fit_clearance_mm: Real, leds_wire_diameter_mm: Real
+    camera_cable_width_mm: Real,
+    housing_fit_clearance_mm: Real,
+    leds_wire_diameter_mm: Real,
+    wire_beside_mm: Real,
 ) -> Real:
-    """Middle of the lane of the LED wires beside the cable."""
+    """Where the wires of the side boards lie in the lane beside the cable; those of the tip's board
+    lie between them and the cable."""
     side = camera_cable_width_mm / 2 + housing_fit_clearance_mm + LANE_GAP_MM
-    return side + leds_wire_diameter_mm / 2
+    return side + leds_wire_diameter_mm / 2 + wire_beside_mm
 
 
-@dimension("wire.run_y_mm", formula="max(LED row, clamp / 2 + fit + wire / 2)")
+@dimension("wire.run_y_mm", formula="max(LED row, clamp / 2 + fit + wire / 2 + wires of the tip)")
 def wire_run_y_mm(
     led_y_mm: Real,
     clamp_width_mm: Real,
     housing_fit_clearance_mm: Real,
     leds_wire_diameter_mm: Real,
+    wire_beside_mm: Real,
 ) -> Real:
-    """Where the LED wires run beside the camera clamp."""
+    """Where the wires of the side boards run beside the camera clamp."""
     beside = clamp_width_mm / 2 + housing_fit_clearance_mm + leds_wire_diameter_mm / 2 + 0.05
-    return np.maximum(led_y_mm, beside)
+    return np.maximum(led_y_mm, beside + wire_beside_mm)
 
 
 @dimension("wire.low_z_mm", formula="cover + gap + wire / 2")

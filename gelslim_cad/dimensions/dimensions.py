@@ -24,6 +24,7 @@ from gelslim_cad.dimensions import (  # noqa: F401  (registers)
     precompression,
     seat,
     thread,
+    tip_light,
     view,
 )
 from gelslim_cad.dimensions.fold import Fold

@@ -172,12 +172,16 @@ def finger_width_mm(
     return 2 * (np.maximum(channel_outer_y_mm, wires) + housing_side_wall_mm)
 
 
-@dimension("finger.tip_x_mm", formula="guide tip end + fit + tip wall")
+@dimension("finger.tip_x_mm", formula="guide tip end + fit + strip at the tip + tip wall")
 def finger_tip_x_mm(
-    guide_distal_end_x_mm: Real, housing_fit_clearance_mm: Real, housing_tip_wall_mm: Real
+    guide_distal_end_x_mm: Real,
+    housing_fit_clearance_mm: Real,
+    led_tip_depth_mm: Real,
+    housing_tip_wall_mm: Real,
 ) -> Real:
     """Tip of the finger."""
-    return guide_distal_end_x_mm + housing_fit_clearance_mm + housing_tip_wall_mm
+    behind_guide = guide_distal_end_x_mm + housing_fit_clearance_mm
+    return behind_guide + led_tip_depth_mm + housing_tip_wall_mm
 
 
 @dimension("cover.top_z_mm", formula="-T + back wall")

@@ -78,6 +78,7 @@ PROBLEM: dict[str, Name] = {
     "max_depth_mm": "design.envelope.max_thickness_mm",
     "back_wall_mm": "design.housing.back_wall_mm",
     "max_length_mm": "design.envelope.max_length_mm",
+    "tip_depth_mm": "led.tip_depth_mm",
     "goal": "design.envelope.goal",
     "length_worth": "design.envelope.length_worth",
     "pixel_worth_mm": "design.envelope.pixel_worth_mm",
@@ -103,7 +104,8 @@ def fold_layout(values: Mapping[str, Any]) -> Fold:
     given |= _worths(given.pop("goal"), given["length_worth"], given["pixel_worth_mm"])
     taken_mm = given.pop("back_wall_mm") + given["guide_thickness_mm"] + given["gel_total_mm"]
     given["max_depth_mm"] = _limit_mm(given["max_depth_mm"]) - taken_mm
-    given["max_length_mm"] = _limit_mm(given["max_length_mm"])
+    # The strip at the tip lengthens every fold alike.
+    given["max_length_mm"] = _limit_mm(given["max_length_mm"]) - given.pop("tip_depth_mm")
     flat = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in given.values()))
     if flat[0].size == 1:
         return _solved_alone(tuple(given), tuple(float(v[0]) for v in flat))

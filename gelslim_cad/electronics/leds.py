@@ -34,6 +34,7 @@ NAMES: tuple[Name, ...] = (
     "design.leds.blue_wavelength_nm",
     "design.leds.white_wavelength_nm",
     "design.leds.light",
+    "design.leds.tip",
     "design.leds.one_wavelength_nm",
     "electronics.own_forward_v",
     "electronics.own_test_current_ma",

@@ -1,6 +1,8 @@
-"""The light of the two LED strips, and how the camera sees it."""
+"""The light of the LED strips, two or three, and how the camera sees it."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,9 @@ from numpy.typing import NDArray
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_optics.light.light_map import LED_COLOURS
 
+Side = Literal["left", "right", "tip"]
+SIDES: tuple[Side, Side, Side] = ("left", "right", "tip")
+"""Where a strip is: under the leg at -y or at +y, or in front of the window's end face."""
 RED_SHARE = 0.45
 """Red appears weaker than green in published images of this sensor."""
 RESPONSES = {
@@ -21,20 +26,32 @@ RESPONSES = {
 SHARES = {"red": RED_SHARE, "green": 1.0, "blue": 1.0, "white": 1.0}
 """How bright the camera sees each light; that of blue is assumed to be that of green."""
 WHITE = "white"
+NO_TIP = "none"
+
+
+def has_tip_light(d: Lookup) -> bool:
+    """Whether a third strip shines into the window's end face at the tip."""
+    return bool(d["design.leds.tip"] != NO_TIP)
+
+
+def strip_sides(d: Lookup) -> tuple[Side, ...]:
+    """Where the strips are, in the order of their lights: left, right and perhaps tip."""
+    return SIDES if has_tip_light(d) else SIDES[:2]
 
 
 def strip_wavelengths_nm(d: Lookup) -> dict[str, float]:
-    """Wavelengths of the strip at -y and of that at +y, by the name of their light.
+    """Wavelengths of the strip at -y, of that at +y and of that at the tip, where there is one.
 
-    Two colours are called by their names. Strips of one wavelength and white ones are called by
-    the side of the picture at which they shine: left and right.
+    Two or three colours are called by their names. Strips of one wavelength and white ones are
+    called by the side of the picture at which they shine: left, right and tip.
     """
     one = d["design.leds.one_wavelength_nm"]
     one = d["design.leds.white_wavelength_nm"] if is_white(d) else one
     if one is not None:
-        return {"left": one, "right": one}
+        return dict.fromkeys(strip_sides(d), one)
     waves = colour_wavelengths_nm(d)
-    return {name: waves[name] for name in d["design.leds.light"].split("_")}
+    names = d["design.leds.light"].split("_")
+    return {name: waves[name] for name in [*names, *([d["design.leds.tip"]] * has_tip_light(d))]}
 
 
 def colour_wavelengths_nm(d: Lookup) -> dict[str, float]:
@@ -47,12 +64,12 @@ def colour_wavelengths_nm(d: Lookup) -> dict[str, float]:
 
 
 def is_white(d: Lookup) -> bool:
-    """Whether both strips shine white."""
+    """Whether all strips shine white."""
     return bool(d["design.leds.light"] == WHITE)
 
 
 def shared_light(d: Lookup) -> str:
-    """The light of both strips in words, such as `white` or `850 nm`; empty for two colours."""
+    """The light of all strips in words, such as `white` or `850 nm`; empty for colours."""
     one = d["design.leds.one_wavelength_nm"]
     return WHITE if is_white(d) else "" if one is None else f"{one:g} nm"
 
@@ -60,21 +77,23 @@ def shared_light(d: Lookup) -> str:
 def camera_responses(d: Lookup) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """How bright the camera sees each strip, and in which colour.
 
-    A mono camera sees both strips alike. A colour camera sees one wavelength as the nearest of the
+    A mono camera sees all strips alike. A colour camera sees one wavelength as the nearest of the
     usual LEDs.
 
     Args:
         d: Spec fields.
 
     Returns:
-        (2,) share of each strip's light, and (2, 3) response of red, green and blue to it.
+        (n,) share of each of the n strips' light, and (n, 3) response of red, green and blue to
+        it; n is 2, or 3 with a strip at the tip, which is the last.
     """
+    strips = strip_wavelengths_nm(d)
     if d["camera.picture"] == "mono":
-        return np.ones(2), np.ones((2, 3))
+        return np.ones(len(strips)), np.ones((len(strips), 3))
     one = d["design.leds.one_wavelength_nm"]
     if one is None:
-        names = [WHITE] * 2 if is_white(d) else list(strip_wavelengths_nm(d))
+        names = [WHITE] * len(strips) if is_white(d) else list(strips)
         return np.array([SHARES[n] for n in names]), np.stack([RESPONSES[n] for n in names])
     usual = colour_wavelengths_nm(d)
     nearest = min(usual, key=lambda name: abs(usual[name] - one))
-    return np.ones(2), np.stack([RESPONSES[nearest]] * 2)
+    return np.ones(len(strips)), np.stack([RESPONSES[nearest]] * len(strips))

@@ -37,6 +37,7 @@ NAMES: tuple[Name, ...] = (
     "design.leds.green_wavelength_nm",
     "design.leds.height_mm",
     "design.leds.light",
+    "design.leds.tip",
     "design.leds.one_wavelength_nm",
     "design.leds.package_mm",
     "design.leds.radiant_flux_mw",

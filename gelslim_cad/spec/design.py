@@ -13,6 +13,9 @@ from gelslim_cad.spec.limits import above, between
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
 
+COLOURS = ("red", "green", "blue")
+"""Colours of the strips, one each where there are three."""
+
 
 class Gel(Block):
     """The soft pad."""
@@ -57,7 +60,8 @@ class LightGuide(Block):
 
 
 class Leds(Block):
-    """Two strips under the legs: one colour at -y (left in the image), one at +y, or both alike."""
+    """Two strips under the legs: one colour at -y (left in the image), one at +y, or both alike;
+    and, where wanted, a third in front of the window's end face at the tip."""
 
     model: str = Field(
         default="LUXEON CZ",
@@ -85,6 +89,11 @@ class Leds(Block):
     light: Literal["red_green", "red_blue", "green_blue", "white"] = Field(
         default="red_green",
         description="Colours of the left and the right strip, or white light from both",
+    )
+    tip: Literal["none", "red", "green", "blue", "white"] = Field(
+        default="none",
+        description="Light of a third strip at the tip, in front of the window's end face: the "
+        "colour that the sides do not have, or white with `light: white`",
     )
     red_wavelength_nm: float = between(560, 760, "Wavelength of the red LEDs", default=625.0)
     green_wavelength_nm: float = between(480, 580, "Wavelength of the green LEDs", default=525.0)
@@ -121,6 +130,29 @@ class Leds(Block):
                 "one_wavelength_nm",
                 f"both strips would have this wavelength, and light is {self.light}",
                 "leave one of the two out",
+                ("light",),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _tip_light(self) -> Leds:
+        if self.tip == "none":
+            return self
+        if self.one_wavelength_nm is not None:
+            raise FieldError(
+                "tip",
+                f"the sides shine at one wavelength, {self.one_wavelength_nm:g} nm, and the strip "
+                f"at the tip would be {self.tip}",
+                "leave tip out, or one_wavelength_nm",
+                ("one_wavelength_nm",),
+            )
+        sides = self.light.split("_")
+        free = sides if self.light == "white" else [c for c in COLOURS if c not in sides]
+        if self.tip not in free:
+            raise FieldError(
+                "tip",
+                f"must be {free[0]} where light is {self.light}; it is {self.tip}",
+                f"write tip: {free[0]}, or change light",
                 ("light",),
             )
         return self
@@ -259,7 +291,7 @@ class Design(Block):
     gel: Gel = Field(description="The gel pad")
     light_guide: LightGuide = Field(default=LightGuide(), description="The curved acrylic guide")
     leds: Annotated[Leds, BeforeValidator(completed_leds)] = Field(
-        default=Leds(), description="The two LED strips"
+        default=Leds(), description="The LED strips: two, or three with one at the tip"
     )
     markers: Annotated[
         Markers, BeforeValidator(without_markers, json_schema_input_type=Markers | Literal["none"])

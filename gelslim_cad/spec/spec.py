@@ -277,3 +277,15 @@ class Spec(Block):
     def _names_a_folder(self) -> Spec:
         require_folder_name("name", self.name)
         return self
+
+    @model_validator(mode="after")
+    def _sees_the_tip(self) -> Spec:
+        leds = self.design.leds
+        if self.camera.picture == "mono" and leds.tip not in ("none", "white"):
+            raise FieldError(
+                "design.leds.tip",
+                f"is {leds.tip}, a third colour, which a mono camera cannot tell from the others",
+                "leave tip out, take light: white with tip: white, or a camera with colours",
+                ("camera.picture",),
+            )
+        return self

@@ -16,9 +16,12 @@ UNSUPPORTED: tuple[Unsupported, ...] = (
         "a gel that is no pad, flat or with a low crown,",
     ),
     Unsupported(
-        r"design\.(leds|lights?)(\w*\.)?\w*(third|tip|front|distal|end_face|rgb|three)"
-        r"|leds\.\w*(colou?rs?|lights?|sides?|strips?): .*(\b3\b|three|rgb|red.*green.*blue|tip)",
-        "light of a third colour or from the tip",
+        r"design\.(leds|lights?)(\w*\.)?\w*(rgb|third|three|four|ring|proximal|rear|near_end)"
+        r"|leds\.\w*: .*rgb|leds\.\w*(colou?rs?|lights?|sides?|strips?): "
+        r".*(\b[34]\b|three|four|red.*green.*blue)",
+        "a fourth strip, or several colours in one strip,",
+        "three colours have a strip each: two of them are design.leds.light, and the third, at the "
+        "tip, is design.leds.tip",
     ),
     Unsupported(r"leds\.(\w+: )?(\w+_)?(ultra_?violet|uva?)(_|:|$)", "ultraviolet light"),
     Unsupported(

@@ -29,10 +29,13 @@ ASKED = {
         ("length_mm: 24", "length_mm: 24, dome_radius_mm: 12"),
         ("length_mm: 24", "length_mm: 24, form: hemisphere"),
     ),
-    "a third colour": (
+    "a fourth strip, or several colours in one strip": (
         "  leds: {third_wavelength_nm: 470}\n",
-        "  leds: {tip_wavelength_nm: 470}\n",
-        "  leds: {tip: {wavelength_nm: 470}}\n",
+        "  leds: {fourth_wavelength_nm: 590}\n",
+        "  leds: {rear: blue}\n",
+        "  leds: {ring: white}\n",
+        "  leds: {left: rgb}\n",
+        "  leds: {light: four_colours}\n",
         "  leds: {light: rgb}\n",
         "  leds: {light: red_green_blue}\n",
         "  leds: {colours: [red, green, blue]}\n",
@@ -59,6 +62,8 @@ SLIPS = [
     ("  leds: {max_cuont: 3}\n", "design.leds.max_count"),
     ("  leds: {blue_wave_length_nm: 465}\n", "design.leds.blue_wavelength_nm"),
     ("  leds: {light: whit}\n", "white"),
+    ("  leds: {tip: bleu}\n", "blue"),
+    ("  leds: {tipp: blue}\n", "design.leds.tip"),
     ("  markers: {pattern: nome}\n", "none"),
     ("  mirror: {thicknes_mm: 1}\n", "design.mirror.thickness_mm"),
 ]
@@ -80,7 +85,7 @@ def test_what_is_not_supported_is_said_and_nothing_is_guessed(
     assert problem.message.startswith(what) or what in problem.message
     assert "did you mean" not in str(problem)
     assert problem.line is not None
-    assert bool(problem.remedy) == what.startswith("infrared")
+    assert bool(problem.remedy) == what.startswith(("infrared", "a fourth"))
 
 
 @pytest.mark.parametrize(("change", "meant"), SLIPS)
@@ -94,3 +99,45 @@ def test_what_is_supported_is_read() -> None:
     text = HEAD + "  markers: none\n  leds: {light: white}\n"
     spec = load_bytes("finger.yaml", text.encode(), Spec).model
     assert (spec.design.markers.pattern, spec.design.leds.light) == ("none", "white")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "  leds: {tip: red}\n",
+        "  leds: {tip: white}\n",
+        "  leds: {light: red_blue, tip: blue}\n",
+        "  leds: {light: white, tip: blue}\n",
+        "  leds: {one_wavelength_nm: 630, tip: blue}\n",
+        "  leds: {tip: blue}\n",
+    ],
+)
+def test_a_light_at_the_tip_that_the_sides_or_the_camera_do_not_suit_is_refused(
+    change: str,
+) -> None:
+    mono = change == "  leds: {tip: blue}\n"
+    head = HEAD.replace("f_number: 2.9", "f_number: 2.9, picture: mono") if mono else HEAD
+    with pytest.raises(InputError) as caught:
+        load_bytes("finger.yaml", (head + change).encode(), Spec)
+    (problem,) = caught.value.problems
+    assert (problem.field, problem.line) == ("design.leds.tip", 7)
+    assert problem.remedy
+
+
+@pytest.mark.parametrize(
+    ("light", "tip", "picture"),
+    [
+        ("red_green", "blue", "colour"),
+        ("red_blue", "green", "colour"),
+        ("green_blue", "red", "colour"),
+        ("white", "white", "colour"),
+        ("white", "white", "mono"),
+    ],
+)
+def test_three_colours_and_white_light_from_three_sides_are_read(
+    light: str, tip: str, picture: str
+) -> None:
+    head = HEAD.replace("f_number: 2.9", f"f_number: 2.9, picture: {picture}")
+    text = head + f"  leds: {{light: {light}, tip: {tip}}}\n"
+    leds = load_bytes("finger.yaml", text.encode(), Spec).model.design.leds
+    assert (leds.light, leds.tip) == (light, tip)
