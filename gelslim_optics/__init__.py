@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from gelslim_optics.light.light_map import LightMap
     from gelslim_optics.light.result import LightResult
     from gelslim_optics.light.scene import LightScene, Medium, Surface
-    from gelslim_optics.light.source import LedRow
+    from gelslim_optics.light.source import EndRow, LedRow
     from gelslim_optics.light.trace import trace_light
 
 __all__ = [
     "CurvedGuide",
+    "EndRow",
     "GelSection",
     "GuideProfile",
     "HeightGrid",

@@ -10,7 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 Point = tuple[float, float]
+Array = NDArray[np.float64]
 CLOSED_MM = 1e-9
 
 
@@ -159,6 +163,30 @@ class GuideProfile:
         """Area of the region of a medium, exact for arcs (Green's theorem)."""
         return sum(_swept(edge.curve) for edge in self.outline(medium))
 
+    def contains(self, medium: str, y_mm: Array, z_mm: Array) -> NDArray[np.bool_]:
+        """Whether points lie in the regions of a medium, exact for arcs.
+
+        The winding number about a point is that of the polygon of the chords, plus 1 for each
+        counter-clockwise arc with the point between it and its chord, less 1 for each clockwise
+        one.
+
+        Args:
+            medium: The name of the medium; False everywhere for one that no edge meets.
+            y_mm: Coordinates across the finger, of any shape.
+            z_mm: Coordinates out of the gel, of the same shape.
+
+        Returns:
+            True for the points within, of the shape of `y_mm`.
+        """
+        y, z = np.asarray(y_mm, dtype=float), np.asarray(z_mm, dtype=float)
+        turns = np.zeros(y.shape, dtype=np.int64)
+        for edge in self.edges:
+            if touches(edge, medium):
+                curve = (edge if edge.left == medium else edge.reversed()).curve
+                for piece in half_turns(curve):
+                    turns += _winding(piece, y, z)
+        return np.asarray(turns > 0)
+
     def bends(self, medium: str = "acrylic") -> tuple[Bend, ...]:
         """Pairs of concentric arcs of equal sweep around `medium`, in the order of the edges."""
         arcs = [
@@ -181,6 +209,28 @@ class GuideProfile:
 def touches(edge: Edge, medium: str) -> bool:
     """Whether a medium is on one side of the edge."""
     return medium in (edge.left, edge.right)
+
+
+def half_turns(curve: Segment | Arc) -> tuple[Segment | Arc, ...]:
+    """The curve itself, or the two halves of an arc above 180 degrees."""
+    if isinstance(curve, Segment) or abs(curve.sweep_rad) <= math.pi * (1 + 1e-12):
+        return (curve,)
+    half = curve.sweep_rad / 2
+    first = Arc(curve.centre, curve.radius_mm, curve.start_rad, half)
+    return first, Arc(curve.centre, curve.radius_mm, curve.start_rad + half, half)
+
+
+def _winding(curve: Segment | Arc, y: Array, z: Array) -> NDArray[np.int64]:
+    """Part of one curve in the winding number about each point; see `GuideProfile.contains`."""
+    (ay, az), (by, bz) = curve.start, curve.end
+    left = (by - ay) * (z - az) - (bz - az) * (y - ay)
+    upward, downward = (az <= z) & (z < bz) & (left > 0), (bz <= z) & (z < az) & (left < 0)
+    turns = upward.astype(np.int64) - downward.astype(np.int64)
+    if isinstance(curve, Arc):
+        (cy, cz), sense = curve.centre, math.copysign(1, curve.sweep_rad)
+        within = np.hypot(y - cy, z - cz) < curve.radius_mm
+        turns += int(sense) * (within & (sense * left < 0))
+    return turns
 
 
 def _swept(curve: Segment | Arc) -> float:

@@ -1,8 +1,8 @@
 """The rays that a source launches: positions, directions and weights from random points.
 
 A launched ray is a row (x, y, z, dx, dy, dz, weight, reflected): the weight that enters its medium
-and the weight that the foot reflects, of a flux of 1 per ray. Both are 0 for a ray that misses the
-foot. The points are a scrambled Sobol sequence or pseudo-random.
+and the weight that the foot or end face reflects, of a flux of 1 per ray. Both are 0 for a ray
+that misses that face. The points are a scrambled Sobol sequence or pseudo-random.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gelslim_optics.guide.profile import Edge, Segment
 from gelslim_optics.light.scene import AIR, GEL, LightScene
-from gelslim_optics.light.source import EdgeLaunch, LedRow, Source
+from gelslim_optics.light.source import AngularLaw, EdgeLaunch, EndRow, LedRow, Source
 
 Array = NDArray[np.float64]
 Sampling = Literal["sobol", "random"]
@@ -54,8 +54,16 @@ def point_batches(
 def launch_medium(scene: LightScene, source: Source) -> str:
     """The medium in which the rays of a source start.
 
-    Raises ValueError where the source's edge is missing, curved, or does not meet that medium.
+    Raises ValueError where the source's edge is missing, curved, or does not meet that medium, and
+    where the guide has no clear end face for an end row.
     """
+    if isinstance(source, EndRow):
+        met = any(source.into in (edge.left, edge.right) for edge in scene.profile.edges)
+        if not met or source.into == AIR or source.into not in scene.media:
+            raise ValueError(f"the guide has no end face of the clear medium {source.into!r}")
+        if scene.ends != AIR:
+            raise ValueError(f"LEDs at the {source.end} end: the ends must meet air")
+        return source.into
     edge = _source_edge(scene, source)
     sides = (edge.left, edge.right)
     if isinstance(source, EdgeLaunch):
@@ -71,8 +79,11 @@ def launch_medium(scene: LightScene, source: Source) -> str:
 def launch(scene: LightScene, source: Source, points: Array) -> Array:
     """Rays (n, 8) for `points` (n, 4) in [0, 1): two for the position, two for the direction.
 
-    Refraction and reflection at the foot follow Fresnel's equations for unpolarised light.
+    Refraction and reflection at the foot or end face follow Fresnel's equations for unpolarised
+    light.
     """
+    if isinstance(source, EndRow):
+        return _end_rays(scene, source, launch_medium(scene, source), points)
     edge = _source_edge(scene, source)
     medium = launch_medium(scene, source)
     segment = edge.curve
@@ -109,20 +120,62 @@ Ray = tuple[Array, Array, Array, Array, Array]
 def _led_rays(
     scene: LightScene, led: LedRow, medium: str, points: Array, length: float
 ) -> tuple[Array, Array, Ray]:
-    place = points[:, 0] * len(led.x_mm)
-    which = np.minimum(place.astype(np.int64), len(led.x_mm) - 1)
-    x = np.asarray(led.x_mm, dtype=float)[which] + (place - which - 0.5) * led.size_mm
+    x = _along_row(led.x_mm, led.size_mm, points[:, 0])
     s = led.offset_mm + (points[:, 1] - 0.5) * led.size_mm
-    cosine = np.maximum(led.law.cosine(points[:, 2]), 1e-300)
-    sine = np.sqrt(np.maximum(0.0, 1 - cosine * cosine))
-    turn = 2 * math.pi * points[:, 3]
-    across, lengthwise = sine * np.cos(turn), sine * np.sin(turn)
-    if led.gap_mm > 0:
-        with np.errstate(over="ignore"):
-            path = led.gap_mm / cosine
-            x, s = x + path * lengthwise, s + path * across
+    cosine, across, lengthwise = _emitted(led.law, points)
+    x, s = _over_gap(led.gap_mm, cosine, (x, lengthwise), (s, across))
     x0, x1 = scene.x_mm
     met = (np.abs(s) <= length / 2) & (x >= x0) & (x <= x1)
+    inside, ratio, weight, reflected = _refracted(scene, led, medium, cosine, met)
+    return x, s, (inside, ratio * across, ratio * lengthwise, weight, reflected)
+
+
+def _end_rays(scene: LightScene, led: EndRow, medium: str, points: Array) -> Array:
+    """Rays (n, 8) of a row at an end face; the first two numbers are places along y and z."""
+    plane, inward = (scene.x_mm[0], 1.0) if led.end == "first" else (scene.x_mm[1], -1.0)
+    y = _along_row(led.y_mm, led.size_mm, points[:, 0])
+    z = led.z_mm + (points[:, 1] - 0.5) * led.size_mm
+    cosine, across, upward = _emitted(led.law, points)
+    y, z = _over_gap(led.gap_mm, cosine, (y, across), (z, upward))
+    met = scene.profile.contains(medium, y, z)
+    inside, ratio, weight, reflected = _refracted(scene, led, medium, cosine, met)
+    x = np.full_like(y, plane)
+    way = (inward * inside, ratio * across, ratio * upward)
+    return np.stack((x, y, z, *way, weight, reflected), axis=1)
+
+
+def _along_row(centres_mm: tuple[float, ...], size_mm: float, part: Array) -> Array:
+    """Places on the LEDs of a row, along it, for numbers in [0, 1)."""
+    place = part * len(centres_mm)
+    which = np.minimum(place.astype(np.int64), len(centres_mm) - 1)
+    found = np.asarray(centres_mm, dtype=float)[which] + (place - which - 0.5) * size_mm
+    return np.asarray(found)
+
+
+def _emitted(law: AngularLaw, points: Array) -> tuple[Array, Array, Array]:
+    """Direction cosines of emitted rays: along the axis of the LED, and two across it."""
+    cosine = np.maximum(law.cosine(points[:, 2]), 1e-300)
+    sine = np.sqrt(np.maximum(0.0, 1 - cosine * cosine))
+    turn = 2 * math.pi * points[:, 3]
+    return cosine, sine * np.cos(turn), sine * np.sin(turn)
+
+
+def _over_gap(
+    gap_mm: float, cosine: Array, first: tuple[Array, Array], second: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Two coordinates behind the gap, from pairs of a coordinate at the LED and a direction."""
+    (a, way_a), (b, way_b) = first, second
+    if gap_mm == 0:
+        return a, b
+    with np.errstate(over="ignore"):
+        path = gap_mm / cosine
+        return a + path * way_a, b + path * way_b
+
+
+def _refracted(
+    scene: LightScene, led: LedRow | EndRow, medium: str, cosine: Array, met: NDArray[np.bool_]
+) -> tuple[Array, float, Array, Array]:
+    """Cosine in the medium, factor on the sines, weight that enters and weight reflected."""
     n1 = scene.media[AIR].index_for(led.colour, led.wavelength_um)
     n2 = scene.media[medium].index_for(led.colour, led.wavelength_um)
     ratio = n1 / n2
@@ -131,7 +184,7 @@ def _led_rays(
     rp = (n1 * inside - n2 * cosine) / (n1 * inside + n2 * cosine)
     reflected = np.where(met, (rs * rs + rp * rp) / 2, 0.0)
     weight = np.where(met, 1 - reflected, 0.0)
-    return x, s, (inside, ratio * across, ratio * lengthwise, weight, reflected)
+    return inside, ratio, weight, reflected
 
 
 def _edge_rays(
@@ -153,7 +206,7 @@ def _edge_rays(
     return x, s, (deep, across, lengthwise, np.ones_like(x), np.zeros_like(x))
 
 
-def _source_edge(scene: LightScene, source: Source) -> Edge:
+def _source_edge(scene: LightScene, source: LedRow | EdgeLaunch) -> Edge:
     try:
         edge = scene.profile.edge(source.edge)
     except KeyError as missing:

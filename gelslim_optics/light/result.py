@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,8 @@ class LightResult:
         `stopped.EDGE`: absorbed by a mirror or coat. `returned.EDGE`: left through a foot.
         `foot_reflection` and `missed_foot`: never entered. `absorbed`: in the media. `truncated`:
         weight that was cut off. `lost`: at corners, should be 0. Edges without light are left out.
+        For a row at an end of the guide its end face stands for the foot: light that misses the
+        cross-section is `missed_foot`, and light that comes back to the LEDs `leaked.ends`.
         """
         sums = self._sum(colour)
         return {
@@ -155,12 +158,35 @@ class LightResult:
         """Flux-weighted mean angle between arriving light and the gel's face."""
         return self._per_arrival(colour, column.ELEVATION, np.degrees)
 
-    def slope_sensitivity(self, colour: str | None = None) -> Estimate:
-        """Relative change of the mean irradiance per unit slope of the face along +y.
+    def slope_sensitivity(
+        self, colour: str | None = None, axis: Literal["x", "y"] = "y"
+    ) -> Estimate:
+        """Relative change of the mean irradiance per unit slope of the face along +y or +x.
 
-        A facet with a small slope h changes the irradiance of each ray d by -h (d·y)/(d·n).
+        A facet with a small slope h along y changes the irradiance of each ray d by
+        -h (d·y)/(d·n); along x likewise.
         """
-        return self._per_arrival(colour, column.SLOPE, lambda value: value)
+        place = column.SLOPE if axis == "y" else column.SLOPE_ALONG
+        return self._per_arrival(colour, place, lambda value: value)
+
+    def of_colours(self, colours: tuple[str, ...]) -> LightResult:
+        """The tallies of the sources of some colours alone, with their share of the flux.
+
+        Raises KeyError for a colour without a source.
+        """
+        missing = [c for c in colours if c not in self.colours]
+        if missing or not colours:
+            raise KeyError(f"no light source has the colour {', '.join(missing) or '(none)'}")
+        chosen = [i for i, c in enumerate(self.colours) if c in colours]
+        whole = sum(self.shares[i] for i in chosen)
+        return replace(
+            self,
+            colours=tuple(self.colours[i] for i in chosen),
+            shares=tuple(self.shares[i] / whole for i in chosen),
+            rays=self.rays * len(chosen) // len(self.colours),
+            tallies=self.tallies[chosen],
+            maps=self.maps[chosen],
+        )
 
     @property
     def crossings(self) -> float:

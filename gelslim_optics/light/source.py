@@ -1,10 +1,14 @@
-"""Light sources: rows of LEDs under a foot, and launches from an edge, with their emission laws."""
+"""Light sources with their emission laws.
+
+Rows of LEDs under a foot or before an end face, and launches from an edge.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +79,7 @@ def _cumulative(law: MeasuredLaw) -> tuple[Array, Array]:
     return cosines, shares / shares[-1]
 
 
+End = Literal["first", "last"]
 AngularLaw = Lambertian | Dome | MeasuredLaw
 
 
@@ -111,12 +116,50 @@ class LedRow:
     offset_mm: float = 0.0
 
     def __post_init__(self) -> None:
-        if not self.x_mm:
-            raise ValueError(f"the LED row at {self.edge} has no LED")
-        if not (math.isfinite(self.size_mm) and self.size_mm > 0):
-            raise ValueError(f"LED size_mm = {self.size_mm!r}: must be > 0")
-        if not (math.isfinite(self.gap_mm) and self.gap_mm >= 0):
-            raise ValueError(f"LED gap_mm = {self.gap_mm!r}: must be >= 0")
+        _check_row(self.edge, self.x_mm, self.size_mm, self.gap_mm)
+        _check_source(self.power, self.wavelength_um)
+
+
+@dataclass(frozen=True)
+class EndRow:
+    """A row of square LEDs that face an end of the extruded guide from outside, parallel to it.
+
+    Light crosses the air to the plane of the end face and is refracted into the guide; light
+    beside the cross-section of `into`, or onto the end of another medium, is counted as missed.
+
+    Attributes:
+        end: Whether the LEDs face the first or the last x of the guide.
+        y_mm: Centres of the LEDs across the finger.
+        z_mm: Height of the centres.
+        into: The medium that the light enters.
+        size_mm: Side of an LED.
+        gap_mm: Air between LED and end face.
+        law: Emission law.
+        colour: Name of the colour.
+        wavelength_um: Wavelength; None uses the index of the colour.
+        power: Flux relative to the other sources.
+
+    Raises:
+        ValueError: There is no LED, or a value is out of range.
+    """
+
+    end: End
+    y_mm: tuple[float, ...]
+    z_mm: float
+    into: str = "acrylic"
+    size_mm: float = 2.0
+    gap_mm: float = 0.1
+    law: AngularLaw = field(default_factory=Lambertian)
+    colour: str = "white"
+    wavelength_um: float | None = None
+    power: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.end not in get_args(End):
+            raise ValueError(f"end = {self.end!r}: must be one of {', '.join(get_args(End))}")
+        _check_row(f"the {self.end} end", self.y_mm, self.size_mm, self.gap_mm)
+        if not all(math.isfinite(value) for value in (*self.y_mm, self.z_mm)):
+            raise ValueError("y_mm and z_mm of an end row must be finite")
         _check_source(self.power, self.wavelength_um)
 
 
@@ -143,7 +186,16 @@ class EdgeLaunch:
         _check_source(self.power, self.wavelength_um)
 
 
-Source = LedRow | EdgeLaunch
+Source = LedRow | EndRow | EdgeLaunch
+
+
+def _check_row(where: str, centres: tuple[float, ...], size_mm: float, gap_mm: float) -> None:
+    if not centres:
+        raise ValueError(f"the LED row at {where} has no LED")
+    if not (math.isfinite(size_mm) and size_mm > 0):
+        raise ValueError(f"LED size_mm = {size_mm!r}: must be > 0")
+    if not (math.isfinite(gap_mm) and gap_mm >= 0):
+        raise ValueError(f"LED gap_mm = {gap_mm!r}: must be >= 0")
 
 
 def _check_source(power: float, wavelength_um: float | None) -> None:

@@ -17,8 +17,15 @@ from gelslim_core.kernel_cache import drop_stale
 from gelslim_optics.light.launch import Sampling, launch, launch_medium, point_batches
 from gelslim_optics.light.result import LightResult
 from gelslim_optics.light.scene import LightScene
-from gelslim_optics.light.source import Source
-from gelslim_optics.light.trace_geometry import OWNER, TraceGeometry, columns, face_names, pack
+from gelslim_optics.light.source import EndRow, Source
+from gelslim_optics.light.trace_geometry import (
+    END,
+    OWNER,
+    TraceGeometry,
+    columns,
+    face_names,
+    pack,
+)
 
 Array = NDArray[np.float64]
 # Sums are made per block and added in order, so that batches and threads change no bit.
@@ -145,7 +152,7 @@ def trace_paths(
 ) -> tuple[tuple[str, Array], ...]:
     """Paths of `count` rays for a picture: pairs of colour and points (k, 3) in mm.
 
-    At each face one branch is followed at random. Rays that miss the foot are left out, and rays
+    At each face one branch is followed at random. Rays that miss the guide are left out, and rays
     that leave end at the last face. On average a ray has at most `max_points` points.
     """
     options = TraceOptions(split=1.0, max_faces=max_points)
@@ -173,12 +180,15 @@ def _job(scene: LightScene, source: Source, options: TraceOptions) -> _Job:
         absorption[number[name]] = medium.absorption_per_mm
     names = face_names(scene)
     start = launch_medium(scene, source)
+    first = END
+    if not isinstance(source, EndRow):
+        first = int(np.flatnonzero(geometry.facts[:, OWNER] == names.index(source.edge))[0])
     return _Job(
         geometry=geometry,
         index=index,
         absorption=absorption,
         medium=number[start],
-        first_edge=int(np.flatnonzero(geometry.facts[:, OWNER] == names.index(source.edge))[0]),
+        first_edge=first,
         middle=middle,
         limits=np.array([options.split, options.cut, options.max_faces]),
         bins=options.bins,

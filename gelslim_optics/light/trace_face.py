@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from gelslim_optics.light.trace_crossing import COMPILED
-from gelslim_optics.light.trace_geometry import ARRIVED, ELEVATION, SLOPE
+from gelslim_optics.light.trace_geometry import ARRIVED, ELEVATION, SLOPE, SLOPE_ALONG
 
 STEP = np.uint64(0x9E3779B97F4A7C15)
 MIX_A = np.uint64(0xBF58476D1CE4E5B9)
@@ -65,7 +65,7 @@ def map_arrival(
     heat: Any,
 ) -> None:
     """Add the flux w that reaches the mapped face at the position of the ray."""
-    x, y, z, dy, dz = ray[0], ray[1], ray[2], ray[4], ray[5]
+    x, y, z, dx, dy, dz = ray[0], ray[1], ray[2], ray[3], ray[4], ray[5]
     ay, az, by, bz = shape[e, 0], shape[e, 1], shape[e, 2], shape[e, 3]
     if shape[e, 7] == 0.0:
         ty, tz = by - ay, bz - az
@@ -88,6 +88,7 @@ def map_arrival(
     up = -nz if nz < 0 else nz
     ty, tz = up, -ny if nz > 0 else ny
     sums[SLOPE] -= w * (dy * ty + dz * tz) / max(cosine, 1e-12)
+    sums[SLOPE_ALONG] -= w * dx / max(cosine, 1e-12)
 
 
 @njit(**COMPILED)

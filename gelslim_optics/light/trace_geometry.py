@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gelslim_optics.guide.profile import CLOSED_MM, Arc, Edge, Segment
+from gelslim_optics.guide.profile import CLOSED_MM, Edge, Segment, half_turns
 from gelslim_optics.light.scene import AIR, GEL, LightScene
 
 ALWAYS, BONDED, GEL_ONLY = 0, 1, 2
 NONE = -1
+# Faces that are not edges of the profile: end of the guide, end of the gel.
+END, GEL_END = -2, -3
 CORNER_PART = 1e-9
 # Columns of `facts` after the media on the left and right.
 PRESENCE, OWNER, EXIT, CIRCLE = range(2, 6)
@@ -82,13 +84,7 @@ def _box(scene: LightScene) -> tuple[tuple[float, float], float]:
 
 
 def _pieces(edge: Edge) -> list[Edge]:
-    curve = edge.curve
-    if isinstance(curve, Segment) or abs(curve.sweep_rad) <= math.pi * (1 + 1e-12):
-        return [edge]
-    half = curve.sweep_rad / 2
-    first = Arc(curve.centre, curve.radius_mm, curve.start_rad, half)
-    second = Arc(curve.centre, curve.radius_mm, curve.start_rad + half, half)
-    return [Edge(edge.name, arc, edge.left, edge.right) for arc in (first, second)]
+    return [Edge(edge.name, curve, edge.left, edge.right) for curve in half_turns(edge.curve)]
 
 
 def _shapes(pieces: list[Edge], middle: tuple[float, float]) -> tuple[Any, list[int]]:
@@ -145,7 +141,7 @@ def _presence(scene: LightScene, edge: Edge) -> int:
 
 # Columns of the sums; then one per edge for each of leaked, stopped and returned flux.
 ABSORBED, MISSED, FOOT_REFLECTION, TRUNCATED, LOST, ENDS, GEL_ENDS, ENDS_STOPPED = range(8)
-ARRIVED, ELEVATION, SLOPE, ENTERED_GEL, CROSSINGS, CORNERS, PER_EDGE = range(8, 15)
+ARRIVED, ELEVATION, SLOPE, SLOPE_ALONG, ENTERED_GEL, CROSSINGS, CORNERS, PER_EDGE = range(8, 16)
 
 
 def columns(edges: int) -> int:

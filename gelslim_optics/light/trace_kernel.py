@@ -30,11 +30,13 @@ from gelslim_optics.light.trace_geometry import (
     ABSORBED,
     CORNERS,
     CROSSINGS,
+    END,
     ENDS,
     ENDS_STOPPED,
     ENTERED_GEL,
     EXIT,
     FOOT_REFLECTION,
+    GEL_END,
     GEL_ENDS,
     LOST,
     MISSED,
@@ -43,9 +45,6 @@ from gelslim_optics.light.trace_geometry import (
     PRESENCE,
     TRUNCATED,
 )
-
-# Faces that are not edges of the profile: end of the guide, end of the gel.
-END, GEL_END = -2, -3
 
 
 @njit(**COMPILED)

@@ -117,6 +117,9 @@ class SlowTracer:
             self.book[f"leaked.{ray.left_through}"] += ray.weight
             return []
         point = ray.point + hit.distance_mm * ray.direction
+        if hit.edge is None:
+            planes = (*self.scene.x_mm, *self.scene.gel_x_mm)
+            point[0] = min(planes, key=lambda x: abs(x - point[0]))
         lost = self.scene.media[ray.medium].absorption_per_mm * hit.distance_mm
         weight = ray.weight * math.exp(-lost)
         self.book["absorbed"] += ray.weight - weight
@@ -182,6 +185,7 @@ class SlowTracer:
         self.book["arrived"] += weight
         self.book["elevation"] += weight * (math.pi / 2 - math.acos(min(cosine, 1.0)))
         self.book["slope"] -= weight * float(direction @ tangent) / cosine
+        self.book["slope_along"] -= weight * float(direction[0]) / cosine
         curve = hit.edge.curve
         if isinstance(curve, Segment):
             part = math.dist(curve.start, point[1:]) / curve.length_mm

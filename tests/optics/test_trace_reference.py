@@ -21,7 +21,7 @@ from gelslim_optics.guide.shapes import (
 from gelslim_optics.light import trace_geometry as column
 from gelslim_optics.light.launch import launch, launch_medium
 from gelslim_optics.light.scene import LightScene, Medium, Surface
-from gelslim_optics.light.source import EdgeLaunch, LedRow
+from gelslim_optics.light.source import EdgeLaunch, EndRow, LedRow
 from gelslim_optics.light.trace import TraceOptions, _job, _run
 
 CUT = 0.02
@@ -109,7 +109,9 @@ def round_rod() -> LightScene:
 SCENES = {f.__name__: f for f in (crowned, dented, glued, air_gap, round_rod)}
 
 
-def agree(scene: LightScene, source: EdgeLaunch | LedRow, rows: np.ndarray, medium: str) -> None:
+def agree(
+    scene: LightScene, source: EdgeLaunch | EndRow | LedRow, rows: np.ndarray, medium: str
+) -> None:
     """Compare the tallies of each ray."""
     options = TraceOptions(split=1e-4, cut=CUT, bins=BINS)
     job = _job(scene, source, options)
@@ -120,7 +122,8 @@ def agree(scene: LightScene, source: EdgeLaunch | LedRow, rows: np.ndarray, medi
         sums, heat, _ = _run(job, centred[None], np.uint64(3), number)
         slow = SlowTracer(scene, source, CUT, BINS)
         if row[6] > 0:
-            slow.follow(Ray(row[:3], row[3:6], medium, row[6], source.edge))
+            through = "ends" if isinstance(source, EndRow) else source.edge
+            slow.follow(Ray(row[:3], row[3:6], medium, row[6], through))
         expected = booked(slow, names, row[7])
         expected[column.MISSED] += 0.0 if row[6] > 0 else 1 - row[7]
         np.testing.assert_allclose(sums, expected, atol=1e-7, err_msg=f"ray {number}")
@@ -138,6 +141,7 @@ def booked(slow: SlowTracer, names: tuple[str, ...], reflected: float) -> np.nda
         "arrived": column.ARRIVED,
         "elevation": column.ELEVATION,
         "slope": column.SLOPE,
+        "slope_along": column.SLOPE_ALONG,
         "entered_gel": column.ENTERED_GEL,
         "crossings": column.CROSSINGS,
     }
@@ -159,6 +163,18 @@ def test_rays_from_the_leds_end_where_the_slow_tracer_says(name: str) -> None:
         if any(edge.name == foot for edge in scene.profile.edges):
             source = LedRow(foot, (1.0, 4.0))
             agree(scene, source, launch(scene, source, points), launch_medium(scene, source))
+
+
+@pytest.mark.parametrize("end", ["first", "last"])
+@pytest.mark.parametrize("name", ["crowned", "air_gap", "round_rod"])
+def test_rays_from_an_end_row_end_where_the_slow_tracer_says(name: str, end: str) -> None:
+    """The row stands before window and leg, so that some light starts in a bend or beside it."""
+    scene = SCENES[name]()
+    y, z = scene.profile.edge("foot_right" if name == "round_rod" else "window_bottom").curve.start
+    source = EndRow(end, (y - 1.0, y + 1.0), z + 0.8)  # type: ignore[arg-type]
+    rows = launch(scene, source, np.random.default_rng(21).random((24, 4)))
+    assert 0 < np.mean(rows[:, 6] > 0) < 1
+    agree(scene, source, rows, launch_medium(scene, source))
 
 
 @pytest.mark.parametrize("name", ["crowned", "dented", "air_gap"])
