@@ -111,7 +111,8 @@ def _brightest(items: tuple[tuple[str, Any], ...]) -> float:
     light = []
     for ratio in ratios:
         profile = curved_profile(replace(own, inner_radius_mm=ratio * own.thickness_mm), gel)
-        light.append(trace_light(light_scene(values, profile), RAYS).value("delivered"))
+        scene = light_scene(values, profile, sides_only=True)
+        light.append(trace_light(scene, RAYS).value("delivered"))
     enough = np.asarray(light) >= GOOD_ENOUGH * max(light)
     return float(ratios[int(np.argmax(enough))])
 

@@ -26,11 +26,15 @@ RAYS = 1 << 13
 
 @dataclass(frozen=True)
 class Traced:
-    """What one trace tells: share on the coat, W/mm² per W of the LEDs of each strip."""
+    """What one trace tells: share on the coat, W/mm² per W of the LEDs of each strip.
+
+    `tip_per_w` is None without a strip at the tip.
+    """
 
     on_coat: float
     left_per_w: float
     right_per_w: float
+    tip_per_w: float | None = None
 
 
 def trace(values: Mapping[str, Any], rays: int) -> Traced:
@@ -40,13 +44,14 @@ def trace(values: Mapping[str, Any], rays: int) -> Traced:
     from gelslim_optics.light.trace import trace_light
 
     light = trace_light(light_scene(values, guide_profile(values)), rays, threads=1)
-    left, right = (float(light.irradiance(c).mean()) for c in strip_wavelengths_nm(values))
-    return Traced(light.value("delivered"), left, right)
+    per_w = (float(light.irradiance(c).mean()) for c in strip_wavelengths_nm(values))
+    return Traced(light.value("delivered"), *per_w)
 
 
 def light_columns(d: Lookup, traced: Traced) -> dict[str, float]:
-    """Share on the coat, µW/mm² on it (darker colour), exposure and frame rate (slower colour)."""
-    per_w = traced.left_per_w, traced.right_per_w
+    """Share on the coat, µW/mm² on it (darkest colour), exposure and frame rate (slowest)."""
+    tip = () if traced.tip_per_w is None else (traced.tip_per_w,)
+    per_w = (traced.left_per_w, traced.right_per_w, *tip)
     found = [exposure_at(d, w, c) for c, w in zip(strip_wavelengths_nm(d), per_w, strict=True)]
     return {
         "light.on_coat": traced.on_coat,

@@ -8,6 +8,7 @@ from typing import Literal
 
 from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.light.scene import strip_leds
 from gelslim_optics.light.result import LightResult
 
 PLANCK_J_S = 6.62607015e-34
@@ -47,8 +48,8 @@ def exposure(d: Lookup, light: LightResult, colour: str) -> Exposure:
 
 
 def exposure_at(d: Lookup, irradiance_per_w: float, colour: str) -> Exposure:
-    """As `exposure`, for a mean irradiance of the coat in W/mm² per W of the LEDs."""
-    watts = d["design.leds.radiant_flux_mw"] / 1000 * d["led.count"]
+    """As `exposure`, for a mean irradiance of the coat in W/mm² per W of the colour's LEDs."""
+    watts = d["design.leds.radiant_flux_mw"] / 1000 * strip_leds(d)[colour]
     arriving = watts * irradiance_per_w
     radiance = _to_air(d) * d["material.gel.coat_reflectance"] * arriving / math.pi
     on_sensor = math.pi * d["camera.lens_transmission"] * radiance / (4 * d["camera.f_number"] ** 2)

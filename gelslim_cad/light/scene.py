@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import has_tip_light, strip_sides, strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
 from gelslim_optics.guide.profile import GuideProfile
 from gelslim_optics.light.scene import PMMA_SELLMEIER, LightScene, Medium, Surface
-from gelslim_optics.light.source import AngularLaw, Dome, Lambertian, LedRow, MeasuredLaw
+from gelslim_optics.light.source import AngularLaw, Dome, EndRow, Lambertian, LedRow, MeasuredLaw
 
 MIRROR_REFLECTANCE = 0.9
 """Reflectance of unprotected aluminium on acrylic; silver reaches 0.95."""
@@ -52,6 +52,10 @@ NAMES: tuple[Name, ...] = (
     "guide.proximal_end_x_mm",
     "led.count",
     "led.pitch_mm",
+    "led.tip_count",
+    "led.tip_face_x_mm",
+    "led.tip_pitch_mm",
+    "led.tip_z_mm",
     "led.top_z_mm",
     "led.y_mm",
     "material.acrylic.absorption_per_m",
@@ -63,18 +67,27 @@ NAMES: tuple[Name, ...] = (
 """Names that scene, study, exposure and pictures use."""
 
 
-def light_scene(d: Lookup, profile: GuideProfile) -> LightScene:
+def light_scene(d: Lookup, profile: GuideProfile, *, sides_only: bool = False) -> LightScene:
     """The profile extruded over the guide's length, with the finger's own LEDs and materials.
 
     Body, baffles and bezel are black: light that leaves the acrylic or the gel is gone, except
     between leg and window of a guide with an air-gap mirror.
+
+    Args:
+        d: Spec fields and dimensions.
+        profile: The cross-section of the guide.
+        sides_only: Leave out the strip at the tip, whose light takes no bend.
+
+    Returns:
+        The scene; its sources are the strips at -y, at +y and, where there is one, at the tip.
     """
+    tip = () if sides_only or not has_tip_light(d) else (tip_row(d),)
     half = d["design.gel.length_mm"] / 2
     return LightScene(
         profile,
         (d["guide.proximal_end_x_mm"], d["guide.distal_end_x_mm"]),
         (-half, half),
-        led_rows(d),
+        (*led_rows(d), *tip),
         media(d),
         {
             "paint": Surface(d["material.gel.coat_reflectance"], diffuse=True),
@@ -93,11 +106,33 @@ def led_rows(d: Lookup) -> tuple[LedRow, LedRow]:
         d["design.housing.fit_clearance_mm"],
         angular_law(d),
     )
-    left, right = strip_wavelengths_nm(d)
+    left, right, *_ = strip_wavelengths_nm(d)
     return (
         LedRow("foot_left", places, size, gap, law, left),
         LedRow("foot_right", places, size, gap, law, right),
     )
+
+
+def tip_row(d: Lookup) -> EndRow:
+    """LEDs before the end face of the window at the tip; only for a finger with that strip."""
+    count, pitch = round(d["led.tip_count"]), d["led.tip_pitch_mm"]
+    return EndRow(
+        "last",
+        tuple((i + 0.5 - count / 2) * pitch for i in range(count)),
+        d["led.tip_z_mm"],
+        size_mm=d["design.leds.package_mm"],
+        gap_mm=d["led.tip_face_x_mm"] - d["guide.distal_end_x_mm"],
+        law=angular_law(d),
+        colour=list(strip_wavelengths_nm(d))[-1],
+        power=count / d["led.count"],
+    )
+
+
+def strip_leds(d: Lookup) -> dict[str, float]:
+    """Number of LEDs of each strip, by the name of its light."""
+    at_side, at_tip = d["led.count"], d["led.tip_count"]
+    names = zip(strip_wavelengths_nm(d), strip_sides(d), strict=True)
+    return {name: at_tip if side == "tip" else at_side for name, side in names}
 
 
 def angular_law(d: Lookup) -> AngularLaw:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
-from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import has_tip_light, strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.optics import (
     curved_guide,
@@ -93,14 +93,26 @@ def study_light(
 ) -> LightStudy:
     """Trace this finger's guide and both kinds of straight guide with 45° mirrors.
 
-    All guides share gel, window, LEDs, length of the legs and materials. `rays` per guide; the
-    curve over R/t takes an eighth of them per point. `threads` never changes the answer.
+    All guides share gel, window, LEDs, length of the legs and materials. The light of a strip at
+    the tip takes no bend: it is traced in this finger's guide, but not compared.
+
+    Args:
+        d: Spec fields and dimensions.
+        rays: Rays per guide; the curve over R/t takes an eighth of them per point.
+        seed: Seed of the random numbers.
+        threads: Number of threads; it never changes the answer.
+        curve: Whether to trace other bend radii too.
+        progress: Called as the work goes on.
+
+    Returns:
+        The study.
     """
     gel, straight = gel_section(d), straight_guide(d)
+    air_gap = mirror_profile(replace(straight, fit="air_gap"), gel)
     scenes = {
         "curved": light_scene(d, guide_profile(d)),
-        "glued": light_scene(d, mirror_profile(straight, gel)),
-        "air_gap": light_scene(d, mirror_profile(replace(straight, fit="air_gap"), gel)),
+        "glued": light_scene(d, mirror_profile(straight, gel), sides_only=True),
+        "air_gap": light_scene(d, air_gap, sides_only=True),
     }
     steps = len(scenes) + (len(RATIOS) if curve else 0)
     tell = progress or (lambda text, done, total: None)
@@ -110,6 +122,7 @@ def study_light(
         traced[name] = trace_light(scene, rays, seed=seed, threads=threads)
     same = f"same LEDs and legs, mirrors of reflectance {MIRROR_REFLECTANCE:g}"
     light, glued, gap = (traced[n] for n in ("curved", "glued", "air_gap"))
+    sides = light.of_colours(glued.colours) if has_tip_light(d) else light
     return LightStudy(
         certificate=certify_tir(
             guide_profile(d),
@@ -121,7 +134,7 @@ def study_light(
         glued=glued,
         air_gap=gap,
         comparisons=tuple(
-            Comparison(name, quantity, paired_ratio(light, other, quantity))
+            Comparison(name, quantity, paired_ratio(sides, other, quantity))
             for quantity in QUANTITIES
             for name, other in (
                 (f"a straight guide with glued 45° mirrors ({same})", glued),
@@ -129,7 +142,7 @@ def study_light(
             )
         ),
         exposures=tuple(exposure(d, light, c) for c in strip_wavelengths_nm(d)),
-        glued_exposures=tuple(exposure(d, glued, c) for c in strip_wavelengths_nm(d)),
+        glued_exposures=tuple(exposure(d, glued, c) for c in glued.colours),
         curve=ratio_curve(
             d, rays // 8, seed, threads, lambda ratio, k: tell(f"R/t = {ratio:g}", 3 + k, steps)
         )
@@ -148,14 +161,15 @@ def ratio_curve(
 ) -> tuple[tuple[float, Estimate], ...]:
     """Light on the coat over that of glued mirrors, for other bend radii of this finger."""
     own, gel, points = curved_guide(d), gel_section(d), []
-    mirrors = light_scene(d, mirror_profile(straight_guide(d), gel))
+    mirrors = light_scene(d, mirror_profile(straight_guide(d), gel), sides_only=True)
     other = trace_light(mirrors, rays, seed=seed, threads=threads)
     for k, ratio in enumerate(RATIOS):
         if tell is not None:
             tell(ratio, k)
         radius = ratio * own.thickness_mm
         bent = curved_profile(replace(own, inner_radius_mm=radius), gel)
-        ours = trace_light(light_scene(d, bent), rays, seed=seed, threads=threads)
+        scene = light_scene(d, bent, sides_only=True)
+        ours = trace_light(scene, rays, seed=seed, threads=threads)
         points.append((ratio, paired_ratio(ours, other, "arrived")))
     return tuple(points)
 
