@@ -3,7 +3,7 @@
     mirror -> mirror_seat \\
     camera_clamp, camera, LED boards, pad, cable -> back_cover \\
     gel_pad -> light_guide \\                                    -> body -> gripper_adapter
-    inserts or nuts, shims, tip_bezel -> body ------------------ /
+    inserts or nuts, LED board at the tip, shims, tip_bezel -> body
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from gelslim_cad.solids.layout import Hole, Layout
 
 PULL_BACK_MM = 2.0
 """Between a part before the last piece of its way and what it then slides into."""
+SIDE_BOARDS = 2
 CLEAR_MM = 0.15
 """Between a nut and the end of its slot."""
 AXES: tuple[Vector, ...] = (
@@ -77,8 +78,7 @@ def _build_cover(bench: Bench, d: Dimensions) -> None:
         )
     held = "springs of the clamp, a drop of glue" if d["clamp.preloaded"] > 0 else "glue"
     bench.join("camera", "back_cover", ["camera"], _straight(into_clamp), held, others=_axes())
-    for number, board in enumerate(bench.named("led_board_")):
-        wires = [f"led_wire_{2 * number + k}" for k in (1, 2)]
+    for board, wires in _boards(bench)[:SIDE_BOARDS]:
         bench.join(
             board,
             "back_cover",
@@ -100,6 +100,14 @@ def _build_cover(bench: Bench, d: Dimensions) -> None:
     )
 
 
+def _boards(bench: Bench) -> list[tuple[str, list[str]]]:
+    """Boards with their wires: those of the sides, then that of the tip."""
+    return [
+        (board, [f"led_wire_{2 * number + k}" for k in (1, 2)])
+        for number, board in enumerate(bench.named("led_board_"))
+    ]
+
+
 def _build_body(bench: Bench, d: Dimensions) -> None:
     """Threads, shims, window and bezel."""
     threads = [
@@ -113,6 +121,11 @@ def _build_body(bench: Bench, d: Dimensions) -> None:
     pressed = any("_insert_" in f.part for f in threads)
     held = "melted plastic or glue" if pressed else "the screws that follow"
     bench.join("threads", "body", [], (), held, fasteners=threads)
+    for board, wires in _boards(bench)[SIDE_BOARDS:]:
+        # The wires are soldered before and bend: through their channel they go to the chamber.
+        ways = _axes()
+        bench.join("tip_board", "body", [board], _straight(DOWN), "its ribs and glue", others=ways)
+        bench.join("tip_wires", "body", wires, _straight(UP), "the cover", others=ways)
     bench.join("gel", "light_guide", ["gel_pad"], _straight(DOWN), "primer", others=_axes())
     for name in bench.named("shim_"):
         bench.join(name, "body", [name], _straight(DOWN), "the window", text="shim", others=_axes())

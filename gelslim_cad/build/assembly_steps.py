@@ -263,6 +263,35 @@ def _board_wires(boards: FingerBoards) -> str:
     )
 
 
+def _tip_board(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
+    """The LED board in its slot of the tip block, its wires hanging through their channel."""
+    (name,) = step.moves
+    return StepText(
+        f"Set {name} into the tip",
+        f"Solder two wires of {d['design.leds.wire_diameter_mm']:g} mm to the pads at the end of "
+        f"the board.{_board_wires(boards)} Put a drop of silicone or slow epoxy on the back of the "
+        "slot in the tip of `body`, at both ends. Thread the wires down through the channel at +y "
+        f"and press `{name}` down to the floor of its slot, its LEDs to the gripper, against the "
+        "stop at -y: the ribs of the lips press it to the slot's back, which locates it to "
+        f"{d['clamp.point_error_mm']:g} mm.",
+        "Its upper edge lies below the face of `body`; all its LEDs light.",
+        8,
+    )
+
+
+def _tip_wires(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
+    """The wires of the board at the tip along the chamber."""
+    return StepText(
+        "Lay the wires of the tip",
+        "Turn `body` over. Lay the two wires along its inside from the channel towards the "
+        "gripper, one above the other where the cover will be, inside of the baffle and clear of "
+        "the mirror, past the place of the clamp and into the lane at +y, next to the cable's "
+        "groove. A strip of adhesive tape holds them until the cover does.",
+        "No wire crosses the window as seen through the gel.",
+        3,
+    )
+
+
 def _pad(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
     width = d["camera.cable_width_mm"]
     return StepText(
@@ -329,6 +358,8 @@ _TEXTS: dict[str, Callable[[Dimensions, FingerBoards, Step], StepText]] = {
     "clamp": _clamp,
     "camera": _camera,
     "led_board": _led_board,
+    "tip_board": _tip_board,
+    "tip_wires": _tip_wires,
     "pad": _pad,
     "cable": _cable,
     "cover": _cover,

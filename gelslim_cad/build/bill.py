@@ -23,6 +23,7 @@ from gelslim_cad.dimensions.cable import PAD_LENGTH_MM
 from gelslim_cad.electronics.finger import FingerBoards
 from gelslim_cad.electronics.order import MATERIAL, bought_parts
 from gelslim_cad.geometry.jaw import JawBolts
+from gelslim_cad.geometry.led_strips import has_tip_light, strip_wavelengths_nm
 from gelslim_cad.geometry.materials import density_g_cm3
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.ordering.line import BomLine, Need
@@ -58,7 +59,13 @@ def finger_bill(d: Dimensions, parts: Iterable[Part], boards: FingerBoards) -> t
         "cable_pad": Need(PAD_LENGTH_MM * d["camera.cable_width_mm"] / 100, "cm²"),
         "led_wire_1": Need(WIRE_M, "m"),
     }
-    lines = (_with_need(line, needs, _board_need(d)) for line in made)
+    if has_tip_light(d):
+        tip = list(strip_wavelengths_nm(d))[-1]
+        needs[f"led_board_{tip}"] = _board_need(
+            d, d["led.tip_board_length_mm"], d["led.tip_board_width_mm"]
+        )
+    side = _board_need(d, d["led.board_length_mm"], d["led.board_width_mm"])
+    lines = (_with_need(line, needs, side) for line in made)
     return (*lines, *coat_bill(d), *board_lines(d, boards), *supplies(d))
 
 
@@ -112,13 +119,13 @@ def _sheet_mm(part: Part, drawn_mm: float) -> float:
 
 
 def _with_need(line: BomLine, needs: Mapping[str, Need], board: Need) -> BomLine:
-    need = board if line.process == "pcb" else needs.get(line.name, line.need)
-    return replace(line, need=need)
+    usual = board if line.process == "pcb" else line.need
+    return replace(line, need=needs.get(line.name, usual))
 
 
-def _board_need(d: Dimensions) -> Need:
+def _board_need(d: Dimensions, length_mm: float, width_mm: float) -> Need:
     return Need(
-        size_mm=(d["led.board_length_mm"], d["led.board_width_mm"]),
+        size_mm=(length_mm, width_mm),
         thickness_mm=d["design.leds.board_thickness_mm"],
         stock=MATERIAL[d["electronics.board"]],
     )
@@ -131,7 +138,7 @@ def board_lines(d: Dimensions, boards: FingerBoards) -> tuple[BomLine, ...]:
     """
     if not boards.boards:
         name = d["design.leds.model"] or "LEDs"
-        count = 2 * round(d["led.count"])
+        count = 2 * round(d["led.count"]) + round(d["led.tip_count"])
         return (BomLine("led_any", count, name, "buy", note="no design of the boards, see ORDER"),)
     bought = (
         BomLine(

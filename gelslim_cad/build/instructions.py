@@ -84,13 +84,15 @@ def _head(d: Dimensions, name: str) -> str:
 
 def _strips(d: Dimensions) -> str:
     """Which light comes from where."""
-    left, right = strip_wavelengths_nm(d)
+    left, right, *tip = strip_wavelengths_nm(d)
     alike = shared_light(d)
     if is_white(d):
-        return "white light comes from -y (left) and from +y (right)"
+        third = ", and from the tip" if tip else ""
+        return f"white light comes from -y (left) and from +y (right){third}"
     if alike:
         return f"light of {alike} comes from -y (left) and from +y (right)"
-    return f"{left} light comes from -y (left), {right} from +y (right)"
+    third = f", {tip[0]} from the tip" if tip else ""
+    return f"{left} light comes from -y (left), {right} from +y (right){third}"
 
 
 def _shopping(bom: tuple[BomLine, ...], boards: FingerBoards) -> str:
@@ -226,10 +228,11 @@ def _all_seen(d: Dimensions) -> str:
 
 
 def _seen(d: Dimensions) -> str:
-    """What the picture shows of the light of the two strips."""
+    """What the picture shows of the light of the strips."""
     if d["camera.picture"] == "mono":
         return "The picture is grey, and left and right are equally bright."
     if shared_light(d):
         return "Left and right have the same colour."
-    left, right = strip_wavelengths_nm(d)
-    return f"Left {left}, right {right}."
+    left, right, *tip = strip_wavelengths_nm(d)
+    third = f", the edge at the tip {tip[0]}" if tip else ""
+    return f"Left {left}, right {right}{third}."

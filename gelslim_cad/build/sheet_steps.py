@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.geometry.led_strips import has_tip_light
 
 
 def guide_steps(d: Dimensions) -> str:
@@ -23,6 +24,11 @@ def guide_steps(d: Dimensions) -> str:
         if trim
         else "4. Polish the ends of the legs: light enters there.\n"
     )
+    if has_tip_light(d):
+        trimmed += (
+            "   Polish the end face of the window at the tip as well: the third strip shines into "
+            "it. A laser's cut is clear enough if it is not matt; keep the face flat and square.\n"
+        )
     return (
         f"1. Laser-cut `laser/light_guide_blank.dxf` from {t:g} mm cast acrylic "
         f"({d['guide.blank_length_mm']:.2f} × {d['guide.blank_width_mm']:.2f} mm{shrunk}). Measure "

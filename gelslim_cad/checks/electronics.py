@@ -14,42 +14,50 @@ from gelslim_cad.electronics.finger import UNKNOWN_LED
 from gelslim_cad.electronics.heat import SOFT_C
 from gelslim_cad.electronics.layout import resistor_size_mm, row_slack_mm
 from gelslim_cad.electronics.slots import Spacing
+from gelslim_cad.geometry.led_strips import TIP_LIP_MM
 
 MOST_SPREAD_PERCENT = 50.0
 """Beyond it a bin of the forward voltage must be ordered, or one LED outshines the next."""
 FLUX_PERCENT = 25.0
 THINNEST_FR4_MM = 0.4
 THICKEST_FOIL_MM = 0.3
-Sides = tuple[Circuit | None, Circuit | None]
+Circuits = tuple[Circuit | None, ...]
+"""Of the left and the right board and, where there is one, of that at the tip."""
 
 
-def _known(sides: Sides) -> Any:
-    """Whether both LEDs are known."""
-    left, right = sides
-    return False if left is None or right is None else left.known & right.known
+def _known(circuits: Circuits) -> Any:
+    """Whether the LEDs of all boards are known."""
+    return functools.reduce(np.logical_and, (c is not None and c.known for c in circuits))
 
 
-def _figures(sides: Sides, name: str) -> tuple[Any, Any]:
-    """A figure of both circuits, by its dotted name; 0 where there is none."""
-    left, right = (0.0 if c is None else _of(c, name) for c in sides)
-    return left, right
+def _figures(circuits: Circuits, name: str) -> list[Any]:
+    """A figure of all circuits, by its dotted name; 0 where there is none."""
+    return [0.0 if c is None else _of(c, name) for c in circuits]
 
 
-def _finding(sides: Sides, value: Any, limit: Any, *, least: bool = False, **how: Any) -> Finding:
+def _finding(
+    circuits: Circuits, value: Any, limit: Any, *, least: bool = False, **how: Any
+) -> Finding:
     """A finding without a limit where an LED is not known: `electronics.led` then says so."""
-    known, none = _known(sides), -np.inf if least else np.inf
+    known, none = _known(circuits), -np.inf if least else np.inf
     return Finding(np.where(known, value, 0.0), np.where(known, limit, none), least=least, **how)
 
 
-def _worse(sides: Sides, name: str, limit: str) -> Finding:
-    """The side with the least room below its limit, both by names of attributes."""
-    left, right = sides
-    if left is None or right is None:
-        return _finding(sides, 0.0, 0.0)
-    values = [np.asarray(_of(c, name), dtype=float) for c in (left, right)]
-    limits = [np.asarray(_of(c, limit), dtype=float) for c in (left, right)]
-    first = limits[0] - values[0] <= limits[1] - values[1]
-    return _finding(sides, np.where(first, *values), np.where(first, *limits))
+def _worst(circuits: Circuits, name: str, limit: str) -> Finding:
+    """The board with the least room below its limit, both by names of attributes."""
+    if any(circuit is None for circuit in circuits):
+        return _finding(circuits, 0.0, 0.0)
+    pairs = zip(_figures(circuits, name), _figures(circuits, limit), strict=True)
+    return _finding(circuits, *_tightest(list(pairs)))
+
+
+def _tightest(pairs: list[tuple[Any, Any]]) -> tuple[Any, Any]:
+    """The value and the limit with the least room between them, design by design."""
+    value, limit = (np.asarray(v, dtype=float) for v in pairs[0])
+    for other, its_limit in pairs[1:]:
+        first = limit - value <= its_limit - other
+        value, limit = np.where(first, value, other), np.where(first, limit, its_limit)
+    return value, limit
 
 
 def _of(circuit: Circuit, name: str) -> Any:
@@ -60,7 +68,7 @@ def _of(circuit: Circuit, name: str) -> Any:
 
 
 def _greatest(values: list[Any]) -> Any:
-    """The greatest of the values of both sides; 0 where there are none."""
+    """The greatest of the values of all boards; 0 where there are none."""
     return functools.reduce(np.maximum, values) if values else 0.0
 
 
@@ -73,10 +81,10 @@ def _greatest(values: list[Any]) -> Any:
     unit="",
 )
 def known_led(
-    electronics_left_circuit: Circuit | None, electronics_right_circuit: Circuit | None
+    electronics_circuits: Circuits,
 ) -> Finding:
     """Value 1 where an LED is not known."""
-    known = _known((electronics_left_circuit, electronics_right_circuit))
+    known = _known(electronics_circuits)
     return Finding(np.where(known, 0.0, 1.0), 0.0, advisory=True)
 
 
@@ -89,11 +97,10 @@ def known_led(
     advice="ask for less current or radiant flux, or choose a larger LED",
 )
 def led_current(
-    electronics_left_circuit: Circuit | None, electronics_right_circuit: Circuit | None
+    electronics_circuits: Circuits,
 ) -> Finding:
     """Greatest current against the LED's limit."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    return _worse(sides, "greatest_ma", "led.variant.max_current_ma")
+    return _worst(electronics_circuits, "greatest_ma", "led.variant.max_current_ma")
 
 
 @rule(
@@ -106,12 +113,11 @@ def led_current(
     "driver",
 )
 def current_spread(
-    electronics_left_circuit: Circuit | None, electronics_right_circuit: Circuit | None
+    electronics_circuits: Circuits,
 ) -> Finding:
     """How far the current may lie above the typical one."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    spread = 100 * np.maximum(*_figures(sides, "spread"))
-    return _finding(sides, spread, MOST_SPREAD_PERCENT, advisory=True)
+    spread = 100 * _greatest(_figures(electronics_circuits, "spread"))
+    return _finding(electronics_circuits, spread, MOST_SPREAD_PERCENT, advisory=True)
 
 
 @rule(
@@ -122,13 +128,15 @@ def current_spread(
     advice="raise the supply, or use resistors, which need shorter strings",
 )
 def supply(
-    electronics_left_circuit: Circuit | None,
-    electronics_right_circuit: Circuit | None,
+    electronics_circuits: Circuits,
     electronics_supply_v: Real,
 ) -> Finding:
     """Supply that the strings need against the given one."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    return _finding(sides, np.maximum(*_figures(sides, "needed_v")), electronics_supply_v)
+    return _finding(
+        electronics_circuits,
+        _greatest(_figures(electronics_circuits, "needed_v")),
+        electronics_supply_v,
+    )
 
 
 @rule(
@@ -139,11 +147,10 @@ def supply(
     advice="lower the supply or the current",
 )
 def resistor_power(
-    electronics_left_circuit: Circuit | None, electronics_right_circuit: Circuit | None
+    electronics_circuits: Circuits,
 ) -> Finding:
     """Greatest power of a resistor against its rating at the temperature of the board."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    return _worse(sides, "resistor_mw", "allowed_mw")
+    return _worst(electronics_circuits, "resistor_mw", "allowed_mw")
 
 
 @rule(
@@ -154,11 +161,10 @@ def resistor_power(
     advice="lower the radiant flux or the supply; the exposure gets longer in proportion",
 )
 def junction(
-    electronics_left_circuit: Circuit | None, electronics_right_circuit: Circuit | None
+    electronics_circuits: Circuits,
 ) -> Finding:
     """Expected junction temperature against the limit of the sheet."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    return _worse(sides, "junction_c", "led.variant.max_junction_c")
+    return _worst(electronics_circuits, "junction_c", "led.variant.max_junction_c")
 
 
 @rule(
@@ -170,14 +176,14 @@ def junction(
     "only, lower the supply, or print in a material that stands the heat",
 )
 def board_temperature(
-    electronics_left_circuit: Circuit | None,
-    electronics_right_circuit: Circuit | None,
+    electronics_circuits: Circuits,
     manufacturing_print_process: str,
 ) -> Finding:
-    """Temperature of the warmer board in still air."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    warmer = np.maximum(*_figures(sides, "board_c"))
-    return _finding(sides, warmer, SOFT_C[manufacturing_print_process], advisory=True)
+    """Temperature of the warmest board in still air."""
+    warmer = _greatest(_figures(electronics_circuits, "board_c"))
+    return _finding(
+        electronics_circuits, warmer, SOFT_C[manufacturing_print_process], advisory=True
+    )
 
 
 @rule(
@@ -188,36 +194,36 @@ def board_temperature(
     advice="leave current_ma out, or give the flux that the LED has at this current",
 )
 def flux(
-    electronics_left_circuit: Circuit | None,
-    electronics_right_circuit: Circuit | None,
+    electronics_circuits: Circuits,
     leds_radiant_flux_mw: Real,
 ) -> Finding:
-    """Greater difference of the two sides' flux from the given one."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    apart = [np.abs(f / leds_radiant_flux_mw - 1) for f in _figures(sides, "flux_mw")]
-    return _finding(sides, 100 * np.maximum(*apart), FLUX_PERCENT, advisory=True)
+    """Greatest difference of a board's flux from the given one."""
+    apart = [
+        np.abs(f / leds_radiant_flux_mw - 1) for f in _figures(electronics_circuits, "flux_mw")
+    ]
+    return _finding(electronics_circuits, 100 * _greatest(apart), FLUX_PERCENT, advisory=True)
 
 
 @rule(
     "electronics.width_mm",
     title="Board is wide enough for pads, vias and tracks",
     parameter="design.light_guide.thickness_mm",
-    why="the board is as wide as the leg of the guide",
+    why="the board is as wide as the leg of the guide, that at the tip narrower than the window is "
+    "thick",
     advice="use a narrower LED, smaller holes, spaces and edges of the board house, or a thicker "
     "guide; no board files are written",
 )
 def board_width(
-    electronics_left_circuit: Circuit | None,
-    electronics_right_circuit: Circuit | None,
+    electronics_circuits: Circuits,
     led_board_width_mm: Real,
+    led_tip_board_width_mm: Real,
     electronics_edge_mm: Real,
     electronics_min_space_mm: Real,
     electronics_min_trace_mm: Real,
     electronics_min_drill_mm: Real,
     electronics_min_ring_mm: Real,
 ) -> Finding:
-    """Width that the parts need against that of the board."""
-    sides = electronics_left_circuit, electronics_right_circuit
+    """Width that the parts of the tightest board need against its own."""
     spacing = Spacing(
         electronics_edge_mm,
         electronics_min_space_mm,
@@ -225,16 +231,21 @@ def board_width(
         electronics_min_drill_mm + 2 * electronics_min_ring_mm,
         electronics_min_drill_mm,
     )
+    widths = (led_board_width_mm, led_board_width_mm, led_tip_board_width_mm)
     needed = [
-        spacing.least_width_mm(
-            max(c.led.pads.anode.size_mm[1], c.led.pads.cathode.size_mm[1]),
-            resistor_size_mm(c)[1],
-            c.strings > 1,
+        (
+            spacing.least_width_mm(
+                max(c.led.pads.anode.size_mm[1], c.led.pads.cathode.size_mm[1]),
+                resistor_size_mm(c)[1],
+                c.strings > 1,
+            ),
+            width,
         )
-        for c in sides
+        for c, width in zip(electronics_circuits, widths, strict=False)
         if c is not None
     ]
-    return _finding(sides, _greatest(needed), led_board_width_mm, advisory=True)
+    value, limit = _tightest(needed) if needed else (0.0, led_board_width_mm)
+    return _finding(electronics_circuits, value, limit, advisory=True)
 
 
 @rule(
@@ -246,12 +257,15 @@ def board_width(
     "supply, or support the guide further at its ends; no board files are written",
 )
 def board_room(
-    electronics_left_circuit: Circuit | None,
-    electronics_right_circuit: Circuit | None,
+    electronics_circuits: Circuits,
     led_board_width_mm: Real,
     led_board_length_mm: Real,
     led_pitch_mm: Real,
     led_count: Real,
+    led_tip_board_width_mm: Real,
+    led_tip_board_length_mm: Real,
+    led_tip_pitch_mm: Real,
+    led_tip_count: Real,
     guide_proximal_end_x_mm: Real,
     guide_distal_end_x_mm: Real,
     electronics_edge_mm: Real,
@@ -260,8 +274,7 @@ def board_room(
     electronics_min_drill_mm: Real,
     electronics_min_ring_mm: Real,
 ) -> Finding:
-    """Room to spare in the tightest slot of both boards."""
-    sides = electronics_left_circuit, electronics_right_circuit
+    """Room to spare in the tightest slot of all boards."""
     spacing = Spacing(
         electronics_edge_mm,
         electronics_min_space_mm,
@@ -273,33 +286,35 @@ def board_room(
     outer = (led_count - 1) / 2 * led_pitch_mm
     half = led_board_length_mm / 2
     ends = half - middle - outer, half + middle - outer
+    side = (led_board_width_mm, led_pitch_mm, ends)
+    tip_end = led_tip_board_length_mm / 2 - TIP_LIP_MM - (led_tip_count - 1) / 2 * led_tip_pitch_mm
+    tip = (led_tip_board_width_mm, led_tip_pitch_mm, (tip_end, tip_end))
     rooms = [
-        row_slack_mm(spacing, c, led_board_width_mm, led_pitch_mm, ends)
-        for c in sides
+        row_slack_mm(spacing, c, *row)
+        for c, row in zip(electronics_circuits, (side, side, tip), strict=False)
         if c is not None
     ]
     room = -_greatest([-r for r in rooms])
-    return _finding(sides, room, 0.0, least=True, advisory=True, tolerance=1e-9)
+    return _finding(electronics_circuits, room, 0.0, least=True, advisory=True, tolerance=1e-9)
 
 
 @rule(
     "electronics.part_height_mm",
     title="Resistors stay below the leg of the guide",
     parameter="design.leds.height_mm",
-    why="the foot of the leg stands the fit clearance above the LEDs",
+    why="the foot of the leg, and at the tip the window's end, stands the fit clearance before the "
+    "LEDs",
     advice="use taller LEDs, or less power, so that a smaller resistor does",
 )
 def part_height(
-    electronics_left_circuit: Circuit | None,
-    electronics_right_circuit: Circuit | None,
+    electronics_circuits: Circuits,
     leds_height_mm: Real,
     housing_fit_clearance_mm: Real,
 ) -> Finding:
     """Height of the taller resistor against that of the leg above the board."""
-    sides = electronics_left_circuit, electronics_right_circuit
-    tallest = np.maximum(*_figures(sides, "resistor_height_mm"))
+    tallest = _greatest(_figures(electronics_circuits, "resistor_height_mm"))
     room = leds_height_mm + housing_fit_clearance_mm
-    return _finding(sides, tallest, room, advisory=True)
+    return _finding(electronics_circuits, tallest, room, advisory=True)
 
 
 @rule(

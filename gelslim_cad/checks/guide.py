@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
+from gelslim_cad.checks.structure import THINNEST_WALL_MM
+from gelslim_cad.dimensions.cable import LANE_GAP_MM
 from gelslim_cad.dimensions.registry import Real
+from gelslim_cad.dimensions.tip_light import TIP_PLAY_MM
+from gelslim_cad.geometry.led_strips import NO_TIP
 
 
 @rule(
@@ -33,12 +37,13 @@ def bend_ratio(guide_bend_ratio: Real, guide_full_guidance_ratio: Real) -> Findi
 def led_colours(
     camera_picture: str,
     leds_light: str,
+    leds_tip: str,
     leds_one_wavelength_nm: Real | None,
     leds_red_wavelength_nm: Real,
     leds_green_wavelength_nm: Real,
     leds_blue_wavelength_nm: Real,
 ) -> Finding:
-    """Difference of the two wavelengths; 0 for white light."""
+    """Least difference of the strips' wavelengths; 0 for white light."""
     waves = {
         "red": leds_red_wavelength_nm,
         "green": leds_green_wavelength_nm,
@@ -47,6 +52,10 @@ def led_colours(
     two_colours = leds_one_wavelength_nm is None and leds_light != "white"
     left, right = (waves[n] for n in (leds_light.split("_") if two_colours else ("red", "red")))
     apart = left - right
+    if two_colours and leds_tip != NO_TIP:
+        third = waves[leds_tip]
+        least = np.minimum(np.abs(left - third), np.abs(right - third))
+        apart = np.minimum(np.abs(apart), least)
     mono = camera_picture == "mono"
     return Finding(apart, 0.0 if mono else 1.0, least=not mono, advisory=True)
 
@@ -55,7 +64,8 @@ def led_colours(
     "led.fits_mm",
     title="LED package fits the guide's edge",
     parameter="design.leds.package_mm",
-    why="light that misses the edge is lost and becomes stray light",
+    why="light that misses the edge of a leg, or of the window at the tip, is lost and becomes "
+    "stray light",
     advice="use a smaller LED, a thicker guide, or place the LEDs more exactly",
 )
 def led_fits(
@@ -72,9 +82,16 @@ def led_fits(
     why="packages must not touch",
     advice="allow a larger LED pitch or use smaller LEDs",
 )
-def led_gap(led_pitch_mm: Real, leds_package_mm: Real, leds_min_gap_mm: Real) -> Finding:
-    """Gap between neighbouring packages: pitch minus package size."""
-    return Finding(led_pitch_mm - leds_package_mm, leds_min_gap_mm, least=True)
+def led_gap(
+    led_pitch_mm: Real,
+    led_tip_pitch_mm: Real,
+    leds_package_mm: Real,
+    leds_min_gap_mm: Real,
+    leds_tip: str,
+) -> Finding:
+    """Gap between neighbouring packages: the smallest pitch minus package size."""
+    pitch = led_pitch_mm if leds_tip == NO_TIP else np.minimum(led_pitch_mm, led_tip_pitch_mm)
+    return Finding(pitch - leds_package_mm, leds_min_gap_mm, least=True)
 
 
 @rule(
@@ -84,9 +101,10 @@ def led_gap(led_pitch_mm: Real, leds_package_mm: Real, leds_min_gap_mm: Real) ->
     why="the count is capped, so the light gets less even",
     advice="allow more LEDs",
 )
-def led_pitch(led_pitch_mm: Real, leds_max_pitch_mm: Real) -> Finding:
-    """Pitch against the largest pitch that the spec allows."""
-    return Finding(led_pitch_mm, leds_max_pitch_mm, advisory=True, tolerance=1e-9)
+def led_pitch(led_pitch_mm: Real, led_tip_pitch_mm: Real, leds_max_pitch_mm: Real) -> Finding:
+    """Largest pitch against the largest that the spec allows."""
+    pitch = np.maximum(led_pitch_mm, led_tip_pitch_mm)
+    return Finding(pitch, leds_max_pitch_mm, advisory=True, tolerance=1e-9)
 
 
 @rule(
@@ -115,12 +133,17 @@ def led_on_board(
     "led.board_width_mm",
     title="LED package fits its board",
     parameter="design.leds.package_mm",
-    why="the board is as wide as the channel allows",
+    why="the board is as wide as the channel allows, that at the tip narrower than the window is "
+    "thick, so that it stays below the bezel",
     advice="use a smaller LED or a thicker guide",
 )
-def led_board_width(leds_package_mm: Real, led_board_width_mm: Real) -> Finding:
-    """Package size against the width of the board."""
-    return Finding(leds_package_mm, led_board_width_mm)
+def led_board_width(
+    leds_package_mm: Real, led_board_width_mm: Real, led_tip_board_width_mm: Real, leds_tip: str
+) -> Finding:
+    """Package size against the width of the narrowest board."""
+    if leds_tip == NO_TIP:
+        return Finding(leds_package_mm, led_board_width_mm)
+    return Finding(leds_package_mm, np.minimum(led_board_width_mm, led_tip_board_width_mm))
 
 
 @rule(
@@ -198,3 +221,40 @@ def led_located(clamp_point_error_mm: Real, led_datum_mm: Real) -> Finding:
     """Error of the edge that locates a board; all of its play where there is no edge."""
     error = np.where(led_datum_mm >= 0.02, clamp_point_error_mm, led_datum_mm + 0.05)[()]
     return Finding(error, 0.05, advisory=True, tolerance=1e-9)
+
+
+@rule(
+    "wire.tip_room_mm",
+    title="Wires of the strip at the tip find room beside the mirror",
+    parameter="design.light_guide.bend_radius_ratio",
+    why="they run along the cover between the baffle and the mirror's seat, and rise beside the "
+    "ledge under the window's end",
+    advice="use a larger bend radius, thinner wires or a thinner baffle, or leave the tip dark",
+)
+def tip_wires(
+    wire_tip_y_mm: Real,
+    mirror_width_mm: Real,
+    guide_flat_width_mm: Real,
+    leds_wire_diameter_mm: Real,
+    leds_tip: str,
+) -> Finding:
+    """From the middle of the wires to mirror or ledge; no limit without a strip at the tip."""
+    if leds_tip == NO_TIP:
+        return Finding(0.0, -np.inf, least=True)
+    inside = np.maximum(mirror_width_mm, guide_flat_width_mm) / 2
+    return Finding(wire_tip_y_mm - inside, leds_wire_diameter_mm / 2 + LANE_GAP_MM, least=True)
+
+
+@rule(
+    "led.tip_lip_mm",
+    title="Lips that hold the board at the tip can be printed",
+    parameter="design.leds.height_mm",
+    why="they stand before the board's ends and are no thicker than its LEDs are high",
+    advice="glue the board to the back of its slot, print by a finer process, or use higher LEDs",
+)
+def tip_lip(leds_height_mm: Real, manufacturing_print_process: str, leds_tip: str) -> Finding:
+    """Thickness of the lips against the thinnest wall; no limit without a strip at the tip."""
+    if leds_tip == NO_TIP:
+        return Finding(0.0, -np.inf, least=True, advisory=True)
+    least = THINNEST_WALL_MM[manufacturing_print_process][0]
+    return Finding(leds_height_mm - TIP_PLAY_MM, least, least=True, advisory=True, tolerance=1e-9)

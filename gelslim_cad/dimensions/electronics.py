@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.dimensions.registry import Real, dimension
-from gelslim_cad.electronics.circuit import NAMES, Circuit, side_circuit
+from gelslim_cad.electronics.circuit import NAMES, TIP_NAMES, Circuit, side_circuit
+from gelslim_cad.geometry.led_strips import NO_TIP
 
 SOURCE = "docs/electronics.md"
 
@@ -35,8 +36,31 @@ def electronics_right_circuit(values: Mapping[str, Any]) -> Circuit | None:
     return side_circuit(values, "right")
 
 
+@dimension(
+    "electronics.tip_circuit",
+    formula="strings and resistors for the current",
+    internal=True,
+    inputs=TIP_NAMES,
+)
+def electronics_tip_circuit(values: Mapping[str, Any]) -> Circuit | None:
+    """Circuit of the board at the tip; None where there is none or its LED is not known."""
+    return side_circuit(values, "tip")
+
+
+@dimension("electronics.circuits", formula="those of the boards of the finger", internal=True)
+def electronics_circuits(
+    electronics_left_circuit: Circuit | None,
+    electronics_right_circuit: Circuit | None,
+    electronics_tip_circuit: Circuit | None,
+    leds_tip: str,
+) -> tuple[Circuit | None, ...]:
+    """Circuits of the left and the right board and, where there is one, of that at the tip."""
+    sides = electronics_left_circuit, electronics_right_circuit
+    return sides if leds_tip == NO_TIP else (*sides, electronics_tip_circuit)
+
+
 def _figure(circuit: Circuit | None, name: str) -> Real:
-    """A figure of a circuit; 0 where the LED is not known."""
+    """A figure of a circuit; 0 where the LED is not known or there is no board."""
     if circuit is None:
         return 0.0
     return np.where(circuit.known, np.asarray(getattr(circuit, name), dtype=float), 0.0)
@@ -54,6 +78,12 @@ def electronics_right_led_ma(electronics_right_circuit: Circuit | None) -> Real:
     return _figure(electronics_right_circuit, "current_ma")
 
 
+@dimension("electronics.tip_led_ma", formula="string's current, typical LEDs", source=SOURCE)
+def electronics_tip_led_ma(electronics_tip_circuit: Circuit | None) -> Real:
+    """Current of an LED on the board at the tip; 0 without."""
+    return _figure(electronics_tip_circuit, "current_ma")
+
+
 @dimension("electronics.left_series", formula="⌊0.8 supply / V⌋, made equal", source=SOURCE)
 def electronics_left_series(electronics_left_circuit: Circuit | None) -> Real:
     """LEDs in series on the left board."""
@@ -64,6 +94,12 @@ def electronics_left_series(electronics_left_circuit: Circuit | None) -> Real:
 def electronics_right_series(electronics_right_circuit: Circuit | None) -> Real:
     """LEDs in series on the right board."""
     return _figure(electronics_right_circuit, "series")
+
+
+@dimension("electronics.tip_series", formula="⌊0.8 supply / V⌋, made equal", source=SOURCE)
+def electronics_tip_series(electronics_tip_circuit: Circuit | None) -> Real:
+    """LEDs in series on the board at the tip; 0 without."""
+    return _figure(electronics_tip_circuit, "series")
 
 
 @dimension("electronics.left_resistor_ohm", formula="(supply - n V) / I, up in E24", source=SOURCE)
@@ -78,6 +114,12 @@ def electronics_right_resistor_ohm(electronics_right_circuit: Circuit | None) ->
     return _figure(electronics_right_circuit, "resistance_ohm")
 
 
+@dimension("electronics.tip_resistor_ohm", formula="(supply - n V) / I, up in E24", source=SOURCE)
+def electronics_tip_resistor_ohm(electronics_tip_circuit: Circuit | None) -> Real:
+    """Resistor of the longest strings on the board at the tip; 0 without or with a driver."""
+    return _figure(electronics_tip_circuit, "resistance_ohm")
+
+
 @dimension("electronics.left_supply_ma", formula="strings · current", source=SOURCE)
 def electronics_left_supply_ma(electronics_left_circuit: Circuit | None) -> Real:
     """Current of the left board."""
@@ -88,6 +130,12 @@ def electronics_left_supply_ma(electronics_left_circuit: Circuit | None) -> Real
 def electronics_right_supply_ma(electronics_right_circuit: Circuit | None) -> Real:
     """Current of the right board."""
     return _figure(electronics_right_circuit, "supply_ma")
+
+
+@dimension("electronics.tip_supply_ma", formula="strings · current", source=SOURCE)
+def electronics_tip_supply_ma(electronics_tip_circuit: Circuit | None) -> Real:
+    """Current of the board at the tip; 0 without."""
+    return _figure(electronics_tip_circuit, "supply_ma")
 
 
 @dimension("electronics.left_board_c", formula="air + R (power - light)", source=SOURCE)
@@ -102,6 +150,12 @@ def electronics_right_board_c(electronics_right_circuit: Circuit | None) -> Real
     return _figure(electronics_right_circuit, "board_c")
 
 
+@dimension("electronics.tip_board_c", formula="air + R (power - light)", source=SOURCE)
+def electronics_tip_board_c(electronics_tip_circuit: Circuit | None) -> Real:
+    """Temperature of the board at the tip; 0 without."""
+    return _figure(electronics_tip_circuit, "board_c")
+
+
 @dimension("electronics.left_junction_c", formula="board + R_JS (V I - light)", source=SOURCE)
 def electronics_left_junction_c(electronics_left_circuit: Circuit | None) -> Real:
     """Junction temperature of the left LEDs."""
@@ -112,3 +166,9 @@ def electronics_left_junction_c(electronics_left_circuit: Circuit | None) -> Rea
 def electronics_right_junction_c(electronics_right_circuit: Circuit | None) -> Real:
     """Junction temperature of the right LEDs."""
     return _figure(electronics_right_circuit, "junction_c")
+
+
+@dimension("electronics.tip_junction_c", formula="board + R_JS (V I - light)", source=SOURCE)
+def electronics_tip_junction_c(electronics_tip_circuit: Circuit | None) -> Real:
+    """Junction temperature of the LEDs at the tip; 0 without."""
+    return _figure(electronics_tip_circuit, "junction_c")

@@ -18,11 +18,11 @@ import numpy as np
 
 from gelslim_cad.dimensions.cable import LANE_GAP_MM
 from gelslim_cad.dimensions.registry import Real, dimension
-from gelslim_cad.geometry.led_strips import NO_TIP
+from gelslim_cad.geometry.led_strips import NO_TIP, TIP_LIP_MM
 
 GUIDE = "docs/light_guide.md#a-strip-at-the-tip"
-TIP_LIP_MM = 1.2
-"""Of the board's ends behind the lips that hold it."""
+TIP_PLAY_MM = 0.1
+"""Between the board and its lips, which their crushed ribs fill."""
 TIP_MARGIN_MM = 2.0
 """Of the board beyond the flat part of the window, for the pads of its wires."""
 TIP_WIRE_MM = 1.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from gelslim_cad.electronics.heat import board_k_per_w
 from gelslim_cad.electronics.leds import NAMES as LED_NAMES
-from gelslim_cad.electronics.leds import BoardLed, Side, board_led
+from gelslim_cad.electronics.leds import BoardLed, board_led
 from gelslim_cad.electronics.resistors import derated, of_size, resistor_index
 from gelslim_cad.electronics.strings import (
     RESISTOR_TOLERANCE,
@@ -20,6 +20,7 @@ from gelslim_cad.electronics.strings import (
     next_e24_ohm,
     string_current_ma,
 )
+from gelslim_cad.geometry.led_strips import Side, has_tip_light
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
 
@@ -38,7 +39,14 @@ NAMES: tuple[Name, ...] = (
     "led.board_width_mm",
     "led.count",
 )
-"""Names that a circuit uses."""
+"""Names that the circuit of a side board uses."""
+TIP_NAMES: tuple[Name, ...] = (
+    *NAMES,
+    "led.tip_board_length_mm",
+    "led.tip_board_width_mm",
+    "led.tip_count",
+)
+"""Names that the circuit of the board at the tip uses."""
 
 
 @dataclass(frozen=True)
@@ -107,31 +115,38 @@ class Circuit:
 
 
 def side_circuit(d: Lookup, side: Side) -> Circuit | None:
-    """The circuit of a board; None where its LED is not known.
+    """The circuit of a board; None where its LED is not known, or where there is no board.
+
+    The board at the tip is counted as warm as one of its size beside a side wall: there is more
+    plastic around it, which carries more heat away.
 
     Args:
-        d: Spec fields and dimensions, those of `NAMES`.
-        side: `left` or `right`.
+        d: Spec fields and dimensions, those of `NAMES`, for the board at the tip of `TIP_NAMES`.
+        side: `left`, `right` or `tip`.
 
     Returns:
         The circuit.
     """
+    if side == "tip" and not has_tip_light(d):
+        return None
     led = board_led(d, side)
     if led is None:
         return None
+    count, length, width = d["led.count"], d["led.board_length_mm"], d["led.board_width_mm"]
+    if side == "tip":
+        count, length = d["led.tip_count"], d["led.tip_board_length_mm"]
+        width = d["led.tip_board_width_mm"]
     given = d["electronics.current_ma"]
     wanted = led.current_for_ma(d["design.leds.radiant_flux_mw"])
     wanted = wanted if given is None else np.asarray(given, dtype=float)
     return circuit(
         led,
-        count=d["led.count"],
+        count=count,
         wanted_ma=wanted,
         supply_v=d["electronics.supply_v"],
         driven=d["electronics.driver"] == "constant_current",
         ambient_c=d["electronics.ambient_c"],
-        board_k=board_k_per_w(
-            d["led.board_length_mm"], d["led.board_width_mm"], d["design.housing.side_wall_mm"]
-        ),
+        board_k=board_k_per_w(length, width, d["design.housing.side_wall_mm"]),
     )
 
 

@@ -1,23 +1,26 @@
-"""The two LED boards of a finger, or why one cannot be made."""
+"""The LED boards of a finger, two or three, or why one cannot be made."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 from gelslim_cad.electronics.board import Board
-from gelslim_cad.electronics.circuit import NAMES as CIRCUIT_NAMES
-from gelslim_cad.electronics.circuit import Circuit, side_circuit, string_resistors_ohm
+from gelslim_cad.electronics.circuit import (
+    TIP_NAMES,
+    Circuit,
+    side_circuit,
+    string_resistors_ohm,
+)
 from gelslim_cad.electronics.layout import BoardShape, lay_out, resistor_size_mm, room_mm
-from gelslim_cad.electronics.leds import SIDES, Side
 from gelslim_cad.electronics.netlist import StringPlan
 from gelslim_cad.electronics.slots import Spacing
 from gelslim_cad.electronics.strings import string_lengths
-from gelslim_cad.geometry.led_strips import shared_light
+from gelslim_cad.geometry.led_strips import SIDES, TIP_LIP_MM, Side, shared_light, strip_sides
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
 
 NAMES: tuple[Name, ...] = (
-    *CIRCUIT_NAMES,
+    *TIP_NAMES,
     "design.leds.board_thickness_mm",
     "electronics.board",
     "electronics.copper_um",
@@ -29,6 +32,7 @@ NAMES: tuple[Name, ...] = (
     "guide.distal_end_x_mm",
     "guide.proximal_end_x_mm",
     "led.pitch_mm",
+    "led.tip_pitch_mm",
 )
 """Names that the boards use."""
 UNKNOWN_LED = (
@@ -52,7 +56,7 @@ class FingerBoards:
     """The boards of a finger; where there are none, `problem` says why.
 
     Attributes:
-        boards: One for each side, or one for both where they are alike.
+        boards: One for each side, or one for both where they are alike, and that of the tip.
         problem: Why there are no boards; empty otherwise.
     """
 
@@ -67,10 +71,10 @@ def finger_boards(d: Lookup) -> FingerBoards:
         d: Spec fields and dimensions, those of `NAMES`.
 
     Returns:
-        Both boards, one for both sides where they are alike, or none with the reason.
+        All boards, one for both sides where they are alike, or none with the reason.
     """
     made: list[FingerBoard] = []
-    for side in SIDES:
+    for side in strip_sides(d):
         found = side_circuit(d, side)
         if found is None or not found.known:
             return FingerBoards((), f"{side} board: {UNKNOWN_LED}")
@@ -80,17 +84,19 @@ def finger_boards(d: Lookup) -> FingerBoards:
             return FingerBoards((), f"{side} board: {problem}")
         plan = _plan(d, found)
         made.append(FingerBoard(lay_out(shape, found, plan), found, plan, (side,)))
-    left, right = made
+    left, right, *tip = made
     if replace(right.board, name=left.board.name) == left.board:
         both = replace(left.board, quantity=2)
-        return FingerBoards((replace(left, board=both, sides=SIDES),))
+        return FingerBoards((replace(left, board=both, sides=SIDES[:2]), *tip))
     return FingerBoards(tuple(made))
 
 
 def board_shape(d: Lookup, side: Side, found: Circuit) -> BoardShape:
-    """What the finger fixes of the board on one side."""
+    """What the finger fixes of the board on one side or at the tip."""
     alike = shared_light(d).replace(" ", "")
     colour = alike or found.led.colour
+    if side == "tip":
+        return _tip_shape(d, colour, bool(alike))
     middle = (d["guide.proximal_end_x_mm"] + d["guide.distal_end_x_mm"]) / 2
     half = d["led.board_length_mm"] / 2
     count, pitch = round(d["led.count"]), d["led.pitch_mm"]
@@ -109,6 +115,26 @@ def board_shape(d: Lookup, side: Side, found: Circuit) -> BoardShape:
     )
 
 
+def _tip_shape(d: Lookup, colour: str, alike: bool) -> BoardShape:
+    """The same at the tip: x of the board is -y of the finger, and its wires leave at +y."""
+    half = d["led.tip_board_length_mm"] / 2
+    count, pitch = round(d["led.tip_count"]), d["led.tip_pitch_mm"]
+    return BoardShape(
+        name="led_board_tip" if alike else f"led_board_{colour}",
+        title=f"LED board, tip, {colour}, {count} LEDs",
+        label=f"tip {colour}".upper(),
+        x_mm=(round(-half, 6), round(half, 6)),
+        width_mm=round(d["led.tip_board_width_mm"], 6),
+        thickness_mm=d["design.leds.board_thickness_mm"],
+        led_x_mm=tuple(round((k - (count - 1) / 2) * pitch, 6) for k in range(count)),
+        material=d["electronics.board"],
+        copper_um=d["electronics.copper_um"],
+        spacing=spacing(d),
+        held_mm=TIP_LIP_MM,
+        cathode_to="-y of the finger (+x)",
+    )
+
+
 def spacing(d: Lookup) -> Spacing:
     """What the board house can make."""
     drill = d["electronics.min_drill_mm"]
@@ -122,7 +148,7 @@ def spacing(d: Lookup) -> Spacing:
 
 
 def _plan(d: Lookup, found: Circuit) -> StringPlan:
-    lengths = string_lengths(round(d["led.count"]), round(float(found.series)))
+    lengths = string_lengths(round(found.count), round(float(found.series)))
     if d["electronics.driver"] == "constant_current":
         return StringPlan(lengths, ())
     ohms = string_resistors_ohm(found, d["electronics.supply_v"], lengths)

@@ -39,6 +39,8 @@ class BoardShape:
         material: `fr4` or `flexible`.
         copper_um: Thickness of the copper.
         spacing: What the board house can make.
+        held_mm: Length of both ends that lips hold, and that parts and wires leave free.
+        cathode_to: Where the cathodes point, in the finger and on the board.
     """
 
     name: str
@@ -51,6 +53,8 @@ class BoardShape:
     material: str
     copper_um: float
     spacing: Spacing
+    held_mm: float = 0.0
+    cathode_to: str = "the tip (+x)"
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,7 @@ def lay_out(shape: BoardShape, found: Circuit, plan: StringPlan) -> Board:
     row = RowGeometry(shape, found, size, len(plan.lengths) > 1)
     copper = _Copper(row)
     leds = tuple(
-        led_component(f"D{i + 1}", found.led, (x, 0.0), plan.led_nets(i))
+        led_component(f"D{i + 1}", found.led, (x, 0.0), plan.led_nets(i), shape.cathode_to)
         for i, x in enumerate(shape.led_x_mm)
     )
     resistors: list[Component] = []
@@ -169,7 +173,7 @@ def room_mm(shape: BoardShape, found: Circuit) -> float:
     """Room to spare in the tightest slot of the row, as the rule has it."""
     first, last = shape.led_x_mm[0], shape.led_x_mm[-1]
     pitch = (last - first) / max(len(shape.led_x_mm) - 1, 1)
-    ends = first - shape.x_mm[0], shape.x_mm[1] - last
+    ends = first - shape.x_mm[0] - shape.held_mm, shape.x_mm[1] - last - shape.held_mm
     return float(row_slack_mm(shape.spacing, found, shape.width_mm, pitch, ends))
 
 
@@ -209,7 +213,7 @@ def resistor_size_mm(found: Circuit) -> tuple[Any, Any]:
 def _wire_pads(row: RowGeometry) -> Component:
     """The pads for the wires at the gripper's end, with what room the first LED leaves."""
     shape, s = row.shape, row.shape.spacing
-    start = shape.x_mm[0] + s.edge_mm
+    start = shape.x_mm[0] + shape.held_mm + s.edge_mm
     free = row.start_mm(shape.led_x_mm[0]) - start
     free -= float(s.head_mm(shape.width_mm, row.lanes))
     abreast = bool(s.pads_abreast(shape.width_mm))

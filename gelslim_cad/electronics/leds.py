@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from gelslim_cad.geometry.led_strips import WHITE, is_white, shared_light, strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import (
+    SIDES,
+    WHITE,
+    Side,
+    is_white,
+    shared_light,
+    strip_wavelengths_nm,
+)
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
 from gelslim_cad.spec.led_library import (
@@ -18,8 +25,6 @@ from gelslim_cad.spec.led_library import (
     library_leds,
 )
 
-Side = Literal["left", "right"]
-SIDES: tuple[Side, Side] = ("left", "right")
 SIZE_TOLERANCE_MM = 0.16
 """How far package and height of the spec may differ from those of the library's LED."""
 OWN_SPREAD = 0.1
@@ -50,7 +55,7 @@ class BoardLed:
     """The LED of one board.
 
     Attributes:
-        colour: Name of its light, the same on both sides for strips of one wavelength.
+        colour: Name of its light, the same on all boards for strips of one wavelength.
         manufacturer: Manufacturer; empty where the spec does not tell.
         variant: Electrical data.
         package_mm: Size along and across the polarity axis.
@@ -99,7 +104,7 @@ def board_led(d: Lookup, side: Side) -> BoardLed | None:
 
     Args:
         d: Spec fields.
-        side: `left`, the board at -y, or `right`.
+        side: `left`, the board at -y, `right`, or `tip` where there is one.
 
     Returns:
         The LED; None where its model is not in the library and the spec does not describe it, or

@@ -42,8 +42,10 @@ class StringPlan:
         return frozenset(sum(self.lengths[: n + 1]) - 1 for n in range(len(self.lengths)))
 
 
-def led_component(ref: str, led: BoardLed, at_mm: Point, nets: tuple[str, str]) -> Component:
-    """An LED with its anode towards the gripper. Pins as in KiCad: 1 cathode, 2 anode."""
+def led_component(
+    ref: str, led: BoardLed, at_mm: Point, nets: tuple[str, str], cathode_to: str
+) -> Component:
+    """An LED with its anode towards the wires' pads. Pins as in KiCad: 1 cathode, 2 anode."""
     pads = [("1", "cathode", led.pads.cathode, nets[1]), ("2", "anode", led.pads.anode, nets[0])]
     if led.pads.thermal is not None:
         pads.append(("3", "thermal", led.pads.thermal, nets[1]))
@@ -62,7 +64,7 @@ def led_component(ref: str, led: BoardLed, at_mm: Point, nets: tuple[str, str]) 
             Pad(number, (at_mm[0] + p.at_mm[0], at_mm[1] + p.at_mm[1]), p.size_mm, net, role)
             for number, role, p, net in pads
         ),
-        note=f"cathode towards the tip (+x); {led.polarity}",
+        note=f"cathode towards {cathode_to}; {led.polarity}",
     )
 
 

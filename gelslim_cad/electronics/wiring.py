@@ -56,7 +56,7 @@ def _row(side: str, item: FingerBoard, y: float, driven: bool) -> list[str]:
     start = SUPPLY_X + SUPPLY_WIDTH
     lines = [
         _box(BOARD_X, top, BOARD_WIDTH, BOARD_HEIGHT, COPPER),
-        _text(BOARD_X, top - 2.0, f"{board.name}, {side} side of the finger", 4.0),
+        _text(BOARD_X, top - 2.0, f"{board.name}, {_place(side)}", 4.0),
         _line(start, plus_y, PADS_X, plus_y, PLUS),
         _line(start, minus_y, PADS_X, minus_y, MINUS),
     ]
@@ -75,6 +75,10 @@ def _row(side: str, item: FingerBoard, y: float, driven: bool) -> list[str]:
         volts = float(circuit.needed_v) - DRIVER_DROPOUT_V
         lines.append(_text(start + 14.0, top + 12.0, f"{circuit.current_ma:.0f} mA, {volts:.1f} V"))
     return lines
+
+
+def _place(side: str) -> str:
+    return "tip of the finger" if side == "tip" else f"{side} side of the finger"
 
 
 def _words(item: FingerBoard, driven: bool) -> str:

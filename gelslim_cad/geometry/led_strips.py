@@ -13,6 +13,8 @@ from gelslim_optics.light.light_map import LED_COLOURS
 Side = Literal["left", "right", "tip"]
 SIDES: tuple[Side, Side, Side] = ("left", "right", "tip")
 """Where a strip is: under the leg at -y or at +y, or in front of the window's end face."""
+TIP_LIP_MM = 1.2
+"""Of both ends of the board at the tip, behind the lips that hold it."""
 RED_SHARE = 0.45
 """Red appears weaker than green in published images of this sensor."""
 RESPONSES = {

@@ -1,6 +1,6 @@
 """The body: one printed tub that holds guide, chamber and mount.
 
-mount  |   chamber    |  pocket (guide, view, LED channels)  | tip block
+mount  |   chamber    |  pocket (guide, view, LED channels)  | tip block, slot of a strip
 ======================+==roof==______ledge_______________ledge======
 = slots=   camera     :     baffles on both sides            ======
 ======== cover ----------------------------------------------------
@@ -27,6 +27,7 @@ from gelslim_cad.solids.shapes import (
     union,
 )
 from gelslim_cad.solids.threads import film, roof_bosses, thread_cuts
+from gelslim_cad.solids.tip_light import tip_ribs, tip_slot, uncrushed_tip_ribs
 
 WEB_MM = 1.2
 CHAMFER_MM = 0.5
@@ -42,9 +43,11 @@ def body(d: Dimensions) -> Part:
     walls = [*_inner_walls(d, at), *locating_edges(d)]
     solid = single(union([solid, *walls]), "body with its inner walls")
     solid = single(subtract(solid, _openings(d, at)), "body")
+    ribs = tip_ribs(d)
+    solid = single(union([solid, *ribs]), "body with the ribs at its tip") if ribs else solid
     process = d["manufacturing.print_process"]
     films = [film(at, hole) for hole in at.bezel_holes()] if process == "fdm" else []
-    added = [*uncrushed_ribs(d), *films]
+    added = [*uncrushed_ribs(d), *uncrushed_tip_ribs(d), *films]
     return Part(
         name="body",
         solid=solid,
@@ -122,7 +125,7 @@ def _inner_walls(d: Dimensions, at: Layout) -> list[cq.Shape]:
 
 
 def _openings(d: Dimensions, at: Layout) -> list[cq.Shape]:
-    """Wire notches, tongue slots, groove of cable and wires, screw holes."""
+    """Wire notches, tongue slots, groove of cable and wires, slot of a strip, screw holes."""
     start = at.pocket_x_mm[0]
     cover, prox = d["cover.top_z_mm"], d["finger.proximal_x_mm"]
     fit = d["design.housing.fit_clearance_mm"]
@@ -134,6 +137,7 @@ def _openings(d: Dimensions, at: Layout) -> list[cq.Shape]:
         *pair(notch_x, channel, (cover - FAR_MM, notch_top_z_mm(d))),
         *pair((prox - FAR_MM, tongue_end), slot_y, at.slot_z_mm),
         *groove(d),
+        *tip_slot(d),
         *(cut for hole in (*at.bezel_holes(), *at.cover_holes()) for cut in thread_cuts(at, hole)),
         *_bolt_holes(d, at),
     ]

@@ -1,4 +1,4 @@
-"""Camera cable, the silicone pad that holds it, and the wires of the LED boards.
+"""Camera cable, the silicone pad that holds it, and the groove of cable and LED wires.
 
 Side view; the plug of the cover closes the groove of the mount under the cable:
 
@@ -20,12 +20,11 @@ from gelslim_cad.dimensions.cable import (
     PAD_INSET_MM,
     PAD_LENGTH_MM,
     STACK_RATIO,
-    wires_under_board,
 )
 from gelslim_cad.dimensions.fold_housing import CHANNEL_WALL_MM, CLAMP_BAR_MM
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
-from gelslim_cad.solids.materials import CABLE, SILICONE, WIRE
+from gelslim_cad.solids.materials import CABLE, SILICONE
 from gelslim_cad.solids.shapes import Piece, Point2, box, closed_wire, pair, single
 from gelslim_cad.solids.tube import Point3, tube
 
@@ -33,14 +32,10 @@ SLIP_MM = 0.02
 """Between the cable and the roof of its groove, so that the two faces do not coincide."""
 STUB_MM = 8.0
 """Cable and wires that are drawn outside of the gripper adapter."""
-WIRE_SHORTER_MM = 2.0
-"""The wires are drawn so much shorter than the cable, beside whose connector they would lie."""
 PLUG_GAP_MM = 0.2
 SMALLEST_TURN = 1e-4
 FLARE_RATIO = 2.0
 """Radius of the wires' bends over their diameter; so much wider are the lanes at their mouths."""
-SOLDERED_MM = (0.8, 2.4)
-"""Of the ends of the upper and the lower wire from the end of their board."""
 FAR_MM = 1.0
 
 
@@ -166,66 +161,6 @@ def cable_pad(d: Dimensions) -> Part:
         note=f"cut {PAD_LENGTH_MM:g} × {2 * half:g} mm from a sheet of its own; squeezed by "
         f"{d['cable.squeeze_mm']:.2f} mm it holds a pull of at least {d['cable.hold_n']:.1f} N",
     )
-
-
-def led_wires(d: Dimensions) -> tuple[Part, ...]:
-    """The four wires of the LED boards, from the boards' ends to outside of the adapter."""
-    diameter = d["design.leds.wire_diameter_mm"]
-    return tuple(
-        Part(
-            name=f"led_wire_{2 * (side > 0) + k + 1}",
-            solid=tube(_wire_points(d, side, k), FLARE_RATIO * diameter, diameter),
-            material=f"stranded wire, {diameter:g} mm outside",
-            process="buy",
-            colour=WIRE,
-            quantity=4 if side < 0 and k == 0 else 0,
-            explode_mm=(0, side * 4, -46),
-            note="two to a board; drawn short outside of the finger",
-            tags=frozenset({"wire"} if side < 0 and k == 0 else {"wire", "instance"}),
-        )
-        for side in (-1, 1)
-        for k in (0, 1)
-    )
-
-
-def _wire_points(d: Dimensions, side: int, k: int) -> list[Point3]:
-    """Corners of the lower (0) or upper (1) wire of a board.
-
-    From the board's end through the notch, down to the cover, along the chamber, behind the
-    clamp to its lane in the mount.
-    """
-    size = d["design.leds.wire_diameter_mm"]
-    low = d["wire.low_z_mm"] + k * STACK_RATIO * size
-    under = wires_under_board(d)
-    soldered = d["led.board_bottom_z_mm"] - size / 2 - SLIP_MM
-    high = soldered - (1 - k) * STACK_RATIO * size if under else low
-    middle = (d["guide.proximal_end_x_mm"] + d["guide.distal_end_x_mm"]) / 2
-    end = middle - d["led.board_length_mm"] / 2
-    web = notch_end_x_mm(d)
-    rear = d["chamber.rear_x_mm"] + LANE_GAP_MM + size / 2
-    row, run = d["led.y_mm"], d["wire.run_y_mm"]
-    notch = web - 0.2
-    aside = notch - (run - row)
-    later = k * STACK_RATIO * size
-    room = aside - rear - (FLARE_RATIO + STACK_RATIO) * size - 0.2
-    ramp = min(max(abs(high - low), 3 * size), room)
-    beside_leg = high + size / 2 > d["guide.leg_end_z_mm"] - SLIP_MM
-    start = d["guide.proximal_end_x_mm"] if beside_leg else end
-    points = [(start - 0.1, row, high)]
-    if under:
-        points = [(end + SOLDERED_MM[1 - k], row, soldered)]
-        if k == 0:
-            points.append((end + SOLDERED_MM[0] + 0.2, row, high))
-    points += [
-        (notch, row, high),
-        (aside, run, high),
-        (aside - later, run, high),
-        (aside - later - max(ramp, 0.1), run, low),
-        (rear, run, low),
-        (rear, d["wire.lane_y_mm"], low),
-        (outside_x_mm(d) + WIRE_SHORTER_MM, d["wire.lane_y_mm"], low),
-    ]
-    return [(x, side * y, z) for x, y, z in points]
 
 
 def groove(d: Dimensions) -> list[cq.Shape]:

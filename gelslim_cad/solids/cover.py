@@ -7,7 +7,7 @@ import cadquery as cq
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.cable import wires_under_board
 from gelslim_cad.geometry.part import Part
-from gelslim_cad.solids.cable import SOLDERED_MM, plug, plug_recess
+from gelslim_cad.solids.cable import plug, plug_recess
 from gelslim_cad.solids.clamp import clamp_screw_positions
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.led_seat import STOP_MM, board_middle_mm, stops
@@ -23,6 +23,7 @@ from gelslim_cad.solids.shapes import (
     subtract,
     union,
 )
+from gelslim_cad.solids.wires import SOLDERED_MM
 
 LOWEST_PEDESTAL_MM = 0.3
 CHAMFER_MM = 0.4

@@ -12,7 +12,7 @@ from gelslim_cad.markers.stencil import lay_out_frame, lay_out_stencil
 from gelslim_cad.solids.adapter import adapter
 from gelslim_cad.solids.bezel import bezel, bezel_blank, shims
 from gelslim_cad.solids.body import body
-from gelslim_cad.solids.cable import cable_pad, camera_cable, led_wires
+from gelslim_cad.solids.cable import cable_pad, camera_cable
 from gelslim_cad.solids.camera import camera
 from gelslim_cad.solids.clamp import camera_clamp
 from gelslim_cad.solids.cover import cover
@@ -35,6 +35,7 @@ from gelslim_cad.solids.tooling.sheets import (
     stencil,
     stencil_problem,
 )
+from gelslim_cad.solids.wires import led_wires
 from gelslim_cad.spec.parts import OwnPart, own_parts
 from ifem_export.markers.grid import MarkerGrid
 

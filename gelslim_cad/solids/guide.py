@@ -5,7 +5,8 @@
   |  /                \\  |
   |_|                  |_|   LEDs shine up into the legs
 
-The LED boards lie under the legs, one colour at -y (left in the image), one at +y.
+The LED boards lie under the legs, one colour at -y (left in the image), one at +y; a third may
+stand in front of the window's end face at the tip.
 """
 
 from __future__ import annotations
@@ -13,11 +14,17 @@ from __future__ import annotations
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.geometry.led_strips import shared_light, strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import (
+    has_tip_light,
+    shared_light,
+    strip_sides,
+    strip_wavelengths_nm,
+)
 from gelslim_cad.geometry.optics import guide_profile
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.materials import ACRYLIC, BLUE_BOARD, GREEN_BOARD, PLAIN_BOARD, RED_BOARD
 from gelslim_cad.solids.shapes import Piece, box, closed_wire, single, union
+from gelslim_cad.solids.tip_light import tip_board
 from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Point, Segment
 
 
@@ -66,7 +73,8 @@ def light_guide(d: Dimensions) -> Part:
         process="bend",
         colour=ACRYLIC,
         explode_mm=(0, 0, 14),
-        note="laser-cut blank, anneal, bend hot over a former, polish the leg ends",
+        note="laser-cut blank, anneal, bend hot over a former, polish the leg ends"
+        + (" and the window's end at the tip" if has_tip_light(d) else ""),
         print_rotation_deg=(180, 0, 0),
     )
 
@@ -113,22 +121,27 @@ def _board(d: Dimensions, side: int) -> cq.Solid:
     return single(union(pieces), "LED board")
 
 
-def led_boards(d: Dimensions) -> tuple[Part, Part]:
-    """The boards of the two colours, or two boards alike."""
-    model, count = d["design.leds.model"], round(d["led.count"])
-    alike, (left, right) = shared_light(d), strip_wavelengths_nm(d)
+def led_boards(d: Dimensions) -> tuple[Part, ...]:
+    """The boards of the two sides and, where there is one, of the tip."""
+    model, alike = d["design.leds.model"], shared_light(d)
     colours = {"red": RED_BOARD, "green": GREEN_BOARD, "blue": BLUE_BOARD}
-    lower, upper = (
-        Part(
+    made = {
+        "left": lambda: (_board(d, -1), d["led.count"], d["led.pitch_mm"], (0.0, -4.0, -46.0)),
+        "right": lambda: (_board(d, 1), d["led.count"], d["led.pitch_mm"], (0.0, 4.0, -46.0)),
+        "tip": lambda: (tip_board(d), d["led.tip_count"], d["led.tip_pitch_mm"], (0, 0, 20.0)),
+    }
+    parts = []
+    for side, name in zip(strip_sides(d), strip_wavelengths_nm(d), strict=True):
+        solid, count, pitch, explode_mm = made[side]()
+        part = Part(
             name=f"led_board_{name}",
-            solid=_board(d, side),
-            material=f"{count} × {model} {alike or name}, "
+            solid=solid,
+            material=f"{round(count)} × {model} {alike or name}, "
             f"{d['design.leds.board_thickness_mm']:g} mm board",
             process="pcb",
             colour=colours.get(name, PLAIN_BOARD),
-            explode_mm=(0, side * 4, -46),
-            note=f"{count} LEDs at {d['led.pitch_mm']:.2f} mm pitch",
+            explode_mm=explode_mm,
+            note=f"{round(count)} LEDs at {pitch:.2f} mm pitch",
         )
-        for name, side in ((left, -1), (right, 1))
-    )
-    return lower, upper
+        parts.append(part)
+    return tuple(parts)

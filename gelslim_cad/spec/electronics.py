@@ -21,7 +21,7 @@ OWN = (
 
 
 class Electronics(Block):
-    """Supply, circuit and making of the two LED boards."""
+    """Supply, circuit and making of the LED boards."""
 
     supply_v: float = between(1.5, 60, "Supply voltage", default=5.0)
     driver: Literal["resistor", "constant_current"] = Field(
@@ -49,9 +49,10 @@ class Electronics(Block):
     edge_mm: float = between(0.1, 2, "Copper's distance from the edge of the board", default=0.2)
     own_forward_v: tuple[float, ...] = Field(
         default=(),
-        max_length=2,
-        description="Typical forward voltages of the LEDs on the left and on the right board, "
-        "for a model that the library does not have; needs the other own_ fields too",
+        max_length=3,
+        description="Typical forward voltages of the LEDs on the left and on the right board and, "
+        "where there is one, at the tip, for a model that the library does not have; needs the "
+        "other own_ fields too",
     )
     own_test_current_ma: float | None = above(0, 5000, "Current of own_forward_v", default=None)
     own_max_current_ma: float | None = above(0, 5000, "Greatest current", default=None)
@@ -70,10 +71,11 @@ class Electronics(Block):
                 f"give {', '.join(missing)} too, or none of them",
             )
         volts = self.own_forward_v
-        if volts and not (len(volts) == 2 and all(0.5 < v < 10 for v in volts)):
+        if volts and not (len(volts) in (2, 3) and all(0.5 < v < 10 for v in volts)):
             raise FieldError(
                 "own_forward_v",
-                "must be two voltages between 0.5 and 10 V, of the left and of the right board",
+                "must be voltages between 0.5 and 10 V, of the left and of the right board and of "
+                "that at the tip where there is one",
                 "give the typical forward voltages of the LED's sheet",
             )
         return self

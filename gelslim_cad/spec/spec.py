@@ -279,6 +279,18 @@ class Spec(Block):
         return self
 
     @model_validator(mode="after")
+    def _voltage_of_each_board(self) -> Spec:
+        given, boards = len(self.electronics.own_forward_v), 2 + (self.design.leds.tip != "none")
+        if given not in (0, boards):
+            raise FieldError(
+                "electronics.own_forward_v",
+                f"must be {boards} voltages, one for each LED board; there are {given}",
+                "give that of the left board, of the right one, and of one at the tip last",
+                ("design.leds.tip",),
+            )
+        return self
+
+    @model_validator(mode="after")
     def _sees_the_tip(self) -> Spec:
         leds = self.design.leds
         if self.camera.picture == "mono" and leds.tip not in ("none", "white"):
