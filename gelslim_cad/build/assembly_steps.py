@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from gelslim_cad.assembly.order import Fastener, Step
 from gelslim_cad.assembly.words import way_in_words
 from gelslim_cad.build.bezel_steps import bezel_step, shim_step, thread_step
+from gelslim_cad.build.led_steps import side_board_step, tip_board_step, tip_wires_step
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.dimensions.cable import PAD_INSET_MM, PAD_LENGTH_MM, wires_under_board
+from gelslim_cad.dimensions.cable import PAD_INSET_MM, PAD_LENGTH_MM
 from gelslim_cad.electronics.finger import FingerBoards
 from gelslim_cad.geometry.jaw import JawBolts
 
@@ -232,64 +233,22 @@ def _camera(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
 
 def _led_board(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
     """An LED board on its pedestal, with its wires."""
-    under = "under" if wires_under_board(d) else "to"
     (name, *_) = step.moves
     title, look = f"Lay {name} with its wires", "All its LEDs light before it is glued."
     if any(part.startswith("led_board_") for part in step.stays):
         return StepText(title, f"Do the same with `{name}` on the other side.", look, 6)
-    return StepText(
-        title,
-        f"Solder two wires of {d['design.leds.wire_diameter_mm']:g} mm {under} the gripper end of "
-        f"the board.{_board_wires(boards)} Put a drop of silicone or slow epoxy on its pedestal "
-        "and lay the board there against the stop at the tip end. Before the glue sets, close the "
-        "cover once: the ribs of the body's channel press the board against the edges of its "
-        f"outer wall, which locate it to {d['clamp.point_error_mm']:g} mm. Lead the wires along "
-        "the chamber's side, behind the clamp, into the lane beside the plug.",
-        look,
-        8,
-    )
-
-
-def _board_wires(boards: FingerBoards) -> str:
-    """How the wires are soldered and the boards tried."""
-    if not boards.boards:
-        return ""
-    currents = " and ".join(
-        f"{float(b.circuit.supply_ma):.0f} mA ({', '.join(b.sides)})" for b in boards.boards
-    )
-    return (
-        " Solder them to the pads there, plus to the pad marked +, joints flatter than the LEDs; "
-        f"try the board at the supply of `electronics/wiring.svg`: the boards take {currents}."
-    )
+    return StepText(title, side_board_step(d, boards), look, 8)
 
 
 def _tip_board(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
-    """The LED board in its slot of the tip block, its wires hanging through their channel."""
     (name,) = step.moves
-    return StepText(
-        f"Set {name} into the tip",
-        f"Solder two wires of {d['design.leds.wire_diameter_mm']:g} mm to the pads at the end of "
-        f"the board.{_board_wires(boards)} Put a drop of silicone or slow epoxy on the back of the "
-        "slot in the tip of `body`, at both ends. Thread the wires down through the channel at +y "
-        f"and press `{name}` down to the floor of its slot, its LEDs to the gripper, against the "
-        "stop at -y: the ribs of the lips press it to the slot's back, which locates it to "
-        f"{d['clamp.point_error_mm']:g} mm.",
-        "Its upper edge lies below the face of `body`; all its LEDs light.",
-        8,
-    )
+    look = "Its upper edge lies below the face of `body`; all its LEDs light."
+    return StepText(f"Set {name} into the tip", tip_board_step(d, boards, name), look, 8)
 
 
 def _tip_wires(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:
-    """The wires of the board at the tip along the chamber."""
-    return StepText(
-        "Lay the wires of the tip",
-        "Turn `body` over. Lay the two wires along its inside from the channel towards the "
-        "gripper, one above the other where the cover will be, inside of the baffle and clear of "
-        "the mirror, past the place of the clamp and into the lane at +y, next to the cable's "
-        "groove. A strip of adhesive tape holds them until the cover does.",
-        "No wire crosses the window as seen through the gel.",
-        3,
-    )
+    look = "No wire crosses the window as seen from the gel's side."
+    return StepText("Lay the wires of the tip", tip_wires_step(), look, 3)
 
 
 def _pad(d: Dimensions, boards: FingerBoards, step: Step) -> StepText:

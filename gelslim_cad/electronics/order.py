@@ -131,9 +131,9 @@ def order_page(boards: FingerBoards, d: Lookup) -> bytes:
         "## Before you order\n\n"
         "- Compare part numbers and pads with the manufacturer's sheet: figures that the library "
         "marks as assumed are listed above.\n"
-        "- In the assembly service's preview every LED's cathode points away from the wires' pads, "
-        "on the side boards to the tip; a bar on the legend marks it. Services count rotations from "
-        "different positions.\n"
+        "- In the assembly service's preview every LED's cathode points away from the wires' "
+        "pads, on the side boards to the tip; a bar on the legend marks it. Services count "
+        "rotations from different positions.\n"
         "- Order LEDs of one bin of forward voltage and of one bin of wavelength for a board.\n"
         "- Joints on the wires' pads must stay below the LEDs: the guide comes to "
         f"{d['design.housing.fit_clearance_mm']:g} mm above them.",
