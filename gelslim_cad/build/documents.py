@@ -14,6 +14,7 @@ from gelslim_cad.build.assembly_steps import ToldStep, fasteners_told, motion, t
 from gelslim_cad.build.draft import Draft
 from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.instructions import after_assembly, before_assembly, build_guide
+from gelslim_cad.build.light_notes import light_notes, light_pictures
 from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
 from gelslim_cad.build.printing import print_hints, printed_parts
 from gelslim_cad.build.stages import Plan, Stages, kerf_mm
@@ -55,14 +56,6 @@ PROJECTION_PICTURES = {
     "pictures/projection_error.png": (
         "Projection error left by each formula",
         "Against the exact refracted ray, over the pad, for a press of 0.5 mm.",
-    ),
-}
-LIGHT_PICTURES = {
-    "pictures/light_paths.png": ("Light paths", "From both LED rows, traced through the guide."),
-    "pictures/irradiance.png": ("Light on the gel", "That of each strip on the gel's coat."),
-    "pictures/light_ratio.png": (
-        "Brightness against bend radius",
-        "Over a straight guide with glued 45° mirrors, with 95 % intervals.",
     ),
 }
 
@@ -173,19 +166,6 @@ def pictures(
     )
 
 
-def light_notes(record: bytes) -> tuple[Note, ...]:
-    """Certificate, comparison and exposure from a build's light.json."""
-    light = json.loads(record)
-    certificate = " ".join(light["certificate"]["sentences"])
-    compared = "\n".join(f"The guide is {c['sentence']}." for c in light["comparisons"])
-    exposed = "\n".join(f"{e['sentence']}." for e in light["exposures"])
-    return (
-        Note("Total internal reflection", certificate),
-        Note("Brightness", compared),
-        Note("Exposure and frame rate", exposed),
-    )
-
-
 def report_data(
     stages: Stages,
     plan: Plan,
@@ -222,7 +202,7 @@ def report_data(
         bom=bill[0],
         cost=bill[1],
         printed=printed,
-        light=pictures(contents, LIGHT_PICTURES),
+        light=pictures(contents, light_pictures(d)),
         light_notes=light_notes(contents[LIGHT_JSON]),
         projection=pictures(contents, PROJECTION_PICTURES),
         projection_notes=(Note("Projection", projection_sentence(d)),),

@@ -1,8 +1,8 @@
 """What rays cost and bring for one finger: half-width of the 95 % interval against time.
 
-An error is that of either colour, of other seeds and of the very rays that the study will trace,
-so that an answer keeps the error it was chosen for by its own interval. Errors are the same in
-every run; times come from the clock and decide nothing but what a budget of time asks. Above the
+An error is that of any colour, of other seeds and of the very rays that the study will trace, so
+that an answer keeps the error it was chosen for by its own interval. Errors are the same in every
+run; times come from the clock and decide nothing but what a budget of time asks. Above the
 counts traced, errors go on with the square root of the rays, times with their number.
 """
 

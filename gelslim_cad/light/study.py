@@ -65,6 +65,20 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class TipLight:
+    """The light of the strip at the tip against that of the sides.
+
+    Attributes:
+        colour: Its name.
+        over_sides: Mean irradiance of the coat by this strip over the mean of both side strips,
+            each by its own LEDs.
+    """
+
+    colour: str
+    over_sides: float
+
+
+@dataclass(frozen=True)
 class LightStudy:
     """Certificate, traced light, comparisons and exposures of one finger.
 
@@ -80,6 +94,17 @@ class LightStudy:
     glued_exposures: tuple[Exposure, ...]
     curve: tuple[tuple[float, Estimate], ...]
     bend_ratio: float
+
+    @property
+    def tip(self) -> TipLight | None:
+        """The light of the strip at the tip; None without one."""
+        names = [c for c in self.light.colours if c not in self.glued.colours]
+        if not names:
+            return None
+        tip, sides = names[0], self.exposures[: len(self.glued.colours)]
+        side = sum(e.irradiance_uw_mm2 for e in sides) / len(sides)
+        found = next(e.irradiance_uw_mm2 for e in self.exposures if e.colour == tip)
+        return TipLight(tip, found / side)
 
 
 def study_light(
@@ -175,8 +200,11 @@ def ratio_curve(
 
 
 def study_record(study: LightStudy) -> dict[str, Any]:
-    """Certificate, ledgers, comparisons, curve and exposures; shares of the emitted flux."""
-    return {
+    """Certificate, ledgers, comparisons, curve and exposures; shares of the emitted flux.
+
+    With a strip at the tip also `tip`, and for each colour the sensitivity to a slope along x.
+    """
+    record: dict[str, Any] = {
         "format": "gelslim-light/1",
         "certificate": {
             **asdict(study.certificate),
@@ -204,6 +232,12 @@ def study_record(study: LightStudy) -> dict[str, Any]:
         "exposures": [_exposure(e) for e in study.exposures],
         "exposures_with_glued_mirrors": [_exposure(e) for e in study.glued_exposures],
     }
+    if study.tip is not None:
+        record["tip"] = asdict(study.tip)
+        for colour, found in record["guides"]["curved"]["by_colour"].items():
+            along = study.light.slope_sensitivity(colour, "x")
+            found["slope_sensitivity_along"] = _estimate(along)
+    return record
 
 
 def _exposure(found: Exposure) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import strip_sides, strip_wavelengths_nm
 from gelslim_cad.geometry.lookup import Lookup
 
 Array = NDArray[np.float64]
@@ -196,7 +196,7 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
             ("led_mm", "place", "uniform", d["design.leds.placement_tolerance_mm"]),
             *(
                 (f"{side}_flux_percent", f"{name} flux", "uniform", d["tolerance.led_flux_percent"])
-                for side, name in zip(("left", "right"), strip_wavelengths_nm(d), strict=True)
+                for side, name in zip(strip_sides(d), strip_wavelengths_nm(d), strict=True)
             ),
         ],
         "gel batch": [

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from gelslim_cad.checks.optics import led_hidden
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import has_markers
-from gelslim_cad.geometry.led_strips import strip_wavelengths_nm
+from gelslim_cad.geometry.led_strips import strip_sides, strip_wavelengths_nm
 from gelslim_cad.sensor import marker_grid
 from gelslim_cad.tolerance.assembly import Stage, assembled, border_points
 from gelslim_cad.tolerance.built import Built, Errors
@@ -241,7 +241,10 @@ def _mirror(d: Dimensions, finger: Built, border: Rays) -> dict[str, Array]:
 
 
 def _light(d: Dimensions, e: Errors) -> dict[str, Array]:
-    """Flux that enters the leg, over nominal: the share of the LED's package before the leg."""
+    """Flux that enters a leg, or the window at the tip, over nominal.
+
+    It is the share of the LED's package before that face, whose height is that of the acrylic.
+    """
     package = d["design.leds.package_mm"]
     leg = np.maximum(d["design.light_guide.thickness_mm"] + e["acrylic_mm"], 0.0)
 
@@ -256,7 +259,7 @@ def _light(d: Dimensions, e: Errors) -> dict[str, Array]:
     return {
         f"light@{name}": share * (1 + e[f"{side}_flux_percent"] / 100)
         - d["tolerance.least_light_ratio"]
-        for name, side in zip(strip_wavelengths_nm(d), ("left", "right"), strict=True)
+        for name, side in zip(strip_wavelengths_nm(d), strip_sides(d), strict=True)
     }
 
 

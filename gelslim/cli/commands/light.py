@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from gelslim_cad.dimensions import Dimensions
-    from gelslim_cad.light.study import Comparison, LightStudy, Progress
+    from gelslim_cad.light.study import Comparison, LightStudy, Progress, TipLight
     from gelslim_cad.spec import Spec
     from gelslim_core.budget.budget import Budget
     from gelslim_optics.light.result import Estimate, LightResult
@@ -39,7 +39,7 @@ RaysPerGuide = Annotated[
 LightError = Annotated[
     str | None,
     typer.Option(
-        help="Largest error of the light of either colour on the coat (half of its 95 % interval), "
+        help="Largest error of the light of any colour on the coat (half of its 95 % interval), "
         "such as 1%; it chooses the rays."
     ),
 ]
@@ -156,8 +156,25 @@ def _report(name: str, study: LightStudy) -> None:
     print()
     for colour in study.light.colours:
         _evenness(study.light, colour)
-    for ours, glued in zip(study.exposures, study.glued_exposures, strict=True):
+    for ours, glued in zip(study.exposures, study.glued_exposures, strict=False):
         say(f"{ours.sentence()} (with glued mirrors: {glued.frame_rate_hz:.0f}).")
+    if study.tip is not None:
+        say(f"{study.exposures[-1].sentence()}.")
+        print()
+        _tip(study.light, study.tip)
+
+
+def _tip(light: LightResult, tip: TipLight) -> None:
+    """Print how bright the light of the tip is, and which slopes each light shows."""
+    say(
+        f"{tip.colour.capitalize()} comes from the tip, where no bend guides it; it is "
+        f"{tip.over_sides:.2f} times as bright on the coat as a side."
+    )
+    rows = table("change per unit slope", "along the finger", "across")
+    for colour in light.colours:
+        along, across = (light.slope_sensitivity(colour, axis) for axis in ("x", "y"))
+        rows.add_row(colour, f"{along.value:+.2f}", f"{across.value:+.2f}")
+    console().print(rows)
 
 
 def _comparisons(name: str, found: Sequence[Comparison]) -> None:
