@@ -6,6 +6,7 @@ import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.dimensions.precompression import SHIM_GAP_MM, WINDOW_GAP_MM
+from gelslim_cad.geometry.led_strips import has_tip_light
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import ALUMINIUM, BEZEL, METALS, PRINTED, SHIM, STEEL
@@ -120,6 +121,8 @@ def shims(d: Dimensions) -> tuple[Part, Part]:
         "proximal": (d["guide.proximal_end_x_mm"], d["ledge.edge_x_mm"]),
         "tip": (d["ledge.distal_x_mm"], d["guide.distal_end_x_mm"]),
     }
+    # Light of a strip at the tip that misses the window's end must not pass below the window.
+    dark = "; of black silicone" if has_tip_light(d) else ""
     first, second = (
         Part(
             name=f"shim_{name}",
@@ -130,7 +133,8 @@ def shims(d: Dimensions) -> tuple[Part, Part]:
             colour=SHIM,
             explode_mm=(0, 0, 6),
             note=f"compressed by {d['shim.least_reached_mm']:.2f} to "
-            f"{d['design.housing.precompression_mm']:.2f} mm when assembled; cut it to size",
+            f"{d['design.housing.precompression_mm']:.2f} mm when assembled; cut it to size"
+            + (dark if name == "tip" else ""),
         )
         for name, x in spans.items()
     )
