@@ -34,20 +34,20 @@ def _with_tip(tip: str, value: Real) -> Real:
     return value * float(tip != NO_TIP)
 
 
-@dimension("led.tip_count", formula="min(max count, ⌈flat width / max pitch⌉); 0 without")
+@dimension("led.tip_count", formula="min(max count, ⌈gel width / max pitch⌉); 0 without")
 def led_tip_count(
-    guide_flat_width_mm: Real, leds_max_pitch_mm: Real, leds_max_count: Real, leds_tip: str
+    gel_width_mm: Real, leds_max_pitch_mm: Real, leds_max_count: Real, leds_tip: str
 ) -> Real:
     """LEDs at the tip."""
-    count = np.minimum(leds_max_count, np.ceil(guide_flat_width_mm / leds_max_pitch_mm - 1e-9))
+    count = np.minimum(leds_max_count, np.ceil(gel_width_mm / leds_max_pitch_mm - 1e-9))
     return _with_tip(leds_tip, count)
 
 
-@dimension("led.tip_pitch_mm", formula="flat width / count; 0 without")
-def led_tip_pitch_mm(guide_flat_width_mm: Real, led_tip_count: Real) -> Real:
-    """Distance of neighbouring LEDs at the tip; the first is half a pitch inside the flat part."""
+@dimension("led.tip_pitch_mm", formula="gel width / count; 0 without")
+def led_tip_pitch_mm(gel_width_mm: Real, led_tip_count: Real) -> Real:
+    """Distance of neighbouring LEDs at the tip; the first is half a pitch inside the gel's side."""
     some = np.asarray(led_tip_count) > 0
-    return np.where(some, guide_flat_width_mm / np.where(some, led_tip_count, 1), 0.0)[()]
+    return np.where(some, gel_width_mm / np.where(some, led_tip_count, 1), 0.0)[()]
 
 
 @dimension("led.tip_face_x_mm", formula="guide's tip end + fit; 0 without", source=GUIDE)
