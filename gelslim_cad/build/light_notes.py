@@ -45,18 +45,28 @@ def light_notes(record: bytes) -> tuple[Note, ...]:
 
 
 def _tip_notes(light: Mapping[str, Any]) -> tuple[Note, ...]:
-    """What the light of a strip at the tip brings; none without one."""
+    """What the light of a strip at the tip brings; none without one, or in the dark."""
     if "tip" not in light:
         return ()
     tip, lights = light["tip"], light["guides"]["curved"]["by_colour"]
     slopes = "; ".join(
-        f"{name} changes by {found['slope_sensitivity_along']['value']:+.2f} per unit slope along "
-        f"the finger and by {found['slope_sensitivity']['value']:+.2f} across"
+        f"{name} changes by {_change(found['slope_sensitivity_along'])} per unit slope along "
+        f"the finger and by {_change(found['slope_sensitivity'])} across"
         for name, found in lights.items()
     )
+    name, over_sides = tip["colour"], tip["over_sides"]
+    least = lights[name]["min_over_mean"]
+    if over_sides is None or least is None:
+        return ()
     text = (
-        f"{tip['colour'].capitalize()} comes from the tip, where no bend guides it; it is "
-        f"{tip['over_sides']:.2f} times as bright on the coat as a side, and its darkest 64th has "
-        f"{lights[tip['colour']]['min_over_mean']:.0%} of its mean.\n{slopes.capitalize()}."
+        f"Light from the tip{'' if name == 'tip' else f' ({name})'}, which no bend guides, is "
+        f"{over_sides:.2f} times as bright on the coat as that of a side; its darkest 64th has "
+        f"{least:.0%} of its mean.\n{slopes.capitalize()}."
     )
     return (Note("Light from the tip", text),)
+
+
+def _change(found: Mapping[str, float | None]) -> str:
+    """A change with its sign and two decimals; a change that rounds to nothing is +0.00."""
+    value = found["value"]
+    return "nothing known" if value is None else f"{round(value, 2) + 0.0:+.2f}"

@@ -258,3 +258,32 @@ def tip_lip(leds_height_mm: Real, manufacturing_print_process: str, leds_tip: st
         return Finding(0.0, -np.inf, least=True, advisory=True)
     least = THINNEST_WALL_MM[manufacturing_print_process][0]
     return Finding(leds_height_mm - TIP_PLAY_MM, least, least=True, advisory=True, tolerance=1e-9)
+
+
+@rule(
+    "led.tip_reach_mm",
+    title="Light from the tip enters the gel over a third of its length",
+    parameter="design.light_guide.thickness_mm",
+    why="light that is steep enough to enter the gel does so at its first meeting with it; what "
+    "lies farther from the tip gets little more than the light that the coat scatters",
+    advice="use thicker acrylic, a gel of higher refractive index, or a shorter gel",
+)
+def tip_reach(
+    leds_tip: str,
+    light_guide_thickness_mm: Real,
+    material_acrylic_refractive_index: Real,
+    material_gel_refractive_index: Real,
+    guide_distal_end_x_mm: Real,
+    gel_length_mm: Real,
+) -> Finding:
+    """Length of the gel in which light of the tip enters, 2 t cot(acos(n_gel/n)) from the end face.
+
+    No limit without a strip at the tip, nor for a gel that is as dense as acrylic.
+    """
+    if leds_tip == NO_TIP:
+        return Finding(0.0, -np.inf, least=True, advisory=True)
+    least_cosine = np.minimum(material_gel_refractive_index / material_acrylic_refractive_index, 1)
+    with np.errstate(divide="ignore"):
+        reach = 2 * light_guide_thickness_mm * least_cosine / np.sqrt(1 - least_cosine**2)
+    lit = np.minimum(reach - (guide_distal_end_x_mm - gel_length_mm / 2), gel_length_mm)
+    return Finding(lit, gel_length_mm / 3, least=True, advisory=True)

@@ -57,6 +57,7 @@ RuleId = Literal[
     "led.located_mm",
     "wire.tip_room_mm",
     "led.tip_lip_mm",
+    "led.tip_reach_mm",
     "print.overhang_mm",
     "mould.cure",
     "mould.gel_mm",

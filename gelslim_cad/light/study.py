@@ -71,7 +71,7 @@ class TipLight:
     Attributes:
         colour: Its name.
         over_sides: Mean irradiance of the coat by this strip over the mean of both side strips,
-            each by its own LEDs.
+            each by its own LEDs; NaN where the sides are dark.
     """
 
     colour: str
@@ -104,7 +104,7 @@ class LightStudy:
         tip, sides = names[0], self.exposures[: len(self.glued.colours)]
         side = sum(e.irradiance_uw_mm2 for e in sides) / len(sides)
         found = next(e.irradiance_uw_mm2 for e in self.exposures if e.colour == tip)
-        return TipLight(tip, found / side)
+        return TipLight(tip, found / side if side > 0 else math.nan)
 
 
 def study_light(
@@ -233,7 +233,8 @@ def study_record(study: LightStudy) -> dict[str, Any]:
         "exposures_with_glued_mirrors": [_exposure(e) for e in study.glued_exposures],
     }
     if study.tip is not None:
-        record["tip"] = asdict(study.tip)
+        tip = study.tip
+        record["tip"] = {"colour": tip.colour, "over_sides": _finite(tip.over_sides)}
         for colour, found in record["guides"]["curved"]["by_colour"].items():
             along = study.light.slope_sensitivity(colour, "x")
             found["slope_sensitivity_along"] = _estimate(along)

@@ -214,6 +214,7 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
         ({"manufacturing.print_process": "fdm"}, "warn"),
         ({"=led.datum_mm": 0.01}, "warn"),
     ],
+    "led.tip_reach_mm": [({**LONG, "design.leds.tip": "blue"}, "warn")],
     "clamp.preload_n": [({"=clamp.preload_n": 0.1}, "fail")],
     "electronics.led": [
         ({"design.leds.model": "unknown"}, "warn"),

@@ -166,15 +166,21 @@ def _report(name: str, study: LightStudy) -> None:
 
 def _tip(light: LightResult, tip: TipLight) -> None:
     """Print how bright the light of the tip is, and which slopes each light shows."""
+    name = "" if tip.colour == "tip" else f" ({tip.colour})"
     say(
-        f"{tip.colour.capitalize()} comes from the tip, where no bend guides it; it is "
-        f"{tip.over_sides:.2f} times as bright on the coat as a side."
+        f"Light from the tip{name}, which no bend guides, is {tip.over_sides:.2f} times as bright "
+        "on the coat as that of a side."
     )
     rows = table("change per unit slope", "along the finger", "across")
     for colour in light.colours:
         along, across = (light.slope_sensitivity(colour, axis) for axis in ("x", "y"))
-        rows.add_row(colour, f"{along.value:+.2f}", f"{across.value:+.2f}")
+        rows.add_row(colour, _change(along.value), _change(across.value))
     console().print(rows)
+
+
+def _change(value: float) -> str:
+    """A change with its sign and two decimals; a change that rounds to nothing is +0.00."""
+    return f"{round(value, 2) + 0.0:+.2f}"
 
 
 def _comparisons(name: str, found: Sequence[Comparison]) -> None:
