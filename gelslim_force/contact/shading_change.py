@@ -2,7 +2,9 @@
 
 The change is logarithmic. Where red and green light come from opposite sides, log R/G follows the
 slope of the surface across the finger, independent of the paint and of the fall-off of the light.
-The remaining change of brightness follows the slope along the finger.
+The remaining change of brightness follows the slope along the finger, and more so the change of a
+third colour that comes from the tip, against the others. Nothing here depends on which colour comes
+from where: the layers are combinations of the channels that the picture has.
 """
 
 from __future__ import annotations

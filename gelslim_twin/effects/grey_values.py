@@ -61,7 +61,7 @@ def shading_ladder(c: Circumstances) -> tuple[Rung, ...]:
 
 SHADING = Effect(
     name="shading",
-    description="Shading: the slopes of the deformed gel change its red and green light",
+    description="Shading: the slopes of the deformed gel change the light of each strip",
     parameters=ShadingParameters,
     bound=lambda c: picture(shift_px(c, grey_share(c))),
     formula="(1 - ambient) min(2.1, slope/tan 18.9 deg) over the ink's contrast x width of an edge",
