@@ -164,8 +164,10 @@ def wire_lane_y_mm(
     leds_wire_diameter_mm: Real,
     wire_beside_mm: Real,
 ) -> Real:
-    """Where the wires of the side boards lie in the lane beside the cable; those of the tip's board
-    lie between them and the cable."""
+    """Where the wires of the side boards lie in the lane beside the cable.
+
+    Those of the board at the tip lie between them and the cable.
+    """
     side = camera_cable_width_mm / 2 + housing_fit_clearance_mm + LANE_GAP_MM
     return side + leds_wire_diameter_mm / 2 + wire_beside_mm
 

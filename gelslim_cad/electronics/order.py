@@ -115,27 +115,30 @@ def order_page(boards: FingerBoards, d: Lookup) -> bytes:
             f"{boards.problem[0].upper()}{boards.problem[1:]}. The finger itself is complete.\n"
         )
         return text.encode()
+    tip = any("tip" in item.sides for item in boards.boards)
+    across = (
+        " The board at the tip lies across the finger: its x runs from +y, where its wires leave, "
+        "to -y."
+    )
+    cathodes = "to the tip, away from the wires' pads"
+    if tip:
+        cathodes = "away from the wires' pads, on the side boards to the tip"
     sections = [
         "# LED boards",
         "Upload each `*_gerber.zip`; for assembly add its `*_BOM.csv` and `*_CPL.csv`. The KiCad "
         "projects are of version 8.0. `wiring.svg` shows the wires. All lengths in mm; the "
         "coordinates are those of the finger, x to the tip, seen from the LEDs."
-        + (
-            " The board at the tip lies across the finger: its x runs from +y, where its wires "
-            "leave, to -y."
-            if any("tip" in item.sides for item in boards.boards)
-            else ""
-        ),
+        + (across if tip else ""),
         _board_table(boards),
         *(_circuit_section(item, d) for item in boards.boards),
         "## Before you order\n\n"
         "- Compare part numbers and pads with the manufacturer's sheet: figures that the library "
         "marks as assumed are listed above.\n"
-        "- In the assembly service's preview every LED's cathode points away from the wires' "
-        "pads, on the side boards to the tip; a bar on the legend marks it. Services count "
-        "rotations from different positions.\n"
+        f"- In the assembly service's preview every LED's cathode points {cathodes}; a bar on the "
+        "legend marks it. Services count rotations from different positions.\n"
         "- Order LEDs of one bin of forward voltage and of one bin of wavelength for a board.\n"
-        "- Joints on the wires' pads must stay below the LEDs: the guide comes to "
+        "- Joints on the wires' pads must stay below the LEDs: the foot of the guide"
+        f"{', and at the tip its end face,' if tip else ''} comes to "
         f"{d['design.housing.fit_clearance_mm']:g} mm above them.",
     ]
     return ("\n\n".join(sections) + "\n").encode()

@@ -98,6 +98,8 @@ def _tip_points(d: Dimensions, k: int) -> list[Point3]:
     along = max(near, clear_of_clamp + 0.05)
     # Side by side round two bends of 45° the wires keep their distance if one bends later.
     aside = _aside_x_mm(d) - (math.sqrt(2) - 1) * beside
+    if along > near:
+        aside = max(aside, d["clamp.front_x_mm"] + 1.5 * size)
     rear = _rear_x_mm(d) + beside
     return [
         (x, near, board_z_mm(d)[0] - SLIP_MM),

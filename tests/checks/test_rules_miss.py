@@ -30,6 +30,12 @@ SPOILT: dict[str, list[tuple[dict[str, Any], str]]] = {
           "design.light_guide.end_support_mm": 0.5}, "fail"),
     ],
     "led.board_width_mm": [({"design.leds.package_mm": 3.0}, "fail")],
+    "wire.tip_room_mm": [
+        ({"design.leds.tip": "blue", "design.light_guide.bend_radius_ratio": 0.8}, "fail"),
+    ],
+    "led.tip_lip_mm": [
+        ({"design.leds.tip": "blue", "manufacturing.print_process": "fdm"}, "warn"),
+    ],
     "guide.stock_mm": [({"design.light_guide.thickness_mm": 2.6}, "fail")],
     "mirror.stock_mm": [({"design.mirror.thickness_mm": 1.2}, "fail")],
     "gel.on_window_mm": [

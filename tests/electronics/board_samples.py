@@ -64,6 +64,8 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "narrow": ("mini20", {**NARROW, **FINE}),
     "narrow_flexible": ("mini20", {**NARROW, **FINE, **FLEXIBLE}),
     "narrow_driven": ("mini20", {**NARROW, **DRIVEN, "electronics.min_drill_mm": 0.2}),
+    "tip": ("gelslim2", {"design.leds.tip": "blue"}),
+    "white_tip": ("mini20", {"design.leds.light": "white", "design.leds.tip": "white"}),
     "own_led": (
         "mini20",
         {
@@ -101,7 +103,7 @@ def made(case: str) -> FingerBoards:
     return finger_boards(derived(case))
 
 
-ALL_BOARDS = [(case, number) for case in CASES for number in (0, 1)]
+ALL_BOARDS = [(case, number) for case in CASES for number in (0, 1)] + [("tip", 2)]
 
 
 def board_of(case: str, number: int) -> FingerBoard:

@@ -30,7 +30,8 @@ from gelslim_cad.electronics.finger import finger_boards
 from gelslim_cad.electronics.gerber_layers import layer_files
 from gelslim_cad.electronics.kicad_project import kicad_files
 from gelslim_cad.electronics.order import order_files
-from gelslim_cad.light.scene import led_rows
+from gelslim_cad.geometry.led_strips import has_tip_light, strip_sides
+from gelslim_cad.light.scene import led_rows, tip_row
 
 SHEET_MM = (150.0, 100.0)
 """Where the files of KiCad put the origin, whose y points down."""
@@ -140,7 +141,10 @@ def test_mask_paste_and_legend_suit_the_pads(case: str, number: int) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_leds_stand_where_the_light_is_traced(case: str) -> None:
     d = derived(case)
-    rows = dict(zip(("left", "right"), led_rows(d), strict=True))
+    rows = {side: row.x_mm for side, row in zip(("left", "right"), led_rows(d), strict=True)}
+    if has_tip_light(d):
+        # Along the board's x the finger's y falls: its wires leave at +y.
+        rows["tip"] = tuple(-y for y in reversed(tip_row(d).y_mm))
     seen = []
     for item in made(case).boards:
         text = layer_files(item.board)[f"{item.board.name}-F_Cu.gbr"].decode()
@@ -152,9 +156,9 @@ def test_leds_stand_where_the_light_is_traced(case: str) -> None:
             if row["Designator"].startswith("D")
         ]
         for side in item.sides:
-            np.testing.assert_allclose(places, rows[side].x_mm, atol=1e-4)
+            np.testing.assert_allclose(places, rows[side], atol=1e-4)
             seen.append(side)
-    assert sorted(seen) == ["left", "right"]
+    assert seen == list(strip_sides(d))
 
 
 def test_outline_and_height_are_those_of_the_cad_part() -> None:
@@ -180,6 +184,25 @@ def test_outline_and_height_are_those_of_the_cad_part() -> None:
             np.testing.assert_allclose(found, wanted, atol=1e-4)
             assert part.name == item.board.name
             assert child(child(parsed(project), "general"), "thickness")[1] == f"{0.8:g}"
+
+
+def test_the_board_at_the_tip_is_as_large_as_its_cad_part() -> None:
+    pytest.importorskip("cadquery", reason="comparing with the solid needs the [cad] extra")
+    from gelslim_cad.solids.guide import led_boards
+
+    d, item = derived("tip"), board_of("tip", 2)
+    part = led_boards(d)[2]
+    bounds = part.solid.BoundingBox()
+    assert part.name == item.board.name == "led_board_blue"
+    assert item.board.x_mm == pytest.approx((bounds.ymin, bounds.ymax))
+    assert item.board.width_mm == pytest.approx(bounds.zlen)
+    wires = next(c for c in item.board.components if c.kind == "wires")
+    # The lips hold 1.2 mm of both ends; between pads and lip lies the copper's edge.
+    assert min(p.box_mm[0] for p in wires.pads) == pytest.approx(bounds.ymin + 1.2 + 0.2)
+    assert max(p.box_mm[2] for _, p in item.board.pads) < bounds.ymax - 1.2
+    # The wires' pads lie over the channel of the wires.
+    assert wires.pads[0].box_mm[0] < -d["wire.tip_y_mm"] < wires.pads[0].box_mm[2]
+    assert item.circuit.led.variant.wavelength_nm == 470
 
 
 def test_gerber_files_say_what_they_are() -> None:
