@@ -9,7 +9,7 @@ import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
 from gelslim_cad.dimensions.registry import Real
-from gelslim_cad.electronics.circuit import Circuit
+from gelslim_cad.electronics.circuit import Circuit, Circuits
 from gelslim_cad.electronics.finger import UNKNOWN_LED
 from gelslim_cad.electronics.heat import SOFT_C
 from gelslim_cad.electronics.layout import resistor_size_mm, row_slack_mm
@@ -21,8 +21,6 @@ MOST_SPREAD_PERCENT = 50.0
 FLUX_PERCENT = 25.0
 THINNEST_FR4_MM = 0.4
 THICKEST_FOIL_MM = 0.3
-Circuits = tuple[Circuit | None, ...]
-"""Of the left and the right board and, where there is one, of that at the tip."""
 
 
 def _known(circuits: Circuits) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.dimensions.registry import Real, dimension
-from gelslim_cad.electronics.circuit import NAMES, TIP_NAMES, Circuit, side_circuit
+from gelslim_cad.electronics.circuit import NAMES, TIP_NAMES, Circuit, Circuits, side_circuit
 from gelslim_cad.geometry.led_strips import NO_TIP
 
 SOURCE = "docs/electronics.md"
@@ -53,7 +53,7 @@ def electronics_circuits(
     electronics_right_circuit: Circuit | None,
     electronics_tip_circuit: Circuit | None,
     leds_tip: str,
-) -> tuple[Circuit | None, ...]:
+) -> Circuits:
     """Circuits of the left and the right board and, where there is one, of that at the tip."""
     sides = electronics_left_circuit, electronics_right_circuit
     return sides if leds_tip == NO_TIP else (*sides, electronics_tip_circuit)

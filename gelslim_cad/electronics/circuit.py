@@ -114,6 +114,10 @@ class Circuit:
         return self.greatest_ma / self.current_ma - 1
 
 
+Circuits = tuple[Circuit | None, ...]
+"""Of the left and the right board and, where there is one, of that at the tip."""
+
+
 def side_circuit(d: Lookup, side: Side) -> Circuit | None:
     """The circuit of a board; None where its LED is not known, or where there is no board.
 

@@ -14,7 +14,7 @@ from gelslim_cad.checks.rule import RULES, rule
 from gelslim_cad.dimensions.dimensions import PATHS
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, UNITS, Real, dimension
-from gelslim_cad.electronics.circuit import Circuit
+from gelslim_cad.electronics.circuit import Circuit, Circuits
 from gelslim_cad.geometry.frame_plate import Deflection
 
 ROOT = Path(__file__).parents[2]
@@ -85,6 +85,7 @@ def test_every_unit_of_a_length_or_angle_is_known() -> None:
         "layout",
         "preloaded",
         "circuit",
+        "circuits",
         "series",
         "frame",
         "k1",
@@ -132,7 +133,7 @@ def test_cyclic_or_open_dimensions_are_refused(monkeypatch: pytest.MonkeyPatch) 
 
 def expected_type(parameter: str) -> object:
     """The type of a parameter's values: of one design, or arrays of n designs."""
-    internal = {"fold_layout": Fold, "bezel_frame": Deflection}
+    internal = {"fold_layout": Fold, "bezel_frame": Deflection, "electronics_circuits": Circuits}
     if parameter in internal:
         return internal[parameter]
     if parameter.endswith("_circuit"):
@@ -158,7 +159,7 @@ def test_parameters_of_dimensions_and_rules_have_the_types_of_their_values() -> 
     for function in functions:
         hints = get_type_hints(function)
         returned = hints.pop("return")
-        assert returned in (Real, Fold, Deflection, Circuit | None, Finding), function
+        assert returned in (Real, Fold, Deflection, Circuit | None, Circuits, Finding), function
         if "values" in hints:  # one mapping of many inputs
             continue
         for parameter, annotation in hints.items():
