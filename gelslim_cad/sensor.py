@@ -6,13 +6,13 @@ import hashlib
 import json
 import math
 from functools import partial
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape, has_markers
-from gelslim_cad.geometry.led_strips import camera_responses, has_tip_light
+from gelslim_cad.geometry.led_strips import camera_responses
 from gelslim_cad.geometry.optics import camera_record, guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
@@ -32,8 +32,10 @@ from ifem_export.operators.ladder import REFERENCE_LAYERS, Progress, measure_lad
 from ifem_export.operators.operator_ladder import OperatorLadder
 
 RAYS = 1 << 16
-ELEVATION_DEG = 25.0
-"""Angle at which the light of the sides rises through the gel; traced, it is 23 to 24 degrees."""
+AZIMUTHS_DEG = 90.0, -90.0, 180.0
+"""Directions of the light of the strips: left towards +y, right towards -y, tip towards -x."""
+SLOPE_AXES: tuple[Literal["x", "y"], ...] = ("y", "y", "x")
+"""Along which a slope changes the light of each strip most."""
 SMOOTHING_MM = 0.6
 
 
@@ -274,16 +276,14 @@ def pad_light(d: Dimensions) -> LightMap:
     seen, colour = camera_responses(d)
     flux = [w * source.power for w, source in zip(seen, scene.sources, strict=True)]
     bins = [f * traced.irradiance(c) for f, c in zip(flux, traced.colours, strict=True)]
-    azimuth_deg, elevation_deg = [90.0, -90.0], [ELEVATION_DEG, ELEVATION_DEG]
-    if has_tip_light(d):
-        azimuth_deg.append(180.0)
-        elevation_deg.append(_elevation_deg(traced.slope_sensitivity(traced.colours[-1], "x")))
+    axes = SLOPE_AXES[: len(scene.sources)]
+    steep = [traced.slope_sensitivity(c, a) for c, a in zip(traced.colours, axes, strict=True)]
     return LightMap.from_bins(
         np.stack(bins),
         float(d["design.gel.length_mm"]),
         float(d["design.gel.width_mm"]),
-        azimuth_deg=np.array(azimuth_deg),
-        elevation_deg=np.array(elevation_deg),
+        azimuth_deg=np.array(AZIMUTHS_DEG[: len(axes)]),
+        elevation_deg=np.array([_elevation_deg(found) for found in steep]),
         colour=colour,
         smooth_mm=SMOOTHING_MM,
     )
