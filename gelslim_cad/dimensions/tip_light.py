@@ -31,7 +31,8 @@ TIP_WIRE_MM = 1.0
 
 def _with_tip(tip: str, value: Real) -> Real:
     """A value where there is a strip at the tip, else 0."""
-    return value * float(tip != NO_TIP)
+    # The sum turns -0.0 into 0.0.
+    return value * float(tip != NO_TIP) + 0.0
 
 
 @dimension("led.tip_count", formula="min(max count, ⌈gel width / max pitch⌉); 0 without")
