@@ -176,6 +176,8 @@ GRACE_S = 2
 """Time for workers to end after SIGTERM, before they are killed."""
 TERMINATED = 128 + signal.SIGTERM
 """Exit status of a worker that SIGTERM ended."""
+HOOK = "swallowed"
+"""Name of the hook for exceptions that could not be raised."""
 _is_busy = False
 """Whether this worker is running a task."""
 _calls = 0
@@ -262,11 +264,23 @@ def _terminate(number: int, frame: FrameType | None) -> None:
     _calls += 1
     if not _is_busy:
         os._exit(TERMINATED)
-    if must_not_be_interrupted(frame):
+    if must_not_be_interrupted(frame) or _is_told(frame):
         _terminate_soon()
         return
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     raise _Terminated
+
+
+def _is_told(frame: FrameType | None) -> bool:
+    """Whether the hook for a swallowed exception runs in a frame or its callers.
+
+    An exception that it raised would be printed, and nothing else.
+    """
+    while frame is not None:
+        if (frame.f_code.co_filename, frame.f_code.co_name) == (__file__, HOOK):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _terminate_soon() -> None:
@@ -275,7 +289,7 @@ def _terminate_soon() -> None:
 
 
 def _unraisable(before: Callable[[Any], Any]) -> Callable[[Any], None]:
-    def hook(raised: Any) -> None:
+    def swallowed(raised: Any) -> None:
         if isinstance(raised.exc_value, _Terminated):
             # A destructor or compiled code was interrupted and swallowed the exception.
             signal.signal(signal.SIGTERM, _terminate)
@@ -283,7 +297,7 @@ def _unraisable(before: Callable[[Any], Any]) -> Callable[[Any], None]:
         else:
             before(raised)
 
-    return hook
+    return swallowed
 
 
 def begin_worker() -> None:

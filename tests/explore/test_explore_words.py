@@ -71,6 +71,7 @@ def test_a_space_of_illegal_designs_says_why(
     assert "less than or equal to 120" in shown_lines[3]
 
 
+@pytest.mark.slow
 def test_words_do_not_send_a_chunk_to_the_slow_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """Groups of a large chunk are small; each once took the search for single designs."""
     found = space("gel.length_mm=16:24:0.115", "housing.screw=M1.6,M2,M2.5")

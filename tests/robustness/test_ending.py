@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from interrupted_run import LINES, interrupted, leaves_nothing
@@ -15,6 +16,7 @@ from sweep_commands import ROOT, environment, heeds_interrupts
 
 from gelslim.cli.failure import _as_json
 from gelslim.ending import SAID, Terminated, asked_to_end, say
+from gelslim_core import jobs
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals process groups")
 BOTH = (signal.SIGINT, signal.SIGTERM)
@@ -340,3 +342,24 @@ def test_a_worker_that_just_starts_says_nothing(tmp_path: Path) -> None:
     )
     done = program(tmp_path, "os.setsid()" + work.replace("interrupt()", "os.killpg(0, 2)"))
     assert (done.returncode, done.stdout, done.stderr) == (130, "", LINES[signal.SIGINT])
+
+
+def test_a_second_signal_while_a_swallowed_one_is_told_raises_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    repeated: list[int] = []
+
+    def soon() -> None:
+        repeated.append(1)
+        if len(repeated) == 1:
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(jobs, "_terminate_soon", soon)
+    monkeypatch.setattr(jobs, "_is_busy", True)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        hook = jobs._unraisable(lambda raised: None)
+        hook(SimpleNamespace(exc_value=jobs._Terminated()))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert len(repeated) == 2
