@@ -104,8 +104,9 @@ class FiniteStrainForce:
 class DepthLaw:
     """The linear law for shallow contacts, and the neo-Hookean one from a depth on.
 
-    At a tenth of the thickness the linear law errs by about 5 % in the resultant, and the error
-    grows with the depth; the neo-Hookean law takes about ten times as long.
+    Under a ball of 10 mm radius on the gel of gelslim2 the linear law gives 4 % less normal force
+    than the neo-Hookean one at a tenth of the thickness, and 15 % less at three eighths. The
+    neo-Hookean law takes about ten times as long.
 
     Attributes:
         linear: Linear law, from motion (c, 3) to forces (c, 3).
