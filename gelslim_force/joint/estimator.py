@@ -4,7 +4,7 @@ Nodal forces on the region where the light changed are fitted to the motion of t
 picture and to the change of the light. A marker shows height too, as the camera looks at the gel
 at an angle; light shows the slope. The forces push, keep within a friction cone, and their
 traction is smooth. The model is linearised at the last estimate and solved again a few times; the
-nodes that hardly press are then removed, and the rest is solved once more.
+nodes that hardly press are then removed, and the rest is solved again.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gelslim_force.joint.light_rows import LightRows, placed_bins
+from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import NormalEquations, huber
-from gelslim_force.joint.region import contact_nodes
+from gelslim_force.joint.region import contact_nodes, pressing_nodes
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.motion.marker_motion import MarkerView
@@ -30,7 +30,6 @@ from ifem_export.operators.rigid_answer import rigid_motions
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
-_STEP_MM = 1e-3
 _MARKER_LIMIT = 3.0
 """Standard deviations beyond which a marker counts linearly."""
 _LEAST_NODES = 3
@@ -71,6 +70,8 @@ class JointEstimator:
         responses: Of markers and heights to nodal forces.
         markers: The followed markers as seen at rest.
         nodes_to_markers: (n, c) interpolation.
+        marker_node: (n,) the node nearest to each marker.
+        by_height: (n, 2) lateral motion that a picture shows per mm less of the marker's height.
         light: The bins of the picture.
         law: Change of light with the slope.
         youngs_modulus_mpa: Of the gel.
@@ -87,6 +88,8 @@ class JointEstimator:
     responses: Responses
     markers: MarkerView
     nodes_to_markers: Any
+    marker_node: Nodes
+    by_height: Array
     light: LightView
     law: LightLaw
     youngs_modulus_mpa: float
@@ -119,17 +122,27 @@ class JointEstimator:
         region = contact_nodes(seen.shading, self._rise(seen), self.light.rest_mm, self.lattice)
         if region.sum() < _LEAST_NODES:
             return None
-        known = last is not None and bool((last.region & region).any())
-        rounds = self.settings.following_rounds if known else self.settings.rounds
-        force = last.force_n if known and last is not None else np.zeros_like(self.points_mm)
-        moved = last.displacement_mm if known and last is not None else np.zeros_like(force)
-        state = _State(force, moved, 1.0 if last is None else last.gain)
         frame = _Frame(seen, markers_px, noise_px)
+        if last is not None and (last.region & region).any():
+            nodes, state = last.region, _State(last.force_n, last.displacement_mm, last.gain)
+        else:
+            still = np.zeros_like(self.points_mm)
+            state = _State(still, still, 1.0)
+            nodes, state = self._rounds(frame, region, state, self.settings.rounds)
+        nodes = region & self.lattice.widened(nodes, 1)
+        return self._found(*self._rounds(frame, nodes, state, self.settings.following_rounds))
+
+    def _rounds(
+        self, frame: _Frame, nodes: Mask, state: _State, rounds: tuple[int, ...]
+    ) -> tuple[Mask, _State]:
         for number, count in enumerate(rounds):
-            nodes = self._nodes(region, state.force_n, cut=number == 1)
+            if number > 0:
+                pressure = -state.force_n[:, 2] / self.area_mm2
+                least = self.settings.least_pressure
+                nodes = pressing_nodes(nodes, pressure, self.neighbours, least)
             for _ in range(count):
-                state = self._round(frame, nodes, state)
-        return self._found(nodes, state)
+                state = self._round(frame, np.flatnonzero(nodes), state)
+        return nodes, state
 
     def _rise(self, seen: SeenLight) -> Array | None:
         """(rows, columns) change that grows with a rise along y; None where no light tells it."""
@@ -141,30 +154,19 @@ class JointEstimator:
             return None
         return np.asarray(-np.sign(falling) * (seen.log_change[0] - seen.log_change[1]))
 
-    def _nodes(self, region: Mask, force_n: Array, *, cut: bool) -> Nodes:
-        if not cut:
-            return np.flatnonzero(region)
-        pressure = -force_n[:, 2] / self.area_mm2
-        pressing = pressure > self.settings.least_pressure * pressure.max()
-        return np.flatnonzero(pressing) if pressing.any() else np.flatnonzero(region)
-
     def _round(self, frame: _Frame, nodes: Nodes, state: _State) -> _State:
         """Linearise at the state, and solve."""
         start, offset = state.force_n[nodes].ravel(), self._offset(state)
-        equations = self._marker_rows(NormalEquations.of(len(start)), frame, nodes, state, offset)
-        light = self._light_rows(frame, nodes, state)
-        chosen = self.settings
-        if len(light.values):
-            equations = equations.with_heights(
-                light.slopes,
-                light.heights,
-                light.values,
-                light.weight,
-                light.by_gain,
-                (1 - state.gain, chosen.gain_sigma),
-            )
+        moved = self.responses.displacement(nodes, state.force_n[nodes]) + offset
+        chosen, near = self.settings, np.zeros(len(self.points_mm), dtype=bool)
+        near[nodes] = True
+        light = self._light(frame, near, moved, state.gain)
+        heights = self.responses.of_heights(nodes, light.nodes)
+        equations = self._with_markers(NormalEquations.of(len(start)), frame, near, moved)
+        equations = equations.with_light(light, heights, (1 - state.gain, chosen.gain_sigma))
         young = self.youngs_modulus_mpa
         equations = equations.with_prior(
+            start,
             self.neighbours[nodes][:, nodes].toarray(),
             self.area_mm2[nodes],
             chosen.roughness * young,
@@ -174,9 +176,14 @@ class JointEstimator:
         found = equations.solved(start, chosen.friction)
         force = np.zeros_like(state.force_n)
         force[nodes] = found.reshape(-1, 3)
-        moved = self.responses.displacement(nodes, force[nodes]) + offset
-        gain = light.gain(found, chosen.gain_sigma) if len(light.values) else state.gain
-        return _State(force, moved, gain, equations, light.unexplained(found))
+        higher = np.asarray(heights @ (found - start).astype(heights.dtype), dtype=float)
+        return _State(
+            force,
+            self.responses.displacement(nodes, force[nodes]) + offset,
+            light.gain_after(higher, chosen.gain_sigma),
+            equations,
+            light.unexplained(higher),
+        )
 
     def _offset(self, state: _State) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -186,48 +193,32 @@ class JointEstimator:
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
         return np.asarray(state.displacement_mm - whole)
 
-    def _marker_rows(
-        self, equations: NormalEquations, frame: _Frame, nodes: Nodes, state: _State, offset: Array
+    def _with_markers(
+        self, equations: NormalEquations, frame: _Frame, near: Mask, moved_mm: Array
     ) -> NormalEquations:
-        """With the markers: lateral motion as it follows from the picture and the height."""
-        height = self.nodes_to_markers @ state.displacement_mm[:, 2]
-        lateral = self.markers.lateral_motion(frame.markers_px, height)
-        above = self.markers.lateral_motion(frame.markers_px, height + _STEP_MM)
-        seen = np.isfinite(lateral).all(axis=1)
-        by_height = ((above - lateral) / _STEP_MM)[seen]
-        response = self.responses.of_markers(nodes)[seen]
-        rows = response[:, :2] - by_height[:, :, None] * response[:, 2:3]
-        base = (self.nodes_to_markers @ offset)[seen]
-        values = lateral[seen] - by_height * (height[seen] - base[:, 2])[:, None] - base[:, :2]
-        rows, values = rows.reshape(-1, rows.shape[2]), values.ravel()
-        moved = np.abs(lateral[seen]).ravel() * self.settings.marker_share
-        scale = np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px[seen])))
+        """With the markers near the contact: lateral motion by the picture and the height."""
+        wide = self.lattice.widened(near, self.settings.marker_reach)
+        model = self.nodes_to_markers @ moved_mm
+        lateral = self.markers.lateral_motion(frame.markers_px, model[:, 2])
+        used = np.flatnonzero(np.isfinite(lateral).all(axis=1) & wide[self.marker_node])
+        rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
+        residual = (lateral[used] - model[used, :2]).ravel()
+        share = np.abs(lateral[used]).ravel() * self.settings.marker_share
+        scale = np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px[used])))
         noise = np.repeat(frame.noise_px * scale, 2)
-        sigma = np.sqrt(self.settings.marker_mm**2 + moved**2 + noise**2)
-        residual = values - rows @ state.force_n[nodes].ravel()
-        return equations.with_rows(rows, values, huber(residual, sigma, _MARKER_LIMIT))
+        sigma = np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2)
+        return equations.with_rows(rows, residual, huber(residual, sigma, _MARKER_LIMIT))
 
-    def _light_rows(self, frame: _Frame, nodes: Nodes, state: _State) -> LightRows:
-        """The change of light near the nodes, linearised."""
-        inside = np.zeros(len(self.points_mm), dtype=bool)
-        inside[nodes] = True
-        near = self.lattice.widened(inside, self.settings.light_reach)
-        bins = placed_bins(self.light, frame.seen, self.lattice, state.displacement_mm, near)
-        heights = self.responses.of_heights(nodes, bins.nodes)
-        return bins.linearised(
-            self.law,
-            heights,
-            heights @ state.force_n[nodes].ravel(),
-            state.displacement_mm[:, 2],
-            state.gain,
-            self.settings.light_error,
-        )
+    def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums:
+        """The change of light near the contact, linear about the present motion (c, 3)."""
+        wide = self.lattice.widened(near, self.settings.light_reach)
+        bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide)
+        return bins.sums(self.law, moved_mm[:, 2], gain, self.settings.light_error)
 
-    def _found(self, nodes: Nodes, state: _State) -> JointForces:
+    def _found(self, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
+        nodes = np.flatnonzero(region)
         sums = np.reshape(rigid_motions(self.points_mm[nodes]), (6, -1))
-        region = np.zeros(len(self.points_mm), dtype=bool)
-        region[nodes] = True
         return JointForces(
             state.force_n,
             state.displacement_mm,

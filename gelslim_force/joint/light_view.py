@@ -57,6 +57,7 @@ class LightView:
 
     Attributes:
         rest_mm: (rows, columns, 2) where the bins meet the gel at rest.
+        nearest: (rows * columns,) the node nearest to each bin.
         lean: (rows, columns, 2) motion of that place along the line of sight per mm of height.
         area_mm2: (rows, columns) of a bin on the gel.
         level: (c, rows, columns) grey value of the reference over itself plus the floor.
@@ -84,6 +85,7 @@ class LightView:
         self.area_mm2 = bin_sizes(x, y) ** 2
         places = self.rest_mm.reshape(-1, 2)
         self._light.on_pad &= lattice.on(places).reshape(x.shape)
+        self.nearest = lattice.nearest_node(places)
         self.channels = source_channels(light)
         dark = [c for c in self.channels if c not in self._light.used]
         if dark:
@@ -116,11 +118,12 @@ class LightView:
         return SeenLight(shading, logs, noise, self._saturated(as_picture(image)))
 
     def _saturated(self, picture: NDArray[np.uint8]) -> Mask:
-        (rows, columns), size = self._light.shape, self._light.bin_px
-        cut = picture[: rows * size, : columns * size][..., self.channels]
-        bins = cut.reshape(rows, size, columns * size, -1).max(axis=1)
-        most = bins.reshape(rows, columns, size, -1).max(axis=2)
-        return np.asarray(np.moveaxis(most, -1, 0) >= _SATURATED)
+        from gelslim_force.joint.light_kernel import saturated_bins
+
+        found = np.zeros((len(self.channels), *self._light.shape), dtype=bool)
+        channels = np.array(self.channels)
+        saturated_bins(picture, channels, self._light.bin_px, _SATURATED, found)
+        return found
 
 
 def source_channels(light: LightMap) -> list[int]:

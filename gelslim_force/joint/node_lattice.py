@@ -10,12 +10,34 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
+from scipy import ndimage
+from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _TAPS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeTaps:
+    """Slopes at n points as sums over the heights of 16 nodes each.
+
+    Attributes:
+        nodes: (n, 16).
+        along: (n, 16) weights of the slope along x.
+        across: (n, 16) of the slope along y.
+    """
+
+    nodes: Nodes
+    along: Array
+    across: Array
+
+    def slopes(self, height_mm: Array) -> Array:
+        """(n, 2) slopes of a surface with nodes of the given heights (c,)."""
+        height = height_mm[self.nodes]
+        by_x, by_y = (np.einsum("nt,nt->n", w, height) for w in (self.along, self.across))
+        return np.column_stack([by_x, by_y])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +75,16 @@ class NodeLattice:
         corners = [self.number[i + di, j + dj] >= 0 for di in (0, 1) for dj in (0, 1)]
         return np.asarray(inside & np.all(corners, axis=0))
 
+    def nearest_node(self, points_mm: Array) -> Nodes:
+        """(n,) the node whose place on the lattice is nearest to each point (n, 2).
+
+        Points beyond the lattice, and places without a node, give a node nearby.
+        """
+        held = np.argwhere(self.number >= 0)
+        at = np.nan_to_num((points_mm - self.origin_mm) / self.step_mm)
+        found = cKDTree(held).query(np.clip(at, -1e6, 1e6))[1]
+        return np.asarray(self.number[tuple(held[found].T)])
+
     def values_at(self, values: Array, points_mm: Array) -> Array:
         """Bilinear interpolation (n, ...) of nodal values (c, ...) at points (n, 2)."""
         at = (points_mm - self.origin_mm) / self.step_mm
@@ -66,23 +98,15 @@ class NodeLattice:
                 found += weight.reshape(-1, *(1,) * (values.ndim - 1)) * values[node]
         return found
 
-    def slopes_at(self, points_mm: Array) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Matrices (n, c) from heights of the nodes to slopes along x and along y at (n, 2)."""
-        at = (points_mm - self.origin_mm) / self.step_mm
-        last = np.array(self.number.shape) - 1
-        cell = np.clip(np.floor(at), 0, last - 1).astype(np.intp)
-        part = at - cell
-        taps = np.arange(_TAPS) - 1
-        places = [np.clip(cell[:, k, None] + taps, 0, last[k]) for k in (0, 1)]
-        nodes = self.number[places[0][:, :, None], places[1][:, None, :]]
-        weight = [_cubic(part[:, k]) for k in (0, 1)]
-        steep = [_cubic_slope(part[:, k]) / self.step_mm[k] for k in (0, 1)]
-        by_x = steep[0][:, :, None] * weight[1][:, None, :]
-        by_y = weight[0][:, :, None] * steep[1][:, None, :]
-        row = np.broadcast_to(np.arange(len(at))[:, None, None], nodes.shape)
-        held = nodes >= 0
-        where, shape = (row[held], nodes[held]), (len(at), len(self.place))
-        return tuple(sparse.csr_array((w[held], where), shape=shape) for w in (by_x, by_y))
+    def slopes_at(self, points_mm: Array) -> SlopeTaps:
+        """Slopes along x and along y at (n, 2), by the heights of the nodes."""
+        from gelslim_force.joint.light_kernel import cubic_taps
+
+        at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
+        nodes = np.empty((len(at), _TAPS * _TAPS), dtype=np.intp)
+        along, across = np.empty(nodes.shape), np.empty(nodes.shape)
+        cubic_taps(at, self.step_mm, self.number, nodes, along, across)
+        return SlopeTaps(nodes, along, across)
 
     def picture(self, nodes: Mask) -> Mask:
         """(nx, ny) places of nodes (c,)."""
@@ -104,25 +128,3 @@ class NodeLattice:
         places = np.zeros(self.number.shape, dtype=bool)
         places[kept[:, 0], kept[:, 1]] = True
         return np.asarray(ndimage.binary_fill_holes(places)[self.place[:, 0], self.place[:, 1]])
-
-
-def _cubic(t: Array) -> Array:
-    """(n, 4) weights of cubic convolution at the fraction t (n,) of a cell."""
-    t2, t3 = t * t, t * t * t
-    return np.stack(
-        [
-            -0.5 * t + t2 - 0.5 * t3,
-            1 - 2.5 * t2 + 1.5 * t3,
-            0.5 * t + 2 * t2 - 1.5 * t3,
-            -0.5 * t2 + 0.5 * t3,
-        ],
-        axis=1,
-    )
-
-
-def _cubic_slope(t: Array) -> Array:
-    """(n, 4) derivatives of `_cubic` by t."""
-    t2 = t * t
-    return np.stack(
-        [-0.5 + 2 * t - 1.5 * t2, -5 * t + 4.5 * t2, 0.5 + 4 * t - 4.5 * t2, -t + 1.5 * t2], axis=1
-    )

@@ -1,19 +1,26 @@
 """Least squares for contact forces: sums over the data, the prior, and the covariance.
 
-The unknowns are the forces (3p,) on p nodes. Rows of data enter as A f = b with weights, and the
-gain of the light, which is one more unknown with a prior, is eliminated exactly:
+The unknowns are changes x (3p,) of the forces on p nodes from a start f. Rows of data enter as
+r - A x with weights, and the gain of the light, which is one more unknown with a prior, is
+eliminated exactly:
 
-    min over f, γ of  Σ w (A f + d γ - b)² + ((γ - γ₀) / σ)²
+    min over x, γ of  Σ w (r - A x - d γ)² + ((γ - γ₀) / σ)²
+
+Written for changes, the sums can be made in single precision: its error is one of the step, and
+vanishes with the step.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
+
+if TYPE_CHECKING:
+    from gelslim_force.joint.light_sums import LightSums
 
 Array = NDArray[np.float64]
 STEPS = 400
@@ -23,56 +30,46 @@ _MARGIN = 1.05
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Hessian (3p, 3p) and gradient's constant part (3p,): minimise f·H f / 2 - g·f."""
+    """Hessian (3p, 3p) and slope (3p,) at the start: minimise x·H x / 2 + slope·x."""
 
     hessian: Array
-    constant: Array
+    slope: Array
 
     @classmethod
     def of(cls, size: int) -> NormalEquations:
         """No data yet."""
         return cls(np.zeros((size, size)), np.zeros(size))
 
-    def with_rows(self, rows: Array, values: Array, weight: Array) -> NormalEquations:
-        """With the data rows (n, 3p), values (n,) and weights (n,)."""
-        weighted = rows * np.sqrt(weight)[:, None]
-        return NormalEquations(
-            self.hessian + weighted.T @ weighted, self.constant + rows.T @ (weight * values)
-        )
+    def with_rows(self, rows: Any, residual: Array, weight: Array) -> NormalEquations:
+        """With the data rows (n, 3p), residuals (n,) and weights (n,)."""
+        root = np.sqrt(weight).astype(rows.dtype)
+        weighted = rows * root[:, None]
+        pull = weighted.T @ (root * residual.astype(rows.dtype))
+        return NormalEquations(self.hessian + weighted.T @ weighted, self.slope - pull)
 
-    def with_heights(
-        self,
-        slopes: sparse.csr_array,
-        heights: Array,
-        values: Array,
-        weight: Array,
-        by_gain: Array,
-        gain: tuple[float, float],
+    def with_light(
+        self, light: LightSums, heights: Any, gain: tuple[float, float]
     ) -> NormalEquations:
-        """With data (n,) that depend on the heights of m nodes near the contact, and on the gain γ.
+        """With sums over the light, and a gain that is not known.
 
         Args:
-            slopes: (n, m) derivative of the data by the heights.
+            light: By the heights of m nodes.
             heights: (m, 3p) heights per force.
-            values: (n,).
-            weight: (n,).
-            by_gain: (n,) derivative of the data by the gain.
-            gain: Value and standard deviation of the gain beforehand.
+            gain: Expected change of the gain, and its standard deviation.
         """
-        weighted = sparse.csr_array(slopes.T @ sparse.diags_array(weight))
-        hessian = heights.T @ ((weighted @ slopes) @ heights)
-        constant = heights.T @ (weighted @ values)
-        mixed = heights.T @ (weighted @ by_gain)
+        hessian = heights.T @ (light.matrix.astype(heights.dtype) @ heights)
         expected, sigma = gain
-        own = float(weight @ (by_gain * by_gain)) + sigma**-2
-        seen = float(weight @ (by_gain * values)) + expected / sigma**2
+        own = light.by_gain + sigma**-2
+        seen = (light.gain_pull + expected / sigma**2) / own
+        sums = np.column_stack([light.pull - light.mixed * seen, light.mixed])
+        pull, mixed = (heights.T @ sums.astype(heights.dtype)).T.astype(float)
         return NormalEquations(
-            self.hessian + hessian - np.outer(mixed, mixed) / own,
-            self.constant + constant - mixed * (seen / own),
+            self.hessian + hessian - np.outer(mixed, mixed / own), self.slope - pull
         )
 
     def with_prior(
         self,
+        start: Array,
         neighbours: Array,
         area_mm2: Array,
         roughness_mpa: float,
@@ -82,6 +79,7 @@ class NormalEquations:
         """With smooth tractions of limited size.
 
         Args:
+            start: (3p,) forces at the start.
             neighbours: (p, p) with 1 where nodes are neighbours.
             area_mm2: (p,) area of each node.
             roughness_mpa: Standard deviation of the difference between neighbours.
@@ -90,20 +88,22 @@ class NormalEquations:
         """
         laplacian = np.diag(neighbours.sum(axis=1)) - neighbours
         smooth = laplacian / roughness_mpa**2 / np.outer(area_mm2, area_mm2)
-        hessian = self.hessian.copy()
+        hessian, slope = self.hessian.copy(), self.slope.copy()
         for axis, size in enumerate((tangential_mpa, tangential_mpa, normal_mpa)):
-            hessian[axis::3, axis::3] += smooth + np.diag((size * area_mm2) ** -2.0)
-        return NormalEquations(hessian, self.constant)
+            stiff = smooth + np.diag((size * area_mm2) ** -2.0)
+            hessian[axis::3, axis::3] += stiff
+            slope[axis::3] += stiff @ start[axis::3]
+        return NormalEquations(hessian, slope)
 
     def solved(self, start: Array, friction: float) -> Array:
         """(3p,) forces in Coulomb's cone that minimise, from those at the start (3p,)."""
         from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue
 
-        force = np.ascontiguousarray(start, dtype=float).copy()
         step = 1.0 / (_MARGIN * largest_eigenvalue(self.hessian))
-        slope = self.hessian @ force - self.constant
-        descend(self.hessian, slope, force, friction, step, TOLERANCE, STEPS)
-        return force
+        gram, slope = (a.astype(np.float32) for a in (self.hessian, self.slope))
+        force = start.astype(np.float32)
+        descend(gram, slope, force, friction, np.float32(step), TOLERANCE, STEPS)
+        return force.astype(float)
 
     def covariance_of(self, sums: Array, force: Array) -> Array:
         """Covariance (k, k) of linear functions `sums` (k, 3p) of the forces.

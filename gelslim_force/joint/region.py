@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
 
 from gelslim_force.contact.shading_change import ShadingChange
 from gelslim_force.joint.node_lattice import NodeLattice
@@ -51,6 +51,29 @@ def contact_nodes(
     return np.asarray(filled[lattice.place[:, 0], lattice.place[:, 1]])
 
 
+def pressing_nodes(
+    region: Mask, pressure: Array, neighbours: sparse.csr_array, least: float
+) -> Mask:
+    """(c,) nodes of a region that press, alone and with their neighbours.
+
+    Args:
+        region: (c,) nodes that may press.
+        pressure: (c,) estimate, with errors from node to node.
+        neighbours: (c, c) with 1 where nodes share an edge of a cell.
+        least: Share of the mean pressure, weighted by itself, that the mean of a node and its
+            neighbours has to reach.
+
+    Returns:
+        The nodes; the whole region where none presses.
+    """
+    if not (pressure > 0).any():
+        return region
+    about = (neighbours @ pressure) / np.maximum(neighbours.sum(axis=1), 1)
+    mean = float(pressure @ pressure) / float(pressure.sum())
+    pressing = region & ((pressure + about) / 2 > least * mean)
+    return np.asarray(pressing if pressing.any() else region)
+
+
 def changed_bins(shading: ShadingChange) -> Mask:
     """(rows, columns) bins in which the gel is touched, or bends.
 
@@ -66,6 +89,15 @@ def changed_bins(shading: ShadingChange) -> Mask:
     seen = ndimage.uniform_filter(valid, 3)
     mean = ndimage.uniform_filter(power * valid, 3) / np.maximum(seen, _LEAST_VALID / 2)
     changed = (mean > LEAST_POWER) & (seen > _LEAST_VALID)
+    box = ndimage.find_objects(changed.astype(np.uint8))
+    found = np.zeros_like(changed)
+    if box:
+        found[box[0]] = _whole(changed[box[0]])
+    return found
+
+
+def _whole(changed: Mask) -> Mask:
+    """Without gaps, such as dots, and specks."""
     wide = np.pad(changed, 2 * _CLOSED)
     closed = ndimage.binary_closing(wide, iterations=_CLOSED)
     inner = slice(2 * _CLOSED, -2 * _CLOSED)

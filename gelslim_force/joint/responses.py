@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _BATCH = 64
 
 
 class Responses:
-    """Motion of the markers under 1 N along each axis on each node.
+    """Motion of the markers and heights of the nodes under 1 N along each axis on each node.
 
     Args:
         compliance: Of the pad's surface.
@@ -26,23 +28,37 @@ class Responses:
         self.compliance = compliance
         self._to_markers = nodes_to_markers
         markers, nodes = nodes_to_markers.shape
-        self._values = np.zeros((nodes, 3, markers, 3), dtype=np.float32)
+        self._markers = np.zeros((markers, 3, nodes, 3), dtype=np.float32)
+        self._heights = np.zeros((nodes, nodes, 3), dtype=np.float32)
         self._made = np.zeros(nodes, dtype=bool)
 
     def prepare(self) -> None:
         """Compute all columns now, so that no frame waits for them."""
         self._make(np.arange(len(self._made)))
 
-    def of_markers(self, nodes: Nodes) -> Array:
-        """(n, 3, 3p) motion of the markers under forces on nodes (p,)."""
-        self._make(nodes)
-        chosen = self._values[nodes].astype(float)
-        return np.ascontiguousarray(chosen.reshape(3 * len(nodes), -1, 3).transpose(1, 2, 0))
+    def of_markers(self, nodes: Nodes, markers: Nodes, by_height: Array) -> Single:
+        """(2n, 3p) what a picture shows of the motion of markers under forces on nodes (p,).
 
-    def of_heights(self, nodes: Nodes, near: Nodes) -> Array:
+        Args:
+            nodes: (p,).
+            markers: (n,) those used.
+            by_height: (n, 2) lateral motion that the picture shows per mm less of height.
+        """
+        from gelslim_force.joint.light_kernel import gather_markers
+
+        self._make(nodes)
+        rows = np.empty((2 * len(markers), 3 * len(nodes)), dtype=np.float32)
+        gather_markers(self._markers, markers, nodes, by_height.astype(np.float32), rows)
+        return rows
+
+    def of_heights(self, nodes: Nodes, near: Nodes) -> Single:
         """(m, 3p) heights of the nodes `near` (m,) under forces on nodes (p,)."""
-        columns = self.compliance.columns(nodes)[:, :, near, 2]
-        return np.ascontiguousarray(columns.reshape(3 * len(nodes), -1).T, dtype=float)
+        from gelslim_force.joint.light_kernel import gather_heights
+
+        self._make(nodes)
+        heights = np.empty((len(near), 3 * len(nodes)), dtype=np.float32)
+        gather_heights(self._heights, near, nodes, heights)
+        return heights
 
     def displacement(self, nodes: Nodes, force_n: Array) -> Array:
         """(c, 3) motion of all nodes under forces (p, 3) on nodes (p,)."""
@@ -55,5 +71,6 @@ class Responses:
             columns = self.compliance.columns(part)
             flat = columns.transpose(2, 0, 1, 3).reshape(columns.shape[2], -1)
             moved = (self._to_markers @ flat).reshape(-1, len(part), 3, 3)
-            self._values[part] = moved.transpose(1, 2, 0, 3)
+            self._markers[:, :, part] = moved.transpose(0, 3, 1, 2)
+            self._heights[:, part] = columns[..., 2].transpose(2, 0, 1)
             self._made[part] = True

@@ -26,11 +26,12 @@ class JointSettings:
         unseen_force: Normal force of a contact that the light may not show, over Young's modulus,
             in mm². On drawn pictures contacts of half this force are not seen, and those of twice
             it are.
-        least_pressure: Share of the largest pressure below which a node is taken to be free.
+        least_pressure: Share of the mean pressure below which a node is taken to be free.
         light_reach: Steps along the lattice around the region whose light is used.
-        rounds: Linearisations on the region seen, and on the region that presses, for a contact
-            without a frame before.
-        following_rounds: The same where the frame before had this contact.
+        marker_reach: The same for the markers.
+        rounds: Linearisations on the region seen, and then each time on the nodes that press.
+        following_rounds: The same on the nodes that pressed before and those next to them: after
+            `rounds`, or instead of them where the frame before had this contact.
 
     Raises:
         ValueError: A value is impossible.
@@ -39,17 +40,18 @@ class JointSettings:
     friction: float = 1.2
     marker_mm: float = 0.004
     marker_share: float = 0.02
-    light_error: float = 0.05
+    light_error: float = 0.038
     gain_sigma: float = 0.2
     gamma: float = 1.8
-    roughness: float = 0.2
+    roughness: float = 0.22
     normal_stress: float = 1.4
     tangential_stress: float = 0.07
     unseen_force: float = 0.2
-    least_pressure: float = 0.08
+    least_pressure: float = 0.15
     light_reach: int = 4
-    rounds: tuple[int, int] = (4, 4)
-    following_rounds: tuple[int, int] = (1, 1)
+    marker_reach: int = 8
+    rounds: tuple[int, ...] = (2, 1)
+    following_rounds: tuple[int, ...] = (1, 1)
 
     def __post_init__(self) -> None:
         positive = (

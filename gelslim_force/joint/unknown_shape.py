@@ -132,6 +132,8 @@ def unknown_shape(
         Responses(SurfaceCompliance(bundle), to_markers),
         view,
         to_markers,
+        lattice.nearest_node(view.rest_mm[:, :2]),
+        view.by_height(),
         LightView(
             calibration.camera,
             upright(reference, calibration.camera),

@@ -59,6 +59,11 @@ class MarkerView:
         """(n, 2, 2) motion on the gel per motion in the picture, at rest."""
         return np.asarray(np.linalg.inv(self.camera.jacobian(self.rest_mm)), dtype=float)
 
+    def by_height(self) -> Array:
+        """(n, 2) by how much the exact lateral motion of each marker grows per mm of its height."""
+        still, step_mm = self.reference_px, 1e-3
+        return (self.lateral_motion(still, step_mm) - self.lateral_motion(still)) / step_mm
+
     def lateral_motion(
         self,
         positions_px: ArrayLike,

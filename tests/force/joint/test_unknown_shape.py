@@ -158,10 +158,10 @@ def test_random_tractions(sources: int) -> None:
         fields.append(np.linalg.norm(found.field.force_n - truth.force_n) / size)
         if abs(truth.wrench[2]) >= 0.2:
             errors.append(off[2] / truth.wrench[2])
-    assert np.median(np.abs(errors)) < 0.04
-    assert np.percentile(np.abs(errors), 95) < 0.10
-    assert np.median(fields) < 0.22
-    assert np.median(shear) < 0.004
+    assert np.median(np.abs(errors)) < 0.03
+    assert np.percentile(np.abs(errors), 95) < 0.08
+    assert np.median(fields) < 0.18
+    assert np.median(shear) < 0.002
     spread = np.sqrt(np.mean(np.square(scores), axis=0))
     assert (spread < 1.3).all()
 

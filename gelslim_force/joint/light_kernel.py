@@ -1,0 +1,155 @@
+"""Compiled sums over the bins of a picture. Import this module only where they run (numba)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_TAPS = 4
+
+
+@njit(**COMPILED)
+def _cubic(t: Any, weight: Any, steep: Any) -> None:
+    """Weights (4,) of cubic convolution at the fraction t of a cell, and their derivatives."""
+    weight[0] = -0.5 * t + t * t - 0.5 * t * t * t
+    weight[1] = 1 - 2.5 * t * t + 1.5 * t * t * t
+    weight[2] = 0.5 * t + 2 * t * t - 1.5 * t * t * t
+    weight[3] = -0.5 * t * t + 0.5 * t * t * t
+    steep[0] = -0.5 + 2 * t - 1.5 * t * t
+    steep[1] = -5 * t + 4.5 * t * t
+    steep[2] = 0.5 + 4 * t - 4.5 * t * t
+    steep[3] = -t + 1.5 * t * t
+
+
+@njit(**COMPILED)
+def cubic_taps(at: Any, step: Any, number: Any, nodes: Any, along: Any, across: Any) -> None:
+    """Nodes (n, 16), and weights (n, 16) of slopes along x and y, of cubic convolution.
+
+    Args:
+        at: (n, 2) in steps of the lattice.
+        step: (2,) of the lattice.
+        number: (nx, ny) number of the node at each place; -1 where there is none.
+        nodes: Receives the nodes.
+        along: Receives the weights along x; 0 where there is no node.
+        across: Receives those along y.
+    """
+    rows, columns = number.shape
+    by_x, by_y = np.empty(_TAPS), np.empty(_TAPS)
+    steep_x, steep_y = np.empty(_TAPS), np.empty(_TAPS)
+    for k in range(len(at)):
+        i = min(max(int(np.floor(at[k, 0])), 0), rows - 2)
+        j = min(max(int(np.floor(at[k, 1])), 0), columns - 2)
+        _cubic(at[k, 0] - i, by_x, steep_x)
+        _cubic(at[k, 1] - j, by_y, steep_y)
+        for a in range(_TAPS):
+            row = min(max(i + a - 1, 0), rows - 1)
+            for b in range(_TAPS):
+                node = number[row, min(max(j + b - 1, 0), columns - 1)]
+                tap = _TAPS * a + b
+                held = 1.0 if node >= 0 else 0.0
+                nodes[k, tap] = max(node, 0)
+                along[k, tap] = held * steep_x[a] * by_y[b] / step[0]
+                across[k, tap] = held * by_x[a] * steep_y[b] / step[1]
+
+
+@njit(**COMPILED)
+def slope_sums(
+    nodes: Any,
+    along: Any,
+    across: Any,
+    by_slope: Any,
+    by_gain: Any,
+    residual: Any,
+    weight: Any,
+    matrix: Any,
+    pull: Any,
+    mixed: Any,
+) -> None:
+    """Sums over the data of c channels in n bins, by the heights of m nodes.
+
+    A datum depends on the heights h by the row a = s_x `along` + s_y `across`.
+
+    Args:
+        nodes: (n, 16) of 0 to m - 1.
+        along: (n, 16).
+        across: (n, 16).
+        by_slope: (c, n, 2) derivatives s.
+        by_gain: (c, n) derivatives d by the gain.
+        residual: (c, n) values r.
+        weight: (c, n) weights w.
+        matrix: (m, m), to which the sum of w a aᵀ is added.
+        pull: (m,), to which that of w a r is added.
+        mixed: (m,), to which that of w a d is added.
+    """
+    channels, bins = weight.shape
+    for k in range(bins):
+        xx = xy = yy = rx = ry = gx = gy = 0.0
+        for c in range(channels):
+            w, x, y = weight[c, k], by_slope[c, k, 0], by_slope[c, k, 1]
+            xx += w * x * x
+            xy += w * x * y
+            yy += w * y * y
+            rx += w * x * residual[c, k]
+            ry += w * y * residual[c, k]
+            gx += w * x * by_gain[c, k]
+            gy += w * y * by_gain[c, k]
+        for a in range(_TAPS * _TAPS):
+            left_x = xx * along[k, a] + xy * across[k, a]
+            left_y = xy * along[k, a] + yy * across[k, a]
+            node = nodes[k, a]
+            pull[node] += rx * along[k, a] + ry * across[k, a]
+            mixed[node] += gx * along[k, a] + gy * across[k, a]
+            for b in range(_TAPS * _TAPS):
+                matrix[node, nodes[k, b]] += left_x * along[k, b] + left_y * across[k, b]
+
+
+@njit(**COMPILED)
+def saturated_bins(image: Any, channels: Any, size: Any, limit: Any, found: Any) -> None:
+    """Mark the bins (c, rows, columns) in which a pixel of a channel reaches the limit.
+
+    Args:
+        image: (h, w, 3) uint8.
+        channels: (c,) those looked at.
+        size: Pixels along the side of a bin.
+        limit: Grey value.
+        found: Receives the marks.
+    """
+    for i in range(found.shape[1] * size):
+        for j in range(found.shape[2] * size):
+            for c in range(len(channels)):
+                if image[i, j, channels[c]] >= limit:
+                    found[c, i // size, j // size] = True
+
+
+@njit(**COMPILED)
+def gather_heights(values: Any, near: Any, nodes: Any, found: Any) -> None:
+    """Entries (m, 3p) of `values` (c, c, 3) for heights of nodes (m,) under forces on (p,)."""
+    for k in range(len(near)):
+        for n in range(len(nodes)):
+            for axis in range(3):
+                found[k, 3 * n + axis] = values[near[k], nodes[n], axis]
+
+
+@njit(**COMPILED)
+def gather_markers(values: Any, markers: Any, nodes: Any, by_height: Any, found: Any) -> None:
+    """Rows (2n, 3p) of what a picture shows of the motion of markers (n,) under forces on (p,).
+
+    Args:
+        values: (markers, 3, c, 3) motion of the markers.
+        markers: (n,) those used.
+        nodes: (p,).
+        by_height: (n, 2) lateral motion that the picture shows per mm less of height.
+        found: Receives the rows.
+    """
+    for k in range(len(markers)):
+        block = values[markers[k]]
+        for lateral in range(2):
+            lean = by_height[k, lateral]
+            for n in range(len(nodes)):
+                for axis in range(3):
+                    found[2 * k + lateral, 3 * n + axis] = (
+                        block[lateral, nodes[n], axis] - lean * block[2, nodes[n], axis]
+                    )

@@ -1,0 +1,158 @@
+"""The change of light near a contact: bins at their places, and sums over them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.node_lattice import NodeLattice, SlopeTaps
+from gelslim_force.joint.normal_equations import huber
+from gelslim_optics.light.light_law import LightLaw
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Nodes = NDArray[np.intp]
+_LIMIT = 10.0
+"""Standard deviations beyond which light counts linearly."""
+_WHOLLY = 0.999
+_GAINS = 0.3, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class LightSums:
+    """Weighted least squares of the light by changes of m heights and of the gain.
+
+    The residual r of a datum depends on the changes h of the heights and γ of the gain as
+    r - a·h - d γ; the weight is w.
+
+    Attributes:
+        nodes: (m,) nodes whose heights matter.
+        matrix: (m, m) sum of w a aᵀ.
+        pull: (m,) of w a r.
+        mixed: (m,) of w a d.
+        by_gain: Of w d d.
+        gain_pull: Of w d r.
+        left: Of w r r.
+        seen: Of w times the square of the change that was seen.
+        gain: The present gain.
+    """
+
+    nodes: Nodes
+    matrix: Array
+    pull: Array
+    mixed: Array
+    by_gain: float
+    gain_pull: float
+    left: float
+    seen: float
+    gain: float
+
+    def gain_after(self, height_mm: Array, sigma: float) -> float:
+        """The gain that fits best after the heights changed by (m,), with a prior about 1."""
+        own = self.by_gain + sigma**-2
+        pull = self.gain_pull - float(self.mixed @ height_mm) + (1 - self.gain) / sigma**2
+        return float(np.clip(self.gain + pull / own, *_GAINS))
+
+    def unexplained(self, height_mm: Array) -> float:
+        """Share of the change of light that is left after the heights changed by (m,)."""
+        left = self.left - float((2 * self.pull - self.matrix @ height_mm) @ height_mm)
+        return max(left, 0.0) / self.seen if self.seen > 0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBins:
+    """Bins (n,) of a frame, at their places on the gel at rest.
+
+    Attributes:
+        taps: Slopes there by the heights of the nodes.
+        change: (c, n) of the light.
+        noise: (c, n).
+        saturated: (c, n).
+        share: (k, c, n) of each source.
+        level: (c, n).
+        area_mm2: (n,).
+    """
+
+    taps: SlopeTaps
+    change: Array
+    noise: Array
+    saturated: Mask
+    share: Array
+    level: Array
+    area_mm2: Array
+
+    def sums(self, law: LightLaw, height_mm: Array, gain: float, light_error: float) -> LightSums:
+        """Sums over the data, linear about the present heights.
+
+        Args:
+            law: Change of light with the slope.
+            height_mm: (c,) present heights of all nodes.
+            gain: Present gain of the light.
+            light_error: Standard deviation of the mean change over 1 mm².
+        """
+        from gelslim_force.joint.light_kernel import slope_sums
+
+        slope = self.taps.slopes(height_mm)
+        model, by_slope, by_gain = law.change(slope, self.share, self.level, gain)
+        residual = self.change - model
+        sigma = np.hypot(light_error / np.sqrt(self.area_mm2), self.noise)
+        weight = huber(residual, sigma, _LIMIT)
+        # A model that is brighter than what saturates agrees with it.
+        weight[self.saturated & (residual < 0)] = 0.0
+        used = np.zeros(len(height_mm), dtype=bool)
+        used[self.taps.nodes] = True
+        nodes, number = np.flatnonzero(used), np.cumsum(used) - 1
+        matrix, pull, mixed = (np.zeros((len(nodes),) * rank) for rank in (2, 1, 1))
+        slope_sums(
+            number[self.taps.nodes], self.taps.along, self.taps.across,
+            by_slope, by_gain, residual, weight, matrix, pull, mixed,
+        )  # fmt: skip
+        return LightSums(
+            nodes,
+            matrix,
+            pull,
+            mixed,
+            _sum(weight, by_gain, by_gain),
+            _sum(weight, by_gain, residual),
+            _sum(weight, residual, residual),
+            _sum(weight, self.change, self.change),
+            gain,
+        )
+
+
+def placed_bins(
+    view: LightView, seen: SeenLight, lattice: NodeLattice, displacement_mm: Array, near: Mask
+) -> PlacedBins:
+    """The valid bins of a frame among the nodes `near` (c,).
+
+    The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
+    leads from there to the place at rest.
+    """
+    about = lattice.widened(near, 1)[view.nearest]
+    bins = np.flatnonzero(seen.shading.valid.ravel() & about)
+    rest = view.rest_mm.reshape(-1, 2)[bins]
+    moved = lattice.values_at(displacement_mm, rest)
+    places = rest + view.lean.reshape(-1, 2)[bins] * moved[:, 2:] - moved[:, :2]
+    kept = lattice.on(places) & (lattice.values_at(near.astype(float), places) > _WHOLLY)
+    bins, places = bins[kept], places[kept]
+
+    def of(layers: Any) -> Any:
+        return np.ascontiguousarray(layers.reshape(*layers.shape[:-2], -1)[..., bins])
+
+    return PlacedBins(
+        lattice.slopes_at(places),
+        of(seen.log_change),
+        of(seen.noise),
+        of(seen.saturated),
+        of(view.share),
+        of(view.level),
+        of(view.area_mm2),
+    )
+
+
+def _sum(weight: Array, one: Array, other: Array) -> float:
+    return float(np.einsum("cn,cn,cn->", weight, one, other))
