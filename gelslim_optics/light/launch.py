@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,10 @@ from gelslim_optics.light.source import AngularLaw, EdgeLaunch, EndRow, LedRow, 
 Array = NDArray[np.float64]
 Sampling = Literal["sobol", "random"]
 DIMENSIONS = 4
+MOST_KEPT_POINTS = 1 << 14
+"""Sobol sets of up to this many points, half a megabyte, are kept for the next scene."""
+KEPT_SETS = 64
+"""Sets that are kept: those of two numbers of rays, eight replicates and up to four sources."""
 
 
 def point_batches(
@@ -30,25 +35,44 @@ def point_batches(
     """`count` points of the unit cube (n, 4) in batches; the batch size never changes a point.
 
     A Sobol sequence is scrambled independently for every replicate and source, so that replicates
-    are independent and each is unbiased. For Sobol `count` should be a power of 2.
+    are independent and each is unbiased. For Sobol `count` should be a power of 2. The arrays may
+    be read-only.
     """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, replicate, source]))
-    if sampling == "sobol":
-        from scipy.stats import qmc
-
-        engine = qmc.Sobol(DIMENSIONS, scramble=True, seed=rng)
-        draw = engine.random
-    else:
-
-        def draw(n: int) -> NDArray[np.float64]:
-            return rng.random((n, DIMENSIONS))
-
+    if sampling == "sobol" and count <= MOST_KEPT_POINTS:
+        points = _kept_points(count, seed, replicate, source)
+        yield from (points[start : start + batch] for start in range(0, count, batch))
+        return
+    draw = _drawer(seed, replicate, source, sampling)
     for start in range(0, count, batch):
+        yield draw(min(batch, count - start))
+
+
+@lru_cache(maxsize=KEPT_SETS)
+def _kept_points(count: int, seed: int, replicate: int, source: int) -> NDArray[np.float64]:
+    """A whole Sobol set: paired comparisons launch the same points in many scenes."""
+    points = _drawer(seed, replicate, source, "sobol")(count)
+    points.flags.writeable = False
+    return points
+
+
+def _drawer(
+    seed: int, replicate: int, source: int, sampling: Sampling
+) -> Callable[[int], NDArray[np.float64]]:
+    """Function that gives the next n points (n, 4) of a sequence."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, replicate, source]))
+    if sampling == "random":
+        return lambda n: rng.random((n, DIMENSIONS))
+    from scipy.stats import qmc
+
+    engine = qmc.Sobol(DIMENSIONS, scramble=True, seed=rng)
+
+    def draw(n: int) -> NDArray[np.float64]:
         with warnings.catch_warnings():
             # Only the whole set needs a power of 2 of points, not each batch.
             warnings.simplefilter("ignore", UserWarning)
-            points = draw(min(batch, count - start))
-        yield points
+            return np.asarray(engine.random(n))
+
+    return draw
 
 
 def launch_medium(scene: LightScene, source: Source) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -122,7 +123,7 @@ def trace_light(
     width = columns(len(faces))
     tallies = np.zeros((len(scene.sources), replicates, width))
     maps = np.zeros((len(scene.sources), replicates, *options.bins))
-    with ThreadPoolExecutor(threads) as pool:
+    with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
         for s, source in enumerate(scene.sources):
             job = _job(scene, source, options)
             for r in range(replicates):
@@ -203,14 +204,18 @@ def _centred(starts: Array, middle: tuple[float, float]) -> Array:
 
 
 def _blocks(
-    pool: ThreadPoolExecutor, job: _Job, batches: Iterator[Array], key: Any
+    pool: ThreadPoolExecutor | None, job: _Job, batches: Iterator[Array], key: Any
 ) -> Iterator[tuple[Array, Array]]:
+    """Sums and maps of the blocks of rays, in their order; without a pool in this thread."""
     first = 0
     for starts in batches:
+
+        def trace(i: int, s: Array = starts, f: int = first) -> tuple[Array, Array, int]:
+            return _run(job, s[i : i + BLOCK_RAYS], key, f + i)
+
         offsets = range(0, len(starts), BLOCK_RAYS)
-        for sums, heat, _ in pool.map(
-            lambda i, s=starts, f=first: _run(job, s[i : i + BLOCK_RAYS], key, f + i), offsets
-        ):
+        done = map(trace, offsets) if pool is None else pool.map(trace, offsets)
+        for sums, heat, _ in done:
             yield sums, heat
         first += len(starts)
 
