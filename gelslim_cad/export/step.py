@@ -197,12 +197,22 @@ def _set_header(model: Any, title: str) -> None:
 def _normalised(text: str) -> str:
     """Put each entity on one line, as line breaks depend on the unrounded digits; round reals."""
     head, mark, data = text.partition("DATA;\n")
-    return head + mark + _TOKEN.sub(_rounded, _CONTINUATION.sub("", data))
+    return head + mark + _TOKEN.sub(_Rounded(), _CONTINUATION.sub("", data))
 
 
-def _rounded(match: re.Match[str]) -> str:
-    token = match[0]
-    if token[0] == "'":
-        return token
-    digits = f"{float(token):.{DECIMALS}f}".rstrip("0")
+class _Rounded:
+    """Rounds the reals among matched tokens. Most reals of a file occur in it many times."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, str] = {}
+
+    def __call__(self, match: re.Match[str]) -> str:
+        token = match[0]
+        if token not in self._known:
+            self._known[token] = token if token[0] == "'" else _rounded(token)
+        return self._known[token]
+
+
+def _rounded(real: str) -> str:
+    digits = f"{float(real):.{DECIMALS}f}".rstrip("0")
     return "0." if digits == "-0." else digits
