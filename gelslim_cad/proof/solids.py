@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -28,20 +28,51 @@ class Interference:
 def interferences(parts: Sequence[Part]) -> list[Interference]:
     """List the pairs of parts whose solids overlap; touching faces do not count.
 
-    Pairs whose bounding boxes are apart are skipped.
+    Pairs whose bounding boxes are apart are skipped. Of the others one Boolean compares a part
+    with several at once. Where their common volume is within the tolerance, so is that of each
+    pair; the other pairs are measured one by one.
     """
-    found = []
-    boxes = [_box(p.solid) for p in parts]
     volumes = [float(p.solid.Volume()) for p in parts]
-    for (a, box_a, all_a), (b, box_b, all_b) in combinations(
-        zip(parts, boxes, volumes, strict=True), 2
-    ):
-        if box_a.IsOut(box_b):
-            continue
-        volume = _common_volume(a.solid, b.solid, min(all_a, all_b))
+    found = []
+    for one, others in sorted(_suspects([p.solid for p in parts])):
+        a, b = parts[one], parts[others]
+        volume = _common_volume(a.solid, b.solid, min(volumes[one], volumes[others]))
         if not volume <= TOLERANCE_MM3:  # a volume that is not a number counts too
             found.append(Interference(a.name, b.name, volume))
     return found
+
+
+def _suspects(solids: Sequence[Any]) -> Iterator[tuple[int, int]]:
+    """Pairs of solids, smaller number first, that no Boolean with several has shown to be apart."""
+    boxes = [_box(solid) for solid in solids]
+    left = {(a, b) for a, b in combinations(range(len(solids)), 2) if not boxes[a].IsOut(boxes[b])}
+    while left:
+        near: dict[int, list[int]] = {}
+        for a, b in sorted(left):
+            near.setdefault(a, []).append(b)
+            near.setdefault(b, []).append(a)
+        one = max(near, key=lambda number: len(near[number]))
+        for group in _apart(near[one], boxes):
+            volume = _boolean([solids[one]], [solids[other] for other in group], 0.0)
+            if volume is None or not 0.0 <= volume <= TOLERANCE_MM3:
+                yield from ((min(one, other), max(one, other)) for other in group)
+        left = {pair for pair in left if one not in pair}
+
+
+def _apart(numbers: Sequence[int], boxes: Sequence[Any]) -> list[list[int]]:
+    """Groups of solids whose boxes are apart from those of the others in the group.
+
+    Tools of a Boolean that share faces would be divided by each other.
+    """
+    groups: list[list[int]] = []
+    for number in numbers:
+        for group in groups:
+            if all(boxes[number].IsOut(boxes[other]) for other in group):
+                group.append(number)
+                break
+        else:
+            groups.append([number])
+    return groups
 
 
 def _box(shape: Any) -> Any:
@@ -65,22 +96,24 @@ def common_volume(first: Any, second: Any) -> float:
 def _common_volume(first: Any, second: Any, most: float) -> float:
     """As `common_volume`, of which no more than the volume `most` can be common."""
     for fuzzy_mm in (0.0, 1e-5):
-        volume = _boolean(first, second, fuzzy_mm)
+        volume = _boolean([first], [second], fuzzy_mm)
         if volume is not None and -1e-6 * most <= volume <= most * (1 + 1e-6):
             return max(volume, 0.0)
     return _mesh_common(first, second)
 
 
-def _boolean(first: Any, second: Any, fuzzy_mm: float) -> float | None:
+def _boolean(first: Sequence[Any], second: Sequence[Any], fuzzy_mm: float) -> float | None:
+    """Volume that is both in one of the first and in one of the second solids, None on failure."""
     import cadquery as cq
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
     from OCP.Standard import Standard_Failure
     from OCP.TopTools import TopTools_ListOfShape
 
     sides = []
-    for shape in (first, second):
+    for shapes in (first, second):
         side = TopTools_ListOfShape()
-        side.Append(shape.wrapped)
+        for shape in shapes:
+            side.Append(shape.wrapped)
         sides.append(side)
     common = BRepAlgoAPI_Common()
     common.SetArguments(sides[0])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import combinations
 
 import cadquery as cq
 import export_samples as samples
+import numpy as np
 import pytest
 
 from gelslim_cad.export import ExportError
@@ -18,6 +20,7 @@ from gelslim_cad.export.step import step_bytes
 from gelslim_cad.proof.mesh import prove_3mf, prove_glb, prove_stl
 from gelslim_cad.proof.outline import prove_dxf
 from gelslim_cad.proof.solids import (
+    TOLERANCE_MM3,
     common_volume,
     interferences,
     prove_mould,
@@ -197,15 +200,34 @@ def test_a_part_inside_another_interferes():
     assert found.volume_mm3 == pytest.approx(6.0)
 
 
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 9))]
+)
+def test_pairs_that_overlap_are_those_that_are_compared_one_by_one(seed):
+    """Boxes on a lattice, many of which touch, and cylinders in some of them."""
+    draw = np.random.default_rng(seed)
+    bodies = []
+    for number in range(14):
+        size, at = draw.integers(1, 4, 3), draw.integers(0, 9, 3)
+        solid = cq.Solid.makeBox(*map(float, size)).translate(cq.Vector(*map(float, at)))
+        if number % 3 == 0:
+            solid = cq.Solid.makeCylinder(0.4 * size[0], float(size[2])).translate(
+                cq.Vector(*(at + 0.5))
+            )
+        bodies.append(samples.part(f"b{number}", solid))
+    found = {(p.first, p.second): p.volume_mm3 for p in interferences(bodies)}
+    alone = {(a.name, b.name): common_volume(a.solid, b.solid) for a, b in combinations(bodies, 2)}
+    assert found == {pair: volume for pair, volume in alone.items() if volume > TOLERANCE_MM3}
+    assert 0 < len(found) < len(alone)
+
+
 @pytest.mark.slow
 def test_exact_and_mesh_volumes_agree_on_every_pair(parts):
-    from itertools import combinations
-
     from gelslim_cad.proof.solids import _boolean, _mesh_common
 
     few = [p for p in parts if p.name not in ("busy", "torus", "sphere")]
     for a, b in combinations(few, 2):
-        exact = _boolean(a.solid, b.solid, 0.0)
+        exact = _boolean([a.solid], [b.solid], 0.0)
         assert common_volume(a.solid, b.solid) == exact, (a.name, b.name)
         mesh = _mesh_common(a.solid, b.solid)
         assert exact == pytest.approx(mesh, rel=2e-3, abs=0.05), (a.name, b.name)
