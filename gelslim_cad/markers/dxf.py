@@ -55,6 +55,7 @@ class Drawing:
             self._document: Any = ezdxf.new("R2010", setup=False, units=_MILLIMETRES)
         self._document.header["$MEASUREMENT"] = 1
         self._space: Any = self._document.modelspace()
+        self._circles_mm: list[NDArray[np.float64]] = []
 
     def add_layer(self, name: str) -> None:
         """Add a layer; each of the drawing's layers is added before anything is put on it."""
@@ -64,6 +65,8 @@ class Drawing:
         self, layer: str, centres_mm: NDArray[np.float64], diameter_mm: NDArray[np.float64]
     ) -> None:
         """Add circles at `centres_mm` (n, 2) with `diameter_mm` (n,)."""
+        reach = np.asarray(diameter_mm)[:, None] / 2
+        self._circles_mm += [np.round(centres_mm, 6) - reach, np.round(centres_mm, 6) + reach]
         for centre, diameter in zip(centres_mm, diameter_mm, strict=True):
             self._space.add_circle(_point(centre), float(diameter) / 2, dxfattribs={"layer": layer})
 
@@ -86,9 +89,7 @@ class Drawing:
 
     def to_bytes(self) -> bytes:
         """Return the file. View and extents are set to the content, dates and ids are fixed."""
-        from ezdxf import bbox
-
-        extents = bbox.extents(self._space)
+        extents = self._extents()
         if extents.has_data:
             low, high = (
                 (round(p.x, 6), round(p.y, 6), 0.0) for p in (extents.extmin, extents.extmax)
@@ -107,6 +108,16 @@ class Drawing:
         with fixed_metadata():
             self._document.write(text)
         return text.getvalue().encode("utf-8")
+
+    def _extents(self) -> Any:
+        """Box around everything; ezdxf would approximate each circle by Bézier curves."""
+        from ezdxf import bbox
+
+        box = bbox.extents(entity for entity in self._space if entity.dxftype() != "CIRCLE")
+        for corners in self._circles_mm:
+            if len(corners):
+                box.extend([(*corners.min(axis=0), 0.0), (*corners.max(axis=0), 0.0)])
+        return box
 
 
 @contextmanager
