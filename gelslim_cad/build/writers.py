@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gelslim_cad.build.manifest import json_bytes
 from gelslim_cad.build.printing import print_stem
@@ -14,6 +15,10 @@ from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
 from gelslim_cad.geometry.overlay import Overlay
 from gelslim_cad.geometry.part import Part
 from gelslim_core.files.replaced_folder import scratch_folder
+
+if TYPE_CHECKING:
+    from gelslim_cad.dimensions import Dimensions
+    from gelslim_cad.spec import Spec
 
 SECTION_MM = 0.013
 """Position of the sections: off the mid-plane, so that none runs along a face."""
@@ -149,14 +154,11 @@ def write_mould(parts: Sequence[Part], scale: float) -> Written:
 
 def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
     """The sensor's bundle with its ladder, read back, and the pad for ParaView."""
-    from gelslim_cad.dimensions import derive
     from gelslim_cad.sensor import make_bundle, marker_grid, measured_ladder, pad_mesh
-    from gelslim_cad.spec import Spec
     from ifem_export.bundle.files import load_bundle, write_bundle
     from ifem_export.mesh.vtu import write_vtu
 
-    found = Spec.model_validate_json(spec)
-    d = derive(found)
+    found, d = _derived(spec)
     grid = marker_grid(d)
     mesh, _ = pad_mesh(d, grid)
     ladder = measured_ladder(found, d, mesh, timed=False)
@@ -172,6 +174,16 @@ def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
                 for p in sorted(folder.iterdir())
             }
         )
+
+
+@lru_cache(maxsize=1)
+def _derived(spec: str) -> tuple[Spec, Dimensions]:
+    """A spec from its JSON, with its dimensions; the units of one build share them."""
+    from gelslim_cad.dimensions import derive
+    from gelslim_cad.spec import Spec
+
+    found = Spec.model_validate_json(spec)
+    return found, derive(found)
 
 
 def write_light(parts: Sequence[Part], **values: Any) -> Written:
@@ -200,10 +212,10 @@ def write_view(parts: Sequence[Part], **values: Any) -> Written:
 
 def write_tolerance(parts: Sequence[Part], spec: str) -> Written:
     """Yields of built fingers, their causes and the errors of their forces."""
-    from gelslim_cad.spec import Spec
     from gelslim_cad.tolerance.study import BUILD_SAMPLES, study_record, tolerance_study
 
-    study = tolerance_study(Spec.model_validate_json(spec), samples=BUILD_SAMPLES)
+    found, d = _derived(spec)
+    study = tolerance_study(found, samples=BUILD_SAMPLES, d=d)
     data = json_bytes(study_record(study))
     return Written({TOLERANCE_JSON: (data, "yields of the rules, causes, force errors")})
 

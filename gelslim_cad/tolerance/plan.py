@@ -88,7 +88,7 @@ def with_values(spec: Spec, values: Change) -> Spec:
     return Spec.model_validate(content)
 
 
-def plan(spec: Spec, wanted: float, count: int, seed: int) -> Plan:
+def plan(spec: Spec, wanted: float, count: int, seed: int, d: Dimensions | None = None) -> Plan:
     """Look for changes of a spec that give a yield; free ones first, then by yield per mm.
 
     Args:
@@ -96,12 +96,13 @@ def plan(spec: Spec, wanted: float, count: int, seed: int) -> Plan:
         wanted: The yield to reach, from 0 to 1.
         count: Number of samples.
         seed: Their seed.
+        d: Dimensions of the spec, where they are known already.
 
     Returns:
         The changes with yield and thickness after each. An image margin that was changed is in
         the end the least that reaches the yield.
     """
-    steps = [_step("", {}, derive(spec), count, seed)]
+    steps = [_step("", {}, derive(spec) if d is None else d, count, seed)]
     while steps[-1].share < wanted and len(steps) <= MOST_STEPS:
         best = _best(spec, steps[-1], count, seed)
         if best is None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from gelslim_cad.dimensions import derive
+from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.spec import Spec
 from gelslim_cad.tolerance.assembly import Stage
 from gelslim_cad.tolerance.causes import GROUPS, Cause, causes
@@ -69,6 +69,7 @@ def tolerance_study(
     samples: int = SAMPLES,
     seed: int = 0,
     least_yield: float = LEAST_YIELD,
+    d: Dimensions | None = None,
 ) -> ToleranceStudy:
     """Sample built fingers of a spec and find what limits them.
 
@@ -77,11 +78,12 @@ def tolerance_study(
         samples: Number of fingers.
         seed: Seed of the samples; the same seed gives the same numbers.
         least_yield: Yield that the plan of changes is to reach.
+        d: Dimensions of the spec, where they are known already.
 
     Returns:
         The study; it takes a few seconds, most of them for the plan.
     """
-    d = derive(spec)
+    d = derive(spec) if d is None else d
     stage = counted(d)
     both = sampled(d, samples, seed)
     found = both[stage]
@@ -102,7 +104,7 @@ def tolerance_study(
         yields={way: fingers.yields() for way, fingers in both.items()},
         shares=shares,
         forces=force_errors(d, found.errors, stage),
-        plan=plan(spec, least_yield, few, seed),
+        plan=plan(spec, least_yield, few, seed, d),
         thickness_per_percent_mm=thickness_per_percent(spec, d, few, seed),
     )
 
