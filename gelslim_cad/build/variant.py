@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from gelslim_cad.build.fingerprint import code_hash, combined, versions
 from gelslim_cad.build.folder import locked, require_ours, staged
 from gelslim_cad.build.manifest import NAME, FileEntry, Manifest, entry, intact, read_manifest
-from gelslim_cad.build.work import Unit, Written, run
+from gelslim_cad.build.work import Unit, Written, run, seldom_collected
 from gelslim_cad.build.writers import load_libraries
 from gelslim_cad.checks import Check
 from gelslim_cad.spec.parts import files_key
@@ -99,7 +99,7 @@ def build_variant(
     loaded = read_spec(spec_path)
     target = Path(os.path.abspath(out_dir))
     notify = progress or (lambda text, done, total: None)
-    with locked(target):
+    with locked(target), seldom_collected():
         recover(target)
         require_ours(target)
         stages = Stages.prepare(loaded)
