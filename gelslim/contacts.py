@@ -150,8 +150,7 @@ def validate(
     remarks: tuple[str, ...] = ()
     if budget is not None and not budget.unlimited:
         # A budget that no operator keeps is refused before anything is written.
-        design = spec_of(spec)
-        ladder = measured_ladder(design, derive(design), sensor.bundle.mesh, progress=progress)
+        ladder = measured_ladder(derive(spec_of(spec)), sensor.bundle.mesh, progress=progress)
         label, remarks = chosen_operator(ladder, budget)
     if folder is not None:
         store_sensor(sensor, Path(folder))

@@ -164,7 +164,7 @@ def make_bundle(
     ladder, label = None, ""
     remarks: tuple[str, ...] = ()
     if measure:
-        ladder = sensor.measured_ladder(found, d, mesh, dense=dense, progress=progress)
+        ladder = sensor.measured_ladder(d, mesh, dense=dense, progress=progress)
         label, remarks = chosen_operator(ladder, budget)
     bundle = sensor.make_bundle(
         found, d, mesh, grid, with_stiffness=with_stiffness, ladder=ladder, operator=label

@@ -13,6 +13,8 @@ import numpy as np
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.geometry.led_strips import camera_responses
+from gelslim_cad.geometry.lookup import Lookup
+from gelslim_cad.geometry.names import Name
 from gelslim_cad.geometry.optics import camera_record, guide_profile
 from gelslim_cad.light.scene import light_scene
 from gelslim_cad.markers.nodes import NearestNodes, nearest_nodes
@@ -22,6 +24,7 @@ from gelslim_core.errors import GelslimError
 from gelslim_optics.light.light_map import LightMap, light_arrays
 from gelslim_optics.light.result import Estimate
 from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.elements.hex8 import Formulation
 from ifem_export.elements.material import Material
 from ifem_export.markers.grid import Anchors, MarkerGrid, build_marker_grid
 from ifem_export.mesh.crop import CropReport, Weighting
@@ -37,6 +40,31 @@ AZIMUTHS_DEG = 90.0, -90.0, 180.0
 SLOPE_AXES: tuple[Literal["x", "y"], ...] = ("y", "y", "x")
 """Along which a slope changes the light of each strip most."""
 SMOOTHING_MM = 0.6
+LADDER_NAMES: tuple[Name, ...] = (
+    "design.gel.corner_radius_mm",
+    "design.gel.crown_height_mm",
+    "design.gel.length_mm",
+    "design.gel.thickness_mm",
+    "design.gel.width_mm",
+    "design.markers.anchors",
+    "design.markers.diameter_mm",
+    "design.markers.pattern",
+    "design.markers.pitch_mm",
+    "marker_grid.columns",
+    "marker_grid.rows",
+    "material.gel.density_kg_m3",
+    "material.gel.poissons_ratio",
+    "material.gel.youngs_modulus_mpa",
+    "mesh.cells_across",
+    "mesh.cells_along",
+    "mesh.element",
+    "mesh.layers",
+    "mesh.least_fill",
+    "mesh.weighting",
+    "pad_mesh.cell_x_mm",
+    "pad_mesh.cell_y_mm",
+)
+"""Names that markers, meshes and the ladder of the operators look up."""
 
 
 def spec_hash(spec: Spec) -> str:
@@ -45,7 +73,7 @@ def spec_hash(spec: Spec) -> str:
     return hashlib.sha256(content.encode()).hexdigest()
 
 
-def pad_outline(d: Dimensions) -> RoundedRectangle:
+def pad_outline(d: Lookup) -> RoundedRectangle:
     """The gel seen from above."""
     return RoundedRectangle(
         d["design.gel.length_mm"], d["design.gel.width_mm"], d["design.gel.corner_radius_mm"]
@@ -71,12 +99,12 @@ class NoMarkersError(GelslimError):
         return {**super().to_dict(), "field": self.field, "value": "none", "remedy": self.remedy}
 
 
-def printed_grid(d: Dimensions) -> MarkerGrid | None:
+def printed_grid(d: Lookup) -> MarkerGrid | None:
     """The printed lattice of markers; None for a gel without."""
     return marker_grid(d) if has_markers(d) else None
 
 
-def marker_grid(d: Dimensions) -> MarkerGrid:
+def marker_grid(d: Lookup) -> MarkerGrid:
     """Make the printed lattice of markers.
 
     Args:
@@ -101,7 +129,7 @@ def marker_grid(d: Dimensions) -> MarkerGrid:
     return grid.clipped(lambda points: outline.contains(points[:, 0], points[:, 1]))
 
 
-def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
+def pad_mesh(d: Lookup, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
     """Mesh the pad with Hex-8 elements; nodes meet the markers where the cell size allows it.
 
     Args:
@@ -130,7 +158,7 @@ def pad_mesh(d: Dimensions, grid: MarkerGrid) -> tuple[PadMesh, CropReport]:
     )
 
 
-def reference_mesh(d: Dimensions, mesh: PadMesh) -> PadMesh | None:
+def reference_mesh(d: Lookup, mesh: PadMesh) -> PadMesh | None:
     """Mesh of half the pitch and eight layers to measure a cut or crowned pad against.
 
     None where the pad's own cells can be split.
@@ -227,9 +255,13 @@ def tolerances(spec: Spec) -> dict[str, float]:
     }
 
 
+def ladder_inputs(d: Lookup) -> dict[str, Any]:
+    """Values of LADDER_NAMES."""
+    return {name: d[name] for name in LADDER_NAMES}
+
+
 def measured_ladder(
-    spec: Spec,
-    d: Dimensions,
+    d: Lookup,
     mesh: PadMesh,
     *,
     timed: bool = True,
@@ -239,8 +271,7 @@ def measured_ladder(
     """Measure the force operators of a pad.
 
     Args:
-        spec: The finger.
-        d: Its dimensions.
+        d: Dimensions of the finger, or `ladder_inputs` of them.
         mesh: The pad's mesh.
         timed: Measure times on this machine too; without them the ladder is the same everywhere.
         dense: Measure the dense operator too, which takes up to a minute.
@@ -249,10 +280,15 @@ def measured_ladder(
     Returns:
         Error, counted work and time of each operator.
     """
+    material = Material(
+        d["material.gel.youngs_modulus_mpa"],
+        d["material.gel.poissons_ratio"],
+        d["material.gel.density_kg_m3"],
+    )
     return measure_ladder(
         mesh,
-        gel_material(spec),
-        spec.mesh.element,
+        material,
+        cast(Formulation, d["mesh.element"]),
         dense=dense,
         progress=progress,
         reference=reference_mesh(d, mesh),

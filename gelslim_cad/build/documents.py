@@ -16,15 +16,14 @@ from gelslim_cad.build.fingerprint import versions
 from gelslim_cad.build.instructions import after_assembly, before_assembly, build_guide
 from gelslim_cad.build.light_notes import light_notes, light_pictures
 from gelslim_cad.build.manifest import FileEntry, entry, json_bytes
+from gelslim_cad.build.order_files import ASSEMBLY_JSON, step_picture
 from gelslim_cad.build.printing import print_hints, printed_parts
 from gelslim_cad.build.stages import Plan, Stages, kerf_mm
 from gelslim_cad.build.work import Files
 from gelslim_cad.build.writers import (
-    ASSEMBLY_JSON,
     LIGHT_JSON,
     LIGHT_PATHS_JSON,
     TOLERANCE_JSON,
-    step_picture,
 )
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.geometry.gel_shape import has_markers

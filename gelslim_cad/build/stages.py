@@ -6,8 +6,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from gelslim_cad.build.fingerprint import code_hash, combined
+from gelslim_cad.build.order_files import order_unit
 from gelslim_cad.build.printing import print_options
 from gelslim_cad.build.work import PackedPart, Unit
+from gelslim_cad.build.writers import LADDER_JSON
 from gelslim_cad.checks import Check, check
 from gelslim_cad.checks.binding import binding_sentences
 from gelslim_cad.dimensions import Dimensions, derive
@@ -17,7 +20,7 @@ from gelslim_cad.geometry.part import Part
 from gelslim_cad.light.scene import light_inputs
 from gelslim_cad.ordering.price_list import Prices, read_prices
 from gelslim_cad.report.view_figures import view_inputs
-from gelslim_cad.sensor import printed_grid, spec_hash
+from gelslim_cad.sensor import ladder_inputs, printed_grid, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
 from ifem_export.markers.grid import MarkerGrid
 
@@ -97,7 +100,9 @@ class Stages:
     def units_without_solids(self) -> tuple[Unit, ...]:
         """The units of work that can begin before any solid is made."""
         spec = (("spec", self.loaded.spec.model_dump_json()),)
-        bundle = (Unit("bundle", "bundle", (), spec, cost=18),)
+        inputs = repr(ladder_inputs(self.dimensions)) if has_markers(self.dimensions) else ""
+        ladder = ((LADDER_JSON, combined(code_hash(), LADDER_JSON, inputs)),)
+        bundle = (Unit("bundle", "bundle", (), spec, cost=18, file_keys=ladder),)
         return (
             *(bundle if has_markers(self.dimensions) else ()),
             Unit("light", "light", (), tuple(light_inputs(self.dimensions).items()), cost=15),
@@ -131,7 +136,7 @@ class Stages:
             *self.units_without_solids,
             Unit("assembly", "assembly", whole, named, cost=8),
             Unit("glb", "glb", whole, named, cost=6),
-            Unit("order", "order", whole, self._order(finger), cost=50),
+            self._order_unit(finger, whole),
             Unit("robot", "robot", whole, named + self._robot_values(), cost=3),
             self._mould_unit(packed["gel_pad"]),
         ]
@@ -149,14 +154,12 @@ class Stages:
         ]
         return tuple(units)
 
-    def _order(self, finger: tuple[Part, ...]) -> tuple[tuple[str, Any], ...]:
+    def _order_unit(self, finger: tuple[Part, ...], whole: tuple[PackedPart, ...]) -> Unit:
         """The order of assembly, which the unit proves on the solids, and what it draws."""
         from gelslim_cad.assembly.finger_order import finger_order, tail_x_mm
 
         steps = finger_order(self.dimensions, [p.name for p in finger])
-        overlays = ((overlay.name, overlay.packed()) for overlay in self.overlays)
-        tail = ("tail_x_mm", tail_x_mm(self.dimensions))
-        return ("name", self.name), ("steps", steps), tail, *overlays
+        return order_unit(whole, self.name, steps, tail_x_mm(self.dimensions), self.overlays)
 
     def _robot_values(self) -> tuple[tuple[str, Any], ...]:
         from gelslim_cad.robot.model import robot_inputs

@@ -130,11 +130,12 @@ def _build(
     notify("solids", 0, 1)
     early = stages.units_without_solids
     kept = _reusable(previous, target, {unit.name: unit.key() for unit in early})
-    with _begun([u for u in early if u.name not in kept], jobs) as begun:
+    begin = [_with_known(u, previous, target) for u in early if u.name not in kept]
+    with _begun(begin, jobs) as begun:
         plan = stages.plan()
         keys = {unit.name: unit.key() for unit in plan.units}
         reused = _reusable(previous, target, keys)
-        todo = [u for u in plan.units if u.name not in reused]
+        todo = [_with_known(u, previous, target) for u in plan.units if u.name not in reused]
         with _doing([u for u in todo if u.name not in begun], jobs) as doing:
             plan = stages.with_solid_checks(plan)
             _require_rules(stages.name, plan.checks)
@@ -157,7 +158,7 @@ def _build(
             stages.spec_hash,
             key if done == keys else "",
             dict(versions()),
-            done,
+            done | {path: k for unit in plan.units for path, k in unit.file_keys},
             files,
             _all_proofs(previous, reused, written),
         )
@@ -254,6 +255,19 @@ def _reusable(
         for name, key in keys.items()
         if previous.units.get(name) == key and intact(target, previous, by_unit.get(name, []))
     }
+
+
+def _with_known(unit: Unit, previous: Manifest | None, target: Path) -> Unit:
+    """The unit with those of its files whose inputs are those of the last build."""
+    if previous is None:
+        return unit
+    kept = [
+        path
+        for path, key in unit.file_keys
+        if previous.units.get(path) == key and path in previous.files
+    ]
+    there = [path for path in kept if intact(target, previous, [path])]
+    return replace(unit, known=tuple((path, (target / path).read_bytes()) for path in there))
 
 
 Doing = dict[str, Callable[[], Written]]

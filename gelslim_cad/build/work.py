@@ -65,13 +65,26 @@ def described(part: Part) -> str:
 
 @dataclass(frozen=True)
 class Unit:
-    """One unit of work, picklable: a name, the kind of work, its inputs and their key."""
+    """One unit of work, picklable: a name, the kind of work, its inputs and their key.
+
+    Attributes:
+        name: Its name.
+        kind: The kind of work, one of `WRITERS`.
+        parts: The parts that it shows or writes.
+        options: Its other inputs, by name.
+        cost: About how long it takes, to begin the longest units first.
+        file_keys: Files that depend on less than the whole unit, which is most of its work: their
+            paths, each with the key of its inputs.
+        known: Those of these files that the last build left, which need not be made again.
+    """
 
     name: str
     kind: str
     parts: tuple[PackedPart, ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
     cost: float = field(default=1.0, compare=False)
+    file_keys: tuple[tuple[str, str], ...] = ()
+    known: tuple[tuple[str, bytes], ...] = field(default=(), compare=False)
 
     def key(self) -> str:
         """Key of everything that shapes the unit's files."""
@@ -84,7 +97,8 @@ def run(unit: Unit) -> Written:
     from gelslim_cad.build.writers import WRITERS
 
     parts = tuple(p.unpacked() for p in unit.parts)
-    return WRITERS[unit.kind](parts, **dict(unit.options))
+    known = {"known": dict(unit.known)} if unit.file_keys else {}
+    return WRITERS[unit.kind](parts, **dict(unit.options), **known)
 
 
 @contextmanager

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gelslim_cad.build.manifest import json_bytes
+from gelslim_cad.build.order_files import write_order
 from gelslim_cad.build.printing import print_stem
 from gelslim_cad.build.work import VOLUME_TOLERANCE, Files, Written
-from gelslim_cad.geometry.overlay import Overlay
 from gelslim_cad.geometry.part import Part
 from gelslim_core.files.replaced_folder import scratch_folder
 
@@ -20,15 +21,13 @@ if TYPE_CHECKING:
     from gelslim_cad.dimensions import Dimensions
     from gelslim_cad.spec import Spec
 
-SECTION_MM = 0.013
-"""Position of the sections: off the mid-plane, so that none runs along a face."""
 GLB_LINEAR_MM = 0.1
 GLB_ANGULAR_DEG = 20.0
 PROOF_DECIMALS = 8
 LIGHT_JSON = "light.json"
 LIGHT_PATHS_JSON = "light_paths.json"
 TOLERANCE_JSON = "tolerance.json"
-ASSEMBLY_JSON = "assembly.json"
+LADDER_JSON = "bundle/ladder.json"
 ERROR_PICTURE = "pictures/projection_error.png"
 LEDGER_LIMIT = 1e-9
 LOST_LIMIT = 1e-9
@@ -83,67 +82,6 @@ def write_glb(parts: Sequence[Part], name: str) -> Written:
     return Written(files, _on_disk(files, lambda written: prove_glb(written, parts)))
 
 
-def write_order(
-    parts: Sequence[Part],
-    name: str,
-    steps: Any,
-    tail_x_mm: float,
-    camera_view: tuple[Any, ...] | None = None,
-    printed_dots: tuple[Any, ...] | None = None,
-) -> Written:
-    """The order of assembly, proved, and pictures of its steps and of the finger.
-
-    Dots and view are overlays as `Overlay.packed` gives them; what is None is not drawn. There are
-    no pictures where VTK cannot draw.
-
-    Raises AssemblyBlockedError where a step is blocked.
-    """
-    from gelslim_cad.assembly.bodies import bodies, part_meshes
-    from gelslim_cad.assembly.proof import prove
-    from gelslim_cad.assembly.record import assembly_record, read_steps
-    from gelslim_cad.assembly.scenes import step_scene
-    from gelslim_cad.pictures.finger_pictures import Shown, picture_set
-    from gelslim_cad.pictures.shaded_mesh import shaded_mesh
-    from gelslim_cad.pictures.step_pictures import picture_steps
-    from gelslim_cad.pictures.window import PictureError, offscreen_window
-
-    meshes = part_meshes(parts)
-    record = assembly_record(name, prove(steps, bodies(meshes, tail_x_mm)))
-    data = json_bytes(record)
-    files: Files = {ASSEMBLY_JSON: (data, "order of assembly with ways, fasteners and drivers")}
-    colours = {part.name: part.colour for part in parts}
-    known = read_steps(record)
-    shaded = {part: shaded_mesh(*mesh) for part, mesh in meshes.items()}
-    shown = [Shown(shaded[p.name], p.colour, p.explode_mm) for p in parts]
-    explode = {part.name: part.explode_mm for part in parts}
-    view, dots = (
-        None if packed is None else _drawn(Overlay.unpacked(packed), explode)
-        for packed in (camera_view, printed_dots)
-    )
-    try:
-        with offscreen_window() as window:
-            drawn = picture_steps(window, [step_scene(s, shaded, colours) for s in known])
-            whole = picture_set(window, shown, SECTION_MM, dots, view)
-    except PictureError as error:
-        return Written(files, note=str(error))
-    for number, (step, png) in enumerate(zip(known, drawn, strict=True), start=1):
-        files[step_picture(number, step.key)] = (png, "picture of a step of the assembly")
-    for kind, png in zip(("whole", "exploded", "section", "section_across"), whole, strict=True):
-        files[f"pictures/{kind}.png"] = (png, "picture")
-    return Written(files)
-
-
-def step_picture(number: int, key: str) -> str:
-    """Path of the picture of a step."""
-    return f"pictures/assembly/{number:02d}_{key}.png"
-
-
-def _drawn(overlay: Overlay, explode: dict[str, tuple[float, float, float]]) -> Any:
-    """An overlay as the pictures take it."""
-    shift = explode.get(overlay.with_part, (0.0, 0.0, 0.0))
-    return overlay.name, overlay.vertices_mm, overlay.faces, overlay.colour, shift
-
-
 def write_mould(parts: Sequence[Part], scale: float) -> Written:
     """Check that the mould's cavity is the gel enlarged by the shrinkage; no file is written."""
     from gelslim_cad.proof.solids import prove_mould
@@ -152,16 +90,33 @@ def write_mould(parts: Sequence[Part], scale: float) -> Written:
     return Written({}, _recorded(prove_mould(cavity.solid, gel.solid, scale)))
 
 
-def write_bundle_files(parts: Sequence[Part], spec: str) -> Written:
-    """The sensor's bundle with its ladder, read back, and the pad for ParaView."""
-    from gelslim_cad.sensor import make_bundle, marker_grid, measured_ladder, pad_mesh
+def write_bundle_files(
+    parts: Sequence[Part], spec: str, known: Mapping[str, bytes] | None = None
+) -> Written:
+    """The sensor's bundle with its ladder, read back, and the pad for ParaView.
+
+    A ladder that is `known` is not measured again.
+    """
+    from gelslim_cad.sensor import (
+        ladder_inputs,
+        make_bundle,
+        marker_grid,
+        measured_ladder,
+        pad_mesh,
+    )
     from ifem_export.bundle.files import load_bundle, write_bundle
     from ifem_export.mesh.vtu import write_vtu
+    from ifem_export.operators.operator_ladder import OperatorLadder
 
     found, d = _derived(spec)
-    grid = marker_grid(d)
-    mesh, _ = pad_mesh(d, grid)
-    ladder = measured_ladder(found, d, mesh, timed=False)
+    # Made from the inputs of the ladder alone, so that no other value can change it unnoticed.
+    inputs = ladder_inputs(d)
+    grid = marker_grid(inputs)
+    mesh, _ = pad_mesh(inputs, grid)
+    if known and LADDER_JSON in known:
+        ladder = OperatorLadder.from_record(json.loads(known[LADDER_JSON]))
+    else:
+        ladder = measured_ladder(inputs, mesh, timed=False)
     bundle = make_bundle(found, d, mesh, grid, ladder=ladder, operator=ladder.balanced().label)
     with scratch_folder() as scratch:
         folder = scratch / "bundle"

@@ -40,6 +40,8 @@ ISO = View(yaw_deg=-56.0, pitch_deg=27.0)
 SECTIONS = {"x": View(0.0, 0.0), "y": View(-90.0, 0.0), "z": View(-90.0, 90.0)}
 """Views at right angles to a section: x from the tip, y from the -y side, z from above the gel."""
 
+KINDS = ("whole", "exploded", "section", "section_across")
+"""Pictures of a set."""
 WIDTH_PX = 1200
 OVERSAMPLING = 2
 
@@ -79,26 +81,27 @@ def picture_set(
     at_mm: float = 0.0,
     dots: Mesh | None = None,
     view: Mesh | None = None,
-) -> tuple[bytes, bytes, bytes, bytes]:
+    kinds: Sequence[str] = KINDS,
+) -> dict[str, bytes]:
     """Draw the finger assembled, exploded, and in sections at y and x = `at_mm`, as PNG.
 
     The printed `dots` are drawn where the gel is seen from above, the camera's `view` in the
     section along the finger; both whole, without edges.
 
-    All four are drawn in one window, as `offscreen_window` gives it. Raises ValueError where a
-    section misses every part.
+    All that `kinds` asks for are drawn in one window, as `offscreen_window` gives it. Raises
+    ValueError where a section misses every part.
     """
     along, across = _cut(parts, "y", at_mm), _cut(parts, "x", at_mm)
     above = () if dots is None else (dots,)
     beside = () if view is None else (view,)
-    scenes = [
-        _scene(parts, ISO, overlays=above),
-        _scene(parts, ISO, 1.0, overlays=above),
-        _scene(parts, SECTIONS["y"], 0.0, along, beside),
-        _scene(parts, SECTIONS["x"], 0.0, across),
-    ]
-    whole, exploded, section, section_across = map(png_bytes, _images(window, scenes))
-    return whole, exploded, section, section_across
+    makers = {
+        "whole": lambda: _scene(parts, ISO, overlays=above),
+        "exploded": lambda: _scene(parts, ISO, 1.0, overlays=above),
+        "section": lambda: _scene(parts, SECTIONS["y"], 0.0, along, beside),
+        "section_across": lambda: _scene(parts, SECTIONS["x"], 0.0, across),
+    }
+    images = _images(window, [makers[kind]() for kind in kinds])
+    return {kind: png_bytes(image) for kind, image in zip(kinds, images, strict=True)}
 
 
 def _cut(parts: Sequence[Shown], axis: Axis, at_mm: float) -> tuple[int, float]:

@@ -17,7 +17,7 @@ from gelslim_cad.assembly.record import assembly_record, read_steps
 from gelslim_cad.assembly.words import direction_in_words, way_in_words
 from gelslim_cad.build.assembly_steps import told_steps, total_minutes
 from gelslim_cad.build.instructions import build_guide
-from gelslim_cad.build.writers import write_order
+from gelslim_cad.build.order_files import write_order
 from gelslim_cad.electronics.finger import finger_boards
 from gelslim_cad.report.assembly import assembly_section
 from gelslim_cad.sensor import marker_grid
