@@ -25,7 +25,11 @@ class FileEntry:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Files by path, and the key of the inputs of each unit of work."""
+    """Files by path, and the key of the inputs of each unit of work.
+
+    Files that depend on less than their unit have keys of their own among those of the units.
+    `solid_checks` is the record of `KeptChecks`.
+    """
 
     name: str
     spec_hash: str
@@ -34,6 +38,7 @@ class Manifest:
     units: Mapping[str, str]
     files: Mapping[str, FileEntry]
     proofs: tuple[Mapping[str, Any], ...] = field(default=())
+    solid_checks: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> bytes:
         """The manifest as it is written, byte for byte the same for the same content."""
@@ -46,6 +51,7 @@ class Manifest:
             "units": dict(sorted(self.units.items())),
             "files": {path: asdict(e) for path, e in sorted(self.files.items())},
             "proofs": [dict(p) for p in self.proofs],
+            "solid_checks": dict(self.solid_checks),
         }
         return json_bytes(content)
 
@@ -70,6 +76,7 @@ def read_manifest(folder: Path) -> Manifest | None:
             content["units"],
             files,
             tuple(content["proofs"]),
+            content.get("solid_checks", {}),
         )
     except (OSError, ValueError, KeyError, TypeError):
         return None

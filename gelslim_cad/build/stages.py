@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from gelslim_cad.build.fingerprint import code_hash, combined
+from gelslim_cad.build.kept_checks import KeptChecks, solid_checks
 from gelslim_cad.build.order_files import order_unit
 from gelslim_cad.build.printing import print_options
 from gelslim_cad.build.work import PackedPart, Unit
@@ -27,12 +28,16 @@ from ifem_export.markers.grid import MarkerGrid
 
 @dataclass(frozen=True)
 class Plan:
-    """Parts, units of work, and the results of the design rules that have been checked so far."""
+    """Parts, units of work, and the results of the design rules that have been checked so far.
+
+    `solid_checks` are those of the rules on solids, with what they read.
+    """
 
     finger: tuple[Part, ...]
     tooling: tuple[Part, ...]
     units: tuple[Unit, ...]
     checks: tuple[Check, ...]
+    solid_checks: KeptChecks | None = None
 
 
 @dataclass(frozen=True)
@@ -121,12 +126,16 @@ class Stages:
         tooling = tooling_parts(self.dimensions, self.grid)
         return Plan(finger, tooling, self._units(finger, tooling), self.checks)
 
-    def with_solid_checks(self, plan: Plan) -> Plan:
-        """The plan with the results of the rules on solids."""
-        from gelslim_cad.build.solid_checks import check_mould, check_solids
+    def with_solid_checks(self, plan: Plan, last: KeptChecks | None = None) -> Plan:
+        """The plan with the results of the rules on solids.
 
-        found = (*check_solids(self.dimensions, plan.finger), *check_mould(self.dimensions))
-        return replace(plan, checks=(*plan.checks, *found))
+        They are those of the `last` build where all that the rules read is as it was then.
+        """
+        solids = next(unit.key() for unit in plan.units if unit.name == "assembly")
+        found = last
+        if found is None or not found.hold(solids, self.dimensions):
+            found = solid_checks(solids, self.dimensions, plan.finger)
+        return replace(plan, checks=(*plan.checks, *found.checks), solid_checks=found)
 
     def _units(self, finger: tuple[Part, ...], tooling: tuple[Part, ...]) -> tuple[Unit, ...]:
         packed = {p.name: PackedPart.of(p) for p in (*finger, *tooling)}

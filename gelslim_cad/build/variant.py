@@ -126,6 +126,7 @@ def _build(
 ) -> BuildResult:
     from gelslim_cad.build.documents import documents
     from gelslim_cad.build.draft import draft
+    from gelslim_cad.build.kept_checks import last_checks
 
     notify("solids", 0, 1)
     early = stages.units_without_solids
@@ -137,7 +138,7 @@ def _build(
         reused = _reusable(previous, target, keys)
         todo = [_with_known(u, previous, target) for u in plan.units if u.name not in reused]
         with _doing([u for u in todo if u.name not in begun], jobs) as doing:
-            plan = stages.with_solid_checks(plan)
+            plan = stages.with_solid_checks(plan, last_checks(previous))
             _require_rules(stages.name, plan.checks)
             drafted = draft(stages, plan)
             written = {**_results(doing, notify), **_results(begun, notify)}
@@ -161,6 +162,7 @@ def _build(
             done | {path: k for unit in plan.units for path, k in unit.file_keys},
             files,
             _all_proofs(previous, reused, written),
+            {} if plan.solid_checks is None else plan.solid_checks.record(),
         )
         for path, data in {**contents, NAME: manifest.to_json()}.items():
             place = folder / path
