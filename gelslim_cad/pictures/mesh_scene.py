@@ -22,9 +22,10 @@ MARGIN = 1.06
 CUT_OFFSET_MM = 1.3e-4
 """Shifts the cut, so that it avoids vertices and faces that lie exactly in its plane."""
 OPAQUE = 0.999
-PEELS = 2
-"""Each peel draws two layers of what light passes through; more of them change no pixel by more
-than 14 of 255."""
+GLASS_LINES = 0.55
+"""Share of the dark colour in the lines of what light passes through; the rest is its own."""
+HATCH_LINES = 0.9
+"""The same in the hatch lines of cut faces."""
 INK = (0.09, 0.11, 0.14)
 
 
@@ -113,7 +114,9 @@ class MeshScene:
         """The renderer with all that was added, for a window from its lower edge up to `top`."""
         self._aim(self._shape())
         plane = self._plane()
-        for rgba, solids in self._by_colour().items():
+        # What light passes through is drawn last, the farthest first; the rest in any order.
+        drawn = sorted(self._by_colour().items(), key=lambda found: self._rank(*found))
+        for rgba, solids in drawn:
             self._show(solids, rgba, plane)
         if plane is not None:
             for solid in self._solids:
@@ -121,13 +124,19 @@ class MeshScene:
         for poly, rgba in self._overlays:
             self._flat(poly, rgba)
         self._light()
-        # Lines alone need no peeling, which draws the scene once for each layer.
-        colours = [solid.rgba for solid in self._solids] + [rgba for _, rgba in self._overlays]
-        self._renderer.SetUseDepthPeeling(any(rgba[3] < OPAQUE for rgba in colours))
-        self._renderer.SetMaximumNumberOfPeels(PEELS)
-        self._renderer.SetOcclusionRatio(0.0)
+        self._renderer.SetUseDepthPeeling(False)
+        # Weighted blending would forget the order in which surfaces are drawn.
+        self._renderer.SetUseOIT(False)
         self._renderer.SetViewport(0.0, 0.0, 1.0, top)
         return self._renderer
+
+    def _rank(self, rgba: tuple[float, ...], solids: Sequence[_Solid]) -> float:
+        """Place in the order of drawing: depth of the middle of what light passes through."""
+        if rgba[3] >= OPAQUE:
+            return -math.inf
+        back = self._view.axes()[2]
+        depths = np.concatenate([(s.mesh.vertices_mm + s.shift_mm) @ back for s in solids])
+        return float(depths.min() + depths.max())
 
     def _by_colour(self) -> dict[tuple[float, ...], list[_Solid]]:
         """Solids of one colour, which are drawn together in a fraction of the time."""
@@ -172,8 +181,12 @@ class MeshScene:
     def _show(self, solids: Sequence[_Solid], rgba: tuple[float, ...], plane: Any) -> None:
         from vtkmodules.vtkFiltersCore import vtkClipPolyData, vtkPolyDataNormals
 
+        back = self._view.axes()[2]
         if plane is None:
-            source = producer(poly_data(*joined([(s.mesh, s.shift_mm) for s in solids])))
+            points, normals, faces = joined([(s.mesh, s.shift_mm) for s in solids])
+            if rgba[3] < OPAQUE:
+                faces = faces[np.argsort((points @ back)[faces].sum(axis=1), kind="stable")]
+            source = producer(poly_data(points, normals, faces))
         else:  # cut first: the clipper merges points, which would mix normals across an edge
             clipped = vtkClipPolyData()
             clipped.SetInputData(appended([solid.poly() for solid in solids]))
@@ -183,8 +196,8 @@ class MeshScene:
             source.SetInputConnection(clipped.GetOutputPort())
         self._actor(source, rgba, smooth=True)
         dark = tuple(min(0.32, 0.45 * channel) for channel in rgba[:3])
-        strength = 1.0 if rgba[3] >= OPAQUE else 0.55
-        back = self._view.axes()[2]
+        if rgba[3] < OPAQUE:
+            dark = _between(rgba, dark, GLASS_LINES)
         creases = [solid.ends(solid.mesh.creases) for solid in solids]
         outlines = [solid.ends(solid.mesh.outline(back)) for solid in solids]
         for lines, width in ((creases, 2.0), (outlines, 2.6)):
@@ -194,7 +207,7 @@ class MeshScene:
                 cut.SetInputConnection(drawn.GetOutputPort())
                 cut.SetClipFunction(plane)
                 drawn = cut
-            self._lines(drawn, dark, width, strength)
+            self._lines(drawn, dark, width)
 
     def _plane(self) -> Any:
         from vtkmodules.vtkCommonDataModel import vtkPlane
@@ -226,7 +239,7 @@ class MeshScene:
         face.SetInputConnection(contour.GetOutputPort())
         face.Update()
         light = tuple(0.22 + 0.78 * channel for channel in solid.rgba[:3])
-        self._actor(face, (*light, max(0.85, solid.rgba[3])), smooth=False)
+        self._actor(face, (*light, 1.0), smooth=False)
         right, up, _ = self._view.axes()
         stripes = vtkPlane()
         stripes.SetOrigin(0.0, 0.0, 0.0)
@@ -240,8 +253,9 @@ class MeshScene:
         hatch.SetNumberOfContours(max(last - first + 1, 0))
         for number in range(first, last + 1):
             hatch.SetValue(number - first, number * step)
-        self._lines(hatch, tuple(0.55 * channel for channel in light), 1.5, 0.9)
-        self._lines(contour, INK, 3.4, 1.0)
+        dark = tuple(0.55 * channel for channel in light)
+        self._lines(hatch, _between(light, dark, HATCH_LINES), 1.5)
+        self._lines(contour, INK, 3.4)
 
     def _actor(self, source: Any, rgba: tuple[float, ...], smooth: bool) -> None:
         mapper, look = self._added(source, rgba)
@@ -258,10 +272,8 @@ class MeshScene:
     def _flat(self, poly: Any, rgba: tuple[float, ...]) -> None:
         self._actor(producer(poly), rgba, smooth=False)
 
-    def _lines(
-        self, source: Any, colour: tuple[float, ...], width_px: float, opacity: float
-    ) -> None:
-        _, look = self._added(source, (*colour, opacity))
+    def _lines(self, source: Any, colour: tuple[float, ...], width_px: float) -> None:
+        _, look = self._added(source, (*colour, 1.0))
         look.SetLineWidth(width_px)
         look.LightingOff()
 
@@ -295,6 +307,11 @@ class MeshScene:
             light.SetFocalPoint(0.0, 0.0, 0.0)
             light.SetIntensity(strength)
             self._renderer.AddLight(light)
+
+
+def _between(first: Sequence[float], second: Sequence[float], share: float) -> tuple[float, ...]:
+    """A colour with this share of the second one."""
+    return tuple((1 - share) * a + share * b for a, b in zip(first[:3], second[:3], strict=True))
 
 
 def view_box(vertices: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray]:
