@@ -40,11 +40,9 @@ AZIMUTHS_DEG = 90.0, -90.0, 180.0
 SLOPE_AXES: tuple[Literal["x", "y"], ...] = ("y", "y", "x")
 """Along which a slope changes the light of each strip most."""
 SMOOTHING_MM = 0.6
-LADDER_NAMES: tuple[Name, ...] = (
+GRID_NAMES: tuple[Name, ...] = (
     "design.gel.corner_radius_mm",
-    "design.gel.crown_height_mm",
     "design.gel.length_mm",
-    "design.gel.thickness_mm",
     "design.gel.width_mm",
     "design.markers.anchors",
     "design.markers.diameter_mm",
@@ -52,6 +50,14 @@ LADDER_NAMES: tuple[Name, ...] = (
     "design.markers.pitch_mm",
     "marker_grid.columns",
     "marker_grid.rows",
+)
+"""Names that the markers within the gel's outline look up."""
+MARKER_NAMES: tuple[Name, ...] = (*GRID_NAMES, "manufacturing.kerf.film_mm")
+"""Names that the drawings of the marker print look up."""
+LADDER_NAMES: tuple[Name, ...] = (
+    *GRID_NAMES,
+    "design.gel.crown_height_mm",
+    "design.gel.thickness_mm",
     "material.gel.density_kg_m3",
     "material.gel.poissons_ratio",
     "material.gel.youngs_modulus_mpa",
@@ -186,8 +192,13 @@ def marker_print(d: Dimensions, grid: MarkerGrid) -> tuple[NearestNodes, Outline
     """What the marker files need beside the grid: nearest surface node per dot, gel outline."""
     mesh, _ = pad_mesh(d, grid)
     nodes = nearest_nodes(grid.positions_mm, mesh.nodes_mm[mesh.surface], mesh.surface)
+    return nodes, print_outline(d)
+
+
+def print_outline(d: Lookup) -> Outline:
+    """The gel's outline on the marker print."""
     gel = pad_outline(d)
-    return nodes, Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
+    return Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
 
 
 def gel_material(spec: Spec) -> Material:
@@ -253,6 +264,11 @@ def tolerances(spec: Spec) -> dict[str, float]:
         "poissons_ratio": gel.poissons_ratio_tolerance,
         "thickness_mm": spec.manufacturing.gel_thickness_tolerance_mm,
     }
+
+
+def marker_inputs(d: Lookup) -> dict[str, Any]:
+    """Values of MARKER_NAMES."""
+    return {name: d[name] for name in MARKER_NAMES}
 
 
 def ladder_inputs(d: Lookup) -> dict[str, Any]:

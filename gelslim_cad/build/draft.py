@@ -9,10 +9,12 @@ from gelslim_cad.build.bill import finger_bill
 from gelslim_cad.build.manifest import json_bytes
 from gelslim_cad.build.stages import Plan, Stages
 from gelslim_cad.build.work import Files
+from gelslim_cad.build.writers import MARKERS_PURPOSE
 from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.electronics.finger import FingerBoards, finger_boards
 from gelslim_cad.electronics.order import circuit_record, order_files
-from gelslim_cad.markers.write import render_marker_files
+from gelslim_cad.markers.nodes import render_csv
+from gelslim_cad.markers.write import MARKER_TABLE
 from gelslim_cad.ordering.cost import Cost, cost_record
 from gelslim_cad.ordering.line import BomLine
 from gelslim_cad.ordering.pricing import priced
@@ -54,7 +56,7 @@ def draft(stages: Stages, plan: Plan) -> Draft:
         "binding": stages.binding,
         "dimensions": {name: d.record(name) for name in d.values},
     }
-    made = {} if grid is None else marker_files(d, grid)
+    made = {} if grid is None else marker_table(d, grid)
     made |= own_files(stages.loaded.own_parts)
     made |= {f"electronics/{n}": entries for n, entries in order_files(boards, d).items()}
     made |= {
@@ -81,9 +83,7 @@ def own_files(own: Iterable[OwnPart]) -> Files:
     }
 
 
-def marker_files(d: Dimensions, grid: MarkerGrid) -> Files:
-    """The marker print in every format."""
-    markers = render_marker_files(
-        grid, *marker_print(d, grid), film_kerf_mm=d["manufacturing.kerf.film_mm"]
-    )
-    return {f"markers/{n}": (data, "marker print, 1:1") for n, data in markers.items()}
+def marker_table(d: Dimensions, grid: MarkerGrid) -> Files:
+    """The table of the markers with their nodes; the drawings are a unit of work."""
+    nodes, _ = marker_print(d, grid)
+    return {f"markers/{MARKER_TABLE}": (render_csv(grid, nodes), MARKERS_PURPOSE)}

@@ -21,7 +21,7 @@ from gelslim_cad.geometry.part import Part
 from gelslim_cad.light.scene import light_inputs
 from gelslim_cad.ordering.price_list import Prices, read_prices
 from gelslim_cad.report.view_figures import view_inputs
-from gelslim_cad.sensor import ladder_inputs, printed_grid, spec_hash
+from gelslim_cad.sensor import ladder_inputs, marker_inputs, printed_grid, spec_hash
 from gelslim_cad.spec.reader import LoadedSpec
 from ifem_export.markers.grid import MarkerGrid
 
@@ -149,6 +149,9 @@ class Stages:
             Unit("robot", "robot", whole, named + self._robot_values(), cost=3),
             self._mould_unit(packed["gel_pad"]),
         ]
+        if has_markers(self.dimensions):
+            values = tuple(marker_inputs(self.dimensions).items())
+            units.append(Unit("markers", "markers", (), values, cost=2))
         units += [
             Unit(
                 f"part {p.name}",

@@ -28,6 +28,7 @@ LIGHT_JSON = "light.json"
 LIGHT_PATHS_JSON = "light_paths.json"
 TOLERANCE_JSON = "tolerance.json"
 LADDER_JSON = "bundle/ladder.json"
+MARKERS_PURPOSE = "marker print, 1:1"
 ERROR_PICTURE = "pictures/projection_error.png"
 LEDGER_LIMIT = 1e-9
 LOST_LIMIT = 1e-9
@@ -158,6 +159,19 @@ def write_light(parts: Sequence[Part], **values: Any) -> Written:
     return Written(files, _light_proofs(study))
 
 
+def write_markers(parts: Sequence[Part], **values: Any) -> Written:
+    """Drawings of the marker print in every format; `values` are `marker_inputs`."""
+    from gelslim_cad.markers.write import render_marker_drawings
+    from gelslim_cad.sensor import marker_grid, print_outline
+
+    made = render_marker_drawings(
+        marker_grid(values),
+        print_outline(values),
+        film_kerf_mm=values["manufacturing.kerf.film_mm"],
+    )
+    return Written({f"markers/{name}": (data, MARKERS_PURPOSE) for name, data in made.items()})
+
+
 def write_view(parts: Sequence[Part], **values: Any) -> Written:
     """Map of the projection errors; `values` are `view_inputs`."""
     from gelslim_cad.report.view_figures import projection_png
@@ -275,6 +289,7 @@ WRITERS: dict[str, Callable[..., Written]] = {
     "assembly": write_assembly,
     "glb": write_glb,
     "order": write_order,
+    "markers": write_markers,
     "mould": write_mould,
     "view": write_view,
     "light": write_light,
@@ -290,6 +305,8 @@ def load_libraries(kinds: Collection[str]) -> None:
 
     A process that does this before it forks its workers spares each of them the import.
     """
+    if not {"part", "bundle", "light"}.isdisjoint(kinds):
+        import numba  # noqa: F401
     if not {"part", "glb", "robot"}.isdisjoint(kinds):
         import trimesh  # noqa: F401
     if "part" in kinds:

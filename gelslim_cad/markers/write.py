@@ -9,6 +9,7 @@ from gelslim_cad.markers.outline import Outline
 from gelslim_core.files.replaced_file import replace_file
 from ifem_export.markers.grid import MarkerGrid
 
+MARKER_TABLE = "markers.csv"
 FIRST_FILE = "markers-Alignment.gbr"
 """The file that is written first; it names its generator."""
 
@@ -16,7 +17,15 @@ FIRST_FILE = "markers-Alignment.gbr"
 def render_marker_files(
     grid: MarkerGrid, nodes: NearestNodes, outline: Outline, *, film_kerf_mm: float = 0.0
 ) -> dict[str, bytes]:
-    """Return the content of every marker file by its name; the stencil's paths keep the kerf.
+    """Return the content of every marker file by its name, as `render_marker_drawings` does."""
+    drawings = render_marker_drawings(grid, outline, film_kerf_mm=film_kerf_mm)
+    return {MARKER_TABLE: render_csv(grid, nodes), **drawings}
+
+
+def render_marker_drawings(
+    grid: MarkerGrid, outline: Outline, *, film_kerf_mm: float = 0.0
+) -> dict[str, bytes]:
+    """Return the marker files that do not depend on the mesh; the stencil's paths keep the kerf.
 
     Raises ValueError when a dot crosses the outline, or is narrower than the kerf.
     """
@@ -32,7 +41,6 @@ def render_marker_files(
 
     sheet = lay_out_stencil(grid, outline)
     return {
-        "markers.csv": render_csv(grid, nodes),
         "markers.svg": render_svg(grid, outline),
         "markers_mirrored.svg": render_svg(grid, outline, mirrored=True),
         "markers.dxf": render_dxf(grid, outline),
