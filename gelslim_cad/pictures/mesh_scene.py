@@ -185,7 +185,7 @@ class MeshScene:
         if plane is None:
             points, normals, faces = joined([(s.mesh, s.shift_mm) for s in solids])
             if rgba[3] < OPAQUE:
-                faces = faces[np.argsort((points @ back)[faces].sum(axis=1), kind="stable")]
+                faces = faces[_far_to_near(points, faces, back)]
             source = producer(poly_data(points, normals, faces))
         else:  # cut first: the clipper merges points, which would mix normals across an edge
             clipped = vtkClipPolyData()
@@ -307,6 +307,13 @@ class MeshScene:
             light.SetFocalPoint(0.0, 0.0, 0.0)
             light.SetIntensity(strength)
             self._renderer.AddLight(light)
+
+
+def _far_to_near(points: np.ndarray, faces: np.ndarray, back: np.ndarray) -> np.ndarray:
+    """Order of faces: those seen from behind, then those seen from the front, by their depth."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    faces_viewer = np.cross(b - a, c - a) @ back > 0
+    return np.lexsort(((a + b + c) @ back, faces_viewer))
 
 
 def _between(first: Sequence[float], second: Sequence[float], share: float) -> tuple[float, ...]:
