@@ -59,7 +59,7 @@ class FiniteStrainForce:
     @cached_property
     def inner(self) -> Solver:
         """Solver of the inner nodes."""
-        return inner_solver(self.system, "pcg")
+        return inner_solver(self.system, "iterative")
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """Forces that hold the surface in a motion (c, 3).
