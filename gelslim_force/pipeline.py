@@ -91,7 +91,12 @@ class ForcePipeline:
         markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
         operator = self.settings.operator(bundle)
         law = self.settings.law(bundle, operator)
-        self._wrench = WrenchNoise.of(operator, points_mm)
+        # The paper's single layer is another pad, with resultants of its own.
+        adjoint = None if operator.name == "paper" else bundle.adjoint
+        if adjoint is None:
+            self._wrench = WrenchNoise.of(operator, points_mm)
+        else:
+            self._wrench = WrenchNoise.exact(adjoint)
         self._motion = SurfaceMotion(
             MarkerView(
                 calibration.camera,
@@ -105,7 +110,7 @@ class ForcePipeline:
         )
         mesh, chosen = bundle.mesh, self.settings.force
         self._forces = ContactForces(
-            ForceEstimator(mesh, operator, chosen, law, self._motion),
+            ForceEstimator(mesh, operator, chosen, law, self._motion, adjoint),
             ForceEstimator(mesh, self.settings.compliance(bundle), chosen, law),
         )
         self._forces.prepare()

@@ -33,6 +33,8 @@ from gelslim_force.forces.low_pass import (
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from ifem_export.inverse.contact_inverse import masked_force
 from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.operators.adjoint_fields import AdjointFields
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
@@ -100,6 +102,9 @@ class ForceEstimator:
     motion: SurfaceMotion | None = None
     """The sensor's markers. Their noise sets the low-pass and the threshold of contact; without
     them the motion is taken to be free of noise."""
+    adjoint: AdjointFields | None = None
+    """Adjoint fields of the linear pad, with which force and torque of `direct` and `low_pass` are
+    exact. They are not used with another law."""
 
     @cached_property
     def points_mm(self) -> Array:
@@ -163,6 +168,8 @@ class ForceEstimator:
             noise = MotionNoise(noise_px, normal_noise_mm(self.curvature, u[:, 2]))
             smoothed = self.low_pass.applied((self.law or self.operator).force(u), noise)
             force = smoothed.force_n
+            if self.adjoint is not None and self.law is None:
+                force = self.adjoint.completed(force, u)
         if touched is None:
             assert smoothed is not None
             touched = _above_noise(smoothed, normal_known)
@@ -254,21 +261,6 @@ class ContactForces:
         thickness_mm = mesh.layers * mesh.cell_size_mm[2]
         distance_mm = edge_distance_mm(self.fit.points_mm, mesh.cell_size_mm[:2])
         return np.asarray(distance_mm < _EDGE_THICKNESSES * thickness_mm)
-
-
-def surface_share_mm2(mesh: PadMesh) -> Array:
-    """Areas (c,) in mm², in the order of `PadMesh.surface`: a quarter of each cell at the node.
-
-    The areas are those of the projection onto the x-y plane. They sum to the area of the columns
-    of cells; a node on an edge has half the area of an inner one.
-    """
-    hx, hy, _ = mesh.cell_size_mm
-    plan = np.asarray(mesh.occupancy).any(axis=2).T.astype(float)
-    around = np.pad(plan, 1)
-    corners = around[:-1, :-1] + around[1:, :-1] + around[:-1, 1:] + around[1:, 1:]
-    numbering = mesh.numbering
-    _, j, i = np.unravel_index(numbering.positions[mesh.surface], numbering.shape)
-    return np.asarray(corners[j, i] * (hx * hy / 4))
 
 
 def neighbour_matrix(points_mm: Array, cell_mm: ArrayLike) -> sparse.csr_array:

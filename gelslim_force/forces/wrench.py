@@ -2,9 +2,9 @@
 
 The covariance follows by linear propagation. The wrench is linear in the motion d of the markers,
 W = G S M d, with S the surface stiffness, M the interpolation from markers to nodes and G the
-resultant about the origin. S is symmetric, so the six products S Gᵀ serve every frame. A masked
-fit uses the same motion with fewer unknowns; its covariance is smaller, so that the one given here
-is an upper estimate.
+resultant about the origin. S is symmetric, so the six adjoint fields S Gᵀ serve every frame. A
+masked fit uses the same motion with fewer unknowns; its covariance is smaller, so that the one
+given here is an upper estimate.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_core.uncertainty import two_digits, with_sigma
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
-from ifem_export.operators.rigid_answer import rigid_motions
+from ifem_export.operators.adjoint_fields import AdjointFields, rigid_motions
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
@@ -95,9 +95,14 @@ class WrenchNoise:
 
     @classmethod
     def of(cls, operator: SurfaceOperator, points_mm: Array) -> WrenchNoise:
-        """Apply the operator to the six rigid motions of the surface."""
+        """For an operator whose resultants are its own: its forces in the six rigid motions."""
         rows = [operator.force(motion) for motion in rigid_motions(points_mm)]
         return cls(points_mm, np.stack(rows))
+
+    @classmethod
+    def exact(cls, adjoint: AdjointFields) -> WrenchNoise:
+        """For the pad itself, by its stored adjoint fields."""
+        return cls(adjoint.points_mm, adjoint.forces)
 
     def gains(self, interpolation: MarkerInterpolation) -> Array:
         """Wrench (6, k, 2) per lateral motion of each marker, N/mm and N; 0 for lost ones.

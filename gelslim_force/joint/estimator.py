@@ -25,7 +25,7 @@ from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_optics.light.light_law import LightLaw
-from ifem_export.operators.rigid_answer import rigid_motions
+from ifem_export.operators.adjoint_fields import rigid_motions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,11 +24,16 @@ from ifem_export.errors import IfemError
 from ifem_export.markers.field import MarkerField, marker_field
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.adjoint_fields import AdjointFields, adjoint_fields, stored_fields
+from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.operator_ladder import OperatorLadder, chosen_rung
 from ifem_export.operators.surface_operator import Rung, SurfaceOperator, surface_operator
 
 _SELF_TEST_SEED = 20190521
 _SELF_TEST_AMPLITUDE = 0.1
+ELEMENT_TOLERANCE = 1e-12
+"""Largest relative difference between the stored element matrix and that of the material."""
+_WITHOUT_ADJOINT = ("paper", "factor", "dense32")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +70,8 @@ class Bundle:
             `poissons_ratio`, `thickness_mm`.
         light: Arrays of the light on the untouched gel by name, as
             `gelslim_optics.light.light_map.LightMap` has them; empty where it was not traced.
+        stored_adjoint: Adjoint fields (6, c, 3) as stored with the bundle, in N/mm and N/rad, or
+            None; see `adjoint`.
     """
 
     mesh: PadMesh
@@ -81,6 +88,7 @@ class Bundle:
     outline: RoundedRectangle | None = None
     tolerances: Mapping[str, float] = field(default_factory=dict)
     light: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    stored_adjoint: NDArray[np.float64] | None = None
 
     def surface_operator(
         self,
@@ -109,9 +117,10 @@ class Bundle:
             chosen = chosen_rung(self.ladder, self.operator, budget)
             if chosen is not None:
                 rung, parameters = chosen.rung, dict(chosen.parameters)
-        return surface_operator(
-            self.mesh, self.material, self.formulation, rung or "pcg", **parameters
-        )
+        rung = rung or "pcg"
+        if rung not in _WITHOUT_ADJOINT:
+            parameters = {"adjoint": self.adjoint, **parameters}
+        return surface_operator(self.mesh, self.material, self.formulation, rung, **parameters)
 
     @cached_property
     def stiffness_matrix(self) -> sparse.csr_array:
@@ -119,6 +128,24 @@ class Bundle:
         if self.stiffness is not None:
             return self.stiffness
         return mesh_stiffness(self.mesh, np.asarray(self.element_matrix))
+
+    @cached_property
+    def adjoint(self) -> AdjointFields:
+        """Adjoint fields of the pad: as stored, or else computed once.
+
+        Stored fields are not used where the material was changed after they were made. Raises
+        ConvergenceError where the inner nodes cannot be solved for.
+        """
+        matrix = hex8_stiffness(self.mesh.cell_size_mm, self.material, self.formulation)
+        if self.stored_adjoint is not None:
+            gap = np.abs(matrix - self.element_matrix).max()
+            if gap <= ELEMENT_TOLERANCE * np.abs(matrix).max():
+                return stored_fields(self.mesh, self.stored_adjoint)
+        return adjoint_fields(pad_system(self.mesh, matrix))
+
+    def with_adjoint(self) -> Bundle:
+        """The bundle with its adjoint fields stored. Raises as `adjoint`."""
+        return replace(self, stored_adjoint=self.adjoint.forces)
 
     @property
     def times_key(self) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.assembly.assembly import corner_fill
-from ifem_export.bundle.bundle import Bundle, elementwise_force
+from ifem_export.bundle.bundle import ELEMENT_TOLERANCE, Bundle, elementwise_force
 from ifem_export.bundle.layout import bundle_arrays
 from ifem_export.bundle.manifest import REBUILD
 from ifem_export.elements.hex8 import hex8_stiffness
@@ -18,10 +18,11 @@ from ifem_export.markers.field import MarkerField
 from ifem_export.markers.thin_plate import affine
 from ifem_export.mesh.crown import column_tops
 from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.adjoint_fields import rigid_motions
 
 _SELF_TEST_TOLERANCE = 1e-10
 _ROW_TOLERANCE = 1e-9
-_ELEMENT_TOLERANCE = 1e-12
+_ADJOINT_TOLERANCE = 1e-6
 
 
 def check_bundle(bundle: Bundle) -> None:
@@ -36,6 +37,7 @@ def check_bundle(bundle: Bundle) -> None:
     if bundle.stiffness is not None:
         _check_csr("stiffness", bundle.stiffness)
     _check_markers(bundle.markers)
+    _check_adjoint(bundle)
     _check_self_test(bundle)
 
 
@@ -112,7 +114,7 @@ def _check_element(bundle: Bundle) -> None:
     except IfemError as error:
         raise BundleError("manifest.json", str(error), REBUILD) from error
     gap = np.abs(bundle.element_matrix - expected).max() / np.abs(expected).max()
-    if gap > _ELEMENT_TOLERANCE:
+    if gap > ELEMENT_TOLERANCE:
         _fail(
             "element_matrix_n_per_mm",
             f"differs by {gap:.2g} from the {bundle.formulation} element of this material",
@@ -138,6 +140,23 @@ def _check_markers(markers: MarkerField | None) -> None:
     asymmetry = np.abs(bending - bending.T).max()
     if max(asymmetry, deviation) > _ROW_TOLERANCE * scale:
         _fail("thin_plate_bending", "is not the bending energy of a spline through the markers")
+
+
+def _check_adjoint(bundle: Bundle) -> None:
+    """Raise BundleError for fields that cannot be S r: their products with r are symmetric.
+
+    The work of a rigid motion is positive, too.
+    """
+    if bundle.stored_adjoint is None:
+        return
+    motions = rigid_motions(np.asarray(bundle.mesh.surface_mm)).reshape(6, -1)
+    work = np.asarray(bundle.stored_adjoint).reshape(6, -1) @ motions.T
+    size = np.sqrt(np.abs(np.diag(work)))
+    scaled = work / np.outer(size, size) if size.all() else work
+    if np.abs(scaled - scaled.T).max() > _ADJOINT_TOLERANCE:
+        _fail("adjoint_fields", "are not forces of a symmetric stiffness")
+    if np.linalg.eigvalsh((scaled + scaled.T) / 2).min() <= 0.0:
+        _fail("adjoint_fields", "give a rigid motion work that is not positive")
 
 
 def _check_csr(name: str, matrix: sparse.csr_array) -> None:

@@ -30,7 +30,8 @@ from ifem_export.bundle.manifest import (
     read_manifest,
     to_json,
 )
-from ifem_export.errors import BundleError
+from ifem_export.errors import BundleError, MeshError
+from ifem_export.operators.solver import ConvergenceError
 
 FAMILY = "gelslim-bundle/"
 """Prefix of the format of a bundle's manifest, for all versions."""
@@ -48,6 +49,7 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
         BundleError: The parts of the bundle do not agree, `path` is something other than a
             bundle, or the disk cannot be written.
     """
+    bundle = _with_adjoint(bundle)
     check_bundle(bundle)
     target = Path(os.path.abspath(path))
     try:
@@ -65,6 +67,14 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
             f"cannot be written ({error.strerror or error})",
             "check the path and the disk",
         ) from error
+
+
+def _with_adjoint(bundle: Bundle) -> Bundle:
+    """The bundle with adjoint fields, unless the pad has no surface stiffness or no solution."""
+    try:
+        return bundle.with_adjoint()
+    except (ConvergenceError, MeshError):
+        return bundle
 
 
 def _fill(folder: Path, bundle: Bundle) -> None:

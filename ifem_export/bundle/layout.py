@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle, SelfTest
-from ifem_export.bundle.manifest import MANIFEST, REBUILD
+from ifem_export.bundle.manifest import ADJOINT_VERSION, MANIFEST, REBUILD
 from ifem_export.elements.material import Material
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.markers.field import MarkerField
@@ -51,6 +52,8 @@ def bundle_arrays(bundle: Bundle) -> dict[str, NDArray[Any]]:
             arrays["thin_plate_bending"] = bundle.markers.spline.bending
         for name, values in bundle.markers.arrays.items():
             arrays[f"marker_{name}"] = values
+    if bundle.stored_adjoint is not None:
+        arrays["adjoint_fields"] = bundle.stored_adjoint
     for name, values in bundle.light.items():
         arrays[f"light_{name}"] = values
     return arrays
@@ -116,7 +119,19 @@ def bundle_from(
         outline=_outline_from(manifest),
         tolerances=dict(manifest.get("tolerances") or {}),
         light={name: take(f"light_{name}") for name in manifest.get("light") or ()},
+        stored_adjoint=_adjoint_from(manifest, take, len(mesh.surface)),
     )
+
+
+def _adjoint_from(
+    manifest: dict[str, Any], take: _Arrays, n_surface: int
+) -> NDArray[np.float64] | None:
+    """Stored adjoint fields; None for bundles without, or with those of another version."""
+    section = manifest.get("adjoint")
+    if not isinstance(section, dict) or section.get("version") != ADJOINT_VERSION:
+        return None
+    fields: NDArray[np.float64] = take("adjoint_fields", "<f8", (6, n_surface, 3))
+    return fields
 
 
 def _outline_from(manifest: dict[str, Any]) -> RoundedRectangle | None:

@@ -21,6 +21,8 @@ FORMAT = "gelslim-bundle/1"
 MANIFEST = "manifest.json"
 LADDER = "ladder.json"
 REBUILD = "rebuild the bundle from its spec (gelslim bundle SPEC)"
+ADJOINT_VERSION = 1
+"""Meaning of the array `adjoint_fields`; readers compute the fields where they know another."""
 _SEAL = "manifest_sha256"
 _MAX_BYTES = 16_000_000
 _FILE_NAME = re.compile(r"[a-z][a-z0-9_]{0,80}\.npy")
@@ -49,6 +51,9 @@ _CONVENTIONS = {
     "occupancy": "axes (x, y, z); with the element matrix it determines the stiffness matrix",
     "cell_fill": "where present, what each cell's element matrix is multiplied by",
     "surface_shift": "where present, cells by which the outer surface lies above its nodes",
+    "adjoint_fields": "where present, (6, surface nodes, 3): forces that hold the surface in unit "
+    "translations (N/mm) and rotations (N/rad) about x, y and z through the origin; their products "
+    "with a motion of the surface are its force and torque",
     "forces": "external force on the gel; on bonded nodes the reaction of the acrylic",
 }
 
@@ -103,6 +108,7 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
         "outline": None if bundle.outline is None else asdict(bundle.outline),
         "tolerances": dict(bundle.tolerances),
         "light": sorted(bundle.light) or None,
+        "adjoint": None if bundle.stored_adjoint is None else {"version": ADJOINT_VERSION},
         "ladder": _ladder_section(bundle),
         "arrays": arrays,
     }

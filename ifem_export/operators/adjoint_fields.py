@@ -1,9 +1,13 @@
-"""Exact force and torque for operators that only approximate the pad's stiffness S.
+"""Exact force and torque of every motion, from six adjoint fields of the pad.
 
-Force and torque of a motion u are the products of S u with the rigid motions r of the surface, and
-S is symmetric: r·(S u) = (S r)·u. The forces S r that hold the surface in six rigid motions,
-computed once, therefore give the resultants of every motion. What an approximate operator lacks of
-them is added as the forces of that rigid motion which has them.
+Force and torque of a motion u of the surface are the products r·(S u) with the six rigid motions
+r. The stiffness S is symmetric, so that they equal (S r)·u: products of the motion with the six
+fields S r, the adjoint fields, which are solved for once per pad. An operator that only
+approximates S misses these resultants. Of all corrections that supply what is missing, `completed`
+adds the one with the least traction, ∫ |t|² dA: nodal forces a (t + ω × p) at points p with the
+shares a of the surface. What an approximate operator misses is spread over the whole pad,
+because its error is that of the pad's inner nodes; a correction of the contact region alone would
+be up to a hundred times as wrong in the field.
 """
 
 from __future__ import annotations
@@ -13,63 +17,68 @@ from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.solver import inner_solver
+from ifem_export.errors import IfemError
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.operators.pad_system import PadSystem, checked_field
+from ifem_export.operators.single_thread import single_threaded
+from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver
 
 Array = NDArray[np.float64]
-RIGID_RTOL = 1e-10
+ADJOINT_RTOL = 1e-10
+LARGEST_RESIDUAL = 1e-6
+"""Where rounding keeps the residual above `ADJOINT_RTOL`, up to this one is accepted."""
 
 
 @dataclass(frozen=True, eq=False)
-class RigidAnswer:
-    """What the pad answers to rigid motions of its surface.
+class AdjointFields:
+    """The forces that hold the surface in the six unit rigid motions about the sensor's origin.
 
     Attributes:
-        arms: (c, 3) places of the surface's points about their middle, divided by the root
-            of their mean square, so that all six motions are of order one.
-        forces: (6, c, 3) in N per mm: for three translations, then for three rotations.
+        points_mm: (c, 3) surface of the pad.
+        area_mm2: (c,) share of the surface of each point.
+        forces: (6, c, 3) for translations along x, y and z in N/mm, then for rotations about
+            x, y and z in N/rad.
     """
 
-    arms: Array
+    points_mm: Array
+    area_mm2: Array
     forces: Array
 
-    @property
-    def motions(self) -> Array:
-        """The motions (6, c, 3): a unit of translation or of rotation, ω × arm, about each axis."""
-        return rigid_motions(self.arms)
+    def wrench(self, displacement_mm: ArrayLike) -> Array:
+        """Force in N and torque in N mm (6,) about the origin that hold a motion (c, 3) in mm.
+
+        Raises IfemError for a wrong shape or a value that is not finite.
+        """
+        u = checked_field(displacement_mm, len(self.points_mm))
+        return np.asarray(self.forces.reshape(6, -1) @ u.ravel())
 
     def completed(self, force_n: Array, displacement_mm: Array) -> Array:
-        """Forces (c, 3) of a motion, with exact force and torque.
+        """Forces (c, 3) of an approximate operator, corrected to the exact force and torque.
 
         Args:
-            force_n: (c, 3) of an approximate operator.
-            displacement_mm: (c, 3) to which they belong.
+            force_n: (c, 3) in N.
+            displacement_mm: (c, 3) or (3c,), the motion to which they belong.
         """
-        due = self._forces @ displacement_mm.ravel()
-        share = self._compliance @ (due - self._resultants(force_n))
-        return np.asarray(force_n + (share @ self._forces).reshape(-1, 3))
+        due = self.forces.reshape(6, -1) @ np.ravel(displacement_mm)
+        share = self._spread @ (due - resultants(self.points_mm, force_n))
+        x, y, z = share[3:]
+        turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+        traction = share[:3] + self.points_mm @ turn
+        return np.asarray(force_n + self.area_mm2[:, None] * traction)
 
     @property
     def n_bytes(self) -> int:
-        """Bytes that a call reads."""
-        return int(self.arms.nbytes + self.forces.nbytes)
-
-    def _resultants(self, force: Array) -> Array:
-        """Force and torque (6,), the products with the six motions."""
-        moments = self.arms.T @ force
-        torque = [moments[k - 2, k - 1] - moments[k - 1, k - 2] for k in range(3)]
-        return np.array([*force.sum(axis=0), *torque])
-
-    @property
-    def _forces(self) -> Array:
-        return self.forces.reshape(6, -1)
+        """Bytes that a call of `completed` reads."""
+        return int(self.points_mm.nbytes + self.area_mm2.nbytes + self.forces.nbytes)
 
     @cached_property
-    def _compliance(self) -> Array:
-        """Motions (6, 6) for unit resultants, symmetric and positive definite."""
-        return np.linalg.inv(np.array([self._resultants(force) for force in self.forces]).T)
+    def _spread(self) -> Array:
+        """Rigid motion (6, 6) whose forces, weighted by the area, have unit resultants."""
+        motions = rigid_motions(self.points_mm).reshape(6, -1)
+        return np.asarray(np.linalg.inv((motions * np.repeat(self.area_mm2, 3)) @ motions.T))
 
 
 def rigid_motions(points: Array) -> Array:
@@ -79,30 +88,61 @@ def rigid_motions(points: Array) -> Array:
     return np.stack(moved + [np.cross(axis, points) for axis in axes])
 
 
-_KNOWN: WeakKeyDictionary[PadSystem, RigidAnswer] = WeakKeyDictionary()
+def resultants(points: Array, force: Array) -> Array:
+    """Force and torque (6,) about the origin of forces (c, 3) at points (c, 3)."""
+    moments = points.T @ force
+    torque = [moments[k - 2, k - 1] - moments[k - 1, k - 2] for k in range(3)]
+    return np.array([*force.sum(axis=0), *torque])
 
 
-def rigid_answer(system: PadSystem) -> RigidAnswer:
-    """The answer of a pad, computed once for each system.
+_KNOWN: WeakKeyDictionary[PadSystem, AdjointFields] = WeakKeyDictionary()
 
-    Raises ConvergenceError where the inner nodes cannot be solved for to `RIGID_RTOL`, and
-    IfemError for a pad of one layer.
+
+def adjoint_fields(system: PadSystem) -> AdjointFields:
+    """The adjoint fields of a pad, computed once for each system.
+
+    Raises ConvergenceError where the inner nodes cannot be solved for to `LARGEST_RESIDUAL`.
     """
     known = _KNOWN.get(system)
     if known is None:
-        known = _KNOWN[system] = _computed(system)
+        known = _KNOWN[system] = stored_fields(system.mesh, _computed(system))
     return known
 
 
-def _computed(system: PadSystem) -> RigidAnswer:
-    points = system.mesh.surface_mm
-    arms = points - points.mean(axis=0)
-    arms = arms / np.sqrt((arms**2).sum(axis=1).mean())
-    forces = np.empty((6, *arms.shape))
-    answer = RigidAnswer(arms, forces)
+def stored_fields(mesh: PadMesh, forces: ArrayLike) -> AdjointFields:
+    """Adjoint fields of a pad from stored forces (6, c, 3). Raises IfemError for another shape."""
+    points, found = np.asarray(mesh.surface_mm), np.asarray(forces, dtype=float)
+    if found.shape != (6, *points.shape):
+        raise IfemError(
+            f"adjoint fields of shape {found.shape}: must be (6, {len(points)}, 3)",
+            field="adjoint",
+            value=found.shape,
+        )
+    return AdjointFields(points, surface_share_mm2(mesh), found)
+
+
+def use_stored(system: PadSystem, fields: AdjointFields) -> None:
+    """Let `adjoint_fields` return these instead of computing them."""
+    _KNOWN[system] = fields
+
+
+@single_threaded
+def _computed(system: PadSystem) -> Array:
+    motions = rigid_motions(np.asarray(system.mesh.surface_mm))
+    if system.layers == 1:
+        forces = [system.surface @ motion.ravel() for motion in motions]
+        return np.reshape(forces, motions.shape)
     solver = inner_solver(system)
-    for motion, force in zip(answer.motions, forces, strict=True):
-        u = motion.ravel()
-        inner = solver.solve(-(system.surface_to_inner @ u), RIGID_RTOL).x
-        force[:] = (system.surface @ u + system.inner_to_surface @ inner).reshape(-1, 3)
-    return answer
+    return np.stack([_held(system, solver, motion.ravel()) for motion in motions])
+
+
+def _held(system: PadSystem, solver: Solver, u: Array) -> Array:
+    """Forces (c, 3) of a motion (3c,) by exact condensation."""
+    load = -(system.surface_to_inner @ u)
+    try:
+        inner = solver.solve(load, ADJOINT_RTOL).x
+    except ConvergenceError as error:
+        if not error.residual <= LARGEST_RESIDUAL:
+            raise
+        inner = solver.solve(load, 2 * error.residual).x
+    return np.asarray(system.surface @ u + system.inner_to_surface @ inner).reshape(-1, 3)

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ifem_export.assembly.occupancy_table import occupancy_table
+from ifem_export.operators.adjoint_fields import AdjointFields
 from ifem_export.operators.pad_system import PadSystem, checked_field
-from ifem_export.operators.rigid_answer import RigidAnswer
 from ifem_export.operators.solver import Solver, SparseFactor, pad_solver
 
 Array = NDArray[np.float64]
@@ -87,13 +87,13 @@ class PaperOperator(_WithCompliance):
 class CondensedOperator(_WithCompliance):
     """Exact condensation that solves for the inner nodes at each call, to a residual `rtol`.
 
-    With `rigid` force and torque are exact whatever the residual.
+    With `adjoint` force and torque are exact whatever the residual.
     """
 
     name: str
     inner_solver: Solver
     rtol: float
-    rigid: RigidAnswer | None = None
+    adjoint: AdjointFields | None = None
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """F = K_ss u + K_si u_i, where K_ii u_i = -K_is u."""
@@ -101,7 +101,7 @@ class CondensedOperator(_WithCompliance):
         inner = self.inner_solver.solve(-(self.system.surface_to_inner @ u), self.rtol).x
         force = np.asarray(self.system.surface @ u + self.system.inner_to_surface @ inner)
         force = force.reshape(-1, 3)
-        return force if self.rigid is None else self.rigid.completed(force, u)
+        return force if self.adjoint is None else self.adjoint.completed(force, u)
 
     @cached_property
     def pad_solver(self) -> Solver:
@@ -116,8 +116,8 @@ class CondensedOperator(_WithCompliance):
         kept = sum(map(_matrix_bytes, parts))
         if isinstance(self.inner_solver, SparseFactor):
             return int(kept + 12 * self.inner_solver.factor.nnz)
-        rigid = 0 if self.rigid is None else self.rigid.n_bytes
-        return int(kept + s.inner_preconditioner.blocks.nbytes + rigid)
+        adjoint = 0 if self.adjoint is None else self.adjoint.n_bytes
+        return int(kept + s.inner_preconditioner.blocks.nbytes + adjoint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import IfemError
+from ifem_export.operators.adjoint_fields import AdjointFields, rigid_motions
 from ifem_export.operators.layered_operator import LayeredOperator
 from ifem_export.operators.pad_system import PadSystem, checked_field
-from ifem_export.operators.rigid_answer import RigidAnswer
 
 Array = NDArray[np.float64]
 
@@ -56,14 +56,14 @@ class ConvolvedOperator:
         system: Equations of the pad.
         stiffness: Surface stiffness of the infinite pad, complete or truncated.
         missing: (c, 3, 3) in N/mm, added node by node so that the resultant is exact; or None.
-        rigid: Answer of the pad that makes the torque exact too; or None.
+        adjoint: Adjoint fields that make force and torque exact; or None.
     """
 
     name: str
     system: PadSystem
     stiffness: LayeredOperator
     missing: Array | None = None
-    rigid: RigidAnswer | None = None
+    adjoint: AdjointFields | None = None
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """Convolution with the surface stiffness."""
@@ -71,7 +71,7 @@ class ConvolvedOperator:
         force = np.asarray(self.stiffness(u[None])[0])
         if self.missing is not None:
             force += np.matmul(self.missing, u[:, :, None])[:, :, 0]
-        return force if self.rigid is None else self.rigid.completed(force, u)
+        return force if self.adjoint is None else self.adjoint.completed(force, u)
 
     def displacement(self, force_n: ArrayLike) -> Array:
         """Convolution with the compliance of the infinite pad, which is not truncated."""
@@ -87,8 +87,8 @@ class ConvolvedOperator:
     def n_bytes(self) -> int:
         """Bytes of the blocks."""
         missing = 0 if self.missing is None else self.missing.nbytes
-        rigid = 0 if self.rigid is None else self.rigid.n_bytes
-        return int(self.stiffness.blocks.nbytes + missing + rigid)
+        adjoint = 0 if self.adjoint is None else self.adjoint.n_bytes
+        return int(self.stiffness.blocks.nbytes + missing + adjoint)
 
 
 def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
@@ -111,7 +111,7 @@ def truncated(stiffness: LayeredOperator, radius: int) -> LayeredOperator:
     return LayeredOperator(blocks, stiffness.columns, stiffness.shape)
 
 
-def missing_resultant(answer: RigidAnswer, stiffness: LayeredOperator) -> Array:
+def missing_resultant(adjoint: AdjointFields, stiffness: LayeredOperator) -> Array:
     """What the convolution lacks of the exact resultant, node by node.
 
     The resultant of a motion u is Σ_j (Σ_i S_ij) u_j, and S is symmetric. Therefore the three
@@ -121,5 +121,5 @@ def missing_resultant(answer: RigidAnswer, stiffness: LayeredOperator) -> Array:
     Returns:
         (c, 3, 3) in N/mm, force component by displacement component.
     """
-    uniform = zip(answer.motions[:3], answer.forces[:3], strict=True)
+    uniform = zip(rigid_motions(adjoint.points_mm)[:3], adjoint.forces[:3], strict=True)
     return np.stack([force - stiffness(motion[None])[0] for motion, force in uniform], axis=1)

@@ -16,6 +16,7 @@ from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.adjoint_fields import AdjointFields, adjoint_fields, use_stored
 from ifem_export.operators.condensed_operators import (
     CondensedOperator,
     DenseOperator,
@@ -28,7 +29,6 @@ from ifem_export.operators.convolved_operator import (
 )
 from ifem_export.operators.crowned_system import pad_system
 from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.rigid_answer import rigid_answer
 from ifem_export.operators.solver import Method, inner_solver
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ DEFAULT_RTOL = 1e-4
 DEFAULT_RADIUS = 6
 FACTOR_RTOL = 1e-10
 EXACT_RTOL = 1e-7
-"""From this residual of the inner solution on, force and torque need no completion."""
+"""From this residual of the inner solution on, force and torque need no correction."""
 
 
 class SurfaceOperator(Protocol):
@@ -89,6 +89,7 @@ def surface_operator(
     rtol: float = DEFAULT_RTOL,
     radius: int = DEFAULT_RADIUS,
     lumped: bool | float = False,
+    adjoint: AdjointFields | None = None,
 ) -> SurfaceOperator:
     """Make the surface operator of one rung for a flat or crowned pad.
 
@@ -101,10 +102,13 @@ def surface_operator(
             "pcg" or "factor" (exact condensation) or "dense32" (S as a dense matrix).
         rtol: Relative residual of the inner solution ("pcg").
         radius: Reach of the convolution in nodes ("truncated").
-        lumped: Whether force and torque of "fft" are corrected; those of "truncated" always are.
+        lumped: Whether "fft" is corrected at the rim, node by node, by what it misses of uniform
+            motions; "truncated" always is.
+        adjoint: Adjoint fields of this pad, where they are stored; else they are computed.
 
     Returns:
-        The operator. Force and torque of a motion are exact for all but "paper" and "fft" alone.
+        The operator. Force and torque of a motion are exact for all but "paper", whose single
+        layer is another pad.
 
     Raises:
         IfemError: The rung is unknown or the radius is below 1.
@@ -127,6 +131,8 @@ def surface_operator(
     if rung == "paper":
         mesh, formulation = one_layer(mesh), "full"
     system = pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
+    if adjoint is not None and rung != "paper":
+        use_stored(system, adjoint)
     return system_operator(system, rung, rtol=rtol, radius=radius, lumped=lumped)
 
 
@@ -146,24 +152,22 @@ def system_operator(
         return PaperOperator(system)
     if rung == "fft":
         infinite = system.infinite_stiffness
-        if not lumped:
-            return ConvolvedOperator("fft", system, infinite)
-        rigid = rigid_answer(system)
-        missing = missing_resultant(rigid, infinite)
-        return ConvolvedOperator("fft", system, infinite, missing, rigid)
+        fields = adjoint_fields(system)
+        missing = missing_resultant(fields, infinite) if lumped else None
+        return ConvolvedOperator("fft", system, infinite, missing, fields)
     if rung == "truncated":
-        rigid = rigid_answer(system)
+        fields = adjoint_fields(system)
         near = truncated(system.infinite_stiffness, radius)
-        missing = missing_resultant(rigid, near)
-        return ConvolvedOperator("truncated", system, near, missing, rigid)
+        missing = missing_resultant(fields, near)
+        return ConvolvedOperator("truncated", system, near, missing, fields)
     if rung == "dense32":
         return DenseOperator(system)
-    iterative: Method = "auto" if system.is_cut else "pcg"
+    iterative: Method = "auto" if system.is_cut else "iterative"
     solver = inner_solver(system, "direct" if rung == "factor" else iterative)
     if rung == "factor":
         return CondensedOperator(system, rung, solver, FACTOR_RTOL)
-    completed = rigid_answer(system) if rtol > EXACT_RTOL else None
-    return CondensedOperator(system, rung, solver, rtol, completed)
+    corrected = adjoint_fields(system) if rtol > EXACT_RTOL else None
+    return CondensedOperator(system, rung, solver, rtol, corrected)
 
 
 def one_layer(mesh: PadMesh) -> PadMesh:

@@ -1,4 +1,4 @@
-"""Surface operators of the infinite pad: exact resultants by lumping, and what that buys."""
+"""Surface operators of the infinite pad: exact resultants, and what the correction buys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,12 @@ OUTLINES: dict[str, Outline] = {
     "polygon": Polygon([(-6, -5), (6, -5), (6, 1), (1, 1), (1, 5), (-6, 5)]),
     "long": RoundedRectangle(22.0, 4.2, 0.5),
 }
-RUNGS = [("truncated", {"radius": 3}), ("truncated", {"radius": 6}), ("fft", {"lumped": True})]
+RUNGS = [
+    ("truncated", {"radius": 3}),
+    ("truncated", {"radius": 6}),
+    ("fft", {}),
+    ("fft", {"lumped": True}),
+]
 
 
 def gel(nu: float) -> Material:
@@ -39,14 +44,6 @@ def test_the_resultant_of_any_motion_is_exact(name, nu, rung, options) -> None:
     exact = surface_operator(mesh, gel(nu), "bbar", "factor").force(u).sum(axis=0)
     found = surface_operator(mesh, gel(nu), "bbar", rung, **options).force(u).sum(axis=0)
     assert np.linalg.norm(found - exact) < 1e-7 * np.linalg.norm(exact)
-
-
-def test_without_lumping_it_is_not() -> None:
-    mesh = pad(OUTLINES["disc"])
-    u = np.random.default_rng(1).normal(size=(len(mesh.surface), 3))
-    exact = surface_operator(mesh, gel(0.49), "bbar", "factor").force(u).sum(axis=0)
-    found = surface_operator(mesh, gel(0.49), "bbar", "fft").force(u).sum(axis=0)
-    assert np.linalg.norm(found - exact) > 1e-2 * np.linalg.norm(exact)
 
 
 def test_lumping_mends_the_rim_and_leaves_the_middle_alone() -> None:
@@ -78,7 +75,7 @@ def test_a_bundle_chooses_the_lumped_rung_and_applies_it() -> None:
     rung = next(r for r in ladder.rungs if r.label == "fft (lumped 1)")
     plain = next(r for r in ladder.rungs if r.label == "fft")
     assert rung.error_field < 0.5 * plain.error_field
-    assert rung.error_resultant < 0.1 * plain.error_resultant
+    assert rung.error_resultant == pytest.approx(plain.error_resultant, abs=2e-6)
     bundle = build_bundle(mesh, gel(0.3223), "bbar", with_stiffness=False)
     u = np.random.default_rng(0).normal(size=(len(mesh.surface), 3))
     found = bundle.surface_operator("fft", **dict(rung.parameters)).force(u)

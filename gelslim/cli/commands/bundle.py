@@ -146,6 +146,8 @@ def _describe(path: Path, found: dict[str, Any]) -> None:
     print(f"  gel        E = {material['youngs_modulus_mpa']:g} MPa, "
           f"nu = {material['poissons_ratio']:g}")  # fmt: skip
     print(f"  stiffness  {stored if found['stiffness']['stored'] else 'assembled when needed'}")
+    adjoint = "stored" if found.get("adjoint") else "computed when needed (older bundle)"
+    print(f"  adjoint    fields of force and torque {adjoint}")
     markers = found["markers"]
     print(f"  markers    {markers['count'] if markers else 'none'}")
     ladder = found.get("ladder") or {}

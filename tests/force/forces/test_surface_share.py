@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelslim_force.forces.estimator import surface_share_mm2
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+from ifem_export.mesh.surface_area import surface_share_mm2
 
 
 @pytest.mark.parametrize(("hx", "hy"), [(0.5, 0.8), (0.9, 0.3), (0.4, 0.4)])
