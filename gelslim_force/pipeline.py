@@ -22,12 +22,12 @@ from gelslim_force.contact.normal_source import (
     NormalSource,
     Remembering,
 )
-from gelslim_force.forces.estimator import ContactForces, ForceEstimator
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.frames.frame import Frame
 from gelslim_force.frames.upright import upright
+from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.settings import PipelineSettings
@@ -90,13 +90,8 @@ class ForcePipeline:
         reference = self._tracker.reference
         markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
         operator = self.settings.operator(bundle)
-        law = self.settings.law(bundle, operator)
-        # The paper's single layer is another pad, with resultants of its own.
-        adjoint = None if operator.name == "paper" else bundle.adjoint
-        if adjoint is None:
-            self._wrench = WrenchNoise.of(operator, points_mm)
-        else:
-            self._wrench = WrenchNoise.exact(adjoint)
+        adjoint = self.settings.adjoint(bundle, operator)
+        self._wrench = WrenchNoise.of(operator, points_mm, adjoint)
         self._motion = SurfaceMotion(
             MarkerView(
                 calibration.camera,
@@ -108,12 +103,9 @@ class ForcePipeline:
             points_mm,
             self.settings.compensation,
         )
-        mesh, chosen = bundle.mesh, self.settings.force
-        self._forces = ContactForces(
-            ForceEstimator(mesh, operator, chosen, law, self._motion, adjoint),
-            ForceEstimator(mesh, self.settings.compliance(bundle), chosen, law),
-        )
+        self._forces = self.settings.contact_forces(bundle, operator, self._motion)
         self._forces.prepare()
+        self._prepare_edge()
         self._kept_gains: tuple[bytes, Array] | None = None
         self.reset()
 
@@ -134,6 +126,7 @@ class ForcePipeline:
         """
         other = copy.copy(self)
         other.normal, other._tracker = normal, self.calibration.tracker()
+        other._prepare_edge()
         other.reset()
         return other
 
@@ -145,6 +138,11 @@ class ForcePipeline:
         self._last_lateral: Array | None = None
         if isinstance(self.normal, Remembering):
             self.normal.reset()
+
+    def _prepare_edge(self) -> None:
+        """Columns near the edge, for a source that says where the gel is touched."""
+        if self.normal is not None and not isinstance(self.normal, UnknownShape):
+            self._forces.prepare_edge()
 
     def unreadable(self, problem: str, *, time_s: float | None = None) -> FrameResult:
         """Result of a frame that could not be read; it is counted as a frame."""

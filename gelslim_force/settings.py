@@ -6,15 +6,17 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from gelslim_core.budget.budget import Budget
-from gelslim_force.forces.estimator import ForceSettings
+from gelslim_force.forces.contact_forces import ContactForces
+from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
 from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
+from gelslim_force.motion.surface_motion import SurfaceMotion
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.errors import IfemError
-from ifem_export.operators.operator_ladder import OperatorLadder, operator_label
+from ifem_export.compliance.contact_columns import ContactCompliance
+from ifem_export.errors import IfemError, MeshError
+from ifem_export.operators.adjoint_fields import AdjointFields
 from ifem_export.operators.surface_operator import RUNGS, Rung, SurfaceOperator
 
-_FAST = operator_label("fft", {"lumped": 1})
 Interpolation = Literal["sparse", "thin_plate"]
 Gel = Literal["linear", "neo_hookean", "auto"]
 GELS: tuple[Gel, ...] = get_args(Gel)
@@ -76,18 +78,36 @@ class PipelineSettings:
         """
         return bundle.surface_operator(self.rung, budget=self.budget)
 
+    def adjoint(self, bundle: Bundle, operator: SurfaceOperator) -> AdjointFields | None:
+        """Adjoint fields of the pad; None for the paper's single layer, which is another pad."""
+        return None if operator.name == "paper" else bundle.adjoint
+
     def compliance(self, bundle: Bundle) -> SurfaceOperator:
         """The operator that a masked fit evaluates many times per frame.
 
-        It is the fast one, unless a budget asks for a smaller error than that has. Then it is the
-        chosen one, which takes many times as long. Raises as `operator`.
+        It is the infinite pad's, whose fits far from the edge are as good as exact ones; `edge` is
+        for contacts near it. A crowned pad has none: there it is the chosen operator. Raises as
+        `operator`.
         """
-        if self._too_coarse(bundle.ladder):
-            return self.operator(bundle)
         try:
             return bundle.surface_operator("fft", lumped=1)
         except IfemError:
             return self.operator(bundle)
+
+    def contact_forces(
+        self, bundle: Bundle, operator: SurfaceOperator, motion: SurfaceMotion | None
+    ) -> ContactForces:
+        """Estimators for contacts in the middle and near the edge. Raises as `operator`."""
+        law, adjoint = self.law(bundle, operator), self.adjoint(bundle, operator)
+        direct = ForceEstimator(bundle.mesh, operator, self.force, law, motion, adjoint)
+        return ContactForces.of(direct, self.compliance(bundle), self.edge(bundle))
+
+    def edge(self, bundle: Bundle) -> ContactCompliance | None:
+        """Columns of the compliance for contacts near the edge; None for pads with too many."""
+        try:
+            return ContactCompliance(bundle)
+        except MeshError:
+            return None
 
     def law(self, bundle: Bundle, operator: SurfaceOperator) -> FiniteStrainForce | DepthLaw | None:
         """The law of the gel, where it is not that of the operator alone."""
@@ -97,9 +117,3 @@ class PipelineSettings:
         if self.gel == "neo_hookean":
             return strained
         return DepthLaw(operator, strained, deep_mm(bundle))
-
-    def _too_coarse(self, ladder: OperatorLadder | None) -> bool:
-        if ladder is None or self.budget is None:
-            return False
-        fast = ladder.named(_FAST)
-        return fast is not None and not self.budget.allows_error(fast.error)

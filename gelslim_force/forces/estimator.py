@@ -19,7 +19,6 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from gelslim_force.forces.frame_result import ForceField
 from gelslim_force.forces.low_pass import (
@@ -33,7 +32,10 @@ from gelslim_force.forces.low_pass import (
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from ifem_export.inverse.contact_inverse import masked_force
 from ifem_export.mesh.pad_mesh import PadMesh
-from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.mesh.surface_lattice import (
+    neighbour_matrix,
+    surface_share_mm2,
+)
 from ifem_export.operators.adjoint_fields import AdjointFields
 from ifem_export.operators.surface_operator import SurfaceOperator
 
@@ -42,8 +44,6 @@ Mask = NDArray[np.bool_]
 Method = Literal["auto", "direct", "low_pass", "masked"]
 METHODS: tuple[Method, ...] = get_args(Method)
 _CONTACT_SIGMAS = 5.0
-_EDGE_THICKNESSES = 1.5
-"""Distance from the edge, in thicknesses, within which a periodic layer errs more than noise."""
 
 
 class SurfaceForce(Protocol):
@@ -223,58 +223,6 @@ class ForceEstimator:
         return float(1 - np.hypot(total[0], total[1]) / (self.settings.friction * -total[2]))
 
 
-@dataclass(frozen=True, eq=False)
-class ContactForces:
-    """Chooses between two estimators of one pad by what is known of the contact.
-
-    A fit evaluates its operator many times, so it uses the fast one. That operator takes the pad
-    for a periodic layer: within about a thickness of the edge its forces are off by a tenth or
-    more. For contacts there, `auto` computes the forces directly from the stiffness instead.
-    """
-
-    direct: ForceEstimator
-    """With the operator that the user chose."""
-    fit: ForceEstimator
-    """With an operator that is fast enough for a fit."""
-
-    def estimate(
-        self, displacement_mm: Array, touched: Mask | None, start_n: Array | None, noise_px: float
-    ) -> ForceField:
-        """Forces for a motion (c, 3); arguments and errors as in `ForceEstimator.estimate`."""
-        if touched is None or self.fit.settings.method not in ("auto", "masked"):
-            return self.direct.estimate(displacement_mm, touched, start_n, noise_px)
-        if self.fit.settings.method == "auto" and (touched & self.near_edge).any():
-            found = self.direct.estimate(displacement_mm, None, None, noise_px)
-            return replace(found, contact=touched)
-        return self.fit.estimate(displacement_mm, touched, start_n, noise_px)
-
-    def prepare(self) -> None:
-        """Compute now all that the first contact would otherwise wait for."""
-        _ = self.direct.low_pass, self.direct.curvature, self.fit.neighbours, self.near_edge
-
-    @cached_property
-    def near_edge(self) -> Mask:
-        """(c,) nodes that are too near the edge for the operator of the fit."""
-        mesh = self.fit.mesh
-        if not self.fit.operator.name.startswith("fft"):
-            return np.zeros(len(self.fit.points_mm), dtype=bool)
-        thickness_mm = mesh.layers * mesh.cell_size_mm[2]
-        distance_mm = edge_distance_mm(self.fit.points_mm, mesh.cell_size_mm[:2])
-        return np.asarray(distance_mm < _EDGE_THICKNESSES * thickness_mm)
-
-
-def neighbour_matrix(points_mm: Array, cell_mm: ArrayLike) -> sparse.csr_array:
-    """(c, c) with 1 where two nodes share an edge of a cell: up to four per node.
-
-    `points_mm` is (c, 2 or 3), on a lattice with cells of `cell_mm` (2,).
-    """
-    positions = points_mm[:, :2] / np.asarray(cell_mm)
-    first, second = cKDTree(positions).query_pairs(1.2, output_type="ndarray").T
-    rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
-    count = len(positions)
-    return sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-
-
 def curvature_operator(neighbours: sparse.csr_array) -> sparse.csr_array:
     """(i, c) that gives the value of each inner node minus the mean of its four neighbours.
 
@@ -283,12 +231,6 @@ def curvature_operator(neighbours: sparse.csr_array) -> sparse.csr_array:
     inner = np.flatnonzero(neighbours.sum(axis=1) == 4)
     identity = sparse.eye_array(neighbours.shape[0], format="csr")
     return sparse.csr_array((identity - neighbours / 4)[inner])
-
-
-def edge_distance_mm(points_mm: Array, cell_mm: ArrayLike) -> Array:
-    """(c,) distance of each node from the nearest node on the edge of the surface."""
-    edge = neighbour_matrix(points_mm, cell_mm).sum(axis=1) < 4
-    return np.asarray(cKDTree(points_mm[edge, :2]).query(points_mm[:, :2])[0])
 
 
 def with_neighbours(touched: NDArray[np.bool_], neighbours: sparse.csr_array) -> NDArray[np.bool_]:

@@ -94,15 +94,14 @@ class WrenchNoise:
     """(6, c, 3) product G S, in N/mm and N."""
 
     @classmethod
-    def of(cls, operator: SurfaceOperator, points_mm: Array) -> WrenchNoise:
-        """For an operator whose resultants are its own: its forces in the six rigid motions."""
+    def of(
+        cls, operator: SurfaceOperator, points_mm: Array, adjoint: AdjointFields | None = None
+    ) -> WrenchNoise:
+        """By the pad's adjoint fields; without, by the operator's forces in six rigid motions."""
+        if adjoint is not None:
+            return cls(points_mm, adjoint.forces)
         rows = [operator.force(motion) for motion in rigid_motions(points_mm)]
         return cls(points_mm, np.stack(rows))
-
-    @classmethod
-    def exact(cls, adjoint: AdjointFields) -> WrenchNoise:
-        """For the pad itself, by its stored adjoint fields."""
-        return cls(adjoint.points_mm, adjoint.forces)
 
     def gains(self, interpolation: MarkerInterpolation) -> Array:
         """Wrench (6, k, 2) per lateral motion of each marker, N/mm and N; 0 for lost ones.

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import FoundForces, NormalReading
-from gelslim_force.forces.estimator import neighbour_matrix
 from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
@@ -26,7 +25,7 @@ from gelslim_optics.light.light_map import LightMap
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.errors import IfemError
 from ifem_export.markers.interpolation import marker_to_node
-from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.mesh.surface_lattice import neighbour_matrix, surface_share_mm2
 
 if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle

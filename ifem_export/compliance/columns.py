@@ -12,7 +12,6 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +49,7 @@ class SurfaceCompliance:
     def __init__(self, bundle: Bundle, folder: Path | None = None) -> None:
         self.bundle = bundle
         self.nodes = len(bundle.mesh.surface)
-        if 36 * self.nodes**2 > MOST_BYTES:
-            raise MeshError(
-                f"{self.nodes} surface nodes: the compliance would take "
-                f"{36 * self.nodes**2 / 1e9:.0f} GB, the limit is {MOST_BYTES / 1e9:.0f} GB; mesh "
-                "the pad with larger cells"
-            )
+        require_room(self.nodes)
         self._folder = folder
         self._rows = self._loaded()
         own = np.arange(self.nodes)
@@ -65,16 +59,19 @@ class SurfaceCompliance:
         self._fresh = False
 
     @cached_property
-    def _operator(self) -> SurfaceOperator:
+    def operator(self) -> SurfaceOperator:
+        """The exact operator of the pad."""
         return self.bundle.surface_operator("factor")
 
     @property
-    def _system(self) -> Any:
-        return self._operator.system  # type: ignore[attr-defined]
+    def system(self) -> PadSystem:
+        """Equations of the pad."""
+        system: PadSystem = self.operator.system  # type: ignore[attr-defined]
+        return system
 
     @cached_property
     def _factor(self) -> SuperLU | RowFactor:
-        system = self._system
+        system = self.system
         if type(system) is not PadSystem:
             return factored(system.stiffness)
         places = np.asarray(system.lattice_positions)
@@ -182,7 +179,7 @@ class SurfaceCompliance:
 
     def whole(self, force_n: Array) -> Array:
         """Displacement (c, 3) under forces (c, 3) on all nodes, by a solve."""
-        return self._operator.displacement(force_n)
+        return self.operator.displacement(force_n)
 
     def store(self) -> None:
         """Write new columns to the folder atomically, unless it is not writable."""
@@ -212,7 +209,7 @@ class SurfaceCompliance:
 
     def _solved(self, nodes: Nodes) -> Array:
         """Columns (n, 3, c, 3)."""
-        n, unknowns = len(nodes), self._system.stiffness.shape[0]
+        n, unknowns = len(nodes), self.system.stiffness.shape[0]
         first = unknowns - 3 * self.nodes
         # The number of right-hand sides is constant, because it affects the last bits: results
         # must not depend on which columns were requested before.
@@ -221,6 +218,17 @@ class SurfaceCompliance:
         loads[first + own, np.arange(3 * n)] = 1.0
         moved = np.asarray(self._factor.solve(loads))[first:, : 3 * n]
         return np.asarray(moved.T.reshape(n, 3, self.nodes, 3))
+
+
+def require_room(nodes: int) -> None:
+    """Raise MeshError for a pad whose table of columns would not fit."""
+    if 36 * nodes**2 > MOST_BYTES:
+        raise MeshError(
+            f"{nodes} surface nodes: the compliance would take {36 * nodes**2 / 1e9:.0f} GB, the "
+            f"limit is {MOST_BYTES / 1e9:.0f} GB; mesh the pad with larger cells",
+            field="mesh",
+            value=nodes,
+        )
 
 
 GRID = 1e-6

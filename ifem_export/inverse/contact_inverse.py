@@ -9,7 +9,7 @@ the forces vanish outside it, only push (no adhesion) and satisfy Coulomb's law 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,14 @@ MOST_BY_PRODUCTS = 200
 """Number of nodes up to which the products among them, (3n)², are faster than the operator."""
 LAST_ROUND = 10.0
 """The rounds end when the change of a round is this many times the tolerance or less."""
+
+
+@runtime_checkable
+class ContactColumns(Protocol):
+    """A surface compliance whose columns are known for nodes in contact."""
+
+    def contact_products(self, nodes: NDArray[np.intp]) -> tuple[NDArray[np.float32], Array]:
+        """Columns (3n, 3c) of nodes (n,) and their products (3n, 3n), in mm/N and mm²/N²."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +91,23 @@ class _Fit:
             force = moved
         return self.result(force, operator.displacement(force) - u, change, steps)
 
+    def by_columns(self, compliance: ContactColumns, start: Array) -> MaskedForce:
+        """The steps of `by_operator` with the exact products of the columns in contact."""
+        from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue
+
+        nodes = np.flatnonzero(self.in_contact)
+        columns, gram = compliance.contact_products(nodes)
+        u = self.displacement_mm.ravel()
+        contact_force = np.ascontiguousarray(start[nodes]).ravel()
+        slope = (columns @ (contact_force @ columns - u)).astype(float)
+        step = 1.0 / (MARGIN * largest_eigenvalue(gram))
+        change, steps = descend(
+            gram, slope, contact_force, self.friction, step, self.tolerance, self.most_steps
+        )
+        force = np.zeros_like(start)
+        force[nodes] = contact_force.reshape(-1, 3)
+        return self.result(force, contact_force @ columns - u, change, steps)
+
     def by_products(self, products: ComplianceProducts, start: Array) -> MaskedForce:
         """Rounds of steps on a quadratic upper bound of the misfit.
 
@@ -130,8 +155,9 @@ def masked_force(
     2015).
 
     Args:
-        operator: Supplies the compliance C. `fft` is fast; condensed operators are exact at the
-            rim.
+        operator: Supplies the compliance C. `fft` is fast and wrong at the rim; columns
+            (`ifem_export.compliance.rim_columns`) are fast and exact, once they are computed;
+            condensed operators are exact and slow.
         displacement_mm: (c, 3) measured displacements of the surface nodes.
         mask: (c,) bool, the nodes in contact.
         friction: Coefficient of friction; inf leaves the tangential forces free.
@@ -157,6 +183,8 @@ def masked_force(
     start = np.zeros_like(u) if start_n is None else checked_field(start_n, len(u))
     start = _projected(start, in_contact, friction)
     fit = _Fit(operator, u, in_contact, friction, most_steps, tolerance)
+    if isinstance(operator, ContactColumns):
+        return fit.by_columns(operator, start)
     products: Any = getattr(operator, "compliance_products", None)
     if isinstance(products, ComplianceProducts) and in_contact.sum() <= MOST_BY_PRODUCTS:
         return fit.by_products(products, start)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import IfemError
 from ifem_export.mesh.pad_mesh import PadMesh
-from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.mesh.surface_lattice import surface_share_mm2
 from ifem_export.operators.pad_system import PadSystem, checked_field
 from ifem_export.operators.single_thread import single_threaded
 from ifem_export.operators.solver import ConvergenceError, Solver, inner_solver

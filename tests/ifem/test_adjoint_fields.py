@@ -13,7 +13,7 @@ from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
 from ifem_export.mesh.outline import Outline, RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.mesh.surface_lattice import surface_share_mm2
 from ifem_export.operators.adjoint_fields import adjoint_fields, resultants, rigid_motions
 from ifem_export.operators.condensed_operators import CondensedOperator
 from ifem_export.operators.crowned_system import pad_system

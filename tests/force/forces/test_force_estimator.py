@@ -11,7 +11,7 @@ from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
 from gelslim_force.forces.wrench import WrenchNoise, resultant, rigid_motions
 from ifem_export.inverse.contact_inverse import masked_force
-from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.mesh.surface_lattice import surface_share_mm2
 from ifem_export.operators.ladder import lumped, refined
 from ifem_export.operators.surface_operator import surface_operator
 

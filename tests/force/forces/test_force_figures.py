@@ -10,16 +10,15 @@ import pytest
 from pad_samples import small_bundle
 from scipy import sparse
 
+from gelslim_force.forces.contact_forces import ContactForces
 from gelslim_force.forces.estimator import (
-    ContactForces,
     ForceEstimator,
     ForceSettings,
     curvature_operator,
-    edge_distance_mm,
-    neighbour_matrix,
     with_neighbours,
 )
 from gelslim_force.forces.low_pass import ForceNoise, LowPass, MotionNoise
+from ifem_export.mesh.surface_lattice import edge_distance_mm, neighbour_matrix
 
 MESH = small_bundle().mesh
 POINTS = np.asarray(MESH.surface_mm)

@@ -7,7 +7,7 @@ import pytest
 
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
-from ifem_export.mesh.surface_area import surface_share_mm2
+from ifem_export.mesh.surface_lattice import surface_share_mm2
 
 
 @pytest.mark.parametrize(("hx", "hy"), [(0.5, 0.8), (0.9, 0.3), (0.4, 0.4)])

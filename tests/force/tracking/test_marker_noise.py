@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from gelslim_force.forces.estimator import curvature_operator, neighbour_matrix
+from gelslim_force.forces.estimator import curvature_operator
 from gelslim_force.forces.low_pass import normal_noise_mm
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.marker_noise import noise_px, robust_sigma
+from ifem_export.mesh.surface_lattice import neighbour_matrix
 
 ROWS, COLUMNS = 40, 55
 SITES = np.stack(np.mgrid[:ROWS, :COLUMNS], axis=-1).reshape(-1, 2)

@@ -1,0 +1,82 @@
+"""The surface compliance as fits of contact forces use it: columns of the nodes in contact."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.columns import SurfaceCompliance, require_room
+from ifem_export.operators.pad_system import PadSystem
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+
+
+class ContactCompliance:
+    """Surface operator of a bundle whose compliance is known by columns, exact up to the edge.
+
+    A step of a fit multiplies by the products of the columns in contact and solves nothing. Columns
+    are computed when they are needed first, and kept, as are the products of the last contact. An
+    instance must not be used by two threads at once.
+
+    Args:
+        bundle: The sensor.
+
+    Attributes:
+        bundle: As given.
+        name: Name of the operator.
+
+    Raises:
+        MeshError: The pad has too many surface nodes.
+    """
+
+    name = "columns"
+
+    def __init__(self, bundle: Bundle) -> None:
+        require_room(len(bundle.mesh.surface))
+        self.bundle = bundle
+        self._last = np.zeros(0, dtype=np.intp), np.zeros((0, 0))
+
+    @cached_property
+    def compliance(self) -> SurfaceCompliance:
+        """The columns."""
+        return SurfaceCompliance(self.bundle)
+
+    @property
+    def system(self) -> PadSystem:
+        """Equations of the pad."""
+        return self.compliance.system
+
+    def prepare(self, nodes: Nodes) -> None:
+        """Compute the columns of nodes (n,) now."""
+        self.compliance.require(nodes)
+
+    def contact_products(self, nodes: Nodes) -> tuple[NDArray[np.float32], Array]:
+        """Columns (3n, 3c) of nodes (n,) and their products CᵀC (3n, 3n), in mm/N and mm²/N²."""
+        columns = self.compliance.columns(nodes).reshape(3 * len(nodes), -1)
+        before, kept = self._last
+        products = np.empty((3 * len(nodes), 3 * len(nodes)))
+        _, old, again = np.intersect1d(before, nodes, return_indices=True)
+        sources, places = (np.ravel(3 * k[:, None] + np.arange(3)) for k in (old, again))
+        products[np.ix_(places, places)] = kept[np.ix_(sources, sources)]
+        new = np.setdiff1d(np.arange(len(columns)), places)
+        fresh = columns[new] @ columns.T
+        products[new], products[:, new] = fresh, fresh.T
+        self._last = np.array(nodes), products
+        return columns, products
+
+    def displacement(self, force_n: ArrayLike) -> Array:
+        """Displacement (c, 3) in mm under forces (c, 3) in N on all nodes, by a solve."""
+        return self.compliance.whole(np.asarray(force_n, dtype=float))
+
+    def force(self, displacement_mm: ArrayLike) -> Array:
+        """Forces (c, 3) in N of a motion (c, 3) in mm, by exact condensation."""
+        return self.compliance.operator.force(displacement_mm)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all columns."""
+        return 36 * self.compliance.nodes**2
