@@ -1,16 +1,17 @@
 """Measurement of the error and the time of each surface operator of one sensor.
 
 The reference is the same pad at half the pitch with eight B-bar layers, whose inner nodes are
-solved for to 1e-8. Its forces are lumped to the coarse nodes by the bilinear shape functions. The
-test motions are smooth bumps about as wide as the pad is thick, tangential and normal, because no
-marker grid resolves narrower ones. Motions that reach the pad's edge have larger errors and are
-measured separately.
+solved for to 1e-8. Its forces are lumped to the coarse nodes by the bilinear shape functions. Some
+test motions are prescribed: smooth bumps about as wide as the pad is thick, tangential and normal,
+in the middle and at the edge. The others are the motions of the reference under the contacts of
+`ladder_contacts`: a small ball, a sharp punch, a contact at the edge and two contacts.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,18 @@ from ifem_export.elements.material import Material
 from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.crowned_system import pad_system
-from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder, operator_label
+from ifem_export.operators.ladder_contacts import (
+    contact_motions,
+    nodal_forces,
+    standard_contacts,
+    surface_positions,
+)
+from ifem_export.operators.operator_ladder import (
+    ContactError,
+    MeasuredRung,
+    OperatorLadder,
+    operator_label,
+)
 from ifem_export.operators.single_thread import single_threaded
 from ifem_export.operators.surface_operator import (
     CROWNED_RUNGS,
@@ -52,6 +64,18 @@ CHOICES: tuple[Choice, ...] = (
     ("factor", {}),
 )
 DENSE: tuple[Choice, ...] = (("dense32", {}),)
+
+
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """A motion (c, 3) in mm of the surface nodes and the forces (c, 3) in N that belong to it."""
+
+    motion_mm: Array
+    force_n: Array
+
+    def errors(self, operator: SurfaceOperator) -> ContactError:
+        found, expected = operator.force(self.motion_mm), self.force_n
+        return ContactError(_relative_error(found, expected), _resultant_error(found, expected))
 
 
 @single_threaded
@@ -87,12 +111,13 @@ def measure_ladder(
     choices = operator_choices(mesh, dense)
     fine = refined(mesh) if reference is None else reference
     report("reference", 0, len(choices) + 1)
-    points = np.asarray(mesh.nodes_mm)[mesh.surface]
-    motions, at_edge = bumps(mesh), edge_bumps(mesh)
-    fields = [motion(points) for motion in motions]
-    edge_fields = [motion(points) for motion in at_edge]
-    truth = reference_forces(mesh, material, [*motions, *at_edge], fine)
-    expected, edge_expected = truth[: len(motions)], truth[len(motions) :]
+    reference_operator = surface_operator(
+        fine, material, REFERENCE_ELEMENT, "pcg", rtol=REFERENCE_RTOL
+    )
+    smooth = _prescribed(mesh, bumps(mesh), reference_operator, fine)
+    at_edge = _prescribed(mesh, edge_bumps(mesh), reference_operator, fine)
+    contacts = _contacts(mesh, reference_operator, fine)
+    fields = [test.motion_mm for test in smooth]
     system = pad_system(mesh, hex8_stiffness(mesh.cell_size_mm, material, formulation))
     exact = system_operator(system, "pcg", rtol=REFERENCE_RTOL)
     condensed = [exact.force(u) for u in fields]
@@ -103,21 +128,23 @@ def measure_ladder(
             operator = surface_operator(mesh, material, formulation, rung)
         else:
             operator = system_operator(system, rung, **parameters)
-        forces = [operator.force(u) for u in fields]
-        edge_forces = [operator.force(u) for u in edge_fields]
-        noise = noise_forces(operator, len(points))
+        noise = noise_forces(operator, system.columns)
+        errors = [test.errors(operator) for test in smooth]
         rungs.append(
             MeasuredRung(
                 rung=rung,
                 parameters=parameters,
-                error_field=max(map(_relative_error, forces, expected)),
-                error_operator=max(map(_relative_error, forces, condensed)),
-                error_resultant=max(map(_resultant_error, forces, expected)),
+                error_field=max(error.field for error in errors),
+                error_operator=max(
+                    map(_relative_error, (operator.force(u) for u in fields), condensed)
+                ),
+                error_resultant=max(error.resultant for error in errors),
                 noise_node_n_per_mm=float(np.std(noise)),
                 noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
                 milliseconds=_one_thread_ms(operator, fields) if timed else None,
                 n_bytes=operator.n_bytes,
-                error_edge=max(map(_relative_error, edge_forces, edge_expected)),
+                error_edge=max(test.errors(operator).field for test in at_edge),
+                contacts={name: test.errors(operator) for name, test in contacts.items()},
             )
         )
     description = (
@@ -126,7 +153,7 @@ def measure_ladder(
     )
     ratio = material.poissons_ratio
     ladder = OperatorLadder(tuple(rungs), description, mesh.layers, formulation, ratio)
-    return ladder if timed else ladder.untimed()
+    return ladder.rounded() if timed else ladder.untimed()
 
 
 def operator_choices(mesh: PadMesh, dense: bool = False) -> tuple[Choice, ...]:
@@ -201,8 +228,27 @@ def reference_forces(
     """
     fine = refined(mesh) if fine is None else fine
     operator = surface_operator(fine, material, REFERENCE_ELEMENT, "pcg", rtol=REFERENCE_RTOL)
-    points = np.asarray(fine.nodes_mm)[fine.surface]
-    return [lumped(operator.force(motion(points)), fine, mesh) for motion in motions]
+    return [test.force_n for test in _prescribed(mesh, motions, operator, fine)]
+
+
+def _prescribed(
+    mesh: PadMesh, motions: Sequence[SurfaceMotion], operator: SurfaceOperator, fine: PadMesh
+) -> list[_Test]:
+    """Tests whose motion is given; their forces are those of the reference."""
+    coarse_mm, fine_mm = np.asarray(mesh.surface_mm), np.asarray(fine.surface_mm)
+    return [
+        _Test(motion(coarse_mm), lumped(operator.force(motion(fine_mm)), fine, mesh))
+        for motion in motions
+    ]
+
+
+def _contacts(mesh: PadMesh, operator: SurfaceOperator, fine: PadMesh) -> dict[str, _Test]:
+    """Tests whose forces are given; their motions are those of the reference."""
+    contacts = standard_contacts(mesh)
+    forces = [nodal_forces(fine, discs) for discs in contacts.values()]
+    moved = contact_motions(operator, fine, mesh, forces)
+    tests = [_Test(u, lumped(f, fine, mesh)) for u, f in zip(moved, forces, strict=True)]
+    return dict(zip(contacts, tests, strict=True))
 
 
 def refined(mesh: PadMesh) -> PadMesh:
@@ -232,10 +278,10 @@ def lumped(force: Array, fine: PadMesh, coarse: PadMesh) -> Array:
         coarse.numbering.shape[1:],
     )
     lattice = np.zeros((fine_rows, fine_columns, 3))
-    lattice[_surface_positions(fine)] = force
+    lattice[surface_positions(fine)] = force
     along_y, along_x = _hats(rows, fine_rows, up), _hats(columns, fine_columns, right)
     total = np.einsum("rj,jic,si->rsc", along_y, lattice, along_x, optimize=True)
-    return np.asarray(total[_surface_positions(coarse)])
+    return np.asarray(total[surface_positions(coarse)])
 
 
 def _hats(coarse: int, fine: int, offset: int) -> Array:
@@ -278,13 +324,6 @@ def _bump(centre: Array, width: float, direction: Array) -> SurfaceMotion:
         return np.asarray(0.1 * np.exp(-square / (2 * width**2))[:, None] * direction)
 
     return field
-
-
-def _surface_positions(mesh: PadMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Lattice rows and columns of the surface nodes."""
-    numbering = mesh.numbering
-    _, j, i = np.unravel_index(numbering.positions[mesh.surface], numbering.shape)
-    return j, i
 
 
 def _relative_error(found: Array, expected: Array) -> float:

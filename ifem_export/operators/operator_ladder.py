@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from gelslim_core.budget.budget import Budget, shown_share
+from gelslim_core.budget.budget import Budget, BudgetError, shown_share
 from gelslim_core.budget.ladder import Choice, Ladder, Rung, Wording
 from ifem_export.errors import IfemError
 from ifem_export.operators.surface_operator import Rung as OperatorName
 
 BALANCE, ENOUGH = 1.1, 0.03
 WORDING = Wording(
-    "operator", "field error", "per frame", "more layers or a finer pitch make smaller errors"
+    "operator", "error", "per frame", "more layers or a finer pitch make smaller errors"
 )
 
 
@@ -22,11 +22,42 @@ _ERRORS = ("error_field", "error_operator", "error_resultant", "error_edge")
 _GAINS = ("noise_node_n_per_mm", "noise_resultant_n_per_mm")
 
 
+CONTACTS = {
+    "small_ball": "a small ball",
+    "sharp_punch": "a sharp punch",
+    "edge": "a contact at the edge",
+    "two_contacts": "two contacts",
+}
+"""Contacts of `ifem_export.operators.ladder_contacts` in words."""
+_UNMEASURED = (
+    "this ladder is of an older release and was measured on smooth motions only; build the bundle "
+    "again for errors of small and sharp contacts"
+)
+
+
+@dataclass(frozen=True)
+class ContactError:
+    """Relative errors of the force field (L2) and of the resultant of one contact."""
+
+    field: float
+    resultant: float
+
+    @property
+    def worst(self) -> float:
+        """The larger one."""
+        return max(self.field, self.resultant)
+
+
 def _rounded(rung: MeasuredRung) -> dict[str, Any]:
     """Errors to 1e-6 and gains to four digits, by name."""
     errors = {name: getattr(rung, name) for name in _ERRORS}
     gains = {name: float(f"{getattr(rung, name):.4g}") for name in _GAINS}
-    return gains | {n: None if v is None else round(v, 6) for n, v in errors.items()}
+    contacts = {
+        name: ContactError(round(e.field, 6), round(e.resultant, 6))
+        for name, e in rung.contacts.items()
+    }
+    rounded = {n: None if v is None else round(v, 6) for n, v in errors.items()}
+    return {**gains, **rounded, "contacts": contacts}
 
 
 def operator_label(rung: str, parameters: Mapping[str, float]) -> str:
@@ -42,16 +73,18 @@ class MeasuredRung:
     Attributes:
         rung: Name of the operator.
         parameters: Its parameters.
-        error_field: L2 error of the force field, for motions that do not reach the pad's edge.
+        error_field: L2 error of the force field, for smooth motions that do not reach the edge.
         error_operator: The same against exact condensation on the same mesh, which leaves out the
             error of the mesh.
-        error_resultant: Error of the resultant.
+        error_resultant: Error of the resultant of these motions.
         noise_node_n_per_mm: Standard deviation of a force component at a node per mm of
             independent noise on every surface displacement.
         noise_resultant_n_per_mm: The same for a component of the resultant.
         milliseconds: Median time of a call on one thread.
         n_bytes: Memory that a call reads.
-        error_edge: L2 error for motions that reach the pad's edge; None if it was not measured.
+        error_edge: L2 error for smooth motions that reach the pad's edge; None if it was not
+            measured.
+        contacts: Errors of `CONTACTS` by name; empty in ladders of older releases.
     """
 
     rung: OperatorName
@@ -64,6 +97,7 @@ class MeasuredRung:
     milliseconds: float | None
     n_bytes: int
     error_edge: float | None = None
+    contacts: Mapping[str, ContactError] = field(default_factory=dict)
 
     @property
     def time_ms(self) -> float:
@@ -72,8 +106,22 @@ class MeasuredRung:
 
     @property
     def error(self) -> float:
-        """The larger of the errors of field and resultant, which a budget is about."""
-        return max(self.error_field, self.error_resultant)
+        """The largest error of field and resultant over all motions, which a budget is about."""
+        return max(self.errors.values())
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """The larger error of field and resultant of each kind of motion; smooth is the first."""
+        found = {"smooth": max(self.error_field, self.error_resultant)}
+        found |= {name: e.worst for name, e in self.contacts.items()}
+        if self.error_edge is not None:
+            found["edge"] = max(self.error_edge, found.get("edge", 0.0))
+        return found
+
+    @property
+    def worst_resultant(self) -> float:
+        """Largest error of the resultant over all motions."""
+        return max([self.error_resultant, *(e.resultant for e in self.contacts.values())])
 
     @property
     def label(self) -> str:
@@ -110,19 +158,24 @@ class OperatorLadder:
         return Ladder(rungs, WORDING)
 
     def choose(self, budget: Budget) -> Choice:
-        """Choose the operator for a budget, which holds for motions that do not reach the edge.
+        """Choose the operator for a budget of its worst error over all motions.
 
         Args:
             budget: Allowed error and time.
 
         Returns:
-            The choice; a remark tells if the error at the pad's edge is larger than allowed.
+            The choice; a remark tells if contacts were not measured.
 
         Raises:
             BudgetError: No operator keeps the budget.
         """
-        choice = self.choices.choose(budget)
-        return replace(choice, remarks=(*choice.remarks, *self._edge_remarks(choice.rung, budget)))
+        try:
+            choice = self.choices.choose(budget)
+        except BudgetError as error:
+            raise BudgetError(f"{error}{self._limiting(budget)}") from error
+        if budget.error is None or all(rung.contacts for rung in self.rungs):
+            return choice
+        return replace(choice, remarks=(*choice.remarks, _UNMEASURED))
 
     def named(self, label: str) -> MeasuredRung | None:
         """The rung with this label, or None."""
@@ -142,10 +195,12 @@ class OperatorLadder:
 
         The last digits are round-off, which differs between processors.
         """
-        return replace(
-            self,
-            rungs=tuple(replace(r, milliseconds=None, **_rounded(r)) for r in self.rungs),
-        )
+        rounded = self.rounded()
+        return replace(rounded, rungs=tuple(replace(r, milliseconds=None) for r in rounded.rungs))
+
+    def rounded(self) -> OperatorLadder:
+        """The ladder with errors and gains rounded, so that every machine makes the same choice."""
+        return replace(self, rungs=tuple(replace(r, **_rounded(r)) for r in self.rungs))
 
     def timed(self, times_ms: Mapping[str, float]) -> OperatorLadder:
         """The same rungs with other times in ms, by label; rungs not named keep theirs."""
@@ -160,28 +215,32 @@ class OperatorLadder:
     def from_record(cls, record: Mapping[str, Any]) -> OperatorLadder:
         """The ladder from plain data. Raises IfemError if these are malformed."""
         try:
-            rungs = tuple(MeasuredRung(**r) for r in record["rungs"])
+            rungs = tuple(_measured(r) for r in record["rungs"])
             return cls(**{**record, "rungs": rungs})
         except (KeyError, TypeError) as error:
             raise IfemError(f"the ladder is malformed ({error!r})", field="ladder") from error
 
-    def _edge_remarks(self, rung: Rung, budget: Budget) -> tuple[str, ...]:
-        chosen = self.named(rung.name)
-        if chosen is None or chosen.error_edge is None or budget.allows_error(chosen.error_edge):
-            return ()
-        remark = (
-            f"where the motion reaches the gel's edge the field error of {rung.name} is "
-            f"{shown_share(chosen.error_edge)}, outside the calibrated range"
+    def _limiting(self, budget: Budget) -> str:
+        """What keeps the most accurate operator from a budget of error that it keeps else."""
+        best = min(self.rungs, key=lambda r: r.error)
+        if budget.allows_error(best.error):
+            return ""
+        worst = max(best.errors, key=lambda name: best.errors[name])
+        smooth = best.errors["smooth"]
+        if worst not in CONTACTS or not budget.allows_error(smooth):
+            return ""
+        return (
+            f"; the error of {best.label} is {shown_share(best.error)} under {CONTACTS[worst]} and "
+            f"{shown_share(smooth)} for smooth motions"
         )
-        edges = [(r.error_edge, r) for r in self._by_work() if r.error_edge is not None]
-        for error, other in edges:
-            if budget.allows(max(error, other.error), other.time_ms):
-                return (f"{remark}; {other.label} keeps the budget there too",)
-        least, best = min(edges, key=lambda pair: pair[0])
-        return (f"{remark}; {best.label} has the smallest error there, {shown_share(least)}",)
 
     def _by_work(self) -> list[MeasuredRung]:
         return sorted(self.rungs, key=lambda r: r.n_bytes)
+
+
+def _measured(record: Mapping[str, Any]) -> MeasuredRung:
+    errors = {name: ContactError(**e) for name, e in record.get("contacts", {}).items()}
+    return MeasuredRung(**{**record, "contacts": errors})
 
 
 def chosen_rung(

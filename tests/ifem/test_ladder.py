@@ -22,9 +22,14 @@ from ifem_export.operators.ladder import (
     lumped,
     measure_ladder,
     operator_choices,
-    reference_forces,
     refined,
     time_operators,
+)
+from ifem_export.operators.ladder_contacts import (
+    Disc,
+    contact_motions,
+    nodal_forces,
+    standard_contacts,
 )
 from ifem_export.operators.operator_ladder import OperatorLadder
 from ifem_export.operators.surface_operator import surface_operator
@@ -126,62 +131,48 @@ def test_lumping_keeps_the_resultant() -> None:
 
 def test_budgets_choose(ladder: OperatorLadder) -> None:
     timed = ladder.timed({r.label: float(k + 1) for k, r in enumerate(ladder.rungs)})
-    lumped_fft = error(ladder, "fft (lumped 1)")
-    assert error(ladder, "pcg (rtol 0.01)") < lumped_fft < 0.05
+    worst = {r.label: r.error for r in ladder.rungs}
+    assert worst["pcg (rtol 0.01)"] < worst["fft (lumped 1)"] < worst["fft"]
 
     def chosen(error: float | None = None, time_ms: float | None = None) -> str:
         return timed.choose(Budget(error, time_ms)).rung.name
 
-    assert chosen(1.01 * lumped_fft) == "fft (lumped 1)"
-    assert chosen(0.99 * lumped_fft) == "pcg (rtol 0.01)"
+    for error in sorted(worst.values()):
+        label = chosen(1.001 * error)
+        assert worst[label] <= 1.001 * error
+        work = {r.label: r.n_bytes for r in ladder.rungs if r.error <= 1.001 * error}
+        assert work[label] == min(work.values())
     assert chosen(time_ms=1.5) == "paper"
-    assert error(ladder, chosen(time_ms=100.0)) == min(r.error_field for r in ladder.rungs)
-    for budget in ({"error": 1e-6}, {"time_ms": 0.5}):
+    assert worst[chosen(time_ms=100.0)] == min(worst.values())
+    for budget in ({"error": 0.99 * min(worst.values())}, {"time_ms": 0.5}):
         with pytest.raises(BudgetError):
             chosen(**budget)
 
 
-def test_an_error_is_kept_off_the_edge_and_told_at_the_edge(ladder: OperatorLadder) -> None:
-    """A circulant operator promised 3 % and erred by 12 % where a slide reached the edge."""
-    mesh = pad()
-    points = np.asarray(mesh.nodes_mm)[mesh.surface]
-    rung = next(r for r in ladder.rungs if r.label == "fft (lumped 1)")
-    operator = surface_operator(mesh, GEL, "bbar", rung.rung, **rung.parameters)
-    assert rung.error_edge is not None
-    for place, way, promised in (
-        ((1.0, -1.5), (0.6, 0.5, -0.6), rung.error_field),
-        ((0.0, 6.5), (0.2, -1.0, 0.0), 1.2 * rung.error_edge),
-        ((-7.5, 2.0), (0.9, 0.4, -0.1), 1.2 * rung.error_edge),
-        ((6.5, -5.5), (0.7, 0.6, -0.3), 1.2 * rung.error_edge),
-    ):
+def test_an_error_is_kept_by_contacts_it_was_not_measured_on(ladder: OperatorLadder) -> None:
+    """Other places and directions, pressures between those of a ball and of a punch, two sizes.
 
-        def field(points: np.ndarray, place=place, way=way) -> np.ndarray:
-            square = ((points[:, :2] - place) ** 2).sum(axis=1)
-            return 0.1 * np.exp(-square / 8)[:, None] * np.array(way)
-
-        (expected,) = reference_forces(mesh, GEL, [field])
-        off = operator.force(field(points)) - expected
-        assert np.linalg.norm(off) <= promised * np.linalg.norm(expected)
-    (remark,) = ladder.choose(Budget(1.01 * rung.error_field)).remarks
-    assert "fft (lumped 1)" in remark
-
-
-def test_the_operator_that_keeps_the_edge_too_is_named(ladder: OperatorLadder) -> None:
-    edges = {"fft (lumped 1)": 0.12, "pcg (rtol 0.01)": 0.04, "factor": 0.029}
-    made = replace(
-        ladder, rungs=tuple(replace(r, error_edge=edges.get(r.label)) for r in ladder.rungs)
-    )
-    asked = Budget(1.01 * error(ladder, "fft (lumped 1)"))
-    (remark,) = made.choose(asked).remarks
-    assert "fft (lumped 1) is 12 %" in remark
-    assert made.choose(Budget(0.05)).rung.name == "fft (lumped 1)"
-    assert "pcg (rtol 0.01)" in made.choose(Budget(0.05)).remarks[0]
-    assert "factor" not in made.choose(Budget(0.05)).remarks[0]
-    assert made.choose(Budget(0.13)).remarks == ()
-    quick = made.timed({r.label: 9.0 for r in made.rungs} | {"fft (lumped 1)": 1.0})
-    remark = quick.choose(Budget(0.05, 5.0)).remarks[0]
-    assert "factor" in remark
-    assert "2.9 %" in remark
+    A circulant operator promised 3 % and erred by 12 % where a slide reached the edge.
+    """
+    mesh, fine = pad(), refined(pad())
+    exact = surface_operator(fine, GEL, "bbar", "pcg", rtol=1e-8)
+    a = standard_contacts(mesh)["small_ball"][0].radius_mm
+    discs = [
+        Disc(np.array([1.0, -1.5]), 1.3 * a, np.array([0.6, 0.5, -1.0])),
+        Disc(np.array([-2.5, 1.0]), a, np.array([-0.1, 0.4, -1.0]), is_sharp=True),
+        Disc(np.array([0.3, 6.6]), a, np.array([0.0, -0.5, -1.0])),
+        Disc(np.array([-7.0, 2.0]), a, np.array([0.5, 0.4, -1.0])),
+    ]
+    forces = [nodal_forces(fine, (disc,)) for disc in discs]
+    moved = contact_motions(exact, fine, mesh, forces)
+    for label in ("fft (lumped 1)", "pcg (rtol 0.01)", "factor"):
+        rung = ladder.named(label)
+        assert rung is not None
+        operator = surface_operator(mesh, GEL, "bbar", rung.rung, **rung.parameters)
+        for u, force in zip(moved, forces, strict=True):
+            expected = lumped(force, fine, mesh)
+            off = np.linalg.norm(operator.force(u) - expected) / np.linalg.norm(expected)
+            assert off < 1.15 * rung.error, (label, off)
 
 
 def test_an_error_picks_the_same_operator_and_the_same_bits_whatever_the_clock(
@@ -193,7 +184,7 @@ def test_an_error_picks_the_same_operator_and_the_same_bits_whatever_the_clock(
     quick = ladder.timed({r.label: float(10 ** rng.uniform(-4, 4)) for r in ladder.rungs})
     assert slow != quick
     assert slow.balanced().label == quick.balanced().label == ladder.balanced().label
-    for error in (0.5, 0.1, 0.05, 0.03):
+    for error in (0.5, *(1.01 * r.error for r in ladder.rungs[-2:])):
         forces = [
             build_bundle(pad(), GEL, "bbar", with_stiffness=False, ladder=one)
             .surface_operator(budget=Budget(error))
@@ -272,13 +263,14 @@ def test_a_bundle_carries_its_ladder_and_chooses_at_load(
     loaded = load_bundle(tmp_path / "b")
     assert loaded.ladder == ladder
     assert loaded.surface_operator().name == "fft"
-    chosen = ladder.named(ladder.choose(Budget(0.05)).rung.name)
+    least = min(r.error for r in ladder.rungs)
+    chosen = ladder.named(ladder.choose(Budget(0.6)).rung.name)
     assert chosen is not None
-    assert loaded.surface_operator(budget=Budget(0.05)).name == chosen.rung
-    assert loaded.surface_operator(budget=Budget(0.035)).name in ("pcg", "factor")
+    assert loaded.surface_operator(budget=Budget(0.6)).name == chosen.rung
+    assert loaded.surface_operator(budget=Budget(1.01 * least)).name in ("pcg", "factor")
     assert loaded.surface_operator("paper").name == "paper"
     with pytest.raises(BudgetError):
-        loaded.surface_operator(budget=Budget(0.05, 1e-6))
+        loaded.surface_operator(budget=Budget(0.6, 1e-6))
     bare = build_bundle(pad(), GEL, "bbar", with_stiffness=False)
     assert bare.surface_operator().name == "pcg"
     with pytest.raises(IfemError) as caught:
@@ -311,7 +303,7 @@ def test_a_coarse_mesh_takes_a_tenth_above_its_smallest_error(ladder: OperatorLa
     rungs = sorted(ladder.rungs, key=lambda r: r.n_bytes)[:3]
     for middle, expected in ((0.109, 1), (0.111, 2)):
         made = [
-            replace(r, error_field=error, error_resultant=0.01)
+            replace(r, error_field=error, error_resultant=0.01, error_edge=None, contacts={})
             for r, error in zip(rungs, (0.2, middle, 0.1), strict=True)
         ]
         assert replace(ladder, rungs=tuple(made)).balanced().label == rungs[expected].label

@@ -10,6 +10,7 @@ import pytest
 from ifem_export.elements.material import Material
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators import ladder as measured
+from ifem_export.operators.ladder_contacts import nodal_forces, standard_contacts
 from ifem_export.operators.operator_ladder import OperatorLadder
 from ifem_export.operators.surface_operator import surface_operator
 
@@ -128,6 +129,15 @@ def test_errors_and_noise_gains_are_those_of_their_definition(
     assert rung.error_operator == pytest.approx(inside[1], abs=2e-6)
     assert rung.error_resultant == pytest.approx(inside[2], abs=2e-6)
     assert rung.error_edge == pytest.approx(np.max(errors[4:], axis=0)[0], abs=2e-6)
+    for name, discs in standard_contacts(mesh).items():
+        force = nodal_forces(fine, discs)
+        truth = measured.lumped(force, fine, mesh)
+        moved = finest.displacement(force)
+        same = np.abs(points[:, None, :2] - fine_points[None, :, :2]).sum(axis=2) < 1e-9
+        found = operator.force(moved[same.argmax(axis=1)])
+        assert rung.contacts[name].field == pytest.approx(relative(found, truth), abs=2e-6)
+        ratio = relative(found.sum(axis=0), truth.sum(axis=0))
+        assert rung.contacts[name].resultant == pytest.approx(ratio, abs=2e-6)
     rng = np.random.default_rng(measured.NOISE_SEED)
     forces = [operator.force(rng.normal(size=points.shape)) for _ in range(measured.NOISE_DRAWS)]
     assert rung.noise_node_n_per_mm == pytest.approx(np.std(forces), rel=6e-4)

@@ -6,9 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from gelslim_core.budget.budget import Budget
+from gelslim_core.budget.budget import Budget, BudgetError
 from ifem_export.errors import IfemError
-from ifem_export.operators.operator_ladder import MeasuredRung, OperatorLadder, chosen_rung
+from ifem_export.operators.operator_ladder import (
+    CONTACTS,
+    ContactError,
+    MeasuredRung,
+    OperatorLadder,
+    chosen_rung,
+)
 
 
 def rung(
@@ -52,18 +58,36 @@ def test_a_budget_is_about_the_resultant_too() -> None:
     assert ladder.choose(Budget(0.3)).rung.name == "pcg (a 1)"
 
 
-def test_the_remark_names_the_least_work_that_keeps_the_edge() -> None:
-    rungs = (rung("a", 0.02, 10, 0.15), rung("b", 0.2, 20, 0.04), rung("c", 0.01, 30, 0.05))
-    (remark,) = made(*rungs).choose(Budget(0.06)).remarks
-    assert "pcg (a 1)" in remark
-    assert "pcg (c 1)" in remark
-    assert "pcg (b 1)" not in remark
-    (remark,) = made(*rungs).choose(Budget(0.03)).remarks
-    assert "pcg (b 1)" in remark
-    assert "4 %" in remark
-    assert made(*rungs).choose(Budget(0.2)).remarks == ()
-    unknown = made(*(replace(r, error_edge=None) for r in rungs))
-    assert unknown.choose(Budget(0.03)).remarks == ()
+def test_a_budget_is_about_the_worst_motion() -> None:
+    """A rung that is right for smooth motions and wrong at the edge or under a punch is refused."""
+    punch = {name: ContactError(0.02, 0.01) for name in CONTACTS}
+    rungs = (
+        replace(rung("a", 0.02, 10, 0.15), contacts=punch),
+        replace(rung("b", 0.02, 20, 0.04), contacts=punch | {"sharp_punch": ContactError(0.2, 0)}),
+        replace(rung("c", 0.02, 30, 0.04), contacts=punch | {"edge": ContactError(0.03, 0.1)}),
+        replace(rung("d", 0.02, 40, 0.04), contacts=punch),
+    )
+    ladder = made(*rungs)
+    assert [r.error for r in rungs] == [0.15, 0.2, 0.1, 0.04]
+    assert rungs[2].errors["edge"] == rungs[2].worst_resultant == 0.1
+    for error, name in ((0.2, "a"), (0.15, "a"), (0.14, "c"), (0.09, "d"), (0.04, "d")):
+        choice = ladder.choose(Budget(error))
+        assert choice.rung.name == f"pcg ({name} 1)"
+        assert choice.remarks == ()
+    with pytest.raises(BudgetError) as caught:
+        ladder.choose(Budget(0.03))
+    assert "4 % under a contact at the edge and 2 % for smooth motions" in str(caught.value)
+    with pytest.raises(BudgetError) as caught:
+        ladder.choose(Budget(0.01))
+    assert "smooth motions" not in str(caught.value)
+
+
+def test_a_ladder_without_contacts_is_chosen_from_and_told() -> None:
+    old = made(rung("a", 0.02, 10, 0.15), rung("b", 0.02, 20, 0.04))
+    choice = old.choose(Budget(0.05))
+    assert choice.rung.name == "pcg (b 1)"
+    assert len(choice.remarks) == 1
+    assert made(rung("a", 0.02, 10)).choose(Budget(0.05)).rung.name == "pcg (a 1)"
 
 
 def test_a_budget_chooses_and_a_name_finds() -> None:
