@@ -37,7 +37,6 @@ def check_bundle(bundle: Bundle) -> None:
     if bundle.stiffness is not None:
         _check_csr("stiffness", bundle.stiffness)
     _check_markers(bundle.markers)
-    _check_adjoint(bundle)
     _check_self_test(bundle)
 
 
@@ -142,10 +141,10 @@ def _check_markers(markers: MarkerField | None) -> None:
         _fail("thin_plate_bending", "is not the bending energy of a spline through the markers")
 
 
-def _check_adjoint(bundle: Bundle) -> None:
-    """Raise BundleError for fields that cannot be S r: their products with r are symmetric.
+def check_adjoint(bundle: Bundle) -> None:
+    """Raise BundleError for adjoint fields that belong to no stiffness.
 
-    The work of a rigid motion is positive, too.
+    The work of one rigid motion's forces in another is symmetric, and that in itself positive.
     """
     if bundle.stored_adjoint is None:
         return

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gelslim_core.files.file_lock import beside, locked
 from gelslim_core.files.replaced_folder import FolderError, recover, replaced_folder
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.bundle.check import check_bundle
+from ifem_export.bundle.check import check_adjoint, check_bundle
 from ifem_export.bundle.layout import bundle_arrays, bundle_from
 from ifem_export.bundle.manifest import (
     LADDER,
@@ -51,6 +51,7 @@ def write_bundle(path: str | os.PathLike[str], bundle: Bundle) -> None:
     """
     bundle = _with_adjoint(bundle)
     check_bundle(bundle)
+    check_adjoint(bundle)
     target = Path(os.path.abspath(path))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -118,6 +119,7 @@ def load_bundle(path: str | os.PathLike[str], verify: bool = True) -> Bundle:
             raise BundleError("free_nodes.npy", "does not follow from the bonded nodes", REBUILD)
         if bundle.geometry_hash != manifest["geometry_hash"]:
             raise BundleError(MANIFEST, "geometry hash does not match the arrays", REBUILD)
+        check_adjoint(bundle)
     return bundle
 
 

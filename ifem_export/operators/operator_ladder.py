@@ -123,6 +123,12 @@ class MeasuredRung:
         """Largest error of the resultant over all motions."""
         return max([self.error_resultant, *(e.resultant for e in self.contacts.values())])
 
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> MeasuredRung:
+        """The rung from plain data. Raises TypeError if these are malformed."""
+        contacts = {name: ContactError(**e) for name, e in record.get("contacts", {}).items()}
+        return cls(**{**record, "contacts": contacts})
+
     @property
     def label(self) -> str:
         """Name with parameters."""
@@ -215,9 +221,9 @@ class OperatorLadder:
     def from_record(cls, record: Mapping[str, Any]) -> OperatorLadder:
         """The ladder from plain data. Raises IfemError if these are malformed."""
         try:
-            rungs = tuple(_measured(r) for r in record["rungs"])
+            rungs = tuple(MeasuredRung.from_record(r) for r in record["rungs"])
             return cls(**{**record, "rungs": rungs})
-        except (KeyError, TypeError) as error:
+        except (AttributeError, KeyError, TypeError) as error:
             raise IfemError(f"the ladder is malformed ({error!r})", field="ladder") from error
 
     def _limiting(self, budget: Budget) -> str:
@@ -236,11 +242,6 @@ class OperatorLadder:
 
     def _by_work(self) -> list[MeasuredRung]:
         return sorted(self.rungs, key=lambda r: r.n_bytes)
-
-
-def _measured(record: Mapping[str, Any]) -> MeasuredRung:
-    errors = {name: ContactError(**e) for name, e in record.get("contacts", {}).items()}
-    return MeasuredRung(**{**record, "contacts": errors})
 
 
 def chosen_rung(

@@ -10,7 +10,7 @@ import pytest
 from ifem_bundles import reseal
 
 from ifem_export.bundle.bundle import Bundle, build_bundle
-from ifem_export.bundle.check import check_bundle
+from ifem_export.bundle.check import check_adjoint
 from ifem_export.bundle.files import load_bundle, write_bundle
 from ifem_export.elements.material import Material
 from ifem_export.errors import BundleError
@@ -73,5 +73,5 @@ def test_fields_that_no_stiffness_has_are_refused(made, damage: str) -> None:
     else:
         fields[0, 3, 2] += 0.1 * np.abs(fields).max()
     with pytest.raises(BundleError) as caught:
-        check_bundle(replace(made, stored_adjoint=fields))
+        check_adjoint(replace(made, stored_adjoint=fields))
     assert caught.value.file == "adjoint_fields.npy"
