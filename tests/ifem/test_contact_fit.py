@@ -10,7 +10,7 @@ from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
 from ifem_export.inverse.contact_fit_kernel import descend, largest_eigenvalue, project
-from ifem_export.inverse.contact_inverse import MARGIN, masked_force, smoothing
+from ifem_export.inverse.contact_inverse import GOLDEN, MARGIN, masked_force, smoothing
 from ifem_export.operators.convolved_operator import ComplianceProducts
 from ifem_export.operators.layered_operator import layered_operator, surface_compliance
 
@@ -79,13 +79,14 @@ def test_projection_is_that_onto_the_nearest_ray(friction: float) -> None:
     assert again == pytest.approx(found, abs=1e-14)
 
 
-@pytest.mark.parametrize("decay", [1.0, 0.9, 0.3])
-def test_largest_eigenvalue_is_the_quotient_after_eight_power_steps(decay: float) -> None:
-    """Of a diagonal matrix in closed form."""
-    values = 2.5 * decay ** np.arange(12.0)
-    weight = np.tile(START, 4) ** 2 * values**14
-    expected = (weight * values).sum() / weight.sum()
-    assert largest_eigenvalue(np.diag(values)) == pytest.approx(expected, rel=1e-12)
+@pytest.mark.parametrize("count", [1, 4, 12, 60])
+@pytest.mark.parametrize("decay", [0.5, 0.9, 0.99])
+def test_the_largest_eigenvalue_is_never_far_below_the_true_one(count: int, decay: float) -> None:
+    """A clustered one too; it was 43 % too low for a ball on 16 nodes, whose fit diverged."""
+    turn, _ = np.linalg.qr(np.random.default_rng(count).normal(size=(3 * count, 3 * count)))
+    values = 2.5 * decay ** np.arange(3.0 * count)
+    found = largest_eigenvalue((turn * values) @ turn.T)
+    assert 2.5 / MARGIN < found <= 2.5 * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5, np.inf])
@@ -118,9 +119,10 @@ def test_a_descent_that_ends_without_force_has_not_changed() -> None:
 
 
 def ritz_value(square: np.ndarray) -> float:
-    """Largest Ritz value of a matrix in the Krylov space of four vectors from a uniform force."""
-    space = [np.tile(START, len(square) // 3)]
-    for _ in range(3):
+    """Largest Ritz value of a matrix in the Krylov space of eight vectors from an uneven force."""
+    uneven = (np.arange(1, len(square) + 1) * GOLDEN) % 1.0 - 0.5
+    space = [np.tile(START, len(square) // 3) + uneven]
+    for _ in range(7):
         space.append(square @ space[-1] / np.linalg.norm(space[-1]))
     basis, _ = np.linalg.qr(np.array(space).T)
     return float(np.linalg.eigvalsh(basis.T @ square @ basis)[-1])
@@ -205,10 +207,10 @@ def test_fit_by_products_takes_the_slope_anew_in_every_round(friction: float, mo
 
 
 def test_the_step_size_takes_few_operator_calls() -> None:
-    """Two for each of four Lanczos steps and of the steps of the fit, and one for the misfit."""
+    """Two for each of eight Lanczos steps and of the steps of the fit, and one for the misfit."""
     operator, u = Dense(12), np.random.default_rng(1).normal(size=(12, 3))
     masked_force(operator, u, np.ones(12, bool), most_steps=3)
-    assert operator.calls == 2 * 4 + 2 * 3 + 1
+    assert operator.calls == 2 * 8 + 2 * 3 + 1
     single = Dense(1)
     single.matrix = 2.0 * np.eye(3)
     masked_force(single, np.array([[0.1, 0.0, -1.0]]), [True], most_steps=1)
