@@ -23,7 +23,7 @@ CORE_NAMES := contact_inverse convolved_operator finite_strain solver_hard surfa
 	contact_balance contact_incompressible contact_ladder contact_limits contact_relief \
 	contact_rungs contact_solver contact_walls calibration_fit contact_forces \
 	crowned_sensor force_estimator lattice_registration low_pass back_projection \
-	lens_distortion tir_certificate trace_balance fold_solver rigid_answer
+	lens_distortion tir_certificate trace_balance fold_solver adjoint_fields
 CORE_TESTS = $(foreach name,$(CORE_NAMES),$(or $(shell find tests -name "test_$(name).py"),\
 	$(error no test file is called test_$(name).py)))
 

@@ -38,6 +38,8 @@ SOURCES: dict[str, Convert] = {
     "rendering": rendering,
 }
 """Files in docs/data with the functions that make ladders of them, in the order of the page."""
+BESIDE = {"stiffness_ladder": "operator_contacts"}
+"""Files whose data a ladder needs too: which operator is the default follows from contacts."""
 HEADER = ("machine", "system", "processor", "cores", "threads", "python", "numpy", "scipy",
           "numba", "opencv", "cadquery", "gelslim_cad", "seed")  # fmt: skip
 PAGE = "accuracy_vs_time.md"
@@ -97,6 +99,9 @@ def read_ladders(docs: Path) -> list[LadderRecord]:
         path = docs / "data" / f"{name}.json"
         if path.exists():
             data = json.loads(path.read_text(encoding="utf-8"))
+            beside = docs / "data" / f"{BESIDE.get(name, name)}.json"
+            if name in BESIDE and beside.exists():
+                data[BESIDE[name]] = json.loads(beside.read_text(encoding="utf-8"))
             found += convert(data, {key: data[key] for key in HEADER if key in data})
     return found
 

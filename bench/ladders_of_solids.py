@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ladder_record import LadderRecord, RungRecord
@@ -38,8 +38,8 @@ def stiffness_at(data: Data, header: Data, ratio: float) -> LadderRecord:
     """The ladder of one Poisson's ratio; ours is what a bundle of four B-bar layers starts with."""
     rows = [r for r in data["rows"] if (r["poissons_ratio"], r["cells"]) == (ratio, OWN_CELLS)]
     own = [r for r in rows if pad_of(r) == (OWN_CELLS, OWN_LAYERS, OWN_ELEMENT)]
-    enough = max(ENOUGH, BALANCE * min(r["error_field"] for r in own))
-    chosen = min((r for r in own if r["error_field"] <= enough), key=lambda r: r["n_bytes"])
+    default = default_label(data, ratio, own)
+    chosen = next(r for r in own if r["label"] == default)
     rungs = []
     for row in rows:
         is_paper = row["rung"] == "paper" and pad_of(row) == (OWN_CELLS, OWN_LAYERS, OWN_ELEMENT)
@@ -75,6 +75,16 @@ def stiffness_at(data: Data, header: Data, ratio: float) -> LadderRecord:
         header=header,
         count_label="MB kept",
     )
+
+
+def default_label(data: Data, ratio: float, own: Sequence[Data]) -> str:
+    """The operator that a bundle starts with, by the worst contact where contacts were measured."""
+    for found in data.get("operator_contacts", {}).get("ladders", ()):
+        if found["poissons_ratio"] == ratio:
+            return str(found["default"])
+    enough = max(ENOUGH, BALANCE * min(r["error_field"] for r in own))
+    chosen = min((r for r in own if r["error_field"] <= enough), key=lambda r: r["n_bytes"])
+    return str(chosen["label"])
 
 
 def pad_of(row: Data) -> tuple[int, int, str]:

@@ -33,6 +33,12 @@ def _from(name: str, make: Callable[[Any], str]) -> Make:
     return lambda: make(json.loads((DOCS / "data" / f"{name}.json").read_text("utf-8")))
 
 
+def _operators_in_short() -> str:
+    names = ("stiffness_ladder", "operator_contacts")
+    found = [json.loads((DOCS / "data" / f"{name}.json").read_text("utf-8")) for name in names]
+    return page_tables.operators_in_short(*found)
+
+
 def _sensitivities() -> str:
     import sensitivities
 
@@ -42,7 +48,7 @@ def _sensitivities() -> str:
 PAGES: Mapping[str, Mapping[str, Make]] = {
     "README.md": {
         "latency": _from("force_latency", force_tables.short_latency),
-        "operators": _from("stiffness_ladder", page_tables.operators_in_short),
+        "operators": _operators_in_short,
         "concessions": lambda: page_tables.concessions(2),
     },
     "docs/design_guide.md": {
@@ -62,7 +68,9 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
     },
     "docs/stiffness.md": {
         "operators": _from("stiffness_ladder", page_tables.operators),
+        "contacts": _from("operator_contacts", page_tables.contacts),
         "layers": _from("stiffness_ladder", page_tables.layers),
+        "edge-fits": _from("operator_contacts", page_tables.edge_fits),
         "cut-cells": _from("stiffness_cases", page_tables.cut_cells),
         "iterations": _from("stiffness_cases", page_tables.iterations),
         "noise": _from("stiffness_cases", page_tables.noise),

@@ -18,6 +18,13 @@ OPERATORS = {
     "`pcg`, residual 1e-4": "pcg (rtol 0.0001)",
     "`factor` (SuperLU)": "factor",
 }
+KINDS = {
+    "smooth": "smooth",
+    "small_ball": "small ball",
+    "sharp_punch": "sharp punch",
+    "edge": "at the edge",
+    "two_contacts": "two contacts",
+}
 SHORT = ("paper", "fft (lumped 1)", "pcg (rtol 0.01)")
 SETTINGS = {
     "plain setting": "plain",
@@ -67,15 +74,50 @@ def operators(data: Data) -> str:
     return table([*heads, "time per frame"], rows)
 
 
-def operators_in_short(data: Data) -> str:
-    """Return error of field and resultant, and time, of three operators."""
+def contact_row(contacts: Data, nu: float, rung: str) -> Data:
+    """Return the errors by kind of contact of one operator."""
+    (found,) = (x for x in contacts["ladders"] if x["poissons_ratio"] == nu)
+    (row,) = (r for r in found["rows"] if r["label"] == rung)
+    return dict(row)
+
+
+def operators_in_short(data: Data, contacts: Data) -> str:
+    """Return error by kind of contact, and time, of three operators."""
     names = {rung: name for name, rung in OPERATORS.items()}
     rows = []
     for rung in SHORT:
-        r = row_of(data, NUS[0], rung)
-        errors = (percent(r["error_field"]), percent(r["error_resultant"]))
-        rows.append([names[rung], *errors, f"{r['milliseconds']:.2g} ms"])
-    return table(["operator", "error of the force field", "of the resultant", "per frame"], rows)
+        errors = contact_row(contacts, NUS[0], rung)["errors"]
+        time = f"{row_of(data, NUS[0], rung)['milliseconds']:.2g} ms"
+        rows.append([names[rung], *(percent(errors[kind]) for kind in KINDS), time])
+    return table(["operator", *KINDS.values(), "per frame"], rows)
+
+
+def contacts(data: Data) -> str:
+    """Return the errors of every operator by kind of contact, at two Poisson's ratios."""
+    rows = []
+    for name, rung in OPERATORS.items():
+        found = [contact_row(data, nu, rung) for nu in (NUS[0], NUS[-1])]
+        cells = [" / ".join(percent(r["errors"][kind]) for r in found) for kind in KINDS]
+        rows.append([name, *cells, " / ".join(percent(r["resultant"]) for r in found)])
+    heads = [f"ν = {NUS[0]:g} / {NUS[-1]:g}", *KINDS.values(), "resultant, worst"]
+    return table(heads, rows)
+
+
+def edge_fits(data: Data) -> str:
+    """Return the error of the field of a fitted contact by its distance from the edge."""
+    rows = []
+    for gap in dict.fromkeys(r["gap_mm"] for r in data["fits"]):
+        found = [
+            next(
+                r["field"] for r in data["fits"] if (r["gap_mm"], r["poissons_ratio"]) == (gap, nu)
+            )
+            for nu in (NUS[0], NUS[-1])
+        ]
+        rows.append(
+            [f"{gap:g} mm"] + [" / ".join(percent(f[way]) for f in found) for way in found[0]]
+        )
+    heads = [f"rim of the contact from the edge; ν = {NUS[0]:g} / {NUS[-1]:g}"]
+    return table([*heads, "fit by the infinite pad", "low-pass, 0.7 mm", "fit by columns"], rows)
 
 
 def layers(data: Data) -> str:

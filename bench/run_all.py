@@ -38,6 +38,7 @@ class Step:
 
 STEPS = (
     Step("stiffness_ladder"),
+    Step("operator_contacts"),
     Step("light_rays", quick=("--rays", "12", "--reference", "18", "--ladder-alone")),
     Step("tessellation"),
     Step("camera_models"),

@@ -28,8 +28,8 @@ class PipelineSettings:
 
     Attributes:
         rung: Surface operator by name; None lets `budget` or the bundle choose.
-        budget: Largest error of the force field, or longest time of the operator per frame, by
-            which the operator is chosen from the ladder measured in the bundle.
+        budget: Largest error of the forces in the worst contact, or longest time of the operator
+            per frame, by which the operator is chosen from the ladder measured in the bundle.
         compensation: How the apparent motion of pressed markers is corrected, see `marker_motion`.
         interpolation: From markers to surface nodes.
         gel: Law of the gel; `auto` takes the neo-Hookean one from a tenth of the thickness on.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FieldError = Annotated[
     str | None,
-    typer.Option("--error", help="Largest error of the force field, such as 3% or 0.03."),
+    typer.Option("--error", help="Largest error of the forces of any contact, as 15% or 0.15."),
 ]
 FrameTime = Annotated[
     str | None,
