@@ -21,6 +21,7 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import BORDER, Detections
 from gelslim_force.detection.settings import DetectorSettings
+from gelslim_force.frames.read_only import read_only
 from gelslim_force.frames.upright import upright
 from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.registration import Registration, register
@@ -120,6 +121,7 @@ def calibrate(
         deviation=deviation,
         diagnosis=diagnosis_lines(deviation, grid, found, missing, aside, in_view),
         warnings=warning_lines(deviation, residuals, grid, missing, aside, in_view),
+        picture=read_only(image.copy()),
     )
 
 

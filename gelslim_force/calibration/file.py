@@ -17,6 +17,7 @@ from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.calibration.stored_picture import picture_of, picture_record
 from gelslim_force.detection.detections import Detections
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.camera.virtual_camera import VirtualCamera
@@ -45,6 +46,7 @@ def calibration_record(calibration: Calibration) -> dict[str, Any]:
         "dots": {name: _plain(getattr(c.dots, name)) for name in _DOTS},
         "residual_px": c.residual_px.tolist(),
         "rest_mm": c.rest_mm.tolist(),
+        "picture": None if c.picture is None else picture_record(c.picture),
     }
 
 
@@ -56,7 +58,7 @@ def calibration_of(record: Mapping[str, Any]) -> Calibration:
     """
     if record.get("format") != FORMAT:
         raise ValueError(f"its format is {record.get('format')!r}, only {FORMAT} is known")
-    deviation = record["deviation"]
+    deviation, picture = record["deviation"], record.get("picture")
     grid, dots = record["grid"], record["dots"]
     return Calibration(
         camera=VirtualCamera.from_record(record["camera"]),
@@ -85,6 +87,7 @@ def calibration_of(record: Mapping[str, Any]) -> Calibration:
         deviation=None if deviation is None else _deviation_of(deviation),
         diagnosis=tuple(str(line) for line in record["diagnosis"]),
         warnings=tuple(str(line) for line in record["warnings"]),
+        picture=None if picture is None else picture_of(picture),
     )
 
 

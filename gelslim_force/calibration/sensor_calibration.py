@@ -41,6 +41,7 @@ class Calibration:
         deviation: Deviation of the built sensor from its design; None if it was not fitted.
         diagnosis: What was found, in sentences.
         warnings: What should be looked at before the calibration is trusted.
+        picture: (h, w) or (h, w, 3) uint8, the reference picture upright; None if it was not kept.
 
     Raises:
         ValueError: The arrays contradict one another.
@@ -57,6 +58,7 @@ class Calibration:
     deviation: BuiltDeviation | None = None
     diagnosis: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    picture: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.markers)

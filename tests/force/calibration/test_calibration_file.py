@@ -21,6 +21,7 @@ from gelslim_force.calibration.file import (
     write_calibration,
 )
 from gelslim_force.calibration.reference_picture import read_reference
+from gelslim_force.calibration.stored_picture import picture_of, picture_record
 from ifem_export.markers.grid import build_marker_grid
 
 GRID = build_marker_grid(12, 11, 1.3, 0.5)
@@ -42,6 +43,7 @@ def test_a_file_gives_the_same_calibration_again(found, tmp_path):
         np.testing.assert_array_equal(getattr(again.dots, name), getattr(found.dots, name))
     for name in ("positions_mm", "kind", "diameter_mm", "omitted"):
         np.testing.assert_array_equal(getattr(again.grid, name), getattr(found.grid, name))
+    np.testing.assert_array_equal(again.picture, found.picture)
     assert again.detector == found.detector
     assert again.diagnosis == found.diagnosis
     assert again.warnings == found.warnings
@@ -55,9 +57,18 @@ def test_a_file_gives_the_same_calibration_again(found, tmp_path):
 
 
 def test_a_bare_calibration_is_kept_too(found):
-    bare = dataclasses.replace(found, deviation=None)
+    bare = dataclasses.replace(found, deviation=None, picture=None)
     record = json.loads(json.dumps(calibration_record(bare)))
     assert calibration_of(record).deviation is None
+    del record["picture"]
+    assert calibration_of(record).picture is None
+
+
+@pytest.mark.parametrize("shape", [(20, 31), (20, 31, 3), (1, 1)])
+def test_pictures_survive_as_text(shape):
+    picture = np.random.default_rng(1).integers(0, 256, shape).astype(np.uint8)
+    record = json.loads(json.dumps(picture_record(picture)))
+    np.testing.assert_array_equal(picture_of(record), picture)
 
 
 def _without(name):
@@ -81,6 +92,10 @@ def _without(name):
         (lambda r: r["detector"].update(colour=1), "colour"),
         (lambda r: r["deviation"]["values"].pop("k1"), "k1"),
         (lambda r: r.update(grid=3), "damaged.json"),
+        (lambda r: r["picture"].update(shape=[3, 5, 4]), "shape"),
+        (lambda r: r["picture"].update(shape=[30_000, 30_000]), "larger"),
+        (lambda r: r["picture"]["shape"].__setitem__(0, 7), "bytes"),
+        (lambda r: r["picture"].update(row_steps="?"), "damaged"),
     ],
 )
 def test_damaged_records_are_named(found, tmp_path, damage, value):
