@@ -32,6 +32,11 @@ Picture = NDArray[np.uint8]
 FileName = str | os.PathLike[str]
 UNKNOWN = "unknown"
 """Argument for an indenter whose shape is not known."""
+NO_INDENTER = "none"
+"""Argument for tangential forces alone."""
+_MOST_NODES = 5000
+"""Surface nodes up to which an unknown shape is looked for unasked: with more, preparing the sensor
+takes minutes and gigabytes."""
 
 
 class SensorError(GelslimError, ValueError):
@@ -61,11 +66,13 @@ def open_sensor(
     Args:
         bundle: The sensor's bundle, or its folder.
         reference: Picture without contact, (h, w) or (h, w, 3) uint8, or its file, or a folder of
-            several; the sensor is calibrated by it.
-        calibration: A calibration of this sensor, or its file, in place of the reference. With an
-            indenter both are needed: the contact patch shows in comparison with the reference.
-        indenter: The known shape that touches the gel, such as `"sphere:10"` (mm), which makes
-            the normal force known; `"unknown"` finds it for any shape from light and markers.
+            several; the sensor is calibrated by it, unless a calibration is given.
+        calibration: A calibration of this sensor, or its file. Contacts show in comparison with
+            the reference; without one, with the picture that the calibration keeps.
+        indenter: By default forces are those of an object of unknown shape, found from light and
+            markers, where the camera has colour and the bundle light; otherwise the normal force
+            is unknown. `"unknown"` insists on the former and `"none"` on the latter. A known
+            shape, such as `"sphere:10"` (mm), is stronger knowledge.
         depth_mm: Known depth of the indenter in mm, which a flat punch needs.
         normal: Another source of the normal motion, in place of an indenter.
         settings: Choices of the pipeline; the defaults if None.
@@ -83,9 +90,9 @@ def open_sensor(
     """
     _require_consistent(reference, calibration, indenter, depth_mm, normal)
     sensor = bundle if isinstance(bundle, Bundle) else load_bundle(Path(bundle))
-    shape = None if indenter is None or indenter == UNKNOWN else _shape(indenter)
-    if indenter is not None:
+    if indenter not in (None, NO_INDENTER):
         require_colour(sensor)
+        indenter = indenter if indenter == UNKNOWN else _shape(indenter)
     picture = reference
     if picture is not None and not isinstance(picture, np.ndarray):
         picture = read_reference(picture)
@@ -94,13 +101,58 @@ def open_sensor(
         calibration = calibrate(sensor, picture)
     elif not isinstance(calibration, Calibration):
         calibration = read_calibration(calibration)
-    if indenter is not None:
-        assert picture is not None
-        if shape is None:
-            normal = unknown_source(sensor, calibration, picture, settings)
-        else:
-            normal = indenter_source(sensor, calibration, picture, shape, depth_mm, settings)
+    if normal is None:
+        normal = normal_source(sensor, calibration, picture, indenter, depth_mm, settings)
     return ForcePipeline(sensor, calibration, settings, normal)
+
+
+def normal_source(
+    bundle: Bundle,
+    calibration: Calibration,
+    reference: Picture | None = None,
+    indenter: Indenter | str | None = None,
+    depth_mm: float | None = None,
+    settings: PipelineSettings | None = None,
+) -> NormalSource | None:
+    """Make the normal source for what is known of the object.
+
+    Args:
+        bundle: The sensor.
+        calibration: Its camera, and its markers at rest.
+        reference: Picture without contact; None for the one that the calibration keeps.
+        indenter: As in `open_sensor`.
+        depth_mm: Known depth in mm, which a flat punch needs.
+        settings: Choices of the pipeline; the defaults if None.
+
+    Returns:
+        The source; None where the normal force stays unknown.
+
+    Raises:
+        SensorError: An indenter is given and there is no picture without contact, or the camera
+            is mono.
+        CalibrationError: The calibration belongs to another bundle.
+        IndenterError: The indenter's description cannot be read.
+        ValueError: An indenter is given and the reference is dark or of another size.
+    """
+    picture = calibration.picture if reference is None else reference
+    if indenter == NO_INDENTER or (indenter is None and not _shows_shapes(bundle, picture)):
+        return None
+    if picture is None:
+        raise SensorError(
+            "reference",
+            "contacts show in comparison with a picture without contact, and this calibration "
+            "keeps none: give the reference picture too, or calibrate again",
+        )
+    if indenter is None or indenter == UNKNOWN:
+        return unknown_source(bundle, calibration, picture, settings)
+    return indenter_source(bundle, calibration, picture, indenter, depth_mm, settings)
+
+
+def _shows_shapes(bundle: Bundle, picture: Picture | None) -> bool:
+    """Whether forces of objects of unknown shape can be found in the pictures of a sensor."""
+    coloured = picture is not None and picture.ndim == 3
+    small = len(bundle.mesh.surface) <= _MOST_NODES
+    return coloured and bool(bundle.light) and not is_mono(bundle.camera) and small
 
 
 def indenter_source(
@@ -211,20 +263,12 @@ def _require_consistent(
 ) -> None:
     if indenter is not None and normal is not None:
         raise SensorError("normal", "give an indenter or another normal source, not both")
-    if depth_mm is not None and indenter == UNKNOWN:
-        raise SensorError("depth_mm", "depth_mm is the depth of an indenter of known shape")
-    if depth_mm is not None and indenter is None:
-        raise SensorError("depth_mm", "depth_mm is the depth of an indenter: give the indenter too")
+    if depth_mm is not None and indenter in (None, UNKNOWN, NO_INDENTER):
+        raise SensorError(
+            "depth_mm", "depth_mm is the depth of an indenter of known shape: give its shape too"
+        )
     if reference is None and calibration is None:
         raise SensorError(
             "reference",
             "give a reference picture without contact, or a calibration of this sensor",
         )
-    if reference is None and indenter is not None:
-        raise SensorError(
-            "reference",
-            "an indenter's contact patch shows in comparison with a picture without contact: give "
-            "the reference picture too",
-        )
-    if reference is not None and calibration is not None and indenter is None:
-        raise SensorError("calibration", "give a reference picture or a calibration, not both")

@@ -139,8 +139,8 @@ RunFolder = Annotated[Path | None, out_folder("out/NAME-force", "Run folder to w
 KnownIndenter = Annotated[
     str | None,
     typer.Option(
-        help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm); or unknown, which "
-        "finds the forces of any shape from light and markers."
+        help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm). Without it the shape "
+        "is unknown, and forces are found from light and markers; none: tangential forces alone."
     ),
 ]
 KnownDepth = Annotated[

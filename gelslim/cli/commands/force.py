@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -59,8 +60,8 @@ def force(
 
     Follows the markers, corrects their motion for projection, and applies the stiffness of the
     bundle. Writes a run folder with the wrench of each frame and its standard deviation
-    (wrenches.csv), the force at every node (fields), and overlay pictures. Without an indenter or
-    depth maps the normal force stays unknown; `--indenter unknown` finds it for any shape.
+    (wrenches.csv), the force at every node (fields), and overlay pictures. The object may have any
+    shape where the camera has colour; otherwise the normal force needs an indenter or depth maps.
     """
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
@@ -76,11 +77,13 @@ def force(
         "interpolation": interpolation, "gel": gel, "friction": friction,
     }  # fmt: skip
     settings = _settings(chosen, budget)
-    built, picture = _calibrated(sensor, reference, calibration, indenter is not None)
+    built, picture = _calibrated(sensor, reference, calibration)
     folder = out or Path("out") / f"{bundle.resolve().name}-force"
     outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
     with open_frames(frames) as source:
         normal = _normal_source(sensor, built, settings, picture, indenter, depth_mm, depth_maps)
+        if indenter is None and normal is not None and depth_maps is None:
+            _note_unused(operator is not None or not budget.unlimited or method != "auto")
         pipeline = ForcePipeline(sensor, built, settings, normal)
         manifest = {
             "bundle": str(bundle), "frames": frames,
@@ -99,10 +102,20 @@ def _require_consistent(
 ) -> None:
     if fields not in ("npz", "parquet", "none"):
         raise CommandError(f"--fields {fields}: give npz, parquet or none")
-    if indenter == "unknown" and depth_mm is not None:
-        raise CommandError("--depth-mm is the depth of a known indenter: leave it out")
+    if indenter in (None, "none", "unknown") and depth_mm is not None:
+        raise CommandError("--depth-mm is the depth of an indenter of known shape: give its shape")
     if indenter and depth_maps:
         raise CommandError("give --indenter or --depth-maps, not both")
+
+
+def _note_unused(chosen: bool) -> None:
+    """Say on standard error that a chosen operator or method has no part in the result."""
+    if chosen:
+        print(
+            "gelslim: the forces of an unknown shape need no operator or method; these serve with "
+            "--indenter none, a known indenter or --depth-maps",
+            file=sys.stderr,
+        )
 
 
 def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
@@ -161,15 +174,16 @@ def _budgeted(sensor: Bundle, budget: Budget, path: Path, gel: str) -> Bundle:
 
 
 def _calibrated(
-    sensor: Bundle, reference: Path | None, file: Path | None, needs_picture: bool
+    sensor: Bundle, reference: Path | None, file: Path | None
 ) -> tuple[Calibration, NDArray[np.uint8] | None]:
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.calibration.reference_picture import read_reference
 
-    if reference is None and (file is None or needs_picture):
-        wanted = "the contact patch is found by it" if needs_picture else "or --calibration FILE"
-        raise CommandError(f"give --reference PICTURE, a picture without contact ({wanted})")
+    if reference is None and file is None:
+        raise CommandError(
+            "give --reference PICTURE, a picture without contact, or --calibration FILE"
+        )
     picture = None if reference is None else read_reference(reference)
     if file is not None:
         return read_calibration(file), picture
@@ -190,11 +204,6 @@ def _normal_source(
         from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
 
         return DepthMapSource(built.camera, sensor.mesh.surface_mm, read_depth_maps(depth_maps))
-    if indenter is None:
-        return None
-    from gelslim_force.sensor import UNKNOWN, indenter_source, unknown_source
+    from gelslim_force.sensor import normal_source
 
-    assert picture is not None
-    if indenter == UNKNOWN:
-        return unknown_source(sensor, built, picture, settings)
-    return indenter_source(sensor, built, picture, indenter, depth_mm, settings)
+    return normal_source(sensor, built, picture, indenter, depth_mm, settings)

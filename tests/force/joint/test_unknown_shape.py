@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from pressed_samples import FRICTION, calibration, lit_bundle, pressed, referenc
 from sensor_samples import sensor_bundle
 from shaded_frames import shaded
 
+from gelslim_force.calibration.file import write_calibration
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
@@ -164,6 +166,24 @@ def test_random_tractions(sources: int) -> None:
     assert np.median(shear) < 0.002
     spread = np.sqrt(np.mean(np.square(scores), axis=0))
     assert (spread < 1.3).all()
+
+
+def test_the_shape_is_unknown_unless_it_is_given(tmp_path: Path) -> None:
+    """A bundle with light and a calibration with its picture are enough for six components."""
+    write_calibration(calibration(), tmp_path / "calibration.json")
+    usual = open_sensor(lit_bundle(), calibration=tmp_path / "calibration.json")
+    assert isinstance(usual.normal, UnknownShape)
+    assert isinstance(open_sensor(lit_bundle(), reference=reference().image).normal, UnknownShape)
+    bare = replace(calibration(), picture=None)
+    for found in (
+        open_sensor(lit_bundle(), calibration=calibration(), indenter="none"),
+        open_sensor(lit_bundle(), calibration=bare),
+        open_sensor(sensor_bundle(), calibration=calibration()),
+    ):
+        assert found.normal is None
+    with pytest.raises(SensorError) as caught:
+        open_sensor(lit_bundle(), calibration=bare, indenter="unknown")
+    assert caught.value.argument == "reference"
 
 
 def test_light_and_colour_are_needed() -> None:

@@ -117,8 +117,6 @@ def test_another_normal_source_shares_what_was_prepared(place, reference) -> Non
     ("arguments", "argument"),
     [
         ({}, "reference"),
-        ({"reference": "r.png", "calibration": "c.json"}, "calibration"),
-        ({"calibration": "c.json", "indenter": "sphere:10"}, "reference"),
         ({"reference": "r.png", "depth_mm": 0.5}, "depth_mm"),
         ({"reference": "r.png", "indenter": "sphere:10", "normal": object()}, "normal"),
     ],
