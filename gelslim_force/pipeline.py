@@ -155,6 +155,7 @@ class ForcePipeline:
         *,
         time_s: float | None = None,
         normal_mm: ArrayLike | None = None,
+        normal_sigma_mm: ArrayLike = 0.0,
     ) -> FrameResult:
         """Estimate the forces of the next frame.
 
@@ -165,13 +166,16 @@ class ForcePipeline:
                 of frames so far.
             normal_mm: (c,) motion of the surface nodes along z in mm, negative where the gel is
                 pressed in. It takes the place of the normal source.
+            normal_sigma_mm: Standard deviation of `normal_mm` where the gel is pressed in, for all
+                nodes or (c,). The errors of all nodes are taken to be fully correlated.
 
         Returns:
             What the frame gave. Nothing is raised for the content of a frame: see
             `FrameResult.problems`.
 
         Raises:
-            ValueError: `normal_mm` has another shape or is not finite.
+            ValueError: `normal_mm` or `normal_sigma_mm` has another shape or is not finite, or a
+                deviation is negative.
         """
         clock = FrameClock()
         image: Any = frame
@@ -197,7 +201,10 @@ class ForcePipeline:
                 f"{self.settings.least_coverage:.0%} forces are not given",
             )
             return self._numbered(time_s, tracks=tracks, stage_ms=clock.stages, problems=problems)
-        reading, motion = self._motions(image, tracks.positions_px, normal_mm, clock)
+        given = None
+        if normal_mm is not None:
+            given = NormalReading.given(len(self.points_mm), normal_mm, normal_sigma_mm)
+        reading, motion = self._motions(image, tracks.positions_px, given, clock)
         if reading is not None and not reading.known:
             problems = (*problems, reading.problem)
         try:
@@ -239,16 +246,15 @@ class ForcePipeline:
         self,
         image: NDArray[np.uint8],
         positions_px: Array,
-        given: ArrayLike | None,
+        given: NormalReading | None,
         clock: FrameClock,
     ) -> tuple[NormalReading | None, Array]:
         """Normal motion, and the motion (n, 3) of the reference's markers."""
         motion_of = self._motion.of_markers
         if given is not None or self.normal is None:
-            reading = None if given is None else self._given(given)
-            motion = motion_of(positions_px, reading)
+            motion = motion_of(positions_px, given)
             clock.stage("displace")
-            return reading, motion
+            return given, motion
         seen = self.normal.look(image, positions_px)
         clock.stage("look")
         reading = self.normal.motion(seen, self._last_lateral)
@@ -271,13 +277,6 @@ class ForcePipeline:
             motion = motion_of(positions_px, reading)
             clock.stage("displace")
         return reading, motion
-
-    def _given(self, normal_mm: ArrayLike) -> NormalReading:
-        w = np.asarray(normal_mm, dtype=float)
-        count = len(self.points_mm)
-        if w.shape != (count,) or not np.isfinite(w).all():
-            raise ValueError(f"normal motion of shape {w.shape}: must be ({count},) and finite")
-        return NormalReading(w, np.zeros(count), None)
 
     def _noise_px(self, tracks: Tracks) -> float:
         if self.settings.noise_px is not None:
@@ -316,7 +315,8 @@ class ForcePipeline:
         seen = np.isfinite(motion[:, 0])
         spread = self._motion.covariance_mm2(seen, noise)
         if reading is not None and reading.known:
-            return self._wrench.covariance(gains, spread, reading.sigma_mm)
+            lateral = self._motion.compensation_change(reading.sigma_mm)
+            return self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
         apparent = self._motion.apparent_motion(motion, self.settings.unknown_normal_mm)
         return self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
 

@@ -151,6 +151,12 @@ DepthMaps = Annotated[
     Path | None,
     typer.Option(help="File .npy of heights (frames, h, w) in mm, registered to the pictures."),
 ]
+DepthSigma = Annotated[
+    float,
+    typer.Option(
+        min=0, help="Standard deviation of the depth maps in mm, where the gel is pressed in."
+    ),
+]
 OperatorName = Annotated[str | None, typer.Option(help="Name of the force operator, such as fft.")]
 Method = Annotated[str, typer.Option(help="Force method: auto, direct, low_pass or masked.")]
 Compensation = Annotated[

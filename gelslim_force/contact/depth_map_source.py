@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gelslim_core.errors import GelslimError
-from gelslim_force.contact.normal_source import NormalReading
+from gelslim_force.contact.normal_source import NormalReading, pressed_sigma_mm
 from gelslim_force.frames.upright import upright
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -35,7 +35,7 @@ class DepthMapSource:
         camera: The sensor's camera, as calibrated.
         points_mm: (c, 3) surface nodes at rest.
         maps: The maps, one per frame.
-        sigma_mm: Standard deviation of the heights.
+        sigma_mm: Standard deviation of the heights where the gel is pressed in, common to all.
         touched_below_mm: Height below which a node counts as touched; None claims no contact.
 
     Raises:
@@ -83,8 +83,9 @@ class DepthMapSource:
         problem = ""
         if known.mean() < 0.5:
             problem = f"the depth map has a height at only {known.mean():.0%} of the nodes"
-        sigma = np.where(known, self.sigma_mm, 0.0)
-        return NormalReading(heights[known][nearest], sigma, touched, problem=problem)
+        height = heights[known][nearest]
+        sigma = np.where(known, pressed_sigma_mm(height, self.sigma_mm), 0.0)
+        return NormalReading(height, sigma, touched, problem=problem)
 
     def _heights_at_nodes(self, heights: Array) -> Array:
         """(c,) heights; each node is looked up where the camera sees it at its own height."""

@@ -6,11 +6,20 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gelslim_force.contact.patch import ContactPatch
 
 Array = NDArray[np.float64]
+
+
+def pressed_sigma_mm(height_mm: Array, sigma_mm: ArrayLike) -> Array:
+    """(c,) standard deviation of heights (c,) that are known to be 0 where the gel is at rest.
+
+    A measured depth is off where the gel is pressed in, and by no more than all of it elsewhere:
+    an error of the whole surface would be a force on all of the pad.
+    """
+    return np.asarray(np.minimum(sigma_mm, np.abs(height_mm)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +62,28 @@ class NormalReading:
     depth_mm: float = 0.0
     problem: str = ""
     forces: FoundForces | None = None
+
+    @classmethod
+    def given(cls, count: int, normal_mm: ArrayLike, sigma_mm: ArrayLike) -> NormalReading:
+        """Reading of `count` nodes from motions that are given.
+
+        Args:
+            count: c.
+            normal_mm: (c,) motion along z.
+            sigma_mm: Its standard deviation where the gel is pressed in, for all nodes or (c,).
+
+        Raises:
+            ValueError: A shape is another, or a value is not finite or a deviation negative.
+        """
+        w, sigma = (np.asarray(values, dtype=float) for values in (normal_mm, sigma_mm))
+        if w.shape != (count,) or not np.isfinite(w).all():
+            raise ValueError(f"normal motion of shape {w.shape}: must be ({count},) and finite")
+        if sigma.shape not in ((), (count,)) or not (np.isfinite(sigma) & (sigma >= 0)).all():
+            raise ValueError(
+                f"standard deviation of the normal motion, of shape {sigma.shape}: must be a "
+                f"number or ({count},), finite and at least 0"
+            )
+        return cls(w, pressed_sigma_mm(w, sigma), None)
 
     @classmethod
     def unknown(cls, count: int, problem: str) -> NormalReading:

@@ -125,19 +125,18 @@ class WrenchNoise:
             marker_covariance_mm2: (k, 2, 2) of each marker's lateral motion.
             normal_sigma_mm: (c,) standard deviation of the normal motion. The errors of all nodes
                 are fully correlated: a depth that is too large is too large everywhere.
-            lateral_sigma_mm: (k, 2) standard deviation of the markers' lateral motion, fully
-                correlated too: the apparent motion of an unknown depth.
+            lateral_sigma_mm: (k, 2) change of the markers' lateral motion with the same error:
+                their apparent motion is taken off for a depth that is wrong or unknown.
         """
         count = len(marker_covariance_mm2)
         spread = np.einsum("aki,kij->akj", gains, marker_covariance_mm2)
         total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
+        common = np.zeros(6)
         if normal_sigma_mm is not None:
-            sensitivity = self.response[:, :, 2] @ normal_sigma_mm
-            total = total + np.outer(sensitivity, sensitivity)
+            common += self.response[:, :, 2] @ normal_sigma_mm
         if lateral_sigma_mm is not None:
-            sensitivity = gains.reshape(6, 2 * count) @ lateral_sigma_mm.reshape(-1)
-            total = total + np.outer(sensitivity, sensitivity)
-        return np.asarray(total)
+            common += gains.reshape(6, 2 * count) @ lateral_sigma_mm.reshape(-1)
+        return np.asarray(total + np.outer(common, common))
 
     def wrench(self, force_n: Array, covariance: Array) -> Wrench:
         """Wrench of nodal forces (c, 3); NaN for what an unknown normal motion leaves open."""

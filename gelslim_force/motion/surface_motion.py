@@ -114,6 +114,13 @@ class SurfaceMotion:
         share = self._of_all(size / largest, 0.0)
         return np.asarray(-normal_mm * share[:, None] * self.apparent_per_mm)
 
+    def compensation_change(self, height_mm: Array) -> Array:
+        """(k, 2) change of the markers' lateral motion for nodes (c,) that are higher."""
+        if self.compensation == "none":
+            return np.zeros((self.interpolation.n_markers, 2))
+        height = self._of_all(self.nodes_to_markers @ height_mm, 0.0)
+        return np.asarray(-height[:, None] * self.apparent_per_mm)
+
     def covariance_mm2(self, known: NDArray[np.bool_], noise_px: float) -> Array:
         """(k, 2, 2) of the markers' motion, for noise of their positions; 0 where not seen."""
         scale = self.view.mm_per_px

@@ -39,6 +39,7 @@ def force(
     indenter: option.KnownIndenter = None,
     depth_mm: option.KnownDepth = None,
     depth_maps: option.DepthMaps = None,
+    depth_sigma_mm: option.DepthSigma = 0.0,
     error: FieldError = None,
     within: FrameTime = None,
     operator: option.OperatorName = None,
@@ -65,9 +66,10 @@ def force(
     """
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
+    from gelslim_force.sensor import normal_source
     from ifem_export.bundle.files import load_bundle
 
-    _require_consistent(fields, indenter, depth_mm, depth_maps)
+    _require_consistent(fields, indenter, depth_mm, depth_maps, depth_sigma_mm)
     budget = budget_of(error, within)
     sensor = load_bundle(bundle)
     if not budget.unlimited and operator is None:
@@ -81,7 +83,10 @@ def force(
     folder = out or Path("out") / f"{bundle.resolve().name}-force"
     outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
     with open_frames(frames) as source:
-        normal = _normal_source(sensor, built, settings, picture, indenter, depth_mm, depth_maps)
+        if depth_maps is not None:
+            normal: NormalSource | None = _depth_source(sensor, built, depth_maps, depth_sigma_mm)
+        else:
+            normal = normal_source(sensor, built, picture, indenter, depth_mm, settings)
         if indenter is None and normal is not None and depth_maps is None:
             _note_unused(operator is not None or not budget.unlimited or method != "auto")
         pipeline = ForcePipeline(sensor, built, settings, normal)
@@ -98,7 +103,11 @@ def force(
 
 
 def _require_consistent(
-    fields: str, indenter: str | None, depth_mm: float | None, depth_maps: Path | None
+    fields: str,
+    indenter: str | None,
+    depth_mm: float | None,
+    depth_maps: Path | None,
+    depth_sigma_mm: float,
 ) -> None:
     if fields not in ("npz", "parquet", "none"):
         raise CommandError(f"--fields {fields}: give npz, parquet or none")
@@ -106,6 +115,8 @@ def _require_consistent(
         raise CommandError("--depth-mm is the depth of an indenter of known shape: give its shape")
     if indenter and depth_maps:
         raise CommandError("give --indenter or --depth-maps, not both")
+    if depth_sigma_mm and not depth_maps:
+        raise CommandError("--depth-sigma-mm is that of --depth-maps: give these too")
 
 
 def _note_unused(chosen: bool) -> None:
@@ -191,19 +202,10 @@ def _calibrated(
     return calibrate(sensor, picture), picture
 
 
-def _normal_source(
-    sensor: Bundle,
-    built: Calibration,
-    settings: PipelineSettings,
-    picture: NDArray[np.uint8] | None,
-    indenter: str | None,
-    depth_mm: float | None,
-    depth_maps: Path | None,
-) -> NormalSource | None:
-    if depth_maps is not None:
-        from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
+def _depth_source(
+    sensor: Bundle, built: Calibration, depth_maps: Path, sigma_mm: float
+) -> NormalSource:
+    from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
 
-        return DepthMapSource(built.camera, sensor.mesh.surface_mm, read_depth_maps(depth_maps))
-    from gelslim_force.sensor import normal_source
-
-    return normal_source(sensor, built, picture, indenter, depth_mm, settings)
+    maps = read_depth_maps(depth_maps)
+    return DepthMapSource(built.camera, sensor.mesh.surface_mm, maps, sigma_mm)

@@ -37,7 +37,7 @@ def test_image_registered_heights_are_those_of_the_surface():
     i, j = np.rint(at_rest[:, 1]).astype(int), np.rint(at_rest[:, 0]).astype(int)
     assert np.abs(height[i, j] - exact).max() > 5 * np.abs(found.w_mm - exact).max()
     assert (found.touched == (exact < -0.05)).mean() > 0.99
-    assert (found.sigma_mm == 0.01).all()
+    np.testing.assert_allclose(found.sigma_mm, np.minimum(0.01, np.abs(found.w_mm)))
     assert found.known
 
 
@@ -46,7 +46,7 @@ def test_nodes_without_a_height_take_the_nearest_one():
     height = -1e-4 * columns
     height[:240] = np.nan
     found = reading(height, sigma_mm=0.02)
-    known = found.sigma_mm == 0.02
+    known = found.sigma_mm > 0
     row = CAMERA.project(NODES)[:, 1]
     assert known[row > 250].all()
     assert not known[row < 239].any()

@@ -73,7 +73,7 @@ def test_covariance_is_the_sum_over_markers_and_correlated_errors() -> None:
     shifted = sum(each[:, k, i] * aside[k, i] for k in range(MARKERS) for i in range(2))
     np.testing.assert_allclose(
         noise.covariance(gains, spread, deep, aside),
-        expected + np.outer(sunk, sunk) + np.outer(shifted, shifted),
+        expected + np.outer(sunk + shifted, sunk + shifted),
         rtol=1e-9,
     )
 

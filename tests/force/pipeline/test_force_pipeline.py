@@ -54,6 +54,25 @@ def test_resultant_of_a_known_press(calibration, frames) -> None:
     assert result.field.slip_margin == pytest.approx(1 - np.hypot(*SHEAR_N), abs=0.03)
 
 
+def test_a_depth_off_by_its_stated_deviation_is_within_that_of_the_force(calibration, frames):
+    """An error of the depth by a tenth enters all components, and the deviation holds it."""
+    w = press().nodes_mm[:, 2]
+    truth = np.array([*SHEAR_N, -NORMAL_N])
+
+    def scores(sigma_mm):
+        chain = pipeline(calibration)
+        last(chain, frames[:-1])
+        found = chain.process(frames[-1].image, normal_mm=1.1 * w, normal_sigma_mm=sigma_mm).wrench
+        return np.abs((found.force_n - truth) / found.standard_deviation[:3])
+
+    assert scores(0.0)[2] > 10
+    assert 0.5 < scores(0.1 * np.abs(w))[2] < 1.5
+    assert scores(0.1 * np.abs(w)).max() < 3
+    for bad in (-0.1, np.nan, np.zeros(3)):
+        with pytest.raises(ValueError, match="deviation"):
+            pipeline(calibration).process(frames[0].image, normal_mm=w, normal_sigma_mm=bad)
+
+
 def test_exact_compensation_beats_the_papers(calibration, frames) -> None:
     markers, force = {}, {}
     for model in ("none", "printed", "exact"):
