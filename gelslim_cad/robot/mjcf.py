@@ -43,7 +43,7 @@ def gripper_bytes(finger: RobotFinger, scene: GripperScene) -> bytes:
     sets the gripping force of the spec.
     """
     root = _root(f"{finger.name} gripper")
-    add(
+    option = add(
         root,
         "option",
         timestep=rounded(finger.contact.timestep_s, 3),
@@ -51,6 +51,8 @@ def gripper_bytes(finger: RobotFinger, scene: GripperScene) -> bytes:
         cone="elliptic",
         impratio="10",
     )
+    # Several points where a flat object meets a mesh: MuJoCo before 3.8 gives one unless asked.
+    add(option, "flag", multiccd="enable")
     look = add(root, "visual")
     add(look, "global", offwidth="1280", offheight="960")
     add(look, "headlight", ambient="0.4 0.4 0.4", diffuse="0.6 0.6 0.6")

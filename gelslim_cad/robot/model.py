@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.jaw import JawBolts
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.names import Name
@@ -133,7 +134,7 @@ def robot_finger(name: str, parts: Sequence[Part], d: Lookup) -> RobotFinger:
         mass=mass,
         part_masses=moved,
         visuals=visual_pieces(parts, meshes, origin_mm),
-        collisions=collision_pieces(parts, meshes, origin_mm, _cuts_x_mm(d)),
+        collisions=collision_pieces(parts, meshes, GelShape.of(d), origin_mm, _cuts_x_mm(d)),
         frames=Frames(gel_frame(d), optical, graphics_frame(optical)),
         fov_y_rad=vertical_fov_rad(d),
         image_px=(int(d["camera.image_width_px"]), int(d["camera.image_height_px"])),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_cad.export.mesh import TriangleMesh, stored, tessellate, volume_mm3
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 
 LINEAR_MM = 0.1
@@ -64,21 +66,23 @@ def visual_pieces(
 def collision_pieces(
     parts: Sequence[Part],
     meshes: Mapping[str, TriangleMesh],
+    gel: GelShape,
     origin_mm: NDArray[np.float64],
     cuts_x_mm: Sequence[float],
 ) -> tuple[Piece, ...]:
     """Convex hulls that together are the outside of the finger, about `origin_mm`.
 
     `meshes` are those of the parts, as `part_meshes` gives them. The case is one piece: what is
-    within it cannot be touched, and cable and wires, which leave it, yield. The gel is one of its
-    own. The adapter is cut at `cuts_x_mm`, rising positions along the finger, into pieces whose
-    hulls follow it; what lies beyond the last cut, its tongues, is inside the case.
+    within it cannot be touched, and cable and wires, which leave it, yield. The gel is one of
+    its own, with a flat top where it is crowned (`crown_top_mm`). The adapter is cut at
+    `cuts_x_mm`, rising positions along the finger, into pieces whose hulls follow it; what lies
+    beyond the last cut, its tongues, is inside the case.
     """
     inside = [p for p in parts if p.name not in (ADAPTER, GEL, CABLE) and "wire" not in p.tags]
     points = {"case": np.concatenate([meshes[p.name].vertices_mm for p in inside])}
     for part in parts:
         if part.name == GEL:
-            points["gel"] = meshes[part.name].vertices_mm
+            points["gel"] = np.concatenate([meshes[part.name].vertices_mm, crown_top_mm(gel)])
         elif part.name == ADAPTER:
             points |= _slices(meshes[part.name], cuts_x_mm)
     pieces = []
@@ -86,6 +90,28 @@ def collision_pieces(
         hull = convex_hull(found - origin_mm)
         pieces.append(Piece(f"collision_{name}", hull, (0.5, 0.5, 0.5, 0.4), volume_mm3(hull)))
     return tuple(pieces)
+
+
+def crown_top_mm(gel: GelShape) -> NDArray[np.float64]:
+    """Corners of the flat rectangle that stands for the top of a crowned gel.
+
+    A simulator takes the points where a flat object touches from one face of the hull. A face of
+    the tessellated crown is a triangle to one side of the middle, so the object tilts from face to
+    face and never rests. On the rectangle it rests on four points about the middle, as on a flat
+    gel. It is a square unless the gel is narrower.
+
+    Args:
+        gel: Shape of the gel.
+
+    Returns:
+        Points (4, 3) in the sensor frame, in the plane of the apex, no more than LINEAR_MM above
+        the gel and inside its outline; (0, 3) for a flat gel.
+    """
+    if not gel.crown_mm:
+        return np.zeros((0, 3))
+    half = gel.rim_mm * math.sqrt(LINEAR_MM / (2 * gel.crown_mm))
+    x, y = np.minimum(half, gel.inset_corner_mm(0.0))
+    return np.array([[x, y, 0.0], [-x, y, 0.0], [-x, -y, 0.0], [x, -y, 0.0]])
 
 
 def convex_hull(points_mm: NDArray[np.float64]) -> TriangleMesh:

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from gelslim_cad.export.brep import bounds_mm
 from gelslim_cad.export.mesh import tessellate
+from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.robot.frames import quaternion_wxyz, roll_pitch_yaw
-from gelslim_cad.robot.pieces import convex_hull
+from gelslim_cad.robot.pieces import LINEAR_MM, convex_hull, crown_top_mm
 
 
 def in_mount(written: WrittenFinger, points_mm: np.ndarray) -> np.ndarray:
@@ -99,6 +100,36 @@ def test_the_hull_of_a_cube_and_of_points_within() -> None:
     # Outward: the divergence theorem gives the volume with its sign.
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
     assert volume == pytest.approx(24)
+
+
+@pytest.mark.parametrize(
+    ("sides_mm", "radius_mm", "crown_mm"),
+    [((20, 20), 1.5, 0.8), ((28, 18), 9.0, 2.0), ((20, 14), 7.0, 0.06), ((30, 12), 0.0, 0.0005)],
+)
+def test_the_top_of_a_crown_is_flat_and_close_to_the_gel(
+    sides_mm: tuple[float, float], radius_mm: float, crown_mm: float
+) -> None:
+    gel = GelShape(*sides_mm, radius_mm, 2.0, crown_mm)
+    top = crown_top_mm(gel)
+    excess = top[:, 2] - gel.surface_z_mm(top[:, 0], top[:, 1])
+    assert (excess > 0).all()
+    assert (excess <= LINEAR_MM + 1e-12).all()
+    assert gel.outline.contains(0.999 * top[:, :2]).all()
+    assert top.mean(axis=0) == pytest.approx([0, 0, 0])
+    # With points of the crown below it, it is the one horizontal face of the hull.
+    u, v = (half.ravel() for half in np.meshgrid(*[np.linspace(-0.5, 0.5, 41)] * 2))
+    x, y = u * sides_mm[0], v * sides_mm[1]
+    crown = np.stack([x, y, gel.surface_z_mm(x, y)], axis=1)
+    hull = ConvexHull(np.concatenate([top, crown[gel.outline.contains(crown[:, :2])]]))
+    flat = hull.equations[:, 2] > 1 - 1e-12
+    corners = hull.points[hull.simplices[flat]]
+    first, second = corners[:, 1, :2] - corners[:, 0, :2], corners[:, 2, :2] - corners[:, 0, :2]
+    areas = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+    assert areas.sum() == pytest.approx(4 * abs(top[0, 0] * top[0, 1]))
+
+
+def test_a_flat_gel_has_no_top_of_its_own() -> None:
+    assert crown_top_mm(GelShape(20.0, 20.0, 1.5, 2.0)).shape == (0, 3)
 
 
 @pytest.mark.parametrize("which", ["written", pytest.param("lateral", marks=pytest.mark.slow)])

@@ -115,11 +115,18 @@ def test_a_thin_light_object_between_crowned_gels_stays_where_it_is(tmp_path: Pa
     )
     model = scene(written.folder)
     assert model.opt.timestep < 0.5e-3
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    data.ctrl[:2] = 6.0  # from 10 N on the gel is pressed down to its bezel
-    run(model, 1.0, data)
-    assert data.sensor("left_force").data[0] == pytest.approx(6, rel=0.02)
+    data = run(model, 1.0)
+    force = written.d["grip.force_n"]
+    for side in ("left", "right"):
+        assert data.sensor(f"{side}_force").data[0] == pytest.approx(force, rel=1e-3)
+        # On the crown it rests on four points, which share the stiffness as on a flat gel.
+        points = touching(model, data, f"{side}_collision_gel")
+        depths = [-c.dist for c in points]
+        expected = force / written.finger.contact.stiffness_n_m
+        assert depths == pytest.approx([expected] * 4, rel=0.01)
+        assert np.mean([c.pos[1:] for c in points], axis=0) == pytest.approx([0, 0], abs=0.2e-3)
+        assert not touching(model, data, f"{side}_collision_case")
+    assert np.abs(data.qvel).max() < 1e-3
     held = data.body("object")
     assert np.abs(held.xpos).max() < 0.2e-3
     assert held.xquat[0] > 0.9999
