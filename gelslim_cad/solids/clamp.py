@@ -27,6 +27,7 @@ from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import CLAMP, PRINTED
 from gelslim_cad.solids.shapes import (
     Point2,
+    SolidError,
     box,
     pair,
     pointed_rod,
@@ -137,12 +138,21 @@ class _Frame:
 
 
 def _clamp(d: Dimensions, forward_mm: float) -> cq.Solid:
-    """The clamp whose springs stand forward by a length; 0 with the camera in place."""
+    """The clamp whose springs stand forward by a length; 0 with the camera in place.
+
+    Raises SolidError where the cable parts it and no floor joins its halves.
+    """
     at, f = Layout(d), _Frame.of(d)
     pieces = _lips(f)
     pieces += _seat(d, f, forward_mm) if d["clamp.preloaded"] > 0 else _bar(f)
     floor = box((f.back, f.face), (-f.outer, f.outer), (f.floor - 0.1, f.floor))
-    if placed(d, floor).BoundingBox().zmin - d["cover.top_z_mm"] > LEAST_FLOOR_MM:
+    floored = placed(d, floor).BoundingBox().zmin - d["cover.top_z_mm"] > LEAST_FLOOR_MM
+    if d["camera.cable_exit"] == "bottom" and not floored:
+        raise SolidError(
+            "camera_clamp is parted by the cable, which leaves at the bottom, and has no room for "
+            "a floor under the module (rule cable.floor_mm)"
+        )
+    if floored:
         pieces.append(box((f.back, f.face), (-f.outer, f.outer), (-FAR_MM, f.floor)))
     whole = subtract(union(pieces), [_passage(d, f)])
     slab = box(

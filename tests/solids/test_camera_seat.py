@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from finger_samples import DESIGNS, each_finger, fingers, part
 from scipy.integrate import solve_bvp
 
+from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.dimensions.seat import LEAST_PRELOAD_MM, MODULUS_MPA, STRAIN
 from gelslim_cad.proof.solids import common_volume
 from gelslim_cad.solids.clamp import camera_clamp
 from gelslim_cad.solids.led_seat import uncrushed_ribs
+from gelslim_cad.solids.shapes import SolidError
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.tolerance.plan import with_values
 
 
-def mini20(**values: object) -> Dimensions:
-    spec = read_spec(next(path for path in DESIGNS if path.stem == "mini20")).spec
-    changed = {name.replace("__", "."): value for name, value in values.items()}
-    return derive(with_values(spec, changed))
+def changed(design: str, **values: object) -> Dimensions:
+    spec = read_spec(next(path for path in DESIGNS if path.stem == design)).spec
+    return derive(with_values(spec, {n.replace("__", "."): v for n, v in values.items()}))
 
 
 @each_finger
@@ -51,7 +54,7 @@ def test_the_printed_springs_reach_into_the_camera_by_their_deflection(name: str
 @pytest.mark.parametrize("process", ["sla", "fdm", "sls"])
 def test_spring_formulas_are_those_of_an_integrated_beam(process: str) -> None:
     """E I w'' = F (L - x) from a clamped root, by collocation."""
-    d = mini20(manufacturing__print_process=process)
+    d = changed("mini20", manufacturing__print_process=process)
     length, thick = d["clamp.spring_length_mm"], d["clamp.spring_mm"]
     inertia = d["clamp.spring_width_mm"] * thick**3 / 12
 
@@ -83,13 +86,53 @@ def test_spring_formulas_are_those_of_an_integrated_beam(process: str) -> None:
     ids=["loose", "no lips", "wide lens", "shallow", "coarse print"],
 )
 def test_a_camera_without_room_for_the_seat_lies_loose(changes: dict[str, object]) -> None:
-    d = mini20(**changes)
+    d = changed("mini20", **changes)
     assert d["clamp.preloaded"] == 0
     height, play = d["camera.module_height_mm"], d["clamp.play_mm"]
     assert d["clamp.pitch_tilt_deg"] == pytest.approx(np.degrees(2 * play / height))
     clamp = camera_clamp(d)
     assert clamp.printed is None
     assert clamp.solid.isValid()
+
+
+PARTED = [
+    ("gelslim2", {"design__envelope__goal": "shortest"}, -0.6564),
+    ("mini20", {"design__gel__length_mm": 14.0, "design__gel__width_mm": 14.0}, 0.1525),
+]
+
+
+@pytest.mark.parametrize(("design", "values", "floor_mm"), PARTED)
+def test_a_clamp_that_its_cable_parts_is_refused_by_its_rule(
+    design: str, values: dict[str, object], floor_mm: float
+) -> None:
+    d = changed(design, **values)
+    rule = check(d).of("cable.floor_mm")
+    assert rule.status == "fail"
+    assert rule.value == pytest.approx(floor_mm, abs=1e-3)
+    with pytest.raises(SolidError, match=r"camera_clamp .* cable\.floor_mm"):
+        camera_clamp(d)
+    # The rule's advice helps.
+    turned = changed(design, **values, camera__cable_exit="rear")
+    assert check(turned).of("cable.floor_mm").status == "pass"
+    assert camera_clamp(turned).solid.isValid()
+
+
+@pytest.mark.parametrize(("design", "values"), [case[:2] for case in PARTED])
+@pytest.mark.parametrize("seat", ["loose", "preloaded"])
+def test_a_clamp_with_the_least_floor_is_one_solid(
+    design: str, values: dict[str, object], seat: str
+) -> None:
+    """The cover lowered until the floor is as thick as the rule's limit."""
+    d = changed(design, **values, design__housing__camera_seat=seat)
+    rule = check(d).of("cable.floor_mm")
+    assert rule.value is not None
+    assert rule.limit is not None
+    lower = d["cover.top_z_mm"] - (rule.limit - rule.value) - 1e-6
+    preloaded = float(seat == "preloaded")
+    moved = replace(d, values=d.values | {"cover.top_z_mm": lower, "clamp.preloaded": preloaded})
+    clamp = camera_clamp(moved)
+    assert clamp.solid.isValid()
+    assert (clamp.printed is not None) == (seat == "preloaded")
 
 
 @each_finger
