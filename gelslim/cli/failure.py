@@ -8,6 +8,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
+from importlib import metadata
 from typing import Any
 
 import typer
@@ -92,12 +93,27 @@ def _missing(error: ImportError) -> tuple[int, str]:
             f"gelslim: this command needs {top}, which is not installed; "
             f"run: {install_command(extra)} (`gelslim doctor` lists all extras)"
         )
+    if top == "OCP" and "cannot import name" in str(error):
+        return BAD_INPUT, (
+            f"gelslim: {top} cannot be loaded ({_one_line(str(error))}); another package, such as "
+            "build123d, has replaced its files by those of another CAD kernel; "
+            f"run: pip install --force-reinstall --no-deps {_kernel()}"
+        )
     if extra or ".so" in str(error):
         return BAD_INPUT, (
             f"gelslim: {top or 'a library'} cannot be loaded ({_one_line(str(error))}); "
             "on Debian or Ubuntu: apt-get install libgl1 libx11-6 libxrender1 libegl1"
         )
     return FAULT, f"gelslim: a module is missing ({_one_line(str(error))}); install gelslim again"
+
+
+def _kernel() -> str:
+    """The package of OCP with CadQuery, in its version."""
+    name = "cadquery-ocp"
+    try:
+        return f"{name}=={metadata.version(name)}"
+    except metadata.PackageNotFoundError:
+        return name
 
 
 def _os_message(error: OSError) -> str:

@@ -129,6 +129,11 @@ def test_a_fault_of_the_program_is_one_line_and_a_hint(
             install_command("view"),
         ),
         (ImportError("libGL.so.1: cannot open shared object file", name="OCP"), 2, "libgl1"),
+        (
+            ImportError("cannot import name 'A' from 'OCP.B' (/x/OCP/B.so)", name="OCP.B"),
+            2,
+            "pip install --force-reinstall --no-deps cadquery-ocp",
+        ),
         (ModuleNotFoundError("No module named 'x'", name="x"), 3, "'x'"),
     ],
 )
