@@ -35,11 +35,12 @@ class LayerContact:
 
 
 def hankel(k: Array, spectrum: Array, r: Array) -> Array:
+    """Transforms at radii r (n,) of a spectrum (m,) over k (m,), or of several (m, s)."""
     weight = np.full(len(k), k[1] - k[0])
     weight[0] /= 2
     return np.concatenate(
         [
-            j0(np.outer(part, k)) @ (spectrum * weight)
+            j0(np.outer(part, k)) @ (spectrum.T * weight).T
             for part in np.split(r, range(200, len(r), 200))
         ]
     )
@@ -97,7 +98,7 @@ def layer_contact(
         parts.append(a * a * 2**mu * gamma(mu + 1) * jv(mu + 1, t) / t ** (mu + 1))
     spectra = np.array(parts) * factor * 2 * (1 - nu**2) / youngs_mpa
     r = a * np.sqrt((np.arange(24) + 0.5) / 24)
-    columns = np.column_stack([hankel(k, s, r) for s in spectra] + [-np.ones_like(r)])
+    columns = np.column_stack([hankel(k, spectra.T, r), -np.ones_like(r)])
     # sinking = d - profile: the unknown d is the last column
     solution, *_ = np.linalg.lstsq(columns, -profile(r), rcond=None)
     c, depth = solution[:-1], solution[-1]

@@ -35,7 +35,7 @@ def contact(radius_mm: float, ball_mm: float, nu: float = 0.48) -> LayerContact:
 
 @cache
 def sight() -> tuple[Vector, Vector]:
-    """Lines of sight of the camera, see `lines_of_sight`."""
+    """Lines of sight of CAMERA, see `lines_of_sight`."""
     return lines_of_sight(CAMERA)
 
 
@@ -52,12 +52,9 @@ def lines_of_sight(camera: VirtualCamera) -> tuple[Vector, Vector]:
 def _profile(radius_mm: float, ball_mm: float, nu: float) -> tuple[Vector, Vector, Vector]:
     r = np.linspace(0, 20, 1001)
     truth = contact(radius_mm, ball_mm, nu)
-    inside = r <= radius_mm
-    z = np.where(
-        inside,
-        ball_mm - np.sqrt(np.maximum(ball_mm**2 - r * r, 0)) - truth.depth_mm,
-        -truth.exact_sinking(r),
-    )
+    z = ball_mm - np.sqrt(np.maximum(ball_mm**2 - r * r, 0)) - truth.depth_mm
+    outside = r > radius_mm
+    z[outside] = -truth.exact_sinking(r[outside])
     return r, z, np.gradient(z, r)
 
 
@@ -66,10 +63,10 @@ def pressed_heights(
     radius_mm: float,
     ball_mm: float,
     nu: float = 0.48,
-    camera: VirtualCamera | None = None,
+    camera: VirtualCamera = CAMERA,
 ) -> tuple[Vector, Vector, Vector]:
     """Slopes (n,) along x and y, and height, of the surface that each pixel sees."""
-    rest, lean = sight() if camera is None else lines_of_sight(camera)
+    rest, lean = sight() if camera is CAMERA else lines_of_sight(camera)
     r, z, slope = _profile(radius_mm, ball_mm, nu)
     height = np.zeros(len(rest))
     for _ in range(6):
@@ -90,6 +87,14 @@ def lit(slope_x: Vector, slope_y: Vector) -> Vector:
     return AMBIENT + (1 - AMBIENT) * np.column_stack([red, green, blue])
 
 
+SHARP = Look(blur=0.0, noise=0.0, seed=7)
+
+
+@cache
+def _level() -> Frame:
+    return render(GRID, CAMERA, SHARP)
+
+
 def shaded(
     slopes: tuple[Vector, Vector] | None = None,
     *,
@@ -106,7 +111,8 @@ def shaded(
     With `dark_sides` each colour falls off as exp(-dark_sides · share of the way) across the gel,
     and blue is all but missing.
     """
-    frame = render(GRID, camera, Look(blur=0.0, noise=0.0, seed=7), moved_mm)
+    usual = camera is CAMERA and moved_mm is None
+    frame = _level() if usual else render(GRID, camera, SHARP, moved_mm)
     image = frame.image.astype(float) * brightness
     if slopes is not None:
         image *= lit(*slopes).reshape(480, 640, 3)

@@ -8,6 +8,7 @@ projection of the disc's centre).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from camera_rig import finger_view
@@ -80,38 +81,44 @@ def centroids(rims: Vector) -> tuple[Vector, Vector]:
     return centre, np.abs(area)
 
 
-def coverage(rim: Vector, shape: tuple[int, int]) -> tuple[slice, slice, Vector]:
-    """Share of each pixel inside a convex outline (k, 2), with the box it stands in."""
-    low = np.clip(np.floor(rim.min(axis=0) - 1).astype(int), 0, None)
-    high = np.minimum(np.ceil(rim.max(axis=0) + 2).astype(int), [shape[1], shape[0]])
-    if np.any(high <= low):
-        return slice(0, 0), slice(0, 0), np.zeros((0, 0))
+def paint(ink: Vector, rims: Vector) -> None:
+    """Fill convex outlines (n, k, 2), in place: `ink` (h, w) is the share of a pixel inside."""
+    low = np.clip(np.floor(rims.min(axis=1) - 1).astype(int), 0, None)
+    high = np.minimum(np.ceil(rims.max(axis=1) + 2).astype(int), ink.shape[::-1])
+    seen = np.all(high > low, axis=1)
+    if not seen.any():
+        return
+    low, high, rims = low[seen], high[seen], rims[seen]
     offset = (np.arange(_SUB) + 0.5) / _SUB - 0.5
-    x = (np.arange(low[0], high[0])[:, None] + offset).ravel()
-    y = (np.arange(low[1], high[1])[:, None] + offset).ravel()
-    left, right = _crossings(rim, y)
-    inside = ((x >= left[:, None]) & (x <= right[:, None])).astype(float)
-    rows, columns = high[1] - low[1], high[0] - low[0]
-    share = inside.reshape(rows, _SUB, columns, _SUB).mean(axis=(1, 3))
-    return slice(low[1], high[1]), slice(low[0], high[0]), share
+    x, y = (
+        (low[:, axis, None, None] + np.arange(size)[:, None] + offset).reshape(len(low), -1)
+        for axis, size in enumerate((high - low).max(axis=0))
+    )
+    left, right = _crossings(rims, y)
+    inside = (x[:, None] >= left[..., None]) & (x[:, None] <= right[..., None])
+    samples = [inside[:, k::_SUB, m::_SUB] for k in range(_SUB) for m in range(_SUB)]
+    share = np.add.reduce(samples, dtype=np.uint8) / _SUB**2
+    for (x0, y0), (x1, y1), filled in zip(low.tolist(), high.tolist(), share, strict=True):
+        box = ink[y0:y1, x0:x1]
+        np.maximum(box, filled[: y1 - y0, : x1 - x0], out=box)
 
 
-def _crossings(rim: Vector, y: Vector) -> tuple[Vector, Vector]:
-    """Where lines of constant y (n,) enter and leave a convex outline; empty ranges outside."""
-    edge = (np.roll(rim, -1, axis=0) - rim) * np.sign(_turning(rim))
-    slanted, falling = edge[:, 1] != 0, edge[:, 1] < 0
-    slope = np.divide(edge[:, 0], edge[:, 1], out=np.zeros(len(rim)), where=slanted)
-    x = rim[:, 0] + slope * (y[:, None] - rim[:, 1])
-    left = np.where(falling, x, -np.inf).max(axis=1)
-    right = np.where(slanted & ~falling, x, np.inf).min(axis=1)
-    level = edge[:, 0] * (y[:, None] - rim[:, 1])
-    right[np.any(~slanted & (level < 0), axis=1)] = -np.inf
+def _crossings(rims: Vector, y: Vector) -> tuple[Vector, Vector]:
+    """Where lines of constant y (n, l) enter and leave convex outlines; empty ranges outside."""
+    rims = np.moveaxis(rims, 0, 2)
+    following = np.roll(rims, -1, axis=0)
+    turning = np.sum(rims[:, 0] * following[:, 1] - following[:, 0] * rims[:, 1], axis=0)
+    across, along = np.moveaxis((following - rims) * np.sign(turning), 1, 0)
+    slanted, falling = along != 0, along < 0
+    slope = np.divide(across, along, out=np.zeros(along.shape), where=slanted)
+    left, right = np.full(y.shape, -np.inf), np.full(y.shape, np.inf)
+    for k, (x0, y0) in enumerate(rims):
+        x = x0[:, None] + slope[k][:, None] * (y - y0[:, None])
+        np.maximum(left, x, out=left, where=falling[k][:, None])
+        np.minimum(right, x, out=right, where=(slanted & ~falling)[k][:, None])
+    for k, n in np.argwhere(~slanted):
+        right[n, across[k, n] * (y[n] - rims[k, 1, n]) < 0] = -np.inf
     return left, right
-
-
-def _turning(rim: Vector) -> float:
-    following = np.roll(rim, -1, axis=0)
-    return float(np.sum(rim[:, 0] * following[:, 1] - following[:, 0] * rim[:, 1]))
 
 
 def render(
@@ -128,20 +135,17 @@ def render(
     centres, areas = centroids(rims)
     drawn = rng.random(len(grid)) >= look.missing
     ink = np.zeros(shape)
-    for rim in rims[drawn]:
-        parts = _halves(rim) if look.double else [rim]
-        for part in parts:
-            rows, columns, share = coverage(part, shape)
-            ink[rows, columns] = np.maximum(ink[rows, columns], share)
+    paint(ink, _halves(rims[drawn]) if look.double else rims[drawn])
     dirt = _dirt(ink, look, rng, float(np.sqrt(np.median(areas))))
-    light = _light(shape, look)
+    light = _light(shape, look.light, look.gradient)
     image = light * (1 - look.contrast * ink[..., None])
     _glare(image, look, rng)
     if look.blur > 0:
         image = gaussian_filter(image, (look.blur, look.blur, 0))
     if not look.colour:
         image = image.mean(axis=2, keepdims=True)
-    image = image + rng.normal(0, 1, image.shape) * look.noise
+    if look.noise > 0:
+        image = image + rng.normal(0, 1, image.shape) * look.noise
     picture = np.clip(np.rint(image), 0, 255).astype(np.uint8)
     return Frame(
         image=picture if look.colour else picture[:, :, 0],
@@ -152,23 +156,24 @@ def render(
     )
 
 
-def _halves(rim: Vector) -> list[Vector]:
-    """Two discs side by side in place of one, with the same common centre."""
-    centre = centroids(rim[None])[0][0]
-    size = np.ptp(rim[:, 0])
-    small = centre + 0.75 * (rim - centre)
-    shift = np.array([0.42 * size, 0.0])
-    return [small - shift, small + shift]
+def _halves(rims: Vector) -> Vector:
+    """Two discs (2 n, k, 2) side by side in place of each one, with the same common centre."""
+    centre = centroids(rims)[0][:, None]
+    small = centre + 0.75 * (rims - centre)
+    shift = np.zeros((len(rims), 1, 2))
+    shift[:, 0, 0] = 0.42 * np.ptp(rims[..., 0], axis=1)
+    return np.concatenate([small - shift, small + shift])
 
 
-def _light(shape: tuple[int, int], look: Look) -> Vector:
+@cache
+def _light(shape: tuple[int, int], level: float, gradient: float) -> Vector:
     """Red from the left, green from the right, both falling off; blue weak and even."""
     y, x = np.mgrid[: shape[0], : shape[1]]
     across = x / (shape[1] - 1)
-    along = 1 - 0.3 * look.gradient * (y / (shape[0] - 1)) ** 2
-    red = look.light * (1 - look.gradient * across) * along
-    green = look.light * (1 - look.gradient * (1 - across)) * along
-    return np.stack([red, green, 0.6 * look.light * along], axis=2)
+    along = 1 - 0.3 * gradient * (y / (shape[0] - 1)) ** 2
+    red = level * (1 - gradient * across) * along
+    green = level * (1 - gradient * (1 - across)) * along
+    return np.stack([red, green, 0.6 * level * along], axis=2)
 
 
 def _dirt(ink: Vector, look: Look, rng: np.random.Generator, usual_px: float) -> Vector:
@@ -180,13 +185,14 @@ def _dirt(ink: Vector, look: Look, rng: np.random.Generator, usual_px: float) ->
         long, short = (1.6 * usual_px, 0.7) if hair else (0.16 * usual_px, 0.13 * usual_px)
         c, s = np.cos(angle), np.sin(angle)
         rim = np.column_stack([long * np.cos(turn), short * np.sin(turn)]) @ [[c, s], [-s, c]]
-        rows, columns, share = coverage(place + rim, ink.shape)
-        ink[rows, columns] = np.maximum(ink[rows, columns], share)
+        paint(ink, (place + rim)[None])
     return places
 
 
 def _glare(image: Vector, look: Look, rng: np.random.Generator) -> None:
     """Saturated spots of 2 to 5 px, in place."""
+    if not look.specular:
+        return
     y, x = np.mgrid[: image.shape[0], : image.shape[1]]
     for _ in range(look.specular):
         cx, cy = rng.uniform(10, image.shape[1] - 10), rng.uniform(10, image.shape[0] - 10)
