@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import random
 from functools import cache
-from pathlib import Path
 from typing import Any, get_args
+
+from shipped_fingers import DESIGNS, NAMES, dimensions, parts
 
 from gelslim_cad.assembly.bodies import Bodies, bodies, part_meshes
 from gelslim_cad.assembly.finger_order import finger_order, tail_x_mm
@@ -18,24 +19,11 @@ from gelslim_cad.spec.gripper_library import GripperName
 from gelslim_cad.spec.reader import read_spec
 from gelslim_cad.tolerance.plan import with_values
 
-DESIGNS = sorted((Path(__file__).parents[2] / "designs").glob("*.yaml"))
-NAMES = [path.stem for path in DESIGNS]
-
-
-@cache
-def dimensions(name: str) -> Dimensions:
-    return derive(read_spec(DESIGNS[NAMES.index(name)]).spec)
-
 
 def changed(name: str, **values: Any) -> Dimensions:
     """A design with other values; two underscores stand for a dot."""
     spec = read_spec(DESIGNS[NAMES.index(name)]).spec
     return derive(with_values(spec, {k.replace("__", "."): v for k, v in values.items()}))
-
-
-@cache
-def parts(name: str) -> tuple[Part, ...]:
-    return parts_of(dimensions(name))
 
 
 def parts_of(d: Dimensions) -> tuple[Part, ...]:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from shipped_fingers import parts as shipped_parts
 
 from gelslim.cli import main
 from gelslim_cad.checks import check
@@ -145,8 +146,6 @@ def test_the_solids_follow(tmp_path: Path) -> None:
 
     import trimesh
 
-    from gelslim_cad.solids.finger import finger_parts
-
     path = tmp_path / "mine.yaml"
     path.write_text(MINI20.read_text("utf-8"))
     with shown(path) as server:
@@ -157,7 +156,7 @@ def test_the_solids_follow(tmp_path: Path) -> None:
         status, glb = asked(server, f"/model.glb?{state['model']}")
     assert status == 200
     scene = trimesh.load(io.BytesIO(glb), file_type="glb")
-    parts = finger_parts(derive(read_spec(path).spec))
+    parts = shipped_parts(MINI20.stem)
     assert set(scene.graph.nodes_geometry) == {part.name for part in parts}
     body = next(part for part in parts if part.name == "body")
     size = scene.geometry["body"].bounds

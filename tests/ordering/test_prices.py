@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from shipped_fingers import DESIGNS
+from shipped_fingers import parts as shipped_parts
 
 from gelslim_cad.ordering.cost import cost_record
 from gelslim_cad.ordering.line import NOT_PRICED, BomLine, Need
@@ -20,7 +22,6 @@ from gelslim_cad.spec.camera_library import library_camera
 from gelslim_cad.spec.led_library import library_leds
 from gelslim_core.yaml.errors import InputError
 
-DESIGNS = sorted((Path(__file__).parents[2] / "designs").glob("*.yaml"))
 HEAD = 'format: gelslim-prices/1\ncurrency: EUR\ndate: "2030-05"\n'
 ALL = read_prices(None, "spec.yaml").entries
 LIST = PriceList.model_validate(
@@ -202,12 +203,12 @@ def test_shipped_designs_are_priced_completely(path: Path) -> None:
     from gelslim_cad.build.stages import Stages
     from gelslim_cad.electronics.finger import finger_boards
     from gelslim_cad.export.outline import flat_face
-    from gelslim_cad.solids.finger import finger_parts, tooling_parts
+    from gelslim_cad.solids.finger import tooling_parts
     from gelslim_cad.tolerance.asked import read_spec
 
     stages = Stages.prepare(read_spec(path))
     d = stages.dimensions
-    parts = (*finger_parts(d), *tooling_parts(d, stages.grid))
+    parts = (*shipped_parts(path.stem), *tooling_parts(d, stages.grid))
     bill = priced(finger_bill(d, parts, finger_boards(d)), stages.prices.entries)
     cost = total_cost(bill, stages.prices.entries)
     assert cost.not_priced == ()

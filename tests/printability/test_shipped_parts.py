@@ -6,6 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from shipped_fingers import DESIGNS
+from shipped_fingers import parts as shipped_parts
 
 pytest.importorskip("cadquery", reason="parts need the [cad] extra")
 
@@ -15,10 +17,8 @@ from gelslim_cad.export.mesh import mesh_for, print_mesh
 from gelslim_cad.printability.limits import LIMITS
 from gelslim_cad.printability.measures import measure
 from gelslim_cad.printability.rules import PrintedPart, print_checks
-from gelslim_cad.solids.finger import finger_parts, tooling_parts
+from gelslim_cad.solids.finger import tooling_parts
 from gelslim_cad.tolerance.asked import read_spec
-
-DESIGNS = sorted((Path(__file__).parents[2] / "designs").glob("*.yaml"))
 
 
 @pytest.mark.slow
@@ -30,7 +30,7 @@ DESIGNS = sorted((Path(__file__).parents[2] / "designs").glob("*.yaml"))
 def test_printed_parts_break_no_limit(path: Path) -> None:
     stages = Stages.prepare(read_spec(path))
     d = stages.dimensions
-    made = (p.as_made() for p in (*finger_parts(d), *tooling_parts(d, stages.grid)))
+    made = (p.as_made() for p in (*shipped_parts(path.stem), *tooling_parts(d, stages.grid)))
     parts = [p for p in made if p.process == "print"]
     meshes = {p.name: print_mesh(mesh_for(p.solid, 2e-4)[0], p.print_rotation_deg) for p in parts}
     for limits in LIMITS.values():

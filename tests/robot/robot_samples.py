@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from shipped_fingers import dimensions
+from shipped_fingers import parts as shipped_parts
 
 pytest.importorskip("cadquery", reason="robot models are made of solids, with the [cad] extra")
 
@@ -30,14 +32,20 @@ class WrittenFinger:
     folder: Path
 
 
+def _finger(gel: dict[str, float], mount: dict[str, object]) -> tuple[Dimensions, tuple[Part, ...]]:
+    if not gel and not mount:
+        return dimensions(DESIGN.stem), shipped_parts(DESIGN.stem)
+    data = read_spec(DESIGN).spec.model_dump()
+    data["design"]["gel"] |= gel
+    data["design"]["mount"] |= mount
+    d = derive(Spec(**data))
+    return d, finger_parts(d)
+
+
 def written_finger(
     folder: Path, gel: dict[str, float] | None = None, **mount: object
 ) -> WrittenFinger:
-    data = read_spec(DESIGN).spec.model_dump()
-    data["design"]["gel"] |= gel or {}
-    data["design"]["mount"] |= mount
-    d = derive(Spec(**data))
-    parts = finger_parts(d)
+    d, parts = _finger(gel or {}, mount)
     finger = robot_finger("mini20", parts, d)
     for path, (content, _) in robot_files(finger, d).items():
         target = folder / path

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
+from shipped_fingers import NAMES, dimensions
+from shipped_fingers import parts as shipped_parts
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.spec import Spec
-from gelslim_cad.spec.reader import read_spec
 
-DESIGNS = sorted((Path(__file__).parents[2] / "designs").glob("*.yaml"))
 RANDOM = 6
 
 
@@ -66,27 +66,30 @@ def screws_refused(d: Dimensions) -> list[str]:
     return [c.id for c in check(d) if c.status == "fail" and c.id.startswith(about)]
 
 
+FINGERS = [*NAMES, *(f"random{number}" for number in range(RANDOM))]
+
+
 @cache
-def fingers() -> dict[str, Dimensions]:
-    """Dimensions by name; of the random specs the first `RANDOM` that can be assembled.
+def random_fingers() -> tuple[Dimensions, ...]:
+    """Dimensions of the first `RANDOM` random specs that can be assembled.
 
     Left out are those without a feasible fold and those whose screws a design rule refuses.
     """
-    found = {path.stem: derive(read_spec(path).spec) for path in DESIGNS}
-    seed = 0
-    while len(found) < len(DESIGNS) + RANDOM:
-        d = derive(random_spec(seed))
-        if d.feasible() and not screws_refused(d):
-            found[f"random{seed}"] = d
-        seed += 1
-    return found
+    drawn = (derive(random_spec(seed)) for seed in itertools.count())
+    built = (d for d in drawn if d.feasible() and not screws_refused(d))
+    return tuple(itertools.islice(built, RANDOM))
+
+
+def finger(name: str) -> Dimensions:
+    """Dimensions of one of FINGERS, derived when they are first asked for."""
+    return dimensions(name) if name in NAMES else random_fingers()[int(name[len("random") :])]
 
 
 @cache
 def parts_of(name: str) -> tuple[Part, ...]:
     from gelslim_cad.solids.finger import finger_parts
 
-    return finger_parts(fingers()[name])
+    return shipped_parts(name) if name in NAMES else finger_parts(finger(name))
 
 
 def part(name: str, wanted: str) -> Part:
@@ -99,8 +102,8 @@ LATER = (
     "long50",
     "thin",
     "wide",
-    *[n for n in fingers() if n.startswith("random")],
+    *FINGERS[len(NAMES) :],
 )
 each_finger = pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n in LATER else ()) for n in fingers()]
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in LATER else ()) for n in FINGERS]
 )

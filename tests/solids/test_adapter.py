@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("cadquery", reason="solids need the [cad] extra")
 
-from finger_samples import DESIGNS
+from shipped_fingers import DESIGNS
 
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.geometry.fasteners import SCREWS

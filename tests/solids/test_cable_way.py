@@ -9,8 +9,9 @@ from itertools import pairwise
 import manifold3d
 import numpy as np
 import pytest
-from finger_samples import DESIGNS, each_finger, fingers, part, parts_of, random_spec
+from finger_samples import FINGERS, each_finger, finger, part, parts_of, random_spec
 from sampled import quick
+from shipped_fingers import DESIGNS
 
 from gelslim_cad.dimensions import Dimensions, derive
 from gelslim_cad.export.mesh import tessellate
@@ -64,17 +65,17 @@ def largest_common_mm3(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", quick(fingers(), lambda name: name == "mini20"))
+@pytest.mark.parametrize("name", quick(FINGERS, lambda name: name == "mini20"))
 def test_the_cover_closes_from_below_with_all_that_it_carries(name: str) -> None:
     stay, moving = groups(parts_of(name))
     assert {"camera", "camera_cable", "led_wire_4", "mirror", "led_board_red"} <= {
         p.name for p in moving
     }
     body, group = whole(p.solid for p in stay), whole(p.solid for p in moving)
-    way = fingers()[name]["finger.thickness_mm"] + 1.0
+    way = finger(name)["finger.thickness_mm"] + 1.0
     assert largest_common_mm3(body, group, way) < TOLERANCE_MM3
     # A closed hole as the one before, at the cable's height: the cable catches in its floor.
-    d = fingers()[name]
+    d = finger(name)
     level, cable = d["cable.level_z_mm"], d["camera.cable_width_mm"] / 2 + 0.2
     x = (d["finger.proximal_x_mm"], d["chamber.rear_x_mm"])
     filled = box(x, (-cable, cable), (-d["finger.thickness_mm"], level - 1.25))
@@ -86,7 +87,7 @@ def test_the_cover_closes_from_below_with_all_that_it_carries(name: str) -> None
 @each_finger
 def test_the_camera_drops_into_its_clamp_with_its_cable(name: str) -> None:
     """Out along the camera's height, which is the way in; the cable stays below."""
-    d = fingers()[name]
+    d = finger(name)
     if d["camera.cable_exit"] == "top":
         pytest.skip("the cable is laid back after the camera is in")
     clamp = whole([part(name, "camera_clamp").solid])

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from finger_samples import DESIGNS, each_finger, fingers, part
+from finger_samples import each_finger, finger, part
 from scipy.integrate import solve_bvp
+from shipped_fingers import DESIGNS
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
@@ -28,7 +29,7 @@ def changed(design: str, **values: object) -> Dimensions:
 @each_finger
 def test_the_printed_springs_reach_into_the_camera_by_their_deflection(name: str) -> None:
     """In place they touch it; as printed they overlap it at two nubs and nowhere else."""
-    d = fingers()[name]
+    d = finger(name)
     if not d["clamp.preloaded"]:
         assert part(name, "camera_clamp").printed is None
         return
@@ -138,7 +139,7 @@ def test_a_clamp_with_the_least_floor_is_one_solid(
 @each_finger
 def test_led_boards_touch_their_edges_and_crush_their_ribs(name: str) -> None:
     """Pushed out by 1 µm a board overlaps the edges; it overlaps the ribs as printed."""
-    d = fingers()[name]
+    d = finger(name)
     if not uncrushed_ribs(d):
         pytest.skip("no room for an edge")
     body, board = part(name, "body"), part(name, "led_board_green").solid

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cadquery as cq
 import numpy as np
 import pytest
-from finger_samples import each_finger, fingers, parts_of
+from finger_samples import each_finger, finger, parts_of
 
 from gelslim_cad.build.solid_checks import blocked_volumes, view_corridor
 from gelslim_cad.geometry.optics import corner_rays
@@ -18,12 +18,12 @@ def obstacle(solid: cq.Shape) -> Part:
 
 @each_finger
 def test_nothing_stands_in_the_view(name: str) -> None:
-    assert blocked_volumes(fingers()[name], parts_of(name)) == {}
+    assert blocked_volumes(finger(name), parts_of(name)) == {}
 
 
 @each_finger
 def test_corner_rays_meet_the_mirror_within_its_border(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     _, mirror, window = corner_rays(d)
     low = np.array([d["mirror.lower_x_mm"], d["mirror.lower_z_mm"]])
     high = np.array([d["mirror.upper_x_mm"], d["mirror.upper_z_mm"]])
@@ -37,7 +37,7 @@ def test_corner_rays_meet_the_mirror_within_its_border(name: str) -> None:
 
 @each_finger
 def test_the_pyramid_has_the_volume_of_its_corners(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     pyramid, _ = view_corridor(d)
     _, m, _ = corner_rays(d)
     tip = np.array([d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]])
@@ -49,7 +49,7 @@ def test_the_pyramid_has_the_volume_of_its_corners(name: str) -> None:
 
 
 def test_an_obstacle_in_either_half_of_the_view_is_noticed() -> None:
-    d = fingers()["mini20"]
+    d = finger("mini20")
     _, mirror, window = corner_rays(d)
     pinhole = np.array([d["camera_pose.x_mm"], 0, d["camera_pose.z_mm"]])
     edge = 0.2
@@ -60,7 +60,7 @@ def test_an_obstacle_in_either_half_of_the_view_is_noticed() -> None:
 
 
 def test_an_obstacle_beside_the_view_is_no_obstacle() -> None:
-    d = fingers()["mini20"]
+    d = finger("mini20")
     y = d["baffle.inner_y_mm"]
     z = d["stack.window_bottom_z_mm"] - 2
     cube = cq.Solid.makeBox(1, 1, 1, cq.Vector(0, y, z - 0.5))
@@ -68,7 +68,7 @@ def test_an_obstacle_beside_the_view_is_no_obstacle() -> None:
 
 
 def test_a_ledge_grown_into_the_view_is_noticed() -> None:
-    d = fingers()["mini20"]
+    d = finger("mini20")
     _, _, window = corner_rays(d)
     low = d["stack.window_bottom_z_mm"] - 1
     ledge = cq.Solid.makeBox(5, 10, 1, cq.Vector(window[:, 0].min() - 4, -5, low))

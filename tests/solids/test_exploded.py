@@ -6,13 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from finger_samples import DESIGNS
+from shipped_fingers import DESIGNS
+from shipped_fingers import parts as shipped_parts
 
-from gelslim_cad.dimensions import derive
 from gelslim_cad.export.mesh import tessellate
 from gelslim_cad.pictures.finger_pictures import ISO
-from gelslim_cad.solids.finger import finger_parts
-from gelslim_cad.spec.reader import read_spec
 
 CELL_MM = 0.8
 CLEAR = frozenset({"light_guide", "gel_pad"})
@@ -61,7 +59,7 @@ def seen_shares(parts) -> dict[str, float]:
     ids=lambda path: path.stem,
 )
 def test_no_part_hides_another(path) -> None:
-    parts = finger_parts(derive(read_spec(path).spec))
+    parts = shipped_parts(path.stem)
     apart = seen_shares(parts)
     # Of the two wires of a board one lies above the other.
     least = {name: 0.35 if name.startswith("led_wire") else 0.6 for name in apart}

@@ -6,7 +6,7 @@ import math
 
 import cadquery as cq
 import pytest
-from finger_samples import each_finger, fingers, part, parts_of
+from finger_samples import each_finger, finger, part, parts_of
 
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
@@ -49,14 +49,14 @@ def test_two_parts_pushed_into_each_other_are_noticed() -> None:
         process="cast",
         colour=(0, 0, 0, 1),
     )
-    area = GelShape.of(fingers()["mini20"]).area_mm2
+    area = GelShape.of(finger("mini20")).area_mm2
     (found,) = interferences([parts[0], sunk])
     assert found.volume_mm3 == pytest.approx(0.1 * area, rel=1e-9)
 
 
 @each_finger
 def test_guide_mirror_and_gel_have_the_volume_of_their_closed_forms(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     t, inner = d["design.light_guide.thickness_mm"], d["guide.inner_radius_mm"]
     flat = d["design.gel.width_mm"] + 2 * d["design.light_guide.side_margin_mm"]
     bends = math.pi / 2 * ((inner + t) ** 2 - inner**2)
@@ -77,7 +77,7 @@ def test_guide_mirror_and_gel_have_the_volume_of_their_closed_forms(name: str) -
 
 @each_finger
 def test_the_finger_is_as_large_as_its_dimensions_say(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     case = [p for p in parts_of(name) if p.name in ("body", "back_cover", "tip_bezel", "gel_pad")]
     x, y, z = (span(case, axis) for axis in "xyz")
     assert x[1] - x[0] == pytest.approx(d["finger.length_mm"], abs=1e-4)
@@ -95,7 +95,7 @@ def test_the_finger_is_as_large_as_its_dimensions_say(name: str) -> None:
 
 @each_finger
 def test_bezel_window_surrounds_the_gel_evenly(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     bezel, gel = part(name, "tip_bezel").solid, part(name, "gel_pad").solid
     z = (d["stack.gel_bottom_z_mm"] - d["design.housing.gel_proud_mm"]) / 2
     for half, direction in (
@@ -113,7 +113,7 @@ def test_bezel_window_surrounds_the_gel_evenly(name: str) -> None:
 
 @each_finger
 def test_every_led_stands_on_its_board_under_the_leg(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     places = led_positions_mm(d)
     assert len(places) == min(
         d["design.leds.max_count"],
@@ -129,7 +129,7 @@ def test_every_led_stands_on_its_board_under_the_leg(name: str) -> None:
 
 @each_finger
 def test_screws_reach_into_their_pilots_and_do_not_bottom_out(name: str) -> None:
-    d = fingers()[name]
+    d = finger(name)
     at = Layout(d)
     body = part(name, "body").solid
     for kind, holes in (("bezel", at.bezel_holes()), ("cover", at.cover_holes())):
