@@ -44,7 +44,9 @@ def failed(d: Dimensions) -> set[str]:
     return {c.id for c in check(d) if c.status == "fail"}
 
 
-@pytest.mark.parametrize("make", [mini20, wide], ids=["mini20", "board"])
+@pytest.mark.parametrize(
+    "make", [mini20, pytest.param(wide, marks=pytest.mark.slow)], ids=["mini20", "board"]
+)
 def test_a_length_limit_is_kept_by_a_thicker_finger(make: Any) -> None:
     shortest = make({ENVELOPE + "goal": "shortest"})["finger.length_mm"]
     free = make({})
@@ -87,7 +89,7 @@ def test_the_best_picture_of_a_thickness_lies_between_thinnest_and_best() -> Non
     assert px[-1] <= most + 0.05
 
 
-@pytest.mark.parametrize("worth", [0.1, 0.5])
+@pytest.mark.parametrize("worth", [pytest.param(0.1, marks=pytest.mark.slow), 0.5])
 def test_a_weighted_finger_is_the_best_of_those_with_a_length_limit(worth: float) -> None:
     """Thickness and weighted length: the least over all lengths, each with its thinnest finger."""
     d = wide({ENVELOPE + "length_worth": worth})

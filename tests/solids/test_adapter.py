@@ -18,10 +18,13 @@ from gelslim_cad.proof.solids import interferences
 from gelslim_cad.solids.adapter import adapter
 from gelslim_cad.solids.body import body
 from gelslim_cad.solids.cover import cover
+from gelslim_cad.solids.reuse import PartStore
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.gripper_library import gripper_names, library_gripper
 from gelslim_cad.spec.reader import read_spec
 
+STORE = PartStore()
+"""What no gripper changes is made once."""
 MINI20 = next(path for path in DESIGNS if path.stem == "mini20")
 
 
@@ -74,7 +77,7 @@ def test_holes_lie_where_the_jaw_has_its_bolts(name: str) -> None:
 @pytest.mark.parametrize("name", gripper_names())
 def test_the_adapter_meets_no_part_of_the_finger_and_its_jaw_face_is_flat(name: str) -> None:
     d, part = made(name)
-    assert interferences((part, body(d), cover(d))) == []
+    assert interferences((part, *STORE.parts(d, (body, cover)))) == []
     jaw, low = library_gripper(name).jaw, d["flange.jaw_z_mm"]
     size = SCREWS[jaw.bolt]
     # A head and the edge fit around every bolt, on the side away from the jaw.

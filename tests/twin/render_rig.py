@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,16 @@ def finger_camera(tilt_deg: float = 30.0, height_mm: float = 22.0, lens=None) ->
 
 
 CAMERA = finger_camera()
+
+
+def coarse(camera: VirtualCamera) -> VirtualCamera:
+    """The same view on a quarter of the pixels."""
+    return replace(
+        camera,
+        focal_px=camera.focal_px / 2,
+        image_width_px=camera.image_width_px // 2,
+        image_height_px=camera.image_height_px // 2,
+    )
 
 
 def light(decay_mm: float = 15.0, elevation_deg: float = 25.0) -> LightMap:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from render_rig import CAMERA, GRID, dent, detected_error, light, moved, renderer, rms
+from render_rig import CAMERA, GRID, coarse, dent, detected_error, light, moved, renderer, rms
 from scipy.ndimage import gaussian_filter
 
 from gelslim_optics.camera.view_quality import blur_map
@@ -49,7 +49,8 @@ ACTIVE = {
 
 
 def picture(look: Look) -> np.ndarray:
-    return renderer(look).frame(dent(0.5), dent(0.5, 1.3, 2.1), number=3).image
+    drawn = renderer(look, camera=coarse(CAMERA))
+    return drawn.frame(dent(0.5), dent(0.5, 1.3, 2.1), number=3).image
 
 
 @cache
