@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from shipped_fingers import parts as shipped_parts
 from gelslim.cli import main
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import derive
+from gelslim_cad.live import follow
 from gelslim_cad.live.board import Board
 from gelslim_cad.live.follow import EMPTY_S, LOOK_S, Follower
 from gelslim_cad.live.server import LiveServer
@@ -32,7 +34,18 @@ PATIENCE_S = 120.0
 
 
 @contextmanager
-def shown(path: Path, empty_s: float = EMPTY_S) -> Iterator[LiveServer]:
+def shown(path: Path, empty_s: float = EMPTY_S, solids: bool = False) -> Iterator[LiveServer]:
+    """The page of a file; without solids no process is started that would make them."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not solids:
+            patch.setattr(follow, "_pool", lambda: ThreadPoolExecutor(1))
+            patch.setattr(follow, "_solids", lambda d, own: "left out")
+        with _served(path, empty_s) as server:
+            yield server
+
+
+@contextmanager
+def _served(path: Path, empty_s: float) -> Iterator[LiveServer]:
     board = Board()
     server = LiveServer(board)
     follower = Follower(path, read_spec, board, empty_s)
@@ -148,7 +161,7 @@ def test_the_solids_follow(tmp_path: Path) -> None:
 
     path = tmp_path / "mine.yaml"
     path.write_text(MINI20.read_text("utf-8"))
-    with shown(path) as server:
+    with shown(path, solids=True) as server:
         events = Events(server)
         state = events.until(lambda s: s.get("solids") not in (None, "working"))
         assert state["solids"] == "ready"
