@@ -26,7 +26,7 @@ from gelslim_twin.simulation.records import COLUMNS, FrameTruth, fields_npz, wre
 
 FORCE, TWIN, OWN = (DOCS / f"{n}.md" for n in ("force_pipeline", "digital_twin", "own_parts"))
 """Their blocks need frames, simulated data or a solid, and run in tests of their own."""
-LATER = ("budget.md",)
+LATER = ("budget.md", "contributing.md")
 PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN, OWN)]
 YAML = [(p, k) for p in PAGES for k in range(len(blocks(p, "yaml")))]
 SMALL = """\

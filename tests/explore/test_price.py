@@ -23,7 +23,7 @@ from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import read_spec
 
 
-@pytest.mark.parametrize("poissons_ratio", [0.3, 0.4])
+@pytest.mark.parametrize("poissons_ratio", [pytest.param(0.3, marks=pytest.mark.slow), 0.4])
 def test_the_stiffness_of_a_thin_layer_is_its_confined_modulus(poissons_ratio: float) -> None:
     """A bonded layer much thinner than the bump is wide only compresses: k = M / t ∫ g² dA."""
     nu, t, width = poissons_ratio, 0.2, 2.0

@@ -40,7 +40,7 @@ def test_a_closed_pipe_leaks_exactly_nothing(na: float) -> None:
 
 
 @pytest.mark.parametrize("planar", [True, False])
-@pytest.mark.parametrize("na", quick([0.0, 0.3, 0.5, 0.7, 1.0], (0.0, 0.5, 1.0).__contains__))
+@pytest.mark.parametrize("na", quick([0.0, 0.3, 0.5, 0.7, 1.0], (0.5, 1.0).__contains__))
 def test_the_bend_holds_all_light_above_the_threshold_and_not_below(
     na: float, planar: bool
 ) -> None:

@@ -137,7 +137,15 @@ def test_a_cantilever_counts_twice_and_a_boss_in_the_air_is_told() -> None:
     assert math.isfinite(measured.bridge_mm)
 
 
-@pytest.mark.parametrize(("slope_deg", "hangs"), [(30, False), (44, False), (50, True), (70, True)])
+@pytest.mark.parametrize(
+    ("slope_deg", "hangs"),
+    [
+        (30, False),
+        pytest.param(44, False, marks=pytest.mark.slow),
+        (50, True),
+        pytest.param(70, True, marks=pytest.mark.slow),
+    ],
+)
 def test_cones_hang_beyond_the_limit(slope_deg: float, hangs: bool) -> None:
     """A frustum on its narrow end; its lateral area is π (r₁ + r₂) s."""
     low, high = 4.0, 10.0

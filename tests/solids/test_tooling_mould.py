@@ -50,7 +50,13 @@ def test_cavity_is_the_gel_over_one_minus_shrinkage(shrinkage: float, crown: flo
     assert cured.xlen * (1 - shrinkage / 100) == pytest.approx(28, abs=1e-5)
 
 
-@pytest.mark.parametrize(("process", "crown"), CASES)
+@pytest.mark.parametrize(
+    ("process", "crown"),
+    [
+        (p, c) if c > 0 or p == PROCESSES[0] else pytest.param(p, c, marks=pytest.mark.slow)
+        for p, c in CASES
+    ],
+)
 def test_parts_enclose_the_cavity_and_nothing_else(process: str, crown: float) -> None:
     """Outside less parts = cavity, holes and notches: what is left is the cavity's volume."""
     d = mould(process, crown)
@@ -143,7 +149,7 @@ def test_undercut_is_measured() -> None:
     "shape",
     [
         (28, 28, 2, 2, 1),
-        (120, 26.4, 13.2, 15, 5),
+        pytest.param((120, 26.4, 13.2, 15, 5), marks=pytest.mark.slow),
         (5, 5, 1.746, 0.3, 0.922),
         (43, 120, 21.5, 0.3, 5),
     ],

@@ -22,7 +22,7 @@ from gelslim_cad.tolerance.yields import ALL, yield_of
 NO_PLAY = {"design.housing.camera_play_mm": 0.0, "design.housing.camera_seat": "loose"}
 
 
-@pytest.mark.parametrize("k1", [-0.12, 0.12])
+@pytest.mark.parametrize("k1", [-0.12, pytest.param(0.12, marks=pytest.mark.slow)])
 def test_a_distorting_lens_counts_as_in_the_rules(k1: float) -> None:
     """Barrel and pincushion; the rules also look between corners and middles of the edges."""
     d = derive(spec("mini20", camera__distortion={"model": "brown", "k1": k1}))

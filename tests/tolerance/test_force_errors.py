@@ -26,7 +26,7 @@ def test_the_force_is_proportional_to_youngs_modulus() -> None:
         assert max(v for k, v in found.causes.items() if k != "Young's modulus") < 1e-9
 
 
-@pytest.mark.parametrize("poisson", [0.0, 0.3223, 0.45])
+@pytest.mark.parametrize("poisson", [0.0, pytest.param(0.3223, marks=pytest.mark.slow), 0.45])
 def test_exponents_of_a_bonded_layer(poisson: float) -> None:
     """Shear G w l / h; pressing (λ + 2 G) w l / h, as long as the bump is wide for the layer."""
     found = exponents(derive(spec("gelslim2", material__gel__poissons_ratio=poisson,

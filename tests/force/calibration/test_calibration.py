@@ -40,7 +40,7 @@ def test_clean_frame_gives_the_camera_to_a_hundredth_of_a_pixel():
     assert found.deviation.rotation_deg == pytest.approx(np.linalg.norm(BUILD[:3]), abs=0.1)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (2, 3))])
 def test_print_errors_noise_and_missing_dots(seed):
     rng = np.random.default_rng(seed)
     camera = deviated_camera(finger_view(), rng.uniform(-1, 1, len(BUILD)) * np.abs(BUILD))

@@ -128,7 +128,7 @@ def test_patch_cut_by_the_pads_edge(centre):
     [
         (0.0, (0.0, 0.0), (-5.0, -9.3), 1.8),
         (0.6, (-3.0, 2.0), (9.8, 1.0), 2.4),
-        (0.3, (6.0, -4.0), (9.8, -1.0), 2.4),
+        pytest.param(0.3, (6.0, -4.0), (9.8, -1.0), 2.4, marks=pytest.mark.slow),
     ],
 )
 def test_patch_cut_by_the_edge_has_no_second_solution(aside_mm, lens_offset_px, centre, radius):
@@ -151,7 +151,9 @@ def test_patch_cut_by_the_edge_has_no_second_solution(aside_mm, lens_offset_px, 
     assert (np.abs(patch.centre_mm - centre) < 3.5 * sigma[:2]).all()
 
 
-@pytest.mark.parametrize(("dark_sides", "noise"), [(1.0, 4.0), (2.0, 2.0)])
+@pytest.mark.parametrize(
+    ("dark_sides", "noise"), [pytest.param(1.0, 4.0, marks=pytest.mark.slow), (2.0, 2.0)]
+)
 def test_noise_of_dark_sides_is_no_patch(dark_sides, noise):
     """Where one colour is all but gone its logarithm is noisy: once taken for a patch along the
     gel's whole side, wider than the pad, which drowned a light press in the middle."""
@@ -170,7 +172,9 @@ def test_noise_of_dark_sides_is_no_patch(dark_sides, noise):
         assert abs(patch.size_mm - radius) < 0.1
 
 
-@pytest.mark.parametrize("sizes", [(1.4, 2.0), (2.0, 2.6), (2.0, 1.5)])
+@pytest.mark.parametrize(
+    "sizes", [(1.4, 2.0), pytest.param((2.0, 2.6), marks=pytest.mark.slow), (2.0, 1.5)]
+)
 def test_a_patch_that_jumps_in_size_is_followed(sizes):
     """A rim a third of the size away: the fit once stayed at the old size with a steep decay."""
     follow, centre = finder(), np.array([-0.5, 2.0])

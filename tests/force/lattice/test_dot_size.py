@@ -18,7 +18,7 @@ GRID = grid_of_dots()
     [
         pytest.param(GRID, Look(noise=8), marks=pytest.mark.slow),
         (GRID, Look(noise=8, double=True)),
-        (GRID, Look(noise=4, contrast=0.1)),
+        pytest.param(GRID, Look(noise=4, contrast=0.1), marks=pytest.mark.slow),
         (GRID, Look(noise=8, dirt=20, specular=8)),
         pytest.param(GRID, Look(noise=8, colour=False, blur=2), marks=pytest.mark.slow),
         pytest.param(

@@ -175,7 +175,7 @@ def test_black_frames_white_frames_and_another_scene_are_survived(rest):
     assert off.max() < 0.5
 
 
-@pytest.mark.parametrize("step", [(1, 0), (0, -1)])
+@pytest.mark.parametrize("step", [(1, 0), pytest.param((0, -1), marks=pytest.mark.slow)])
 def test_the_anchors_show_a_shift_of_all_markers_by_a_pitch(rest, step, monkeypatch):
     """Between two frames the print moves by a pitch: nothing but the anchors looks different."""
     monkeypatch.setattr("gelslim_force.tracking.tracker._FULL_EVERY", 5)

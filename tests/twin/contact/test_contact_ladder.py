@@ -61,7 +61,9 @@ def test_rungs_keep_what_they_say_and_finer_is_better(name: str, poisson: float)
     assert all(b < a for a, b in itertools.pairwise(errors)), errors
 
 
-@pytest.mark.parametrize(("side", "allowed"), [(8.6, 1e-2), (9.3, 1e-2), (9.0, 0.15)])
+@pytest.mark.parametrize(
+    ("side", "allowed"), [(8.6, 1e-2), pytest.param(9.3, 1e-2, marks=pytest.mark.slow), (9.0, 0.15)]
+)
 def test_a_rim_on_a_row_of_nodes_leaves_two_answers(side: float, allowed: float) -> None:
     """A plane of 9 mm ends on the row of nodes at 4.5 mm, which bulge past its rim in a step.
 

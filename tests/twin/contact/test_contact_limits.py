@@ -126,7 +126,7 @@ def test_small_presses_are_linear(friction: float) -> None:
         assert np.linalg.norm(one.force_n - other.force_n) < 0.02 * np.linalg.norm(one.force_n)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_deep_press(friction: float) -> None:
     """Sixty per cent of the thickness, down and up: nodal forces are those of the gel's law."""
     pad = small_pad(0.49)
