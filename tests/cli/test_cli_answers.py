@@ -40,6 +40,17 @@ def test_check_as_json_holds_every_rule(capsys: pytest.CaptureFixture[str]) -> N
     assert f"{truth_thickness():.2f} mm" in answer["binding"][0]
 
 
+def test_check_lists_what_holds_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    held = re.compile(r"^ok ", re.MULTILINE)
+    assert main(["check", str(MINI20)]) == 0
+    shown = capsys.readouterr().out
+    assert not held.search(shown)
+    assert str(len(RULES)) in shown
+    assert main(["check", str(MINI20), "--verbose"]) == 0
+    passed = [c for c in check(derive(read_spec(MINI20).spec)) if c.status == "pass"]
+    assert len(held.findall(capsys.readouterr().out)) == len(passed)
+
+
 def test_check_puts_failures_first_and_says_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -54,17 +65,6 @@ def test_check_puts_failures_first_and_says_what_to_do(
     joined = " ".join(shown.split())
     assert "design.optics.min_px_per_marker" in joined
     assert f"{len(failed)} of {len(RULES)}" in joined
-
-
-def test_check_lists_what_holds_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
-    held = re.compile(r"^ok ", re.MULTILINE)
-    assert main(["check", str(MINI20)]) == 0
-    shown = capsys.readouterr().out
-    assert not held.search(shown)
-    assert str(len(RULES)) in shown
-    assert main(["check", str(MINI20), "--verbose"]) == 0
-    passed = [c for c in check(derive(read_spec(MINI20).spec)) if c.status == "pass"]
-    assert len(held.findall(capsys.readouterr().out)) == len(passed)
 
 
 def test_a_failing_check_as_json_keeps_its_status(

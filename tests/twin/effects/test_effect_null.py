@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sampled import quick
 from scene_samples import ROOT
 from sim_rig import small_sensor
 
@@ -98,7 +99,11 @@ def outcome(folder: Path, effects: dict[str, Any]) -> tuple[tuple[str, ...], byt
     )
 
 
-@pytest.mark.parametrize("name", sorted(NULL))
+DRAWN = ("motion_blur", "exposure", "sensor_noise", "marker_print", "dirt", "specular")
+"""Tried in every run on the renderer alone, in the tests of its effects."""
+
+
+@pytest.mark.parametrize("name", quick(sorted(NULL), lambda name: name not in DRAWN))
 def test_switched_on_with_nothing_to_do_it_changes_nothing(folder: Path, name: str) -> None:
     on_order, on = outcome(folder, {name: {"use": "on", **NULL[name]}})
     off_order, off = outcome(folder, {name: {"use": "off"}})
