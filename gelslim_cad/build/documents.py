@@ -41,10 +41,13 @@ from gelslim_cad.report.camera_view import CameraView
 from gelslim_cad.report.render import Picture, ReportData, render_report
 from gelslim_cad.report.tables import Note
 from gelslim_cad.report.view_figures import projection_sentence
+from ifem_export.bundle.manifest import LADDER, MANIFEST
 from ifem_export.markers.grid import MarkerGrid
+from ifem_export.operators.operator_ladder import OperatorLadder
 
 OF_MARKERS = ("marker_grid.", "pad_mesh.")
 """Groups of dimensions that the report leaves out for a gel without markers."""
+BUNDLE_JSON, OPERATORS_JSON = f"bundle/{MANIFEST}", f"bundle/{LADDER}"
 PICTURES = {
     "pictures/whole.png": ("The finger", "Assembled, seen from the tip."),
     "pictures/exploded.png": ("Exploded", "Every part on its way into the finger."),
@@ -209,6 +212,8 @@ def report_data(
         tolerance=json.loads(contents[TOLERANCE_JSON]),
         overlays=tuple(overlay.record(explode_mm) for overlay in overlays),
         assembly=json.loads(contents[ASSEMBLY_JSON]),
+        operators=OperatorLadder.from_record(json.loads(contents[OPERATORS_JSON])),
+        operator=json.loads(contents[BUNDLE_JSON])["ladder"]["operator"],
     )
 
 

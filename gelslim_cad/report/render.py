@@ -15,6 +15,7 @@ from gelslim_cad.ordering.line import BomLine
 from gelslim_cad.report import tables
 from gelslim_cad.report.assembly import assembly_section
 from gelslim_cad.report.camera_view import CameraView, camera_view, ramp_style
+from gelslim_cad.report.forces import forces_section
 from gelslim_cad.report.markup import text
 from gelslim_cad.report.page import VIEWER_SCRIPTS, asset, fill, policy
 from gelslim_cad.report.printing import printing_section
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from gelslim_cad.build.manifest import FileEntry
     from gelslim_cad.checks.rule import Check
     from gelslim_cad.printability.rules import PrintedPart
+    from ifem_export.operators.operator_ladder import OperatorLadder
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,10 @@ class ReportData:
     """What the 3D view shows beside the parts, as `Overlay.record` gives it."""
     assembly: Mapping[str, Any] = field(default_factory=dict)
     """The proven order of assembly as plain data; empty where there is none."""
+    operators: OperatorLadder | None = None
+    """The force operators of the bundle with their errors."""
+    operator: str = ""
+    """Label of the one that the force pipeline starts with."""
 
 
 def render_report(data: ReportData) -> bytes:
@@ -122,6 +128,7 @@ def _sections(data: ReportData) -> list[tuple[str, str, str]]:
         ("pictures", "Pictures", _pictures(data.pictures)),
         ("camera", "What the camera sees", camera_view(data.camera_view) + projection),
         ("light", "How the gel is lit", light),
+        ("forces", "How exact its forces are", forces_section(data.operators, data.operator)),
         ("tolerance", "What tolerances do", tolerance_section(data.tolerance)),
         ("assembly", "How it goes together", assembly_section(data.assembly)),
         ("thickness", "What sets the thickness", _binding(data.binding)),
