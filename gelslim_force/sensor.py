@@ -196,8 +196,9 @@ def indenter_source(
         surface_mm=points_mm,
         indenter=shape,
     )
-    operator = (settings or PipelineSettings()).compliance(bundle)
-    return IndenterSource(finder, NormalModel(operator, points_mm), shape, depth_mm)
+    chosen = settings or PipelineSettings()
+    model = NormalModel(chosen.compliance(bundle), points_mm, chosen.edge(bundle))
+    return IndenterSource(finder, model, shape, depth_mm)
 
 
 def unknown_source(

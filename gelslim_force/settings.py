@@ -105,7 +105,7 @@ class PipelineSettings:
     def edge(self, bundle: Bundle) -> ContactCompliance | None:
         """Columns of the compliance for contacts near the edge; None for pads with too many."""
         try:
-            return ContactCompliance(bundle)
+            return ContactCompliance.shared(bundle)
         except MeshError:
             return None
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import SuperLU
 
+from ifem_export.compliance.contact_columns import ContactCompliance
 from ifem_export.operators.condensed_operators import (
     CondensedOperator,
     DenseOperator,
@@ -37,12 +38,16 @@ class Compliant(Protocol):
 class NormalCompliance:
     """C_zz of a surface operator: float32 columns in mm/N.
 
-    They come from `displacement`. For an operator that holds the full system of the pad, they come
-    from one factorisation with many right-hand sides: the same numbers, several times faster.
+    They come from `displacement`. Near the edge of the pad, where a fast operator takes it for a
+    periodic layer, they come from `edge`, if that is given. For an operator that holds the full
+    system of the pad, they come from one factorisation with many right-hand sides: the same
+    numbers, several times faster.
     """
 
-    def __init__(self, operator: Compliant, columns: int) -> None:
-        self._operator = operator
+    def __init__(
+        self, operator: Compliant, columns: int, edge: ContactCompliance | None = None
+    ) -> None:
+        self._operator, self._edge = operator, edge
         self._columns = columns
         self._values = np.zeros((columns, columns), dtype=np.float32)
         self._known = np.zeros(columns, dtype=bool)
@@ -90,6 +95,18 @@ class NormalCompliance:
 
     def _solved(self, nodes: Nodes) -> Array:
         """Columns (c, n)."""
+        if self._edge is None:
+            return self._fast(nodes)
+        near = self._edge.near_edge[nodes]
+        columns = np.empty((self._columns, len(nodes)))
+        columns[:, near] = self._edge.compliance.columns(nodes[near])[:, 2, :, 2].T
+        columns[:, ~near] = self._fast(nodes[~near])
+        return columns
+
+    def _fast(self, nodes: Nodes) -> Array:
+        """Columns (c, n) by the operator."""
+        if len(nodes) == 0:
+            return np.empty((self._columns, 0))
         if not isinstance(self._operator, (PaperOperator, CondensedOperator, DenseOperator)):
             return np.column_stack([self._one(node) for node in nodes])
         system = self._operator.system

@@ -13,6 +13,7 @@ from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch, rotated
 from gelslim_force.contact.patch_finder import PatchFinder
+from ifem_export.compliance.contact_columns import ContactCompliance
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -37,17 +38,20 @@ class NormalModel:
     stiffness of a flat punch with the outline of the patch and Φ is the reduction of its force by
     the profile. This needs no modulus.
 
-    `points_mm` (c, 3) are the surface nodes in the operator's order, on a lattice of `pitch_mm`.
+    `points_mm` (c, 3) are the surface nodes in the operator's order, on a lattice of `pitch_mm`;
+    `edge` takes the operator's place near the edge of the pad.
     Not safe for use from two threads at once.
     """
 
-    def __init__(self, operator: Compliant, points_mm: ArrayLike) -> None:
+    def __init__(
+        self, operator: Compliant, points_mm: ArrayLike, edge: ContactCompliance | None = None
+    ) -> None:
         points = np.array(points_mm, dtype=float)
         if points.ndim != 2 or points.shape[1] < 2 or not np.isfinite(points).all():
             raise ValueError(f"surface nodes of shape {points.shape}: give (c, 3) finite, in mm")
         self.points_mm = points[:, :2]
         self.pitch_mm = _pitch(self.points_mm)
-        self.compliance = NormalCompliance(operator, len(points))
+        self.compliance = NormalCompliance(operator, len(points), edge)
 
     def prepare(self) -> None:
         """Compute the full compliance now, so that no frame waits for a part of it."""

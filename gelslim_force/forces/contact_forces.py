@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.estimator import ForceEstimator
 from gelslim_force.forces.frame_result import ForceField
-from ifem_export.compliance.contact_columns import ContactCompliance
-from ifem_export.mesh.surface_lattice import edge_distance_mm
+from ifem_export.compliance.contact_columns import ContactCompliance, near_edge
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-_EDGE_THICKNESSES = 1.5
-"""Distance from the edge, in thicknesses, within which a periodic layer errs more than noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +76,7 @@ class ContactForces:
     @cached_property
     def near_edge(self) -> Mask:
         """(c,) nodes that are too near the edge for the operator of the fit."""
-        mesh = self.fit.mesh
         if not self.fit.operator.name.startswith("fft"):
             # Condensed operators are exact but slow in a fit, so that columns are used everywhere.
             return np.full(len(self.fit.points_mm), self.edge is not None)
-        thickness_mm = mesh.layers * mesh.cell_size_mm[2]
-        distance_mm = edge_distance_mm(self.fit.points_mm, mesh.cell_size_mm[:2])
-        return np.asarray(distance_mm < _EDGE_THICKNESSES * thickness_mm)
+        return near_edge(self.fit.mesh)

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 from functools import cached_property
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.columns import SurfaceCompliance, require_room
+from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.mesh.surface_lattice import edge_distance_mm
 from ifem_export.operators.pad_system import PadSystem
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 
 
+EDGE_THICKNESSES = 1.5
+"""Distance from the edge, in thicknesses, within which the infinite pad's forces of a fitted
+contact err by more than a hundredth of the field."""
+_SHARED: WeakValueDictionary[int, ContactCompliance] = WeakValueDictionary()
+
+
 class ContactCompliance:
     """Surface operator of a bundle whose compliance is known by columns, exact up to the edge.
 
     A step of a fit multiplies by the products of the columns in contact and solves nothing. Columns
-    are computed when they are needed first, and kept, as are the products of the last contact. An
-    instance must not be used by two threads at once.
+    are computed when they are needed first, and kept, as are the products of the last contact.
 
     Args:
         bundle: The sensor.
@@ -39,6 +47,19 @@ class ContactCompliance:
         require_room(len(bundle.mesh.surface))
         self.bundle = bundle
         self._last = np.zeros(0, dtype=np.intp), np.zeros((0, 0))
+
+    @classmethod
+    def shared(cls, bundle: Bundle) -> ContactCompliance:
+        """The compliance of a bundle that others use too. Raises MeshError as the constructor."""
+        found = _SHARED.get(id(bundle))
+        if found is None or found.bundle is not bundle:
+            found = _SHARED[id(bundle)] = cls(bundle)
+        return found
+
+    @cached_property
+    def near_edge(self) -> NDArray[np.bool_]:
+        """(c,) nodes within `EDGE_THICKNESSES` of the edge."""
+        return near_edge(self.bundle.mesh)
 
     @cached_property
     def compliance(self) -> SurfaceCompliance:
@@ -80,3 +101,10 @@ class ContactCompliance:
     def n_bytes(self) -> int:
         """Bytes of all columns."""
         return 36 * self.compliance.nodes**2
+
+
+def near_edge(mesh: PadMesh) -> NDArray[np.bool_]:
+    """(c,) surface nodes of a pad within `EDGE_THICKNESSES` of its edge."""
+    thickness_mm = mesh.layers * mesh.cell_size_mm[2]
+    distance_mm = edge_distance_mm(np.asarray(mesh.surface_mm), mesh.cell_size_mm[:2])
+    return np.asarray(distance_mm < EDGE_THICKNESSES * thickness_mm)

@@ -15,8 +15,11 @@ from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
 from gelslim_force.contact.normal_compliance import NormalCompliance
 from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.contact.patch import ContactPatch
+from ifem_export.bundle.bundle import build_bundle
+from ifem_export.compliance.contact_columns import ContactCompliance
 from ifem_export.elements.material import Material
-from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
 from ifem_export.operators.surface_operator import surface_operator
 
 E_MPA, THICK_MM = 0.147, 2.0
@@ -273,3 +276,32 @@ def test_what_is_not_known_is_not_invented():
         model.motion(disc(), BALL, depth_mm=-1.0)
     with pytest.raises(ValueError, match="surface nodes"):
         NormalModel(None, np.zeros(3))
+
+
+@pytest.mark.parametrize("x_mm", [7.0, 9.0, 10.0])
+def test_a_press_near_the_edge_is_that_of_the_exact_pad(x_mm):
+    """The infinite pad alone overestimated the force by up to two thirds."""
+    bundle = edge_pad()
+    points = np.asarray(bundle.mesh.surface_mm)
+    exact, quick = (bundle.surface_operator(rung) for rung in ("factor", "fft"))
+    patch = disc(x_mm, 0.4)
+    found = {}
+    for name, model in {
+        "exact": NormalModel(exact, points),
+        "mixed": NormalModel(quick, points, ContactCompliance.shared(bundle)),
+        "quick": NormalModel(quick, points),
+    }.items():
+        motion = model.motion(patch, BALL)
+        found[name] = motion.depth_mm, node_forces_n(model, motion).sum(), motion.w_mm
+    assert found["mixed"][0] == pytest.approx(found["exact"][0], rel=0.02)
+    assert found["mixed"][1] == pytest.approx(found["exact"][1], rel=0.02)
+    size = np.linalg.norm(found["exact"][2])
+    assert np.linalg.norm(found["mixed"][2] - found["exact"][2]) < 0.06 * size
+    if x_mm > 8.0:
+        assert found["quick"][1] > 1.15 * found["exact"][1]
+
+
+@cache
+def edge_pad():
+    mesh, _ = build_pad_mesh(RoundedRectangle(20.0, 16.0, 1.0), THICK_MM, cells=(30, 24, 4))
+    return build_bundle(mesh, Material(E_MPA, 0.48, 1000.0), "bbar", with_stiffness=False)
