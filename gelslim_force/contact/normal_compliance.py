@@ -97,7 +97,7 @@ class NormalCompliance:
         """Columns (c, n)."""
         if self._edge is None:
             return self._fast(nodes)
-        near = self._edge.near_edge[nodes]
+        near = self._edge.ahead[nodes]
         columns = np.empty((self._columns, len(nodes)))
         columns[:, near] = self._edge.compliance.columns(nodes[near])[:, 2, :, 2].T
         columns[:, ~near] = self._fast(nodes[~near])

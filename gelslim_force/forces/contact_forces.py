@@ -70,7 +70,7 @@ class ContactForces:
     def prepare_edge(self) -> None:
         """Compute the columns near the edge now."""
         if self.edge is not None and isinstance(self.edge.operator, ContactCompliance):
-            self.edge.operator.prepare(np.flatnonzero(self.near_edge))
+            self.edge.operator.prepare()
             _ = self.edge.neighbours
 
     @cached_property

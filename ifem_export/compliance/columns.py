@@ -91,6 +91,11 @@ class SurfaceCompliance:
         return np.asarray(images.min(axis=0))
 
     @property
+    def distinct(self) -> int:
+        """Number of nodes that are no images of others, whose columns must be solved for."""
+        return len(np.unique(self._originals))
+
+    @property
     def key(self) -> str:
         """Hash of everything that the compliance depends on."""
         parts = (FORMAT, self.bundle.geometry_hash, repr(self.bundle.material),

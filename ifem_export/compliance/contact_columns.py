@@ -21,6 +21,8 @@ Nodes = NDArray[np.intp]
 EDGE_THICKNESSES = 1.5
 """Distance from the edge, in thicknesses, within which the infinite pad's forces of a fitted
 contact err by more than a hundredth of the field."""
+FEW = 512
+"""Number of nodes whose columns are solved for in some seconds."""
 _SHARED: WeakValueDictionary[int, ContactCompliance] = WeakValueDictionary()
 
 
@@ -62,6 +64,17 @@ class ContactCompliance:
         return near_edge(self.bundle.mesh)
 
     @cached_property
+    def ahead(self) -> NDArray[np.bool_]:
+        """(c,) nodes whose columns contacts near the edge need.
+
+        These are all where symmetry leaves few to solve for, else those within twice the distance
+        of `near_edge`: a contact that reaches farther waits for its columns once.
+        """
+        if self.compliance.distinct <= FEW:
+            return np.ones(self.compliance.nodes, dtype=bool)
+        return near_edge(self.bundle.mesh, 2 * EDGE_THICKNESSES)
+
+    @cached_property
     def compliance(self) -> SurfaceCompliance:
         """The columns."""
         return SurfaceCompliance(self.bundle)
@@ -71,9 +84,9 @@ class ContactCompliance:
         """Equations of the pad."""
         return self.compliance.system
 
-    def prepare(self, nodes: Nodes) -> None:
-        """Compute the columns of nodes (n,) now."""
-        self.compliance.require(nodes)
+    def prepare(self) -> None:
+        """Compute the columns of the nodes `ahead` now."""
+        self.compliance.require(np.flatnonzero(self.ahead))
 
     def contact_products(self, nodes: Nodes) -> tuple[NDArray[np.float32], Array]:
         """Columns (3n, 3c) of nodes (n,) and their products CᵀC (3n, 3n), in mm/N and mm²/N²."""
@@ -103,8 +116,8 @@ class ContactCompliance:
         return 36 * self.compliance.nodes**2
 
 
-def near_edge(mesh: PadMesh) -> NDArray[np.bool_]:
-    """(c,) surface nodes of a pad within `EDGE_THICKNESSES` of its edge."""
+def near_edge(mesh: PadMesh, thicknesses: float = EDGE_THICKNESSES) -> NDArray[np.bool_]:
+    """(c,) surface nodes of a pad within some of its thicknesses of its edge."""
     thickness_mm = mesh.layers * mesh.cell_size_mm[2]
     distance_mm = edge_distance_mm(np.asarray(mesh.surface_mm), mesh.cell_size_mm[:2])
-    return np.asarray(distance_mm < EDGE_THICKNESSES * thickness_mm)
+    return np.asarray(distance_mm < thicknesses * thickness_mm)

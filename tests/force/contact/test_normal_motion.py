@@ -16,7 +16,7 @@ from gelslim_force.contact.normal_compliance import NormalCompliance
 from gelslim_force.contact.normal_motion import NormalModel
 from gelslim_force.contact.patch import ContactPatch
 from ifem_export.bundle.bundle import build_bundle
-from ifem_export.compliance.contact_columns import ContactCompliance
+from ifem_export.compliance import contact_columns
 from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
@@ -278,9 +278,10 @@ def test_what_is_not_known_is_not_invented():
         NormalModel(None, np.zeros(3))
 
 
-@pytest.mark.parametrize("x_mm", [7.0, 9.0, 10.0])
-def test_a_press_near_the_edge_is_that_of_the_exact_pad(x_mm):
+@pytest.mark.parametrize("x_mm", [5.0, 7.5])
+def test_a_press_near_the_edge_is_that_of_the_exact_pad(x_mm, monkeypatch):
     """The infinite pad alone overestimated the force by up to two thirds."""
+    monkeypatch.setattr(contact_columns, "FEW", 0)
     bundle = edge_pad()
     points = np.asarray(bundle.mesh.surface_mm)
     exact, quick = (bundle.surface_operator(rung) for rung in ("factor", "fft"))
@@ -288,7 +289,7 @@ def test_a_press_near_the_edge_is_that_of_the_exact_pad(x_mm):
     found = {}
     for name, model in {
         "exact": NormalModel(exact, points),
-        "mixed": NormalModel(quick, points, ContactCompliance.shared(bundle)),
+        "mixed": NormalModel(quick, points, contact_columns.ContactCompliance(bundle)),
         "quick": NormalModel(quick, points),
     }.items():
         motion = model.motion(patch, BALL)
@@ -296,12 +297,12 @@ def test_a_press_near_the_edge_is_that_of_the_exact_pad(x_mm):
     assert found["mixed"][0] == pytest.approx(found["exact"][0], rel=0.02)
     assert found["mixed"][1] == pytest.approx(found["exact"][1], rel=0.02)
     size = np.linalg.norm(found["exact"][2])
-    assert np.linalg.norm(found["mixed"][2] - found["exact"][2]) < 0.06 * size
-    if x_mm > 8.0:
+    assert np.linalg.norm(found["mixed"][2] - found["exact"][2]) < 0.02 * size
+    if x_mm > 7.0:
         assert found["quick"][1] > 1.15 * found["exact"][1]
 
 
 @cache
 def edge_pad():
-    mesh, _ = build_pad_mesh(RoundedRectangle(20.0, 16.0, 1.0), THICK_MM, cells=(30, 24, 4))
+    mesh, _ = build_pad_mesh(RoundedRectangle(16.0, 12.0, 1.0), THICK_MM, cells=(24, 18, 3))
     return build_bundle(mesh, Material(E_MPA, 0.48, 1000.0), "bbar", with_stiffness=False)

@@ -36,7 +36,7 @@ def estimators(sensor: Bundle, request: pytest.FixtureRequest) -> ContactForces:
     return settings.contact_forces(sensor, settings.operator(sensor), None)
 
 
-@pytest.mark.parametrize("gap_mm", [6.0, 1.0, -1.0])
+@pytest.mark.parametrize("gap_mm", [6.0, -1.0])
 def test_a_known_contact_is_right_within_a_budget(
     sensor: Bundle, estimators: ContactForces, gap_mm: float
 ) -> None:
