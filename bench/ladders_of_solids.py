@@ -27,11 +27,15 @@ def stiffness(data: Data, header: Data) -> list[LadderRecord]:
 
     Pads of another pitch are left out: each pitch has a reference of its own.
     """
-    return [
-        stiffness_at(data, header, ratio)
-        for ratio in SHOWN_RATIOS
-        if any(r["poissons_ratio"] == ratio for r in data["rows"])
+    measured = [
+        ratio for ratio in SHOWN_RATIOS if any(r["poissons_ratio"] == ratio for r in data["rows"])
     ]
+    contacts = [
+        contacts_at(data, header, found)
+        for found in data.get("operator_contacts", {}).get("ladders", ())
+        if found["poissons_ratio"] in measured
+    ]
+    return [stiffness_at(data, header, ratio) for ratio in measured] + contacts
 
 
 def stiffness_at(data: Data, header: Data, ratio: float) -> LadderRecord:
@@ -74,6 +78,45 @@ def stiffness_at(data: Data, header: Data, ratio: float) -> LadderRecord:
         rungs=tuple(rungs),
         header=header,
         count_label="MB kept",
+    )
+
+
+def contacts_at(data: Data, header: Data, found: Data) -> LadderRecord:
+    """The operators of our pad by their worst contact, with the times of the other ladder."""
+    ratio, shown = found["poissons_ratio"], f"ν = {found['poissons_ratio']:g}"
+    times = {
+        r["label"]: r["milliseconds"]
+        for r in data["rows"]
+        if (r["poissons_ratio"], *pad_of(r)) == (ratio, OWN_CELLS, OWN_LAYERS, OWN_ELEMENT)
+    }
+    return LadderRecord(
+        name=f"contacts-{ratio:g}".replace(".", "p"),
+        title=f"Stiffness at {shown}: the worst of smooth, small, sharp and edge contacts",
+        question="Forces of the worst of smooth motions, a small ball, a sharp punch, a contact at "
+        f"the edge and two contacts ({data['pad']}, {OWN_CELLS}² x {OWN_LAYERS} {OWN_ELEMENT}), "
+        f"{shown}. A budget means this error.",
+        paper="one layer of fully integrated elements, all nodes observed.",
+        reference="The same pad at half the pitch with eight B-bar layers, solved to 1e-8; the "
+        "larger error of field and resultant (`data/operator_contacts.json`)",
+        error_label="error of the worst contact",
+        error_unit="relative",
+        time_label="time per frame, one thread",
+        time_unit="ms",
+        source="stiffness_ladder",
+        rungs=tuple(
+            RungRecord(
+                "the paper's one layer" if row["label"] == "paper" else row["label"],
+                row["error"],
+                times[row["label"]],
+                "",
+                row["label"] == "paper",
+                row["label"] == found["default"],
+                100 * row["errors"]["smooth"],
+            )
+            for row in found["rows"]
+        ),
+        header=header,
+        count_label="% of smooth motions",
     )
 
 
