@@ -25,11 +25,25 @@ if TYPE_CHECKING:
     from gelslim_force.forces.wrench import Wrench
     from gelslim_force.frames.frame import Frame
     from gelslim_force.frames.source import open_frames
+    from gelslim_force.joint.light_calibration import (
+        LightCalibration,
+        read_light_calibration,
+        write_light_calibration,
+    )
     from gelslim_force.outputs.overlay import Overlay
     from gelslim_force.outputs.recorded_run import read_run
     from gelslim_force.outputs.run_recorder import RunRecorder
     from gelslim_force.outputs.sinks import PictureSink, RecorderSink
     from gelslim_force.pipeline import ForcePipeline
+    from gelslim_force.presses.calibrate_gel import calibrate_gel
+    from gelslim_force.presses.calibrate_light import calibrate_light
+    from gelslim_force.presses.gel_calibration import (
+        GelCalibration,
+        read_gel_calibration,
+        write_gel_calibration,
+    )
+    from gelslim_force.presses.load_table import Load, read_loads
+    from gelslim_force.presses.press_error import PressError
     from gelslim_force.run import run_frames
     from gelslim_force.sensor import indenter_source, open_sensor
     from gelslim_force.settings import PipelineSettings
@@ -43,26 +57,37 @@ __all__ = [
     "ForceSettings",
     "Frame",
     "FrameResult",
+    "GelCalibration",
     "Intrinsics",
+    "LightCalibration",
+    "Load",
     "NormalReading",
     "NormalSource",
     "Overlay",
     "PictureSink",
     "PipelineSettings",
+    "PressError",
     "RecorderSink",
     "RunRecorder",
     "Wrench",
     "calibrate",
+    "calibrate_gel",
+    "calibrate_light",
     "indenter_source",
     "open_frames",
     "open_sensor",
     "read_calibration",
     "read_depth_maps",
+    "read_gel_calibration",
     "read_intrinsics",
+    "read_light_calibration",
+    "read_loads",
     "read_reference",
     "read_run",
     "run_frames",
     "write_calibration",
+    "write_gel_calibration",
+    "write_light_calibration",
 ]
 
 __getattr__, __dir__ = lazy_exports(__name__)

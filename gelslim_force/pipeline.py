@@ -30,6 +30,7 @@ from gelslim_force.frames.upright import upright
 from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.surface_motion import SurfaceMotion
+from gelslim_force.presses.gel_share import GelShare
 from gelslim_force.settings import PipelineSettings
 from gelslim_force.tracking.marker_noise import noise_px
 from gelslim_force.tracking.tracker import TrackedFrame
@@ -60,12 +61,14 @@ class ForcePipeline:
         settings: Choices of the pipeline; the defaults if None.
         normal: Finds the normal motion in each frame. Without it normal forces are unknown, unless
             `process` is given the motion.
+        gel: What the uncertain gel adds to the covariance of the wrench; by default nothing.
 
     Attributes:
         bundle: As given.
         calibration: As given.
         settings: As given, or the defaults.
         normal: As given.
+        gel: As given.
 
     Raises:
         IfemError: No operator keeps the budget, or the bundle has no markers.
@@ -79,13 +82,14 @@ class ForcePipeline:
         calibration: Calibration,
         settings: PipelineSettings | None = None,
         normal: NormalSource | None = None,
+        gel: GelShare | None = None,
     ) -> None:
         if bundle.markers is None:
             raise IfemError("the bundle has no markers: rebuild it with marker positions")
         calibration.require_bundle(bundle)
         self.bundle, self.calibration = bundle, calibration
         self.settings = settings or PipelineSettings()
-        self.normal = normal
+        self.normal, self.gel = normal, gel
         self._tracker = calibration.tracker()
         reference = self._tracker.reference
         markers, points_mm = bundle.markers, np.asarray(bundle.mesh.surface_mm)
@@ -213,6 +217,8 @@ class ForcePipeline:
             problems = (*problems, str(error))
             return self._numbered(time_s, tracks=tracks, stage_ms=clock.stages, problems=problems)
         field = found["field"]
+        if self.gel is not None:
+            found["wrench"] = self.gel.added(found["wrench"], field.displacement_mm, reading)
         if field.misfit > _LARGEST_MISFIT and self._motion.moved(motion):
             problems = (*problems, _MISFIT.format(field.misfit))
         known = reading is not None and reading.known
@@ -312,8 +318,7 @@ class ForcePipeline:
         reading: NormalReading | None,
     ) -> Array:
         gains = self._gains(interpolation)
-        seen = np.isfinite(motion[:, 0])
-        spread = self._motion.covariance_mm2(seen, noise)
+        spread = self._motion.covariance_mm2(np.isfinite(motion[:, 0]), noise)
         if reading is not None and reading.known:
             lateral = self._motion.compensation_change(reading.sigma_mm)
             return self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)

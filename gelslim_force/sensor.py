@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.errors import GelslimError
+from gelslim_force.built_sensor import BuiltGel, built_gel, built_light
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.file import read_calibration
 from gelslim_force.calibration.reference_picture import read_reference
@@ -18,8 +19,10 @@ from gelslim_force.contact.indenter import Indenter, parse_indenter
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.frames.upright import upright
+from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.settings import PipelineSettings
 from gelslim_optics.camera.record import is_mono
 from ifem_export.bundle.bundle import Bundle
@@ -60,6 +63,8 @@ def open_sensor(
     depth_mm: float | None = None,
     normal: NormalSource | None = None,
     settings: PipelineSettings | None = None,
+    gel_calibration: GelCalibration | FileName | None = None,
+    light_calibration: LightCalibration | FileName | None = None,
 ) -> ForcePipeline:
     """Open a sensor: a force pipeline that is calibrated and ready for frames.
 
@@ -76,6 +81,10 @@ def open_sensor(
         depth_mm: Known depth of the indenter in mm, which a flat punch needs.
         normal: Another source of the normal motion, in place of an indenter.
         settings: Choices of the pipeline; the defaults if None.
+        gel_calibration: The gel as built, or its file of `gelslim calibrate-gel`. Its values take
+            the place of the design's, and its covariance enters that of the wrench.
+        light_calibration: The light as built, or its file of `gelslim calibrate-light`, for an
+            indenter of unknown shape.
 
     Returns:
         The pipeline; `process` takes one frame after the other.
@@ -87,8 +96,14 @@ def open_sensor(
         CalibrationError: The reference does not show this sensor at rest, or the calibration
             cannot be read or belongs to another sensor.
         IndenterError: The indenter's description cannot be read.
+        PressError: The calibration of the gel cannot be read or belongs to another sensor.
     """
     _require_consistent(reference, calibration, indenter, depth_mm, normal)
+    if light_calibration is not None and (indenter not in (None, UNKNOWN) or normal is not None):
+        raise SensorError(
+            "light_calibration",
+            "a calibration of the light serves objects of unknown shape: leave the indenter out",
+        )
     sensor = bundle if isinstance(bundle, Bundle) else load_bundle(Path(bundle))
     if indenter not in (None, NO_INDENTER):
         require_colour(sensor)
@@ -101,28 +116,30 @@ def open_sensor(
         calibration = calibrate(sensor, picture)
     elif not isinstance(calibration, Calibration):
         calibration = read_calibration(calibration)
+    gel = built_gel(sensor, calibration, gel_calibration, settings)
+    light = built_light(sensor, light_calibration)
     if normal is None:
-        normal = normal_source(sensor, calibration, picture, indenter, depth_mm, settings)
-    return ForcePipeline(sensor, calibration, settings, normal)
+        normal = normal_source(gel, picture, indenter, depth_mm, settings, light)
+    return ForcePipeline(gel.bundle, gel.calibration, settings, normal, gel.share)
 
 
 def normal_source(
-    bundle: Bundle,
-    calibration: Calibration,
+    sensor: BuiltGel,
     reference: Picture | None = None,
     indenter: Indenter | str | None = None,
     depth_mm: float | None = None,
     settings: PipelineSettings | None = None,
+    light: LightCalibration | None = None,
 ) -> NormalSource | None:
     """Make the normal source for what is known of the object.
 
     Args:
-        bundle: The sensor.
-        calibration: Its camera, and its markers at rest.
+        sensor: The sensor with its gel.
         reference: Picture without contact; None for the one that the calibration keeps.
         indenter: As in `open_sensor`.
         depth_mm: Known depth in mm, which a flat punch needs.
         settings: Choices of the pipeline; the defaults if None.
+        light: The light as built; None for the traced light.
 
     Returns:
         The source; None where the normal force stays unknown.
@@ -134,6 +151,7 @@ def normal_source(
         IndenterError: The indenter's description cannot be read.
         ValueError: An indenter is given and the reference is dark or of another size.
     """
+    bundle, calibration = sensor.bundle, sensor.calibration
     picture = calibration.picture if reference is None else reference
     if indenter == NO_INDENTER or (indenter is None and not _shows_shapes(bundle, picture)):
         return None
@@ -144,8 +162,9 @@ def normal_source(
             "keeps none: give the reference picture too, or calibrate again",
         )
     if indenter is None or indenter == UNKNOWN:
-        return unknown_source(bundle, calibration, picture, settings)
-    return indenter_source(bundle, calibration, picture, indenter, depth_mm, settings)
+        return unknown_source(bundle, calibration, picture, settings, light)
+    named = indenter_source(bundle, calibration, picture, indenter, depth_mm, settings)
+    return sensor.varied(named, settings)
 
 
 def _shows_shapes(bundle: Bundle, picture: Picture | None) -> bool:
@@ -206,6 +225,7 @@ def unknown_source(
     calibration: Calibration,
     reference: Picture,
     settings: PipelineSettings | None = None,
+    light: LightCalibration | None = None,
 ) -> UnknownShape:
     """Make a normal source for objects of unknown shape, from light and markers together.
 
@@ -214,6 +234,7 @@ def unknown_source(
         calibration: Its camera, and its markers at rest.
         reference: (h, w, 3) uint8 picture without contact.
         settings: Choose the law of the gel; the defaults if None.
+        light: The light as built; None takes it as traced.
 
     Returns:
         The source, for the constructor of `ForcePipeline`.
@@ -233,7 +254,7 @@ def unknown_source(
         )
     calibration.require_bundle(bundle)
     gel = "linear" if settings is None else settings.gel
-    return unknown_shape(bundle, calibration, reference, gel=gel)
+    return unknown_shape(bundle, calibration, reference, gel=gel, light=light)
 
 
 def require_colour(bundle: Bundle) -> None:

@@ -47,7 +47,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",
-        "forces", "joint", "dot_tracking", "outputs", "settings", "pipeline", "sensor", "run",
+        "forces", "joint", "dot_tracking", "outputs", "settings", "presses", "pipeline",
+        "built_sensor", "sensor", "run",
     ),
     "gelslim_twin": (
         "effects", "scene", "planning", "contact", "render", "simulation", "validation",

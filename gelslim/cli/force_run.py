@@ -135,6 +135,16 @@ Calibration = Annotated[
         "-c", "--calibration", help="File of `gelslim calibrate`, in place of the picture."
     ),
 ]
+GelCalibration = Annotated[
+    Path | None,
+    typer.Option(help="File of `gelslim calibrate-gel`: the gel as built, with its uncertainty."),
+]
+LightCalibration = Annotated[
+    Path | None,
+    typer.Option(
+        help="File of `gelslim calibrate-light`: the light as built, for objects of unknown shape."
+    ),
+]
 RunFolder = Annotated[Path | None, out_folder("out/NAME-force", "Run folder to write")]
 KnownIndenter = Annotated[
     str | None,

@@ -237,6 +237,8 @@ class IndenterSource:
         indenter: The shape that touches the gel.
         depth_mm: Known depth, which a flat punch needs; otherwise the patch determines it.
         cap_only: Use the paper's model: the indenter's cap below the rim, and no motion outside.
+        varied: Models of a gel with more of a parameter, such as its thickness, and how much more;
+            `motion` then gives the derivatives by these parameters.
     """
 
     finder: PatchFinder
@@ -244,6 +246,7 @@ class IndenterSource:
     indenter: Indenter
     depth_mm: float | None = None
     cap_only: bool = False
+    varied: tuple[tuple[NormalModel, float], ...] = ()
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | None:
         """Return the patch of a frame whose markers are at (n, 2)."""
@@ -265,7 +268,19 @@ class IndenterSource:
             found = self.model.cap_only(at_rest, self.indenter)
         else:
             found = self.model.motion(at_rest, self.indenter, self.depth_mm)
-        return replace(found, patch=seen)
+        return replace(found, patch=seen, by_gel_mm=self._by_gel(at_rest, found))
+
+    def _by_gel(self, patch: ContactPatch, found: NormalReading) -> Array | None:
+        """Derivatives (p, c) of the motion by the parameters of `varied`."""
+        if not self.varied or not found.known or self.cap_only:
+            return None
+        rows = []
+        for model, step in self.varied:
+            other = model.motion(patch, self.indenter, self.depth_mm)
+            rows.append(
+                (other.w_mm - found.w_mm) / step if other.known else np.zeros(len(found.w_mm))
+            )
+        return np.array(rows)
 
 
 def _pitch(points_mm: Array) -> float:

@@ -53,6 +53,8 @@ class NormalReading:
         depth_mm: Depth of the indenter's lowest point below the rest surface.
         problem: Why the motion is unknown; the arrays are then NaN. Empty otherwise.
         forces: Forces found together with the motion; None where they follow from it.
+        by_gel_mm: (p, c) derivative of the motion by ln thickness and by Poisson's ratio of the
+            gel; None where it does not depend on them, or is not computed.
     """
 
     w_mm: Array
@@ -62,6 +64,7 @@ class NormalReading:
     depth_mm: float = 0.0
     problem: str = ""
     forces: FoundForces | None = None
+    by_gel_mm: Array | None = None
 
     @classmethod
     def given(cls, count: int, normal_mm: ArrayLike, sigma_mm: ArrayLike) -> NormalReading:

@@ -75,6 +75,7 @@ class PlacedBins:
         share: (k, c, n) of each source.
         level: (c, n).
         area_mm2: (n,).
+        built: Gain of the light as calibrated, (c, n) or one number.
     """
 
     taps: SlopeTaps
@@ -84,6 +85,7 @@ class PlacedBins:
     share: Array
     level: Array
     area_mm2: Array
+    built: Array | float = 1.0
 
     def sums(self, law: LightLaw, height_mm: Array, gain: float, light_error: float) -> LightSums:
         """Sums over the data, linear about the present heights.
@@ -97,7 +99,8 @@ class PlacedBins:
         from gelslim_force.joint.light_kernel import slope_sums
 
         slope = self.taps.slopes(height_mm)
-        model, by_slope, by_gain = law.change(slope, self.share, self.level, gain)
+        model, by_slope, by_gain = law.change(slope, self.share, self.level, gain * self.built)
+        by_gain = by_gain * self.built
         residual = self.change - model
         sigma = np.hypot(light_error / np.sqrt(self.area_mm2), self.noise)
         weight = huber(residual, sigma, _LIMIT)
@@ -151,6 +154,7 @@ def placed_bins(
         of(view.share),
         of(view.level),
         of(view.area_mm2),
+        of(view.gain),
     )
 
 

@@ -15,6 +15,7 @@ from gelslim_force.contact.shading_change import (
     bin_positions,
     bin_sizes,
 )
+from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from gelslim_optics.light.light_map import LightMap
@@ -54,6 +55,7 @@ class LightView:
         radius_px: (m,) their radii.
         lattice: The surface nodes; bins beyond them are not used.
         light: Light on the untouched gel.
+        built: Its gains as calibrated; None for light as traced.
 
     Attributes:
         rest_mm: (rows, columns, 2) where the bins meet the gel at rest.
@@ -62,6 +64,7 @@ class LightView:
         area_mm2: (rows, columns) of a bin on the gel.
         level: (c, rows, columns) grey value of the reference over itself plus the floor.
         share: (k, c, rows, columns) share of each source in the light of each channel.
+        gain: (c, rows, columns) gain of the light over the traced one; 1 where not calibrated.
 
     Raises:
         ValueError: The reference is dark, of another size, or no picture.
@@ -75,6 +78,7 @@ class LightView:
         radius_px: Array,
         lattice: NodeLattice,
         light: LightMap,
+        built: LightCalibration | None = None,
     ) -> None:
         picture = as_picture(reference)
         self._radius = np.ascontiguousarray(radius_px * _DISC + _RIM_PX)
@@ -91,6 +95,14 @@ class LightView:
         if dark:
             raise ValueError(f"channel {dark[0]} of the reference picture is dark")
         self.level, self.share = self._references(light)
+        self.gain = np.ones(self.level.shape)
+        if built is not None:
+            if list(built.channels) != self.channels:
+                raise ValueError(
+                    f"the light calibration has the channels {list(built.channels)}, the light of "
+                    f"this sensor {self.channels}"
+                )
+            self.gain = built.gain_at(places).reshape(self.gain.shape)
 
     def _references(self, light: LightMap) -> tuple[Array, Array]:
         grey = np.stack([self._light.levels()[c] for c in self.channels]).astype(float)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gelslim_force.joint.light_calibration import LightCalibration
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,19 @@ class JointSettings:
     marker_reach: int = 8
     rounds: tuple[int, ...] = (2, 1)
     following_rounds: tuple[int, ...] = (1, 1)
+
+    def with_light(self, light: LightCalibration) -> JointSettings:
+        """The settings for a calibrated light.
+
+        Its response and the deviation of its gain take the place of those assumed. What it does not
+        explain adds to the error of the light, which holds what the mesh does not resolve.
+        """
+        return replace(
+            self,
+            gamma=light.gamma,
+            gain_sigma=light.gain_sigma,
+            light_error=math.hypot(self.light_error, light.light_error),
+        )
 
     def __post_init__(self) -> None:
         positive = (

@@ -13,6 +13,7 @@ from gelslim_force.contact.normal_source import FoundForces, NormalReading
 from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
+from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.light_view import LightView
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.responses import Responses
@@ -97,6 +98,7 @@ def unknown_shape(
     *,
     gel: str = "linear",
     settings: JointSettings | None = None,
+    light: LightCalibration | None = None,
 ) -> UnknownShape:
     """Make the source for one calibrated sensor.
 
@@ -106,6 +108,7 @@ def unknown_shape(
         reference: (h, w, 3) uint8 picture without contact.
         gel: Law of the gel as in `PipelineSettings`.
         settings: What is assumed; the defaults if None.
+        light: The light as built; see `JointSettings.with_light`.
 
     Returns:
         The source.
@@ -115,6 +118,8 @@ def unknown_shape(
         MeshError: The pad has too many surface nodes.
     """
     chosen = settings or JointSettings()
+    if light is not None:
+        chosen = chosen.with_light(light)
     followed = calibration.reference
     points_mm = np.asarray(bundle.mesh.surface_mm)
     cell_mm = np.asarray(bundle.mesh.cell_size_mm[:2])
@@ -123,7 +128,7 @@ def unknown_shape(
     view = MarkerView(calibration.camera, followed.positions_px, heights_mm)
     to_markers = marker_to_node(points_mm, view.rest_mm)
     radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
-    light = LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
+    traced = LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
     estimator = JointEstimator(
         points_mm,
         surface_share_mm2(bundle.mesh),
@@ -140,9 +145,10 @@ def unknown_shape(
             followed.positions_px,
             radius_px[np.searchsorted(calibration.markers, followed.markers)],
             lattice,
+            traced,
             light,
         ),
-        LightLaw.of(light, chosen.gamma),
+        LightLaw.of(traced, chosen.gamma),
         bundle.material.youngs_modulus_mpa,
         chosen,
         None if gel == "linear" else FiniteStrainForce(bundle),

@@ -72,7 +72,7 @@ class LightLaw:
         return value, (1 - self.ambient) * by_slope
 
     def change(
-        self, slope: Array, share: Array, level: Array, gain: float
+        self, slope: Array, share: Array, level: Array, gain: float | Array
     ) -> tuple[Array, Array, Array]:
         """Logarithmic change of the grey values of c channels.
 
@@ -82,7 +82,7 @@ class LightLaw:
                 the shares of a channel sum to 1.
             level: (c, n) grey value of the reference over itself plus the floor that was added
                 before the logarithm.
-            gain: Factor on the logarithm of the light; 1 for light as traced.
+            gain: Factor on the logarithm of the light, one number or (c, n); 1 for light as traced.
 
         Returns:
             (c, n) change, (c, n, 2) its derivative by the slopes, (c, n) by the gain.

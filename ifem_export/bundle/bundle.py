@@ -147,6 +147,32 @@ class Bundle:
         """The bundle with its adjoint fields stored. Raises as `adjoint`."""
         return replace(self, stored_adjoint=self.adjoint.forces)
 
+    def with_gel(self, material: Material, thickness_ratio: float = 1.0) -> Bundle:
+        """The same sensor with a gel of another material and thickness.
+
+        Cells change in height alone, so that nodes, markers and camera keep their order. The ladder
+        is that of the gel as designed. The geometry hash is another where the thickness is.
+
+        Args:
+            material: The gel.
+            thickness_ratio: Thickness over that of this bundle, > 0.
+
+        Raises:
+            MeshError: The ratio is not positive and finite.
+        """
+        mesh = self.mesh.stretched(thickness_ratio)
+        matrix = hex8_stiffness(mesh.cell_size_mm, material, self.formulation)
+        moved = np.asarray(self.self_test.displacement_mm)
+        return replace(
+            self,
+            mesh=mesh,
+            material=material,
+            element_matrix=matrix,
+            stiffness=None,
+            stored_adjoint=None,
+            self_test=SelfTest(moved, elementwise_force(mesh, matrix, moved)),
+        )
+
     @property
     def times_key(self) -> str:
         """Key of this sensor's operators among the measured times of a machine."""

@@ -132,6 +132,24 @@ class PadMesh:
         surface, shift = surface_of(np.asarray(self.occupancy), self.numbering, levels)
         return replace(self, surface=surface, surface_shift=shift)
 
+    def stretched(self, ratio: float) -> PadMesh:
+        """The same cells with their heights times `ratio`; z = 0 stays where it is.
+
+        Raises:
+            MeshError: The ratio is not positive and finite.
+        """
+        if not (math.isfinite(ratio) and ratio > 0):
+            raise MeshError(
+                f"thickness ratio = {ratio!r}: must be a finite number > 0", field="ratio"
+            )
+        (hx, hy, hz), (x, y, z) = self.cell_size_mm, self.origin_mm
+        return replace(
+            self,
+            nodes_mm=self.nodes_mm * [1.0, 1.0, ratio],
+            cell_size_mm=(hx, hy, hz * ratio),
+            origin_mm=(x, y, z * ratio),
+        )
+
     @property
     def n_nodes(self) -> int:
         """Number of nodes n."""

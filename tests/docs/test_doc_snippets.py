@@ -24,10 +24,12 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.records import COLUMNS, FrameTruth, fields_npz, wrench_csv
 
-FORCE, TWIN, OWN = (DOCS / f"{n}.md" for n in ("force_pipeline", "digital_twin", "own_parts"))
+FORCE, TWIN, OWN, BUILT = (
+    DOCS / f"{n}.md" for n in ("force_pipeline", "digital_twin", "own_parts", "calibration")
+)
 """Their blocks need frames, simulated data or a solid, and run in tests of their own."""
 LATER = ("budget.md", "contributing.md")
-PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN, OWN)]
+PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN, OWN, BUILT)]
 YAML = [(p, k) for p in PAGES for k in range(len(blocks(p, "yaml")))]
 SMALL = """\
 format: gelslim-spec/1
@@ -136,6 +138,33 @@ def test_the_guide_of_the_force_pipeline_runs(
     assert np.isfinite(names["known"].wrench.vector).all()
     assert names["known"].wrench.force_n[2] == pytest.approx(-1.0, abs=0.05)
     assert names["tracked"].tracks.coverage == 1.0
+
+
+@pytest.mark.slow
+def test_the_guide_of_calibration_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("PIL")
+    from ball_presses import YOUNG_MPA, Built, ball_bundle, ball_picture, rest_picture
+
+    from gelslim_force.outputs.canvas import encoded
+    from gelslim_force.presses.load_table import read_loads
+    from ifem_export.bundle.files import write_bundle
+
+    write_bundle(tmp_path / "out" / "gelslim2-bundle", ball_bundle())
+    table = next(b for b in blocks(BUILT, "") if b.startswith("picture,"))
+    (tmp_path / "loads.csv").write_text(table, encoding="utf-8")
+    (tmp_path / "presses").mkdir()
+    built, rng = Built(young=1.1), np.random.default_rng(8)
+    for number, load in enumerate(read_loads(tmp_path / "loads.csv")):
+        place = rng.uniform(-3, 3, 2)
+        image = ball_picture(built, load.load_n, place, number) if load.load_n else rest_picture()
+        (tmp_path / "presses" / load.picture).write_bytes(encoded(image, ".png"))
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    _run_blocks(BUILT, names)
+    assert names["gel"].youngs_modulus_mpa == pytest.approx(1.1 * YOUNG_MPA, rel=0.05)
+    assert names["pipeline"].gel is not None
+    assert np.abs(names["light"].gain[:, 0] / names["light"].gamma - 1).max() < 0.08
+    assert names["lit"].normal.estimator.settings.gain_sigma == names["light"].gain_sigma
 
 
 def test_the_guide_of_the_twin_runs_and_names_columns_arrays_and_effects(

@@ -52,6 +52,16 @@ effects: {nonlinearity: off}
 observe: [force, markers, image]
 tolerance: {force_n: 0.05, image_px: 0.2}
 """
+BALL = """\
+format: gelslim-scene/1
+name: ball
+sensor: {spec: designs/gelslim2.yaml}
+indenters: [{shape: sphere, radius_mm: 6}]
+motion: {waypoints: [{move: press, depth_mm: 0.5, steps: 5}]}
+effects: {nonlinearity: off}
+observe: [force, markers, image]
+tolerance: {force_n: 0.02, image_px: 0.2}
+"""
 RUN = [p for p in PAGES if commands(p) and p != DOCS / "start_here.md"]
 
 
@@ -86,7 +96,25 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(folder / "frames" / "frame_000000.png", folder / "reference.png")
     line = "gelslim calibrate out/gelslim2-bundle reference.png -o calibration.json"
     done(line, folder)
+    _press_ball(folder)
     return folder
+
+
+def _press_ball(folder: Path) -> None:
+    """Pictures of a ball, and the table of its loads, as the page on calibration has them."""
+    (folder / "ball.yaml").write_text(BALL, encoding="utf-8")
+    done("gelslim simulate ball.yaml -o out/ball", folder)
+    frames = sorted((folder / "out" / "ball" / "frames").glob("*.png"))
+    names = ["rest.png", *(f"press{k}.png" for k in range(1, len(frames)))]
+    (folder / "presses").mkdir()
+    # The first press is too faint for a patch.
+    kept = [k for k in range(len(frames)) if k != 1]
+    for k in kept:
+        shutil.copy(frames[k], folder / "presses" / names[k])
+    with (folder / "out" / "ball" / "truth.csv").open() as lines:
+        loads = [-float(row["fz_n"]) for row in csv.DictReader(lines)]
+    rows = [f"{names[k]},{loads[k]:.4f}" for k in kept]
+    (folder / "loads.csv").write_text("picture,load_n\n" + "\n".join(rows), encoding="utf-8")
 
 
 def lessened(line: str) -> str:

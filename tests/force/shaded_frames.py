@@ -105,17 +105,22 @@ def shaded(
     brightness: float = 1.0,
     dark_sides: float = 0.0,
     camera: VirtualCamera = CAMERA,
+    light_gain: Vector | None = None,
 ) -> Frame:
     """A 480 x 640 frame; without slopes, of a level surface.
 
     With `dark_sides` each colour falls off as exp(-dark_sides · share of the way) across the gel,
-    and blue is all but missing.
+    and blue is all but missing. `light_gain` (480 x 640, 3) is the exponent of the change of light
+    that the slopes cause.
     """
     usual = camera is CAMERA and moved_mm is None
     frame = _level() if usual else render(GRID, camera, SHARP, moved_mm)
     image = frame.image.astype(float) * brightness
     if slopes is not None:
-        image *= lit(*slopes).reshape(480, 640, 3)
+        change = lit(*slopes)
+        if light_gain is not None:
+            change = change**light_gain
+        image *= change.reshape(480, 640, 3)
     if dark_sides:
         across = np.linspace(0, 1, 640)[None, :]
         image[:, :, 0] *= np.exp(-dark_sides * across)

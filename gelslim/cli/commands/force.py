@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from gelslim.cli.force_run import RunOutputs
     from gelslim_core.budget.budget import Budget
+    from gelslim_force.built_sensor import BuiltGel
     from gelslim_force.calibration.sensor_calibration import Calibration
     from gelslim_force.contact.normal_source import NormalSource
     from gelslim_force.frames.frame import FrameSource
@@ -35,6 +36,8 @@ def force(
     frames: option.Frames,
     reference: option.Reference = None,
     calibration: option.Calibration = None,
+    gel_calibration: option.GelCalibration = None,
+    light_calibration: option.LightCalibration = None,
     out: option.RunFolder = None,
     indenter: option.KnownIndenter = None,
     depth_mm: option.KnownDepth = None,
@@ -64,12 +67,13 @@ def force(
     (wrenches.csv), the force at every node (fields), and overlay pictures. The object may have any
     shape where the camera has colour; otherwise the normal force needs an indenter or depth maps.
     """
+    from gelslim_force.built_sensor import built_gel, built_light
     from gelslim_force.frames.source import open_frames
     from gelslim_force.pipeline import ForcePipeline
     from gelslim_force.sensor import normal_source
     from ifem_export.bundle.files import load_bundle
 
-    _require_consistent(fields, indenter, depth_mm, depth_maps, depth_sigma_mm)
+    _require_consistent(fields, indenter, depth_mm, depth_maps, depth_sigma_mm, light_calibration)
     budget = budget_of(error, within)
     sensor = load_bundle(bundle)
     if not budget.unlimited and operator is None:
@@ -79,22 +83,26 @@ def force(
         "interpolation": interpolation, "gel": gel, "friction": friction,
     }  # fmt: skip
     settings = _settings(chosen, budget)
-    built, picture = _calibrated(sensor, reference, calibration)
+    camera, picture = _calibrated(sensor, reference, calibration)
+    built = built_gel(sensor, camera, gel_calibration, settings)
+    light = built_light(sensor, light_calibration)
     folder = out or Path("out") / f"{bundle.resolve().name}-force"
     outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
     with open_frames(frames) as source:
         if depth_maps is not None:
-            normal: NormalSource | None = _depth_source(sensor, built, depth_maps, depth_sigma_mm)
+            normal: NormalSource | None = _depth_source(built, depth_maps, depth_sigma_mm)
         else:
-            normal = normal_source(sensor, built, picture, indenter, depth_mm, settings)
+            normal = normal_source(built, picture, indenter, depth_mm, settings, light)
         if indenter is None and normal is not None and depth_maps is None:
             _note_unused(operator is not None or not budget.unlimited or method != "auto")
-        pipeline = ForcePipeline(sensor, built, settings, normal)
+        pipeline = ForcePipeline(built.bundle, built.calibration, settings, normal, built.share)
         manifest = {
             "bundle": str(bundle), "frames": frames,
             **chosen, "operator": pipeline.operator_name, "indenter": indenter,
             "reference": str(reference) if reference else None,
             "calibration": str(calibration) if calibration else None,
+            "gel_calibration": str(gel_calibration) if gel_calibration else None,
+            "light_calibration": str(light_calibration) if light_calibration else None,
         }  # fmt: skip
         summary, drawn = _run(pipeline, source, most_frames, outputs, manifest)
     say = answer_json if as_json else report
@@ -108,6 +116,7 @@ def _require_consistent(
     depth_mm: float | None,
     depth_maps: Path | None,
     depth_sigma_mm: float,
+    light_calibration: Path | None,
 ) -> None:
     if fields not in ("npz", "parquet", "none"):
         raise CommandError(f"--fields {fields}: give npz, parquet or none")
@@ -117,6 +126,11 @@ def _require_consistent(
         raise CommandError("give --indenter or --depth-maps, not both")
     if depth_sigma_mm and not depth_maps:
         raise CommandError("--depth-sigma-mm is that of --depth-maps: give these too")
+    if light_calibration and (depth_maps or indenter not in (None, "unknown")):
+        raise CommandError(
+            "--light-calibration serves objects of unknown shape: leave --indenter and "
+            "--depth-maps out"
+        )
 
 
 def _note_unused(chosen: bool) -> None:
@@ -202,10 +216,8 @@ def _calibrated(
     return calibrate(sensor, picture), picture
 
 
-def _depth_source(
-    sensor: Bundle, built: Calibration, depth_maps: Path, sigma_mm: float
-) -> NormalSource:
+def _depth_source(built: BuiltGel, depth_maps: Path, sigma_mm: float) -> NormalSource:
     from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
 
-    maps = read_depth_maps(depth_maps)
-    return DepthMapSource(built.camera, sensor.mesh.surface_mm, maps, sigma_mm)
+    points_mm, maps = built.bundle.mesh.surface_mm, read_depth_maps(depth_maps)
+    return DepthMapSource(built.calibration.camera, points_mm, maps, sigma_mm)

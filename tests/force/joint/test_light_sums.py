@@ -71,6 +71,16 @@ def test_sums_are_those_of_rows_by_differences() -> None:
         np.testing.assert_allclose(getattr(sums, name), value, atol=2e-4 * scale, err_msg=name)
 
 
+def test_calibrated_gains_multiply_that_of_the_frame() -> None:
+    plain = bins(9)
+    height = np.random.default_rng(2).normal(0, 0.02, 64)
+    even = replace(plain, built=np.full((2, BINS), 1.25)).sums(LAW, height, 0.8, 0.05)
+    same = plain.sums(LAW, height, 1.0, 0.05)
+    np.testing.assert_allclose(even.matrix, same.matrix, atol=1e-9 * same.matrix.max())
+    np.testing.assert_allclose(even.mixed, 1.25 * same.mixed, atol=1e-9 * same.mixed.max())
+    assert even.gain_pull == pytest.approx(1.25 * same.gain_pull)
+
+
 def test_what_is_left_after_a_step_is_that_of_the_rows() -> None:
     found = bins(3)
     sums = found.sums(LAW, np.zeros(64), 1.0, 0.05)

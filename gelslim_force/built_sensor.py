@@ -1,0 +1,85 @@
+"""The gel and the light of a sensor as built, in the place of the designed ones."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
+from gelslim_force.joint.light_calibration import LightCalibration, read_light_calibration
+from gelslim_force.presses.gel_calibration import GelCalibration, read_gel_calibration
+from gelslim_force.presses.gel_share import GelShare, varied_bundles
+from gelslim_force.settings import PipelineSettings
+from ifem_export.bundle.bundle import Bundle
+
+FileName = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltGel:
+    """A sensor with its gel as built, or as designed where that is not known.
+
+    Attributes:
+        bundle: The sensor.
+        calibration: Its camera and markers, for this bundle.
+        share: What the uncertain gel adds to the covariance; None without a gel calibration.
+        more: The same sensor with more of a parameter of its gel, and how much more.
+    """
+
+    bundle: Bundle
+    calibration: Calibration
+    share: GelShare | None = None
+    more: tuple[tuple[Bundle, float], ...] = ()
+
+    def varied(self, source: IndenterSource, settings: PipelineSettings | None) -> IndenterSource:
+        """The source with the derivatives of its motion by the parameters of the gel."""
+        chosen = settings or PipelineSettings()
+        points_mm = np.asarray(self.bundle.mesh.surface_mm)
+        models = [(NormalModel(chosen.compliance(b), points_mm), step) for b, step in self.more]
+        return replace(source, varied=tuple(models))
+
+
+def built_gel(
+    bundle: Bundle,
+    calibration: Calibration,
+    gel: GelCalibration | FileName | None,
+    settings: PipelineSettings | None = None,
+) -> BuiltGel:
+    """Put a calibrated gel in the place of the designed one.
+
+    Args:
+        bundle: The sensor as designed.
+        calibration: Its camera, and its markers at rest.
+        gel: The gel as built, or its file; None leaves everything as it is.
+        settings: Choose the operators; the defaults if None.
+
+    Raises:
+        PressError: The gel calibration cannot be read, or belongs to another sensor.
+        CalibrationError: The calibration belongs to another bundle.
+        IfemError: No operator keeps the budget.
+    """
+    if gel is None:
+        return BuiltGel(bundle, calibration)
+    found = gel if isinstance(gel, GelCalibration) else read_gel_calibration(gel)
+    made, moved = found.applied(bundle, calibration)
+    chosen = settings or PipelineSettings()
+    more = tuple((thicker, step) for _, thicker, step in varied_bundles(bundle, found))
+    return BuiltGel(made, moved, GelShare.of(bundle, found, chosen.operator), more)
+
+
+def built_light(
+    bundle: Bundle, light: LightCalibration | FileName | None
+) -> LightCalibration | None:
+    """The calibrated light of a sensor as designed; None stays None.
+
+    Raises:
+        CalibrationError: It cannot be read, or belongs to another sensor.
+    """
+    if light is None:
+        return None
+    found = light if isinstance(light, LightCalibration) else read_light_calibration(light)
+    found.require_bundle(bundle)
+    return found

@@ -1,0 +1,214 @@
+"""The gel of one built sensor: modulus, thickness and Poisson's ratio as presses show them.
+
+Stored as JSON, format `gelslim-gel-calibration/1`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_core.files.replaced_file import json_bytes, replace_file
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.presses.press_error import PressError
+
+if TYPE_CHECKING:
+    from ifem_export.bundle.bundle import Bundle
+
+Array = NDArray[np.float64]
+FORMAT = "gelslim-gel-calibration/1"
+PARAMETERS = ("ln_youngs_modulus", "ln_thickness", "poissons_ratio")
+"""Order of the covariance."""
+_MAKE = "make it with `gelslim calibrate-gel BUNDLE PRESSES LOADS.csv --ball-mm D -o FILE`"
+_THICKNESS_RATIO = 0.5, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class GelCalibration:
+    """A gel as built.
+
+    Attributes:
+        geometry_hash: Of the bundle as designed.
+        youngs_modulus_mpa: Young's modulus.
+        thickness_mm: Thickness.
+        poissons_ratio: Poisson's ratio.
+        covariance: (3, 3) of ln modulus, ln thickness and Poisson's ratio.
+        design: The same three as designed, by name.
+        ball_mm: Diameter of the ball that was pressed.
+        presses: What was found of each press, as plain data.
+        diagnosis: What was found, in sentences.
+        warnings: What should be looked at before the calibration is trusted.
+
+    Raises:
+        ValueError: A value is impossible, or the covariance is none.
+    """
+
+    geometry_hash: str
+    youngs_modulus_mpa: float
+    thickness_mm: float
+    poissons_ratio: float
+    covariance: Array
+    design: Mapping[str, float]
+    ball_mm: float
+    presses: tuple[Mapping[str, Any], ...] = ()
+    diagnosis: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        covariance = np.array(self.covariance, dtype=float)
+        if covariance.shape != (3, 3) or not np.isfinite(covariance).all():
+            raise ValueError("covariance must be 3 x 3 numbers")
+        least = np.linalg.eigvalsh((covariance + covariance.T) / 2)[0]
+        if not np.allclose(covariance, covariance.T, atol=1e-12) or least < -1e-12:
+            raise ValueError("covariance must be symmetric and positive")
+        covariance.setflags(write=False)
+        object.__setattr__(self, "covariance", covariance)
+        for name in ("youngs_modulus_mpa", "thickness_mm", "ball_mm"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name} = {value!r}: must be above 0")
+        if not 0 <= self.poissons_ratio < 0.5:
+            raise ValueError(f"poissons_ratio = {self.poissons_ratio!r}: must be in 0 ... 0.5")
+
+    @property
+    def standard_deviation(self) -> Array:
+        """(3,) of modulus in MPa, thickness in mm, and Poisson's ratio."""
+        scale = np.array([self.youngs_modulus_mpa, self.thickness_mm, 1.0])
+        return np.asarray(scale * np.sqrt(np.diag(self.covariance)))
+
+    def applied(self, bundle: Bundle, calibration: Calibration) -> tuple[Bundle, Calibration]:
+        """The bundle with the gel as built, and the sensor's calibration for it.
+
+        Args:
+            bundle: The sensor as designed.
+            calibration: Its camera, and its markers at rest.
+
+        Raises:
+            PressError: The gel calibration belongs to another sensor, or its thickness is not
+                between half and twice that of the design.
+            CalibrationError: The camera's calibration belongs to another sensor.
+        """
+        calibration.require_bundle(bundle)
+        self.require_bundle(bundle)
+        made = self.varied(bundle)
+        return made, replace(calibration, geometry_hash=made.geometry_hash)
+
+    def varied(
+        self, bundle: Bundle, ln_thickness: float = 0.0, poissons_ratio: float = 0.0
+    ) -> Bundle:
+        """The bundle with the gel as built and a change of two of its parameters."""
+        gel = replace(
+            bundle.material,
+            youngs_modulus_mpa=self.youngs_modulus_mpa,
+            poissons_ratio=self.poissons_ratio + poissons_ratio,
+        )
+        ratio = self.thickness_mm / designed_thickness_mm(bundle)
+        return bundle.with_gel(gel, ratio * float(np.exp(ln_thickness)))
+
+    def require_bundle(self, bundle: Bundle) -> None:
+        """Raise PressError for another sensor, or an impossible thickness."""
+        if bundle.geometry_hash != self.geometry_hash:
+            raise PressError(
+                "sensor",
+                f"the gel calibration belongs to a sensor of geometry {self.geometry_hash[:12]}, "
+                f"the bundle to {bundle.geometry_hash[:12]}: {_MAKE}",
+            )
+        ratio = self.thickness_mm / designed_thickness_mm(bundle)
+        low, high = _THICKNESS_RATIO
+        if not low <= ratio <= high:
+            raise PressError(
+                "sensor",
+                f"the gel calibration has a thickness of {self.thickness_mm:.3g} mm, {ratio:.2g} "
+                f"times that of the design; {low:g} to {high:g} times can be used",
+            )
+
+
+def designed_thickness_mm(bundle: Bundle) -> float:
+    """Thickness of a bundle's gel."""
+    return float(bundle.mesh.layers * bundle.mesh.cell_size_mm[2])
+
+
+def gel_calibration_record(found: GelCalibration) -> dict[str, Any]:
+    """Return the calibration as numbers, strings, lists and dicts."""
+    return {
+        "format": FORMAT,
+        "geometry_hash": found.geometry_hash,
+        "youngs_modulus_mpa": found.youngs_modulus_mpa,
+        "thickness_mm": found.thickness_mm,
+        "poissons_ratio": found.poissons_ratio,
+        "standard_deviation": dict(
+            zip(
+                ("youngs_modulus_mpa", "thickness_mm", "poissons_ratio"),
+                found.standard_deviation.tolist(),
+                strict=True,
+            )
+        ),
+        "parameters": list(PARAMETERS),
+        "covariance": found.covariance.tolist(),
+        "design": dict(found.design),
+        "ball_mm": found.ball_mm,
+        "presses": [dict(press) for press in found.presses],
+        "diagnosis": list(found.diagnosis),
+        "warnings": list(found.warnings),
+    }
+
+
+def write_gel_calibration(found: GelCalibration, path: str | os.PathLike[str]) -> None:
+    """Write a gel calibration; an earlier file is kept if writing fails.
+
+    Args:
+        found: What to write.
+        path: File to write; its folder must exist.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    replace_file(path, json_bytes(gel_calibration_record(found)))
+
+
+def read_gel_calibration(path: str | os.PathLike[str]) -> GelCalibration:
+    """Read a gel calibration.
+
+    Args:
+        path: File of `gelslim calibrate-gel`, or of `write_gel_calibration`.
+
+    Returns:
+        The calibration.
+
+    Raises:
+        PressError: There is no such file, or it is damaged or of another kind.
+    """
+    place = Path(path)
+    try:
+        record = json.loads(place.read_bytes().decode("utf-8"))
+        if not isinstance(record, Mapping) or record.get("format") != FORMAT:
+            raise ValueError(f"its format is not {FORMAT}")
+        if tuple(record["parameters"]) != PARAMETERS:
+            raise ValueError(f"its parameters are not {', '.join(PARAMETERS)}")
+        return GelCalibration(
+            str(record["geometry_hash"]),
+            float(record["youngs_modulus_mpa"]),
+            float(record["thickness_mm"]),
+            float(record["poissons_ratio"]),
+            np.array(record["covariance"], dtype=float),
+            {str(name): float(value) for name, value in record["design"].items()},
+            float(record["ball_mm"]),
+            tuple(dict(press) for press in record["presses"]),
+            tuple(str(line) for line in record["diagnosis"]),
+            tuple(str(line) for line in record["warnings"]),
+        )
+    except OSError as error:
+        reason = (error.strerror or "cannot be read").lower()
+        raise PressError("file", f"{place}: {reason}; {_MAKE}") from error
+    except KeyError as error:
+        reason = f"{error.args[0]} is missing"
+        raise PressError("file", f"{place} is no gel calibration: {reason}; {_MAKE}") from error
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise PressError("file", f"{place} is no gel calibration: {error}; {_MAKE}") from error
