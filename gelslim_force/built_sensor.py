@@ -10,7 +10,11 @@ import numpy as np
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.joint.light_calibration import LightCalibration, read_light_calibration
-from gelslim_force.presses.gel_calibration import GelCalibration, read_gel_calibration
+from gelslim_force.presses.gel_calibration import (
+    GelCalibration,
+    read_gel_calibration,
+    specified_gel,
+)
 from gelslim_force.presses.gel_share import GelShare, varied_bundles
 from gelslim_force.settings import PipelineSettings
 from ifem_export.bundle.bundle import Bundle
@@ -25,7 +29,7 @@ class BuiltGel:
     Attributes:
         bundle: The sensor.
         calibration: Its camera and markers, for this bundle.
-        share: What the uncertain gel adds to the covariance; None without a gel calibration.
+        share: What the uncertain gel adds to the covariance; None where nothing is known of it.
         more: The same sensor with more of a parameter of its gel, and how much more.
     """
 
@@ -53,7 +57,8 @@ def built_gel(
     Args:
         bundle: The sensor as designed.
         calibration: Its camera, and its markers at rest.
-        gel: The gel as built, or its file; None leaves everything as it is.
+        gel: The gel as built, or its file; by default the gel is as specified, with the tolerances
+            that the bundle holds.
         settings: Choose the operators; the defaults if None.
 
     Raises:
@@ -61,13 +66,17 @@ def built_gel(
         CalibrationError: The calibration belongs to another bundle.
         IfemError: No operator keeps the budget.
     """
+    law = (settings or PipelineSettings()).gel
+    made, moved = bundle, calibration
     if gel is None:
-        return BuiltGel(bundle, calibration)
-    found = gel if isinstance(gel, GelCalibration) else read_gel_calibration(gel)
-    made, moved = found.applied(bundle, calibration)
-    chosen = settings or PipelineSettings()
+        found = specified_gel(bundle)
+        if found is None:
+            return BuiltGel(bundle, calibration)
+    else:
+        found = gel if isinstance(gel, GelCalibration) else read_gel_calibration(gel)
+        made, moved = found.applied(bundle, calibration)
     more = tuple((thicker, step) for _, thicker, step in varied_bundles(bundle, found))
-    return BuiltGel(made, moved, GelShare.of(bundle, found, chosen.operator), more)
+    return BuiltGel(made, moved, GelShare.of(bundle, found, law), more)
 
 
 def built_light(

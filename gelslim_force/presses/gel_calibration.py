@@ -41,7 +41,7 @@ class GelCalibration:
         poissons_ratio: Poisson's ratio.
         covariance: (3, 3) of ln modulus, ln thickness and Poisson's ratio.
         design: The same three as designed, by name.
-        ball_mm: Diameter of the ball that was pressed.
+        ball_mm: Diameter of the ball that was pressed; None for a gel as specified.
         presses: What was found of each press, as plain data.
         diagnosis: What was found, in sentences.
         warnings: What should be looked at before the calibration is trusted.
@@ -56,7 +56,7 @@ class GelCalibration:
     poissons_ratio: float
     covariance: Array
     design: Mapping[str, float]
-    ball_mm: float
+    ball_mm: float | None
     presses: tuple[Mapping[str, Any], ...] = ()
     diagnosis: tuple[str, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
@@ -72,7 +72,7 @@ class GelCalibration:
         object.__setattr__(self, "covariance", covariance)
         for name in ("youngs_modulus_mpa", "thickness_mm", "ball_mm"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
+            if value is not None and not (np.isfinite(value) and value > 0):
                 raise ValueError(f"{name} = {value!r}: must be above 0")
         if not 0 <= self.poissons_ratio < 0.5:
             raise ValueError(f"poissons_ratio = {self.poissons_ratio!r}: must be in 0 ... 0.5")
@@ -128,6 +128,27 @@ class GelCalibration:
                 f"the gel calibration has a thickness of {self.thickness_mm:.3g} mm, {ratio:.2g} "
                 f"times that of the design; {low:g} to {high:g} times can be used",
             )
+
+
+def specified_gel(bundle: Bundle) -> GelCalibration | None:
+    """The gel as specified, with the tolerances of its maker; None where the bundle has none."""
+    known, material = bundle.tolerances, bundle.material
+    if not any(known.values()):
+        return None
+    thickness_mm = designed_thickness_mm(bundle)
+    young, ratio = material.youngs_modulus_mpa, material.poissons_ratio
+    sigma = [
+        known.get("youngs_modulus_mpa", 0.0) / young,
+        known.get("thickness_mm", 0.0) / thickness_mm,
+        known.get("poissons_ratio", 0.0),
+    ]
+    design = {
+        "youngs_modulus_mpa": young, "thickness_mm": thickness_mm, "poissons_ratio": ratio,
+    }  # fmt: skip
+    covariance = np.diag(np.square(sigma))
+    return GelCalibration(
+        bundle.geometry_hash, young, thickness_mm, ratio, covariance, design, None
+    )
 
 
 def designed_thickness_mm(bundle: Bundle) -> float:

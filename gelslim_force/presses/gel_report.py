@@ -43,6 +43,7 @@ def sentence(text: str) -> str:
 
 
 def _force_against_patch(found: GelCalibration) -> Scatter:
+    assert found.ball_mm is not None
     sizes = [float(press["contact_mm"]) for press in found.presses]
     curve = []
     for size in np.linspace(0.9 * min(sizes), 1.05 * max(sizes), _CURVE_POINTS):

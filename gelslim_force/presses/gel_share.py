@@ -2,22 +2,21 @@
 
 The wrench is W = G S u. It is proportional to Young's modulus, so that its derivative by the
 logarithm of the modulus is W. The derivatives of G S by thickness and by Poisson's ratio are
-differences of two operators, computed once; where the normal motion follows from the size of a
-patch, it depends on the gel too, and its derivative adds G S du/dh.
+differences of the adjoint fields of two pads, computed once; where the normal motion follows from
+the size of a patch, it depends on the gel too, and its derivative adds G S du/dh. A linear law
+leaves out a part of the force that grows with the depth (docs/physics.md, "Modulus").
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.forces.wrench import Wrench, WrenchNoise
-from gelslim_force.presses.gel_calibration import GelCalibration
-from ifem_export.operators.surface_operator import SurfaceOperator
+from gelslim_force.forces.wrench import Wrench
+from gelslim_force.presses.gel_calibration import GelCalibration, designed_thickness_mm
 
 if TYPE_CHECKING:
     from gelslim_force.contact.normal_source import NormalReading
@@ -26,14 +25,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 LN_THICKNESS_STEP, RATIO_STEP = 0.02, 0.002
 """Changes for differences."""
+_DEPTHS, _LEFT_OUT = (0.0, 0.1, 0.2, 0.3, 0.5), (0.0, 0.03, 0.11, 0.20, 0.47)
+"""Depth of a ball over the thickness, and the share of its force that a linear law leaves out."""
 
 
 def varied_bundles(bundle: Bundle, gel: GelCalibration) -> list[tuple[Bundle, Bundle, float]]:
     """Sensors with a thicker and a thinner gel, and those of another Poisson's ratio if it varies.
 
     Returns:
-        For each parameter the sensor with less and with more of it, and the size of this step.
+        For each parameter the sensor with less and with more of it, and the size of this step; none
+        for a crowned gel, whose mesh is not stretched.
     """
+    if bundle.mesh.surface_shift is not None:
+        return []
     step = LN_THICKNESS_STEP
     found = [(gel.varied(bundle, -step), gel.varied(bundle, step), step)]
     if gel.covariance[2, 2] > 0:
@@ -51,36 +55,33 @@ class GelShare:
             ratio.
         by_normal: (6, c) product G S for the normal motion.
         derivative: (p, 6, c, 3) of G S by thickness and ratio.
+        linear_mm: Thickness of a gel whose law is taken to be linear; 0 for another law.
     """
 
     covariance: Array
     by_normal: Array
     derivative: Array
+    linear_mm: float = 0.0
 
     @classmethod
-    def of(
-        cls,
-        bundle: Bundle,
-        gel: GelCalibration,
-        operator_of: Callable[[Bundle], SurfaceOperator],
-    ) -> GelShare:
+    def of(cls, bundle: Bundle, gel: GelCalibration, law: str = "linear") -> GelShare:
         """Make it for one sensor.
 
         Args:
             bundle: The sensor as designed.
-            gel: Its gel as built.
-            operator_of: The surface operator of a bundle.
+            gel: Its gel as built, or as specified.
+            law: Of the gel, as in `PipelineSettings`.
         """
-        points = np.asarray(bundle.mesh.surface_mm)
-
-        def response(sensor: Bundle) -> Array:
-            return WrenchNoise.of(operator_of(sensor), points).response
-
         pairs = varied_bundles(bundle, gel)
-        derivative = [(response(more) - response(less)) / (2 * step) for less, more, step in pairs]
         size = 1 + len(pairs)
-        by_normal = response(gel.varied(bundle))[:, :, 2]
-        return cls(gel.covariance[:size, :size], by_normal, np.stack(derivative))
+        shape = (len(pairs), 6, len(bundle.mesh.surface), 3)
+        derivative = [
+            (more.adjoint.forces - less.adjoint.forces) / (2 * step) for less, more, step in pairs
+        ]
+        by_normal = gel.varied(bundle).adjoint.forces[:, :, 2] if pairs else np.zeros(shape[1:3])
+        linear_mm = designed_thickness_mm(bundle) if law == "linear" else 0.0
+        covariance = gel.covariance[:size, :size]
+        return cls(covariance, by_normal, np.reshape(derivative, shape), linear_mm)
 
     def added(
         self, wrench: Wrench, displacement_mm: Array, reading: NormalReading | None = None
@@ -99,4 +100,13 @@ class GelShare:
             parts = parts + reading.by_gel_mm @ self.by_normal.T
         by_gel = np.vstack([np.nan_to_num(wrench.vector), parts])
         share = by_gel.T @ self.covariance @ by_gel
-        return replace(wrench, covariance=wrench.covariance + share)
+        left_out = self._left_out(displacement_mm) * by_gel[0]
+        total = wrench.covariance + share + np.outer(left_out, left_out)
+        return replace(wrench, covariance=total)
+
+    def _left_out(self, displacement_mm: Array) -> float:
+        """Share of the force that the linear law leaves out; 0 where the depth is unknown."""
+        if not self.linear_mm:
+            return 0.0
+        depth = -float(np.nan_to_num(displacement_mm[:, 2]).min(initial=0.0))
+        return float(np.interp(depth / self.linear_mm, _DEPTHS, _LEFT_OUT))

@@ -16,12 +16,14 @@ from pressed_samples import FRICTION, calibration, lit_bundle, pressed, referenc
 from sensor_samples import sensor_bundle
 from shaded_frames import shaded
 
+from gelslim_force.built_sensor import built_gel
 from gelslim_force.calibration.file import write_calibration
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import SensorError, open_sensor
+from gelslim_force.settings import PipelineSettings
 from ifem_export.operators.solver import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -184,6 +186,35 @@ def test_the_shape_is_unknown_unless_it_is_given(tmp_path: Path) -> None:
     with pytest.raises(SensorError) as caught:
         open_sensor(lit_bundle(), calibration=bare, indenter="unknown")
     assert caught.value.argument == "reference"
+
+
+@pytest.mark.slow
+def test_deviations_hold_for_gels_and_lights_within_their_tolerances() -> None:
+    """Modulus drawn within 10 % and gain of the light within 20 %: scores and coverage."""
+    rng, tolerance = np.random.default_rng(4), 0.1
+    known = {"youngs_modulus_mpa": tolerance * lit_bundle().material.youngs_modulus_mpa}
+    bundle = replace(lit_bundle(), tolerances=known)
+    share = built_gel(bundle, calibration(), None, PipelineSettings(gel="auto")).share
+    assert share is not None
+    source = pipeline().normal
+    assert isinstance(source, UnknownShape)
+    first = ForcePipeline(bundle, calibration(), normal=source, gel=share)
+    scores, errors = [], []
+    for seed in range(60):
+        truth = pressed(seed)
+        gamma = float(np.exp(rng.normal(0, 0.2)))
+        estimator = replace(source.estimator, law=replace(source.estimator.law, gamma=gamma))
+        drawn = UnknownShape(estimator, source.reference, source.unseen_mm)
+        found = first.with_normal(drawn).process(truth.image).wrench
+        assert found is not None
+        errors.append(abs(found.force_n[2] / truth.wrench[2] - 1))
+        for stiffer in np.exp(rng.normal(0, tolerance, 5)):
+            scores.append((found.vector - stiffer * truth.wrench) / found.standard_deviation)
+    spread = np.sqrt(np.mean(np.square(scores), axis=0))[:3]
+    inside = (np.abs(scores) < 1.96).mean(axis=0)[:3]
+    assert np.median(errors) < 0.04
+    assert ((spread > 0.7) & (spread < 1.3)).all()
+    assert ((inside > 0.9) & (inside < 0.99)).all()
 
 
 def test_light_and_colour_are_needed() -> None:

@@ -21,6 +21,7 @@ from gelslim_force.presses.gel_calibration import (
     designed_thickness_mm,
     gel_calibration_record,
     read_gel_calibration,
+    specified_gel,
     write_gel_calibration,
 )
 from gelslim_force.presses.gel_share import GelShare, varied_bundles
@@ -148,9 +149,32 @@ def test_the_share_of_the_gel_is_that_of_true_rebuilds(ratio_varies: bool) -> No
         [(wrench_of(*s).vector - wrench_of(*-s).vector) / (2 * s.max()) for s in steps]
     )
     expected = slopes.T @ covariance[: len(steps), : len(steps)] @ slopes
-    found = GelShare.of(bundle, gel, exact).added(wrench_of(0.0, 0.0, 0.0), motion)
+    found = GelShare.of(bundle, gel, "neo_hookean").added(wrench_of(0.0, 0.0, 0.0), motion)
     np.testing.assert_allclose(found.covariance, expected, atol=0.02 * expected.max())
     assert found.covariance[2, 2] == pytest.approx(expected[2, 2], rel=0.02)
+
+
+def test_a_gel_as_specified_has_the_tolerances_of_its_maker() -> None:
+    """Force is proportional to the modulus, and for a given motion to one over the thickness."""
+    bundle = small_bundle(2)
+    assert specified_gel(bundle) is None
+    young, thickness = bundle.material.youngs_modulus_mpa, designed_thickness_mm(bundle)
+    known = {"youngs_modulus_mpa": 0.1 * young, "thickness_mm": 0.05 * thickness}
+    gel = specified_gel(replace(bundle, tolerances=known))
+    assert gel is not None
+    np.testing.assert_allclose(gel.standard_deviation, [0.1 * young, 0.05 * thickness, 0.0])
+    points = np.asarray(bundle.mesh.surface_mm)
+    motion = exact(bundle).displacement(hertz_like(points, 0.1, (0.02, -0.01)))
+    wrench = WrenchNoise(points, np.zeros((6, len(points), 3))).wrench(
+        exact(bundle).force(motion), np.zeros((6, 6))
+    )
+    for law in ("auto", "linear"):
+        found = GelShare.of(bundle, gel, law).added(wrench, motion)
+        depth = -motion[:, 2].min() / thickness
+        left_out = np.interp(depth, [0, 0.1, 0.2], [0, 0.03, 0.11]) * (law == "linear")
+        sigma = np.sqrt(0.1**2 + 0.05**2 + left_out**2)
+        assert 0.02 < depth < 0.2
+        assert found.standard_deviation[2] == pytest.approx(sigma * abs(wrench.vector[2]), rel=0.02)
 
 
 def test_an_indenter_tells_how_its_motion_depends_on_the_gel() -> None:
@@ -181,7 +205,7 @@ def test_an_indenter_tells_how_its_motion_depends_on_the_gel() -> None:
 def test_an_unknown_normal_motion_stays_unknown() -> None:
     bundle = small_bundle(2)
     gel = built(bundle)
-    share = GelShare.of(bundle, gel, exact)
+    share = GelShare.of(bundle, gel, "neo_hookean")
     motion = np.zeros((len(bundle.mesh.surface), 3))
     motion[:, 0], motion[:, 2] = 0.01, np.nan
     covariance = np.full((6, 6), np.nan)
