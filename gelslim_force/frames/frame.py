@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
@@ -15,6 +16,10 @@ from gelslim_core.errors import GelslimError
 
 Picture = NDArray[np.uint8]
 """(h, w) grey or (h, w, 3) in the order red, green, blue; contiguous."""
+
+
+_LATEST_STAMP_S = 1e11
+"""Stamps beyond, some 3000 years from now, are taken for milliseconds or nanoseconds."""
 
 
 class FrameSourceError(GelslimError, ValueError):
@@ -32,6 +37,11 @@ class Frame:
         image: The picture, or None if it could not be read.
         problem: Why it could not be read.
         name: Name of the file, for a source of several files.
+        stamp_s: When it was taken, in seconds since the start of 1970 (UTC); None if the source
+            does not know. It serves to merge frames with other logs; differences are better taken
+            of `time_s`, because a system clock may be set in between.
+        sensor_s: Time by the clock of the camera or its driver, whose zero is its own; None if the
+            source has none.
     """
 
     index: int
@@ -39,6 +49,52 @@ class Frame:
     image: Picture | None
     problem: str = ""
     name: str = ""
+    stamp_s: float | None = None
+    sensor_s: float | None = None
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """When a picture was taken; None where it is not known.
+
+    Attributes:
+        time_s: Time since the first frame, or by a clock of the caller.
+        stamp_s: Seconds since the start of 1970 (UTC).
+        sensor_s: Time by the clock of the camera or its driver.
+
+    Raises:
+        ValueError: `stamp_s` is not finite, negative, or in another unit than seconds.
+    """
+
+    time_s: float | None = None
+    stamp_s: float | None = None
+    sensor_s: float | None = None
+
+    def __post_init__(self) -> None:
+        problem = "" if self.stamp_s is None else stamp_problem(self.stamp_s)
+        if problem:
+            raise ValueError(problem)
+
+    @classmethod
+    def of(cls, frame: object, time_s: float | None, stamp_s: float | None) -> FrameTimes:
+        """Times that the caller gives, and otherwise those of the frame; a picture has none."""
+        if not isinstance(frame, Frame):
+            return cls(time_s, stamp_s)
+        return cls(
+            frame.time_s if time_s is None else time_s,
+            frame.stamp_s if stamp_s is None else stamp_s,
+            frame.sensor_s,
+        )
+
+
+def stamp_problem(stamp_s: float) -> str:
+    """Return why a number cannot be seconds since 1970; empty if it can."""
+    if math.isfinite(stamp_s) and 0 <= stamp_s <= _LATEST_STAMP_S:
+        return ""
+    return (
+        f"stamp_s = {stamp_s:g}: must be seconds since 1970 in 0 ... {_LATEST_STAMP_S:g}; divide "
+        "nanoseconds by 1e9"
+    )
 
 
 class FrameSource(AbstractContextManager[Any]):

@@ -22,7 +22,7 @@ _VIDEO_ATTEMPTS = 10
 _MAX_FRAMES = 10**8
 _CAMERA_ATTEMPTS = 30
 """Failed reads in succession after which a camera is taken to be disconnected."""
-_FPS, _FRAME_COUNT = 5, 7
+_POSITION_MS, _FPS, _FRAME_COUNT = 0, 5, 7
 """OpenCV's numbers of these properties."""
 
 
@@ -34,6 +34,12 @@ class Capture(Protocol):
 
     def read(self) -> tuple[bool, Any]:
         """Return success and the picture (h, w, 3) in the order blue, green, red."""
+
+    def grab(self) -> bool:
+        """Wait for the next picture without decoding it; return success."""
+
+    def retrieve(self) -> tuple[bool, Any]:
+        """Decode the picture that was grabbed; return as `read` does."""
 
     def get(self, prop: int) -> float:
         """Return a property; 0 if it is not known."""
@@ -61,6 +67,12 @@ def open_capture(source: str | int) -> Capture:
 def _known_rate(frames_per_s: float) -> float | None:
     known = math.isfinite(frames_per_s) and 0.01 <= frames_per_s <= 1e5
     return float(frames_per_s) if known else None
+
+
+def _sensor_time_s(capture: Capture) -> float | None:
+    """Time of the grabbed picture by the clock of the camera's driver; None if it has none."""
+    milliseconds = capture.get(_POSITION_MS)
+    return milliseconds / 1000 if math.isfinite(milliseconds) and milliseconds > 0 else None
 
 
 class VideoFile(FrameSource):
@@ -139,13 +151,15 @@ class LiveCamera(FrameSource):
         frames_per_s: float | None = None,
         capture: Callable[[int | str], Capture] = open_capture,
         clock: Callable[[], float] = time.monotonic,
+        system_clock: Callable[[], float] = time.time,
     ) -> None:
         """Open a camera and request a rate.
 
-        `device` is a number, a file such as /dev/video0 or the address of a stream.
+        `device` is a number, a file such as /dev/video0 or the address of a stream. `clock` gives
+        the times of the frames, `system_clock` their stamps in seconds since 1970.
         Raises FrameSourceError if the camera does not open.
         """
-        self.device, self._clock = device, clock
+        self.device, self._clock, self._system_clock = device, clock, system_clock
         self._capture = capture(device)
         if not self._capture.isOpened():
             self._capture.release()
@@ -159,7 +173,11 @@ class LiveCamera(FrameSource):
         self._closed = self._reading = False
 
     def __iter__(self) -> Iterator[Frame]:
-        """Yield frames with the time since the first; a read that fails gives a problem."""
+        """Yield frames with the time since the first; a read that fails gives a problem.
+
+        Each has the system's time at which it was grabbed and, if the driver tells it, the time by
+        the driver's clock (Video4Linux: that of the kernel's buffer).
+        """
         self._reading = True
         try:
             yield from self._frames()
@@ -170,10 +188,13 @@ class LiveCamera(FrameSource):
         index = failed = 0
         start = self._clock()
         while not self._closed and failed < _CAMERA_ATTEMPTS:
-            good, image = self._capture.read()
-            time_s = self._clock() - start
+            good = self._capture.grab()
+            # Decoding comes after the clocks are read, so that its time is not in the stamps.
+            time_s, stamp_s = self._clock() - start, self._system_clock()
+            sensor_s = _sensor_time_s(self._capture) if good else None
             if index == 0:
                 start, time_s = start + time_s, 0.0
+            good, image = self._capture.retrieve() if good else (False, None)
             problem = "the camera gave no picture"
             if good and image is not None:
                 image = np.ascontiguousarray(image[:, :, ::-1] if image.ndim == 3 else image)
@@ -183,7 +204,8 @@ class LiveCamera(FrameSource):
             if failed == _CAMERA_ATTEMPTS:
                 problem = f"the camera gave no picture {_CAMERA_ATTEMPTS} times in succession"
             if not self._closed:
-                yield Frame(index, time_s, None if problem else image, problem)
+                seen = None if problem else image
+                yield Frame(index, time_s, seen, problem, stamp_s=stamp_s, sensor_s=sensor_s)
             index += 1
 
     def close(self) -> None:

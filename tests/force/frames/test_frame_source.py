@@ -255,6 +255,23 @@ def test_times_that_do_not_fit_an_array():
     for times in ([0, 1], [0, 1, 2, 3, np.nan], list("abcde")):
         with pytest.raises(FrameSourceError):
             FrameArray(stack, times)
+        with pytest.raises(FrameSourceError, match="stamps"):
+            FrameArray(stack, stamp_s=times)
+    for wrong in (-1.0, 1.8e18):
+        with pytest.raises(FrameSourceError, match="since 1970"):
+            FrameArray(stack, stamp_s=[0, 1, 2, 3, wrong])
+
+
+def test_only_a_source_that_knows_its_stamps_has_them(tmp_path):
+    """A folder or video has none: the time of a file is that of a copy, not of a picture."""
+    stack = np.stack([scene(k) for k in range(3)])
+    stamps = 1.8e9 + np.array([0, 0.1, 0.25])
+    np.savez(tmp_path / "run.npz", frames=stack, stamp_s=stamps)
+    assert [f.stamp_s for f in frames_of(tmp_path / "run.npz")] == stamps.tolist()
+    assert [f.time_s for f in frames_of(tmp_path / "run.npz")] == [0, 1, 2]
+    save(tmp_path / "one.png", scene(7))
+    for source in (stack, tmp_path / "one.png", write_video(tmp_path / "run.avi", 2)):
+        assert all(f.stamp_s is None for f in frames_of(source))
 
 
 def test_damaged_numpy_files(tmp_path):

@@ -1,5 +1,6 @@
 """Reading ahead: live frames go stale, recorded ones wait; cameras that fail, errors, closing."""
 
+import time
 from threading import Event
 
 import numpy as np
@@ -93,26 +94,27 @@ def test_ahead_must_be_one_at_least():
 
 
 class FakeCapture:
-    """A camera: pictures of these sizes, None where a read fails."""
+    """A camera: pictures of these sizes, None where a read fails; its clock runs per picture."""
 
-    def __init__(self, script, opened=True):
-        self.script, self.opened, self.at = script, opened, 0
+    def __init__(self, script, opened=True, sensor_ms=0.0):
+        self.script, self.opened, self.at, self.sensor_ms = script, opened, 0, sensor_ms
         self.released, self.asked = 0, {}
 
     def isOpened(self):
         return self.opened
 
-    def read(self):
-        shape = self.script[min(self.at, len(self.script) - 1)]
+    def grab(self):
+        self.shape = self.script[min(self.at, len(self.script) - 1)]
         self.at += 1
-        if shape is None:
-            return False, None
-        image = np.zeros((*shape, 3), np.uint8)
+        return self.shape is not None
+
+    def retrieve(self):
+        image = np.zeros((*self.shape, 3), np.uint8)
         image[..., 2] = 250
         return True, image
 
     def get(self, prop):
-        return 90.0 if prop == 5 else 0.0
+        return {0: self.sensor_ms * self.at, 5: 90.0}.get(prop, 0.0)
 
     def set(self, prop, value):
         self.asked[prop] = value
@@ -136,6 +138,20 @@ def test_a_failed_read_is_skipped_and_a_lost_camera_ends_the_frames():
     assert [f.time_s for f in found[:3]] == [0.0, 0.5, 1.0]
     assert np.all(found[0].image[..., 0] == 250), "blue, green, red becomes red, green, blue"
     assert capture.released == 1
+
+
+def test_a_live_frame_has_the_time_of_its_grabbing_by_both_clocks():
+    """Stamps follow the system clock, also where it is set back; differences do not."""
+    capture = FakeCapture([(48, 64), (48, 64), None, (48, 64), None], sensor_ms=11.0)
+    ticks, system = iter(np.arange(100) * 0.5), iter([1.8e9, 1.8e9 + 0.5, 1.8e9 - 60, *[9.0] * 50])
+    camera = LiveCamera(0, None, lambda device: capture, lambda: next(ticks), lambda: next(system))
+    found = list(camera)[:4]
+    assert [f.stamp_s for f in found] == [1.8e9, 1.8e9 + 0.5, 1.8e9 - 60, 9.0]
+    assert [f.time_s for f in found] == [0.0, 0.5, 1.0, 1.5]
+    assert [f.sensor_s for f in found] == [0.011, 0.022, None, 0.044]
+    without = next(iter(LiveCamera(0, capture=lambda device: FakeCapture([(48, 64)]))))
+    assert without.sensor_s is None
+    assert abs(without.stamp_s - time.time()) < 3600
 
 
 def test_a_camera_is_asked_for_its_rate_and_refused_when_it_does_not_open():
