@@ -25,7 +25,7 @@ from gelslim_force.contact.normal_source import (
 from gelslim_force.forces.frame_clock import FrameClock
 from gelslim_force.forces.frame_result import ForceField, FrameResult
 from gelslim_force.forces.wrench import WrenchNoise
-from gelslim_force.frames.frame import Frame
+from gelslim_force.frames.frame import Frame, FrameTimes
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.unknown_shape import UnknownShape
 from gelslim_force.motion.marker_motion import MarkerView
@@ -33,8 +33,7 @@ from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.presses.gel_share import GelShare
 from gelslim_force.settings import PipelineSettings
 from gelslim_force.tracking.marker_noise import noise_px
-from gelslim_force.tracking.tracker import TrackedFrame
-from gelslim_force.tracking.tracks import MarkerStatus, Tracks
+from gelslim_force.tracking.tracks import Tracks
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.errors import IfemError
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
@@ -148,9 +147,11 @@ class ForcePipeline:
         if self.normal is not None and not isinstance(self.normal, UnknownShape):
             self._forces.prepare_edge()
 
-    def unreadable(self, problem: str, *, time_s: float | None = None) -> FrameResult:
+    def unreadable(
+        self, problem: str, *, time_s: float | None = None, stamp_s: float | None = None
+    ) -> FrameResult:
         """Result of a frame that could not be read; it is counted as a frame."""
-        return self._numbered(time_s, problems=(problem,))
+        return self._numbered(FrameTimes(time_s, stamp_s), problems=(problem,))
 
     @single_threaded
     def process(
@@ -158,6 +159,7 @@ class ForcePipeline:
         frame: Frame | NDArray[np.uint8],
         *,
         time_s: float | None = None,
+        stamp_s: float | None = None,
         normal_mm: ArrayLike | None = None,
         normal_sigma_mm: ArrayLike = 0.0,
     ) -> FrameResult:
@@ -168,6 +170,8 @@ class ForcePipeline:
                 portrait also as the camera gives it, on its side.
             time_s: When it was taken. By default the frame's own time; for a picture, the number
                 of frames so far.
+            stamp_s: The same in seconds since 1970 (UTC), to merge results with other logs. By
+                default the frame's own stamp; unknown for a picture.
             normal_mm: (c,) motion of the surface nodes along z in mm, negative where the gel is
                 pressed in. It takes the place of the normal source.
             normal_sigma_mm: Standard deviation of `normal_mm` where the gel is pressed in, for all
@@ -178,33 +182,31 @@ class ForcePipeline:
             `FrameResult.problems`.
 
         Raises:
-            ValueError: `normal_mm` or `normal_sigma_mm` has another shape or is not finite, or a
-                deviation is negative.
+            ValueError: `normal_mm` or `normal_sigma_mm` has another shape or is not finite, a
+                deviation is negative, or `stamp_s` is no number of seconds since 1970.
         """
         clock = FrameClock()
-        image: Any = frame
-        if isinstance(frame, Frame):
-            image, time_s = frame.image, frame.time_s if time_s is None else time_s
-            if image is None:
-                return self.unreadable(frame.problem, time_s=time_s)
+        times = FrameTimes.of(frame, time_s, stamp_s)
+        if isinstance(frame, Frame) and frame.image is None:
+            return self._numbered(times, problems=(frame.problem,))
+        image: Any = frame.image if isinstance(frame, Frame) else frame
         image = upright(image, self.calibration.camera)
         problem = self._size_problem(image)
         if problem:
-            return self._numbered(time_s, problems=(problem,))
+            return self._numbered(times, problems=(problem,))
         try:
             tracked = self._tracker.update(image)
         except ValueError as error:
-            return self._numbered(time_s, problems=(str(error),))
+            return self._numbered(times, problems=(str(error),))
         clock.stage("track")
-        problems = _tracking_problems(tracked)
-        tracks = tracked.tracks
+        problems, tracks = tracked.problems, tracked.tracks
         if tracks.coverage < self.settings.least_coverage:
             problems = (
                 *problems,
                 f"{tracks.coverage:.0%} of the markers are seen: under "
                 f"{self.settings.least_coverage:.0%} forces are not given",
             )
-            return self._numbered(time_s, tracks=tracks, stage_ms=clock.stages, problems=problems)
+            return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
         given = None
         if normal_mm is not None:
             given = NormalReading.given(len(self.points_mm), normal_mm, normal_sigma_mm)
@@ -215,7 +217,7 @@ class ForcePipeline:
             found = self._forces_of(motion, reading, noise=self._noise_px(tracks), clock=clock)
         except IfemError as error:
             problems = (*problems, str(error))
-            return self._numbered(time_s, tracks=tracks, stage_ms=clock.stages, problems=problems)
+            return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
         field = found["field"]
         if self.gel is not None:
             found["wrench"] = self.gel.added(found["wrench"], field.displacement_mm, reading)
@@ -224,7 +226,7 @@ class ForcePipeline:
         known = reading is not None and reading.known
         self._last_force = field.force_n if known else None
         return self._numbered(
-            time_s,
+            times,
             tracks=tracks,
             marker_displacement_mm=motion,
             normal_known=known,
@@ -234,9 +236,11 @@ class ForcePipeline:
             **found,
         )
 
-    def _numbered(self, time_s: float | None, **found: Any) -> FrameResult:
+    def _numbered(self, times: FrameTimes, **found: Any) -> FrameResult:
         index, self._index = self._index, self._index + 1
-        return FrameResult(index, float(index) if time_s is None else time_s, **found)
+        time_s = float(index) if times.time_s is None else times.time_s
+        found |= {"stamp_s": times.stamp_s, "sensor_s": times.sensor_s}
+        return FrameResult(index, time_s, **found)
 
     def _size_problem(self, image: Any) -> str:
         camera = self.calibration.camera
@@ -338,13 +342,3 @@ def _findings(field: ForceField, reading: NormalReading | None) -> dict[str, Any
     if field.low_pass_mm is not None:
         found["low_pass_mm"] = [round(float(width), 4) for width in field.low_pass_mm]
     return found
-
-
-def _tracking_problems(tracked: TrackedFrame) -> tuple[str, ...]:
-    problems = []
-    if tracked.slipped:
-        problems.append("the anchors contradict the lattice: it may be off by a pitch")
-    lost = tracked.tracks.count(MarkerStatus.LOST)
-    if lost:
-        problems.append(f"{lost} of {len(tracked.tracks)} markers are lost")
-    return tuple(problems)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -101,11 +101,9 @@ def run_frames(
     summary = RunSummary()
     for frame in frames:
         image = frame.image
-        if image is None:
-            result = pipeline.unreadable(frame.problem, time_s=frame.time_s)
-        else:
+        if image is not None:
             image = upright(image, pipeline.calibration.camera)
-            result = pipeline.process(image, time_s=frame.time_s)
+        result = pipeline.process(replace(frame, image=image))
         summary.add(result)
         for sink in sinks:
             sink.take(image, result)

@@ -61,7 +61,7 @@ class FrameResult:
 
     Attributes:
         index: Number of the frame, from 0.
-        time_s: When it was taken.
+        time_s: When it was taken, since the first frame or by a clock of the caller.
         tracks: The markers in the picture.
         marker_displacement_mm: (m, 3) of the followed markers, in the order of the tracks; NaN
             where unknown.
@@ -71,6 +71,8 @@ class FrameResult:
         stage_ms: Time in ms per stage: track, look, normal, displace, interpolate, force, wrench.
         problems: What was wrong with the frame, one sentence each.
         extra: Further findings, such as the fitted contact patch.
+        stamp_s: When it was taken, in seconds since 1970 (UTC); None if that is not known.
+        sensor_s: The same by the clock of the camera or its driver; None without one.
     """
 
     index: int
@@ -83,6 +85,8 @@ class FrameResult:
     stage_ms: Mapping[str, float] = default(default_factory=dict)
     problems: tuple[str, ...] = ()
     extra: Mapping[str, Any] = default(default_factory=dict)
+    stamp_s: float | None = None
+    sensor_s: float | None = None
 
     @property
     def coverage(self) -> float:

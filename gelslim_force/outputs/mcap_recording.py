@@ -1,5 +1,8 @@
 """A run as an MCAP file of ROS 2 messages: open it in Foxglove, replay it with rosbag2.
 
+The messages have the stamps of the frames, so that a live recording merges with other logs; frames
+without a stamp have their time since the first frame, and begin in 1970.
+
 Topics: `wrench` (geometry_msgs/msg/WrenchStamped) for frames that have one, and `force_field`
 (gelslim_msgs/msg/ForceField) for every frame, each below the recording's namespace.
 """
@@ -93,7 +96,7 @@ class McapRecording(AbstractContextManager["McapRecording"]):
         """
         if not self._open:
             raise OutputError(f"{self.path}: the recording is already finished")
-        stamp, sequence = nanoseconds(result.time_s), int(result.index) % 2**32
+        stamp, sequence = log_time_ns(result), int(result.index) % 2**32
         wrench = wrench_stamped(result, self._frame_id)
         field = force_field(result, self._frame_id)
         try:
@@ -156,6 +159,11 @@ def nanoseconds(time_s: float) -> int:
     return round(time_s * 1e9) if valid else 0
 
 
+def log_time_ns(result: FrameResult) -> int:
+    """Return the stamp of a frame since 1970, or the time since its first frame without one."""
+    return nanoseconds(result.time_s if result.stamp_s is None else result.stamp_s)
+
+
 def wrench_stamped(result: FrameResult, frame_id: str) -> Message | None:
     """Return a geometry_msgs/msg/WrenchStamped in N and N m; None without a wrench."""
     if result.wrench is None:
@@ -188,7 +196,7 @@ def force_field(result: FrameResult, frame_id: str) -> Message:
 
 
 def _header(result: FrameResult, frame_id: str) -> Message:
-    sec, nanosec = divmod(nanoseconds(result.time_s), 10**9)
+    sec, nanosec = divmod(log_time_ns(result), 10**9)
     return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": _text(frame_id)}
 
 

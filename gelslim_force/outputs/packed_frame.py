@@ -64,6 +64,8 @@ def pack(result: FrameResult, precision: Precision) -> PackedFrame:
     arrays: dict[str, NDArray[Any]] = {
         "index": np.array(result.index, np.int64),
         "time_s": np.array(result.time_s, np.float64),
+        "stamp_s": np.array(_or_nan(result.stamp_s), np.float64),
+        "sensor_s": np.array(_or_nan(result.sensor_s), np.float64),
         "normal_known": np.array(result.normal_known, np.bool_),
         "has_tracks": np.array(result.tracks is not None),
         "has_marker_displacement": np.array(result.marker_displacement_mm is not None),
@@ -89,6 +91,10 @@ def pack(result: FrameResult, precision: Precision) -> PackedFrame:
     return PackedFrame(arrays, points, tuple(result.problems), extra)
 
 
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
 def _no_tracks(markers: int) -> Tracks:
     unknown, nothing = np.full((markers, 2), np.nan), np.full(markers, -1)
     return Tracks(unknown, unknown, nothing, nothing)
@@ -103,11 +109,16 @@ def unpack(
 ) -> FrameResult:
     """Return the result of a packed frame, in its precision.
 
-    Arrays of markers and nodes that the frame does not have may be of any length.
+    Arrays of markers and nodes that the frame does not have may be of any length. Frames of the
+    first version, which have no stamps, are read too.
     """
 
     def real(name: str) -> NDArray[np.float64]:
         return np.asarray(arrays[name], dtype=np.float64)
+
+    def stamp(name: str) -> float | None:
+        found = float(arrays.get(name, math.nan))
+        return None if math.isnan(found) else found
 
     tracks = field = wrench = None
     if arrays["has_tracks"]:
@@ -143,6 +154,8 @@ def unpack(
         stage_ms=dict(stage_ms or {}),
         problems=problems,
         extra=json.loads(extra),
+        stamp_s=stamp("stamp_s"),
+        sensor_s=stamp("sensor_s"),
     )
 
 

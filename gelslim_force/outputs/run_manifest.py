@@ -28,6 +28,7 @@ UNITS: Mapping[str, str] = {
     "traction": "MPa",
     "image": "px, centre of the first pixel at (0, 0), x right, y down",
     "time": "s",
+    "stamp": "s since 1970-01-01 00:00 UTC",
     "frame": "origin at the centre of the gel's outer surface, x to the tip, z out of the gel",
     "byte_order": "little-endian",
     "unknown": "NaN",
@@ -45,6 +46,8 @@ class RunCounts:
     with_problems: int = 0
     first_time_s: float | None = None
     last_time_s: float | None = None
+    first_stamp_s: float | None = None
+    last_stamp_s: float | None = None
     problems: dict[str, int] = field(default_factory=dict)
     """Number of frames by problem; beyond `_MAX_PROBLEMS` different ones they count as "other"."""
 
@@ -58,6 +61,10 @@ class RunCounts:
         if self.first_time_s is None:
             self.first_time_s = plain(float(result.time_s))
         self.last_time_s = plain(float(result.time_s))
+        if result.stamp_s is not None:
+            self.last_stamp_s = float(result.stamp_s)
+            if self.first_stamp_s is None:
+                self.first_stamp_s = self.last_stamp_s
         for problem in result.problems:
             known = problem in self.problems or len(self.problems) < _MAX_PROBLEMS
             name = problem if known else "other"

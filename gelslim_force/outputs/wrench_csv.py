@@ -33,6 +33,8 @@ ESCAPE = "backslashreplace"
 NUMBERS = (
     "index",
     "time_s",
+    "stamp_s",
+    "sensor_s",
     *_AXES,
     *(f"sigma_{axis}" for axis in _AXES),
     "normal_known",
@@ -47,6 +49,8 @@ NUMBERS = (
 """Columns of numbers; `normal_known` is 0 or 1, counts are nan without markers or nodes."""
 COLUMNS = (*NUMBERS, "problems")
 """All columns; several problems are separated by "; "."""
+_STAMPS = ("stamp_s", "sensor_s")
+"""Columns that the first version of this file did not have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +108,10 @@ def line(result: FrameResult) -> str:
 
 
 def read_wrenches(path: str | os.PathLike[str]) -> WrenchTable:
-    """Read a file, also an incomplete one. Raises OutputError if it is no wrench file."""
+    """Read a file, also an incomplete one, or one of the first version, without stamps.
+
+    Raises OutputError if it is no wrench file.
+    """
     try:
         data = Path(path).read_bytes()
     except OSError as error:
@@ -120,22 +127,26 @@ def read_wrenches(path: str | os.PathLike[str]) -> WrenchTable:
         raise OutputError(
             f"{os.fspath(path)}: not a wrench file; its first line must be {header()!r}"
         )
-    if tuple(rows[0]) != COLUMNS:
+    names = tuple(rows[0])
+    if names not in (COLUMNS, tuple(name for name in COLUMNS if name not in _STAMPS)):
         raise OutputError(
             f"{os.fspath(path)}: not a wrench file; its first line must be {header()!r}"
         )
-    numbers = np.array([_row(path, k + 2, row) for k, row in enumerate(rows[1:])])
+    numbers = np.full((len(rows) - 1, len(NUMBERS)), np.nan)
+    places = [NUMBERS.index(name) for name in names[:-1]]
+    for k, row in enumerate(rows[1:]):
+        numbers[k, places] = _row(path, k + 2, row, len(names))
     return WrenchTable(
-        numbers.reshape(len(rows) - 1, len(NUMBERS)),
+        numbers,
         tuple(row[-1] for row in rows[1:]),
         incomplete=bool(rest),
     )
 
 
-def _row(path: str | os.PathLike[str], number: int, row: list[str]) -> list[float]:
-    if len(row) != len(COLUMNS):
+def _row(path: str | os.PathLike[str], number: int, row: list[str], columns: int) -> list[float]:
+    if len(row) != columns:
         raise OutputError(
-            f"{os.fspath(path)}, line {number}: {len(row)} values, expected {len(COLUMNS)}"
+            f"{os.fspath(path)}, line {number}: {len(row)} values, expected {columns}"
         )
     try:
         return [float(value) for value in row[:-1]]
@@ -158,6 +169,8 @@ def _numbers(result: FrameResult) -> list[float]:
     return [
         int(result.index),
         result.time_s,
+        math.nan if result.stamp_s is None else result.stamp_s,
+        math.nan if result.sensor_s is None else result.sensor_s,
         *(unknown if wrench is None else wrench.vector),
         *(unknown if wrench is None else _sigma(wrench.covariance)),
         int(result.normal_known),

@@ -20,7 +20,7 @@ from gelslim_force.lattice.growth import LatticeError
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.lattice.registration import register
 from gelslim_force.tracking.matching import match
-from gelslim_force.tracking.tracks import Tracks
+from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
 _SAME_PX = 1.0
@@ -45,6 +45,17 @@ class TrackedFrame:
     route: Route
     slipped: bool
     """The anchors contradict the tracks, and registration did not help."""
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What is wrong with the tracks, one sentence each."""
+        problems = []
+        if self.slipped:
+            problems.append("the anchors contradict the lattice: it may be off by a pitch")
+        lost = self.tracks.count(MarkerStatus.LOST)
+        if lost:
+            problems.append(f"{lost} of {len(self.tracks)} markers are lost")
+        return tuple(problems)
 
 
 class Tracker:

@@ -86,6 +86,7 @@ def frame(
     shear_mm: tuple[float, float] = (0.5, 0.35),
     normal_known: bool = True,
     problems: tuple[str, ...] = (),
+    stamp_s: float | None = None,
 ) -> FrameResult:
     """A whole result."""
     field = force_field(depth_mm, shear_mm, normal_known)
@@ -110,6 +111,8 @@ def frame(
         stage_ms={"detect": 2.0 + 0.01 * index, "match": 0.5, "force": 1.25},
         problems=problems,
         extra={"patch": {"radius_mm": 2.5 + depth_mm, "centre_mm": np.array([1.5, -0.8])}},
+        stamp_s=stamp_s,
+        sensor_s=None if stamp_s is None else 0.25 + index / 90.0,
     )
 
 
@@ -121,6 +124,7 @@ def unreadable(index: int, problem: str = "truncated picture, frame skipped") ->
 def assert_same(found: FrameResult, given: FrameResult, relative: float) -> None:
     """All parts equal, NaN at the same places; reals to `relative`, wrenches exactly."""
     assert (found.index, found.time_s) == (given.index, given.time_s)
+    assert (found.stamp_s, found.sensor_s) == (given.stamp_s, given.sensor_s)
     assert found.problems == given.problems
     assert found.normal_known == given.normal_known
     assert dict(found.stage_ms) == dict(given.stage_ms)

@@ -98,6 +98,20 @@ def test_every_field_comes_back(tmp_path: Path) -> None:
         np.testing.assert_allclose(xyz(item.ros_msg.wrench.torque), given.wrench.torque_nmm / 1e3)
 
 
+def test_frames_with_stamps_merge_with_other_logs(tmp_path: Path) -> None:
+    """Header, log time and publish time are the stamp, to the quarter of a microsecond."""
+    stamps = [1_795_441_687.125 + k / 90 for k in range(3)]
+    with McapRecording(tmp_path / "live.mcap") as out:
+        for k, stamp_s in enumerate(stamps):
+            out.append(samples.frame(k, stamp_s=stamp_s))
+    for topic in messages(tmp_path / "live.mcap").values():
+        for item, stamp_s in zip(topic, stamps, strict=True):
+            header = item.ros_msg.header.stamp
+            assert item.log_time_ns == item.publish_time_ns == nanoseconds(stamp_s)
+            assert header.sec * 10**9 + header.nanosec == item.log_time_ns
+            assert abs(item.log_time_ns - stamp_s * 1e9) < 250
+
+
 def test_metadata(tmp_path: Path) -> None:
     from mcap.reader import make_reader
 

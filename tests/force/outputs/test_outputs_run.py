@@ -21,12 +21,13 @@ from gelslim_force.outputs.recorded_run import read_run
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
 
 SAMPLES = Path(__file__).parents[1]
+STAMP_S = 1_795_441_687.125
 MIXED = [
     samples.unreadable(0),
     samples.frame(1),
     samples.frame(2, normal_known=False, problems=("no contact patch found", 'dim, "dark"\npart')),
     samples.unreadable(4, "größe 3×5 px"),
-    samples.frame(5, depth_mm=0.0, shear_mm=(0.0, 0.0)),
+    samples.frame(5, depth_mm=0.0, shear_mm=(0.0, 0.0), stamp_s=STAMP_S),
 ]
 
 
@@ -71,10 +72,13 @@ def test_wrenches_and_counts(tmp_path: Path) -> None:
     assert np.isnan(table["tracked"][0])
     assert table.problems[2] == 'no contact patch found; dim, "dark" part'
     assert table.problems[3] == "größe 3×5 px"
+    np.testing.assert_array_equal(table["stamp_s"], [*[np.nan] * 4, STAMP_S])
+    np.testing.assert_array_equal(table["sensor_s"][3:], [np.nan, MIXED[4].sensor_s])
     assert list(run.results()) == []
     counts = run.manifest["counts"]
     assert (counts["frames"], counts["with_field"], counts["with_problems"]) == (5, 3, 3)
     assert counts["problems"]["größe 3×5 px"] == 1
+    assert (counts["first_stamp_s"], counts["last_stamp_s"]) == (STAMP_S, STAMP_S)
     assert run.manifest["settings"] == {"method": "masked"}
     assert run.manifest["versions"]["numpy"] == np.__version__
 
@@ -86,12 +90,32 @@ def test_csv_is_read_by_another_reader(tmp_path: Path) -> None:
         tmp_path / "wrenches.csv",
         delimiter=",",
         names=True,
-        usecols=range(25),
+        usecols=range(27),
         encoding="utf-8",
         max_rows=2,
     )
     for name in plain.dtype.names:
         np.testing.assert_array_equal(plain[name], run.wrenches[name][:2], err_msg=name)
+
+
+def test_a_run_without_stamps_is_still_read(tmp_path: Path) -> None:
+    """The columns and arrays of the first version, in text and chunks."""
+    lines = (recorded(tmp_path, MIXED, RecorderSettings()) / "wrenches.csv").read_text().split("\n")
+    cells = [line.split(",") for line in lines]
+    assert cells[0][2:4] == ["stamp_s", "sensor_s"]
+    old = [",".join(row[:2] + row[4:]) for row in cells[:3]]
+    (tmp_path / "wrenches.csv").write_text("\n".join(old) + "\n")
+    chunk = tmp_path / "fields_00000.npz"
+    with np.load(chunk) as file:
+        kept = {name: file[name] for name in file.files if name not in ("stamp_s", "sensor_s")}
+    np.savez(chunk, **kept)  # type: ignore[arg-type]
+    run = read_run(tmp_path)
+    assert np.isnan(run.wrenches["stamp_s"]).all()
+    assert run.wrenches["time_s"][1] == MIXED[1].time_s
+    np.testing.assert_array_equal(run.wrenches.wrench[1], MIXED[1].wrench.vector)  # type: ignore[union-attr]
+    found = list(run.results())
+    assert [r.stamp_s for r in found] == [None] * 5
+    assert found[1].time_s == MIXED[1].time_s
 
 
 def test_same_frames_same_bytes(tmp_path: Path) -> None:
@@ -273,7 +297,7 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
         list(read_run(tmp_path).results())
     lines = (tmp_path / "wrenches.csv").read_text().splitlines()
     (tmp_path / "wrenches.csv").write_text("\n".join([lines[0], lines[1], "1,2"]) + "\n")
-    with pytest.raises(OutputError, match="line 3: 2 values, expected 26"):
+    with pytest.raises(OutputError, match="line 3: 2 values, expected 28"):
         read_run(tmp_path)
     (tmp_path / "wrenches.csv").write_text("a,b\n")
     with pytest.raises(OutputError, match="index,time_s"):

@@ -93,6 +93,24 @@ def test_a_frame_of_a_source_is_processed_with_its_time(place, reference) -> Non
     assert torn.wrench is None
 
 
+def test_the_callers_stamp_takes_the_place_of_the_frames(place) -> None:
+    """Torn frames, whose results have stamps as well; a stamp of another unit is refused."""
+    sensor = open_sensor(place / "bundle", calibration=place / "calibration.json")
+    torn = Frame(0, 0.0, None, "torn picture", stamp_s=1.8e9, sensor_s=31.5)
+    own = sensor.process(torn)
+    given = sensor.process(torn, stamp_s=1.7e9)
+    assert [(r.time_s, r.stamp_s, r.sensor_s) for r in (own, given)] == [
+        (0.0, 1.8e9, 31.5),
+        (0.0, 1.7e9, 31.5),
+    ]
+    assert sensor.process(np.zeros((3, 3), np.uint8)).stamp_s is None
+    assert sensor.unreadable("gone", stamp_s=1.8e9).stamp_s == 1.8e9
+    for wrong in (1.8e18, -1.0, np.nan):
+        with pytest.raises(ValueError, match="since 1970"):
+            sensor.process(torn, stamp_s=wrong)
+    assert sensor.process(torn).index == 4
+
+
 def test_the_documented_lines_run(place, reference) -> None:
     frames = np.stack([seen.image for seen in stream(3)])
     sensor = gelslim_force.open_sensor(place / "bundle", reference=reference)
