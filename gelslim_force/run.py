@@ -34,6 +34,8 @@ class RunSummary:
     """Counts and extreme values of a run."""
 
     frames: int = 0
+    dropped: int = 0
+    """Frames of a camera that were dropped for newer ones, as the reader of the frames counts."""
     with_forces: int = 0
     problems: dict[str, int] = field(default_factory=dict)
     """Number of frames with each problem; problems that differ in numbers only count as one."""

@@ -180,6 +180,14 @@ OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video to write,
 Recording = Annotated[
     Path | None, typer.Option(help="Recording with ROS 2 messages to write, .mcap.")
 ]
+Latest = Annotated[
+    bool | None,
+    typer.Option(
+        "--latest/--all-frames",
+        help="Of a camera, always the newest frame, as by default; or all frames in order.",
+        show_default=False,
+    ),
+]
 LiveView = Annotated[bool, typer.Option("--view", help="Show the run in a browser.")]
 ReplaceRun = Annotated[bool, typer.Option("--force", help="Replace an earlier run in the folder.")]
 
@@ -196,6 +204,7 @@ def answer_json(
             "folder": str(folder),
             "operator": pipeline.operator_name,
             "frames": summary.frames,
+            "frames_dropped": summary.dropped,
             "frames_with_forces": summary.with_forces,
             "problems": summary.problems,
             "least_coverage": summary.least_coverage,
@@ -210,6 +219,8 @@ def answer_json(
 def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]) -> None:
     """Print the number of frames with forces, the last wrench, problems, times and folder."""
     say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")
+    if summary.dropped:
+        say(f"{summary.dropped} frames of the camera were dropped for newer ones.")
     wrench = summary.last.wrench if summary.last is not None else None
     if wrench is not None:
         say(f"Last frame: {wrench}.")

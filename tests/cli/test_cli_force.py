@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, stream
 
 from gelslim.cli.main import main
+from gelslim_force.frames.opencv_frames import LiveCamera
 from gelslim_force.outputs.canvas import encoded
 from gelslim_force.outputs.recorded_run import read_run
 from ifem_export.bundle.files import write_bundle
@@ -103,6 +105,8 @@ def test_video_and_recording(sensor: Path, tmp_path: Path, capsys) -> None:
         (("--fields", "xml"), "xml"),
         (("--video", "a.txt"), "a.txt"),
         (("--indenter", "sphere:3", "--depth-maps", "m.npy"), "--depth-maps"),
+        (("--latest",), "camera"),
+        (("--all-frames",), "camera"),
     ],
 )
 def test_bad_options_are_refused(sensor, tmp_path, capsys, more, words) -> None:
@@ -111,6 +115,58 @@ def test_bad_options_are_refused(sensor, tmp_path, capsys, more, words) -> None:
     assert words in said
     assert "Traceback" not in said
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("choice", ["--latest", "--all-frames"])
+def test_a_camera_gives_stamped_frames_until_the_number_wanted(
+    sensor: Path, tmp_path: Path, capsys, monkeypatch, choice
+) -> None:
+    """Its system clock counts the pictures, so that the stamps tell which were processed."""
+    pytest.importorskip("cv2")
+    made: list[LiveCamera] = []
+
+    def camera(device: int, frames_per_s: None) -> LiveCamera:
+        clock = map(float, count(1_800_000_000))
+        made.append(
+            LiveCamera(device, None, lambda _: Still(frame(0.0).image), system_clock=clock.__next__)
+        )
+        return made[0]
+
+    monkeypatch.setattr("gelslim_force.frames.source.LiveCamera", camera)
+    options = ["-r", str(sensor / "reference.png"), "-o", str(tmp_path / "run"), "--pictures", "0"]
+    given = [str(sensor / "bundle"), "camera:3", *options, "--frames", "3", choice, "--json"]
+    assert main(["force", *given]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    stamps = read_run(tmp_path / "run").wrenches["stamp_s"] - 1.8e9
+    assert (made[0].device, answer["frames"], len(stamps)) == (3, 3, 3)
+    if choice == "--all-frames":
+        assert stamps.tolist() == [0, 1, 2]
+        assert answer["frames_dropped"] == 0
+    else:
+        assert (np.diff(stamps) >= 1).all()
+        assert answer["frames_dropped"] >= stamps[-1] - 2
+
+
+class Still:
+    """A camera that always gives the same picture."""
+
+    def __init__(self, image: np.ndarray) -> None:
+        self.image = image if image.ndim == 2 else image[:, :, ::-1]
+
+    def isOpened(self) -> bool:
+        return True
+
+    def grab(self) -> bool:
+        return True
+
+    def retrieve(self) -> tuple[bool, np.ndarray]:
+        return True, self.image
+
+    def get(self, prop: int) -> float:
+        return 0.0
+
+    def release(self) -> None:
+        self.image = self.image[:0]
 
 
 def test_missing_reference_and_wrong_frames(sensor: Path, tmp_path: Path, capsys) -> None:

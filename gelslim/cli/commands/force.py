@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gelslim_force.built_sensor import BuiltGel
     from gelslim_force.calibration.sensor_calibration import Calibration
     from gelslim_force.contact.normal_source import NormalSource
-    from gelslim_force.frames.frame import FrameSource
+    from gelslim_force.frames.source import ThreadedReader
     from gelslim_force.pipeline import ForcePipeline
     from gelslim_force.run import RunSummary
     from gelslim_force.settings import PipelineSettings
@@ -56,6 +56,7 @@ def force(
     video: option.OverlayVideo = None,
     mcap: option.Recording = None,
     view: option.LiveView = False,
+    latest: option.Latest = None,
     most_frames: MostFrames = None,
     overwrite: option.ReplaceRun = False,
     as_json: AsJson = False,
@@ -68,12 +69,17 @@ def force(
     shape where the camera has colour; otherwise the normal force needs an indenter or depth maps.
     """
     from gelslim_force.built_sensor import built_gel, built_light
-    from gelslim_force.frames.source import open_frames
+    from gelslim_force.frames.source import is_camera, open_frames
     from gelslim_force.pipeline import ForcePipeline
     from gelslim_force.sensor import normal_source
     from ifem_export.bundle.files import load_bundle
 
     _require_consistent(fields, indenter, depth_mm, depth_maps, depth_sigma_mm, light_calibration)
+    if latest is not None and not is_camera(frames):
+        raise CommandError(
+            f"--latest and --all-frames choose between the frames of a camera, and {frames} is "
+            "recorded: leave the option out"
+        )
     budget = budget_of(error, within)
     sensor = load_bundle(bundle)
     if not budget.unlimited and operator is None:
@@ -88,7 +94,7 @@ def force(
     light = built_light(sensor, light_calibration)
     folder = out or Path("out") / f"{bundle.resolve().name}-force"
     outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
-    with open_frames(frames) as source:
+    with open_frames(frames, latest=latest) as source:
         if depth_maps is not None:
             normal: NormalSource | None = _depth_source(built, depth_maps, depth_sigma_mm)
         else:
@@ -163,7 +169,7 @@ def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
 
 def _run(
     pipeline: ForcePipeline,
-    source: FrameSource,
+    source: ThreadedReader,
     most_frames: int | None,
     outputs: RunOutputs,
     chosen: dict[str, Any],
@@ -178,6 +184,7 @@ def _run(
         sinks, kept = result_sinks(stack, pipeline, outputs, chosen, frames_per_s)
         frames = source if most_frames is None else islice(source, most_frames)
         summary = run_frames(pipeline, frames, sinks, source.count, progress=tell)
+        summary = replace(summary, dropped=source.dropped)
     return summary, [] if kept is None else [str(f) for f in kept.write()]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError
 from gelslim_force.frames.opencv_frames import LiveCamera
-from gelslim_force.frames.source import ThreadedReader
+from gelslim_force.frames.source import ThreadedReader, is_camera, open_frames
 
 
 class Scripted(FrameSource):
@@ -152,6 +152,86 @@ def test_a_live_frame_has_the_time_of_its_grabbing_by_both_clocks():
     without = next(iter(LiveCamera(0, capture=lambda device: FakeCapture([(48, 64)]))))
     assert without.sensor_s is None
     assert abs(without.stamp_s - time.time()) < 3600
+
+
+class FastCapture(FakeCapture):
+    """A camera that waits before its second picture and before `holds_at` until it is let go."""
+
+    def __init__(self, holds_at, fails_at=None):
+        super().__init__([(4, 4)])
+        self.fails_at = fails_at
+        self.holds = {1: (Event(), Event()), holds_at: (Event(), Event())}
+
+    def came_to(self, at):
+        return self.holds[at][0].wait(20)
+
+    def go_on(self, at):
+        self.holds[at][1].set()
+
+    def grab(self):
+        if self.at in self.holds:
+            waits, let_go = self.holds[self.at]
+            waits.set()
+            assert let_go.wait(20)
+        if self.at == self.fails_at:
+            raise OSError("the cable is out")
+        return super().grab()
+
+
+@pytest.mark.parametrize("latest", [None, True])
+def test_a_consumer_slower_than_the_camera_gets_the_newest_frame(latest):
+    """While frame 0 is in work, 49 others arrive: 48 are dropped, and frame 49 comes next."""
+    capture = FastCapture(holds_at=50)
+    with ThreadedReader(LiveCamera(capture=lambda device: capture), latest=latest) as reader:
+        frames = iter(reader)
+        assert next(frames).index == 0
+        capture.go_on(1)
+        assert capture.came_to(50)
+        assert next(frames).index == 49
+        assert (reader.dropped, reader.latest) == (48, True)
+        capture.go_on(50)
+    assert not reader._thread.is_alive()
+    assert capture.released == 1
+
+
+def test_all_frames_of_a_camera_come_in_order_if_asked():
+    capture = FastCapture(holds_at=50)
+    capture.go_on(1)
+    with ThreadedReader(LiveCamera(capture=lambda device: capture), latest=False) as reader:
+        frames = iter(reader)
+        next(frames)
+        assert capture.came_to(50)
+        assert [next(frames).index for _ in range(49)] == list(range(1, 50))
+        assert (reader.dropped, reader.latest, reader.live) == (0, False, True)
+        capture.go_on(50)
+    assert not reader._thread.is_alive()
+
+
+def test_an_error_of_a_camera_comes_after_its_newest_frame():
+    capture = FastCapture(holds_at=3, fails_at=9)
+    reader = ThreadedReader(LiveCamera(capture=lambda device: capture), latest=True)
+    frames = iter(reader)
+    next(frames)
+    capture.go_on(1)
+    capture.go_on(3)
+    seen = []
+    with pytest.raises(OSError, match="cable"):  # noqa: PT012
+        for frame in frames:
+            seen.append(frame.index)
+    assert seen[-1] == 8
+    reader.close()
+    assert not reader._thread.is_alive()
+    assert capture.released == 1
+
+
+def test_the_latest_frame_of_a_recording_is_refused(tmp_path):
+    for source in (np.zeros((2, 4, 4), np.uint8), tmp_path, tmp_path / "gone.mp4"):
+        with pytest.raises(FrameSourceError, match="camera"):
+            open_frames(source, latest=True)
+    with pytest.raises(ValueError, match="live"):
+        ThreadedReader(Scripted(3, live=False), latest=True)
+    assert is_camera("camera:0")
+    assert is_camera("rtsp://192.0.2.1/stream")
 
 
 def test_a_camera_is_asked_for_its_rate_and_refused_when_it_does_not_open():
