@@ -36,7 +36,8 @@ BELOW: dict[str, tuple[str, ...]] = {
 
 ROOMS: dict[str, tuple[str, ...]] = {
     "gelslim_core": (
-        "errors", "lazy", "optional_library", "uncertainty", "figure", "html_table", "kernel_cache",
+        "errors", "lazy", "optional_library", "uncertainty", "immutable", "figure", "html_table",
+        "kernel_cache",
         "files",
         "budget", "jobs", "yaml",
     ),

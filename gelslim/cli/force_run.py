@@ -196,7 +196,7 @@ def answer_json(
     folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]
 ) -> None:
     """Print the run's folder, counts, last wrench (N, N mm) and median times (ms) as JSON."""
-    from gelslim_force.outputs.packed_frame import plain
+    from gelslim_force.forces.record import plain
 
     wrench = summary.last.wrench if summary.last is not None else None
     print_json(

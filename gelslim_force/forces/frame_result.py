@@ -11,18 +11,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.immutable import Immutable
+from gelslim_force.forces.record import RecordReader, plain
 from gelslim_force.forces.wrench import Wrench
 from gelslim_force.tracking.tracks import Tracks
 
 Array = NDArray[np.float64]
+RECORD_FORMAT = "gelslim-frame-result/1"
 _MOST_ARROWS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class ForceField:
+class ForceField(Immutable):
     """Motion and forces at the c nodes of the pad's outer surface (`PadMesh.surface` order).
 
-    In a notebook a force field shows itself as a picture, if matplotlib is installed.
+    In a notebook a force field shows itself as a picture, if matplotlib is installed. Its arrays
+    are read-only.
 
     Attributes:
         points_mm: (c, 3) nodes at rest.
@@ -47,17 +51,41 @@ class ForceField:
     misfit: float = 0.0
     low_pass_mm: Array | None = None
 
+    def to_record(self) -> dict[str, Any]:
+        """The attributes as values that JSON holds; null where unknown."""
+        record: dict[str, Any] = plain(self)
+        return record
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> ForceField:
+        """Read what `to_record` gave. Raises RecordError."""
+        read = RecordReader(record, "field")
+        points = read.reals("points_mm", None, 3)
+        count = len(points)
+        return cls(
+            points_mm=points,
+            displacement_mm=read.reals("displacement_mm", count, 3),
+            force_n=read.reals("force_n", count, 3),
+            traction_mpa=read.reals("traction_mpa", count, 3),
+            contact=read.truths("contact", count),
+            centre_of_pressure_mm=read.reals("centre_of_pressure_mm", 2),
+            slip_margin=read.real("slip_margin"),
+            misfit=read.real("misfit"),
+            low_pass_mm=read.known_reals("low_pass_mm", 2),
+        )
+
     def _repr_png_(self) -> bytes | None:
         """Picture for a notebook; None where matplotlib is not installed."""
         return _png(self)
 
 
 @dataclass(frozen=True, eq=False)
-class FrameResult:
+class FrameResult(Immutable):
     """What one frame gave.
 
     A frame that could not be read, or whose markers were not found, has no tracks, field and
-    wrench. In a notebook a result with a force field shows the field.
+    wrench. In a notebook a result with a force field shows the field. Arrays and mappings are
+    read-only.
 
     Attributes:
         index: Number of the frame, from 0.
@@ -88,6 +116,40 @@ class FrameResult:
     stamp_s: float | None = None
     sensor_s: float | None = None
 
+    def to_record(self) -> dict[str, Any]:
+        """All attributes as values that JSON holds, for messages and logs of other programs.
+
+        Arrays are lists, what is unknown is null, and `format` names the schema, which
+        `docs/force_formats.md` describes. The values of `extra` become lists, objects, numbers and
+        text.
+        """
+        return {"format": RECORD_FORMAT, **plain(self)}
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> FrameResult:
+        """Read what `to_record` gave. Raises RecordError for a field that is missing or wrong."""
+        read = RecordReader(record, "result")
+        if read.value("format") != RECORD_FORMAT:
+            raise read.wrong("format", RECORD_FORMAT)
+        tracks, field, wrench = (read.value(name) for name in ("tracks", "field", "wrench"))
+        problems, stages = read.value("problems"), RecordReader(read.value("stage_ms"), "stage_ms")
+        if not isinstance(problems, list) or not all(isinstance(p, str) for p in problems):
+            raise read.wrong("problems", "a list of texts")
+        return cls(
+            index=int(read.integers("index")),
+            time_s=read.real("time_s"),
+            tracks=None if tracks is None else _tracks(tracks),
+            marker_displacement_mm=read.known_reals("marker_displacement_mm", None, 3),
+            field=None if field is None else ForceField.from_record(field),
+            wrench=None if wrench is None else Wrench.from_record(wrench),
+            normal_known=bool(read.truths("normal_known")),
+            stage_ms={name: stages.real(name) for name in stages.record},
+            problems=tuple(problems),
+            extra=RecordReader(read.value("extra"), "extra").record,
+            stamp_s=read.known_real("stamp_s"),
+            sensor_s=read.known_real("sensor_s"),
+        )
+
     @property
     def coverage(self) -> float:
         """Share of the markers seen and verified; 0 without tracks."""
@@ -96,6 +158,18 @@ class FrameResult:
     def _repr_png_(self) -> bytes | None:
         """Picture of the force field for a notebook; None without one, or without matplotlib."""
         return None if self.field is None else _png(self.field)
+
+
+def _tracks(record: Mapping[str, Any]) -> Tracks:
+    read = RecordReader(record, "tracks")
+    status = read.integers("status", None)
+    count = len(status)
+    return Tracks(
+        read.reals("positions_px", count, 2),
+        read.reals("displacement_px", count, 2),
+        status,
+        read.integers("dots", count),
+    )
 
 
 def _png(field: ForceField) -> bytes | None:

@@ -9,12 +9,16 @@ given here is an upper estimate.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_core.immutable import Immutable
 from gelslim_core.uncertainty import two_digits, with_sigma
+from gelslim_force.forces.record import RecordReader, plain
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 from ifem_export.operators.adjoint_fields import AdjointFields, rigid_motions
 from ifem_export.operators.surface_operator import SurfaceOperator
@@ -33,10 +37,10 @@ _ROWS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Wrench:
+class Wrench(Immutable):
     """Force and torque on the gel about the sensor's origin, in the sensor frame.
 
-    In a notebook a wrench shows itself as a table.
+    In a notebook a wrench shows itself as a table. Its arrays are read-only.
 
     Attributes:
         force_n: (3,) in N; z is NaN where the normal motion is unknown.
@@ -48,6 +52,18 @@ class Wrench:
     force_n: Array
     torque_nmm: Array
     covariance: Array
+
+    def to_record(self) -> dict[str, Any]:
+        """The attributes as lists that JSON holds; null where unknown."""
+        record: dict[str, Any] = plain(self)
+        return record
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> Wrench:
+        """Read what `to_record` gave. Raises RecordError."""
+        read = RecordReader(record, "wrench")
+        parts = read.reals("force_n", 3), read.reals("torque_nmm", 3)
+        return cls(*parts, read.reals("covariance", 6, 6))
 
     @property
     def vector(self) -> Array:

@@ -17,8 +17,8 @@ from typing import Any
 
 from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.record import plain
 from gelslim_force.outputs.canvas import Image, encoded
-from gelslim_force.outputs.packed_frame import plain
 from gelslim_force.outputs.wrench_csv import row
 
 _BOUNDARY = "gelslimframe"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.frame_result import ForceField, FrameResult
+from gelslim_force.forces.record import plain
 from gelslim_force.forces.wrench import Wrench
 from gelslim_force.tracking.tracks import Tracks
 
@@ -157,24 +157,3 @@ def unpack(
         stamp_s=stamp("stamp_s"),
         sensor_s=stamp("sensor_s"),
     )
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON: arrays as lists, dataclasses as objects, other types as text.
-
-    NaN and the infinities, which JSON does not have, become null, "inf" and "-inf".
-    """
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = [item.name for item in dataclasses.fields(value)]
-        return {name: plain(getattr(value, name)) for name in names}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
-    return str(value)

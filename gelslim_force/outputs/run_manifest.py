@@ -14,7 +14,7 @@ from typing import Any, Literal
 from gelslim_core.errors import OutputError, disk_error
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.outputs.packed_frame import plain
+from gelslim_force.forces.record import plain
 from ifem_export.bundle.bundle import Bundle
 
 MANIFEST = "run.json"

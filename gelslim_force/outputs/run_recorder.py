@@ -28,10 +28,11 @@ from gelslim_core.files.file_lock import locked
 from gelslim_core.files.held_interrupt import interrupts_held
 from gelslim_core.files.replaced_file import sweep
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.record import plain
 from gelslim_force.outputs import wrench_csv
 from gelslim_force.outputs.field_chunk import ChunkWriter, Format, fits
 from gelslim_force.outputs.frame_journal import AppendFile, record
-from gelslim_force.outputs.packed_frame import PackedFrame, Precision, pack, plain
+from gelslim_force.outputs.packed_frame import PackedFrame, Precision, pack
 from gelslim_force.outputs.run_manifest import (
     FORMAT_NAME,
     MANIFEST,

@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.immutable import Immutable
+
 
 class MarkerStatus(IntEnum):
     """How the position of a marker is known."""
@@ -23,7 +25,7 @@ class MarkerStatus(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Tracks:
+class Tracks(Immutable):
     """The n markers of the reference in one frame, in its order; arrays are read-only."""
 
     positions_px: NDArray[np.float64]
@@ -34,12 +36,6 @@ class Tracks:
     """(n,) values of `MarkerStatus`."""
     dots: NDArray[np.int64]
     """(n,) index of the dot of each tracked marker; -1 for the others."""
-
-    def __post_init__(self) -> None:
-        for name in ("positions_px", "displacement_px", "status", "dots"):
-            array = np.array(getattr(self, name))
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
         """Return the number of markers."""

@@ -44,7 +44,7 @@ def validate(
     from gelslim.scene_sensor import spec_bundle
     from gelslim_cad.tolerance.asked import read_spec
     from gelslim_core.files.replaced_file import json_bytes
-    from gelslim_force.outputs.packed_frame import plain
+    from gelslim_force.forces.record import plain
     from gelslim_twin.simulation.sensor import TwinSensor
 
     started = time.monotonic()
