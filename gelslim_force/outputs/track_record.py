@@ -18,7 +18,8 @@ from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.tracking.tracks import MarkerStatus
 
 COLUMNS = (
-    "index", "time_s", "coverage", "tracked", "predicted", "lost", "rejected",
+    "index", "time_s", "stamp_s", "sensor_s",
+    "coverage", "tracked", "predicted", "lost", "rejected",
     "median_displacement_px", "largest_displacement_px", "problem",
 )  # fmt: skip
 _NO_TRACKS = 255
@@ -33,7 +34,8 @@ class TrackRecord:
         self._places: list[NDArray[np.float32]] = []
         self._status: list[NDArray[np.uint8]] = []
         self._index: list[int] = []
-        self._time_s: list[float] = []
+        self._times_s: list[tuple[float, float, float]] = []
+        """By the three clocks of `FrameResult`; NaN where unknown."""
         self._problems: list[str] = []
 
     def __len__(self) -> int:
@@ -51,7 +53,8 @@ class TrackRecord:
             self._places.append(tracks.positions_px.astype(np.float32))
             self._status.append(tracks.status.astype(np.uint8))
         self._index.append(result.index)
-        self._time_s.append(result.time_s)
+        stamps = [np.nan if t is None else t for t in (result.stamp_s, result.sensor_s)]
+        self._times_s.append((result.time_s, stamps[0], stamps[1]))
         self._problems.append("; ".join(result.problems))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -59,18 +62,22 @@ class TrackRecord:
 
         places_px and displacement_px (f, n, 2) float32, NaN where unknown; status (f, n) uint8,
         values of `MarkerStatus`, 255 where a frame has no tracks; coverage (f,); frame_index
-        (f,); time_s (f,); sites (n, 2) row and column; rest_px (n, 2).
+        (f,); time_s, stamp_s and sensor_s (f,), NaN where unknown; sites (n, 2) row and column;
+        rest_px (n, 2).
         """
         count, rest = len(self._rest.reference), self._rest.reference.positions_px
         places = np.array(self._places, dtype=np.float32).reshape(-1, count, 2)
         status = np.array(self._status, dtype=np.uint8).reshape(-1, count)
+        times_s = np.array(self._times_s, dtype=np.float64).reshape(-1, 3)
         return {
             "places_px": places,
             "displacement_px": (places - rest).astype(np.float32),
             "status": status,
             "coverage": (status == int(MarkerStatus.TRACKED)).mean(axis=1),
             "frame_index": np.array(self._index, dtype=np.int64),
-            "time_s": np.array(self._time_s),
+            "time_s": times_s[:, 0],
+            "stamp_s": times_s[:, 1],
+            "sensor_s": times_s[:, 2],
             "sites": self._rest.reference.sites,
             "rest_px": rest,
         }
@@ -94,7 +101,7 @@ class TrackRecord:
             writer.writerow(
                 [
                     self._index[k],
-                    repr(self._time_s[k]),
+                    *(repr(float(t)) for t in self._times_s[k]),
                     f"{counts[0] / len(status):.4f}",
                     *counts,
                     f"{np.median(moved):.4f}" if len(moved) else "nan",

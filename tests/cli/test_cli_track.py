@@ -50,6 +50,7 @@ def test_the_run_is_written_and_told(frames, tmp_path, capsys):
         )
         rest = data["rest_px"]
         assert np.abs((rest - [40, 36]) / PITCH - np.rint((rest - [40, 36]) / PITCH)).max() < 0.01
+        assert np.isnan(data["stamp_s"]).all(), "a folder does not know when it was taken"
     assert len((out / "frames.csv").read_text().splitlines()) == 6
     summary = json.loads((out / "summary.json").read_text())
     assert sorted(summary["lattice_shape"]) == [8, 9]
@@ -57,6 +58,20 @@ def test_the_run_is_written_and_told(frames, tmp_path, capsys):
     pictures = sorted(f.name for f in (out / "pictures").iterdir())
     assert len(pictures) == 4
     assert not [f for f in out.iterdir() if f.name.startswith(".")]
+
+
+def test_tracks_have_the_stamps_of_their_frames(tmp_path):
+    stamps = 1_795_441_687.125 + np.array([0.0, 0.02, 0.05])
+    stack = np.stack([frame((1.5 * k, -k), seed=k) for k in range(3)])
+    np.savez(tmp_path / "run.npz", frames=stack, stamp_s=stamps)
+    out = tmp_path / "run"
+    assert main(["track", str(tmp_path / "run.npz"), "-o", str(out), "--pictures", "0"]) == 0
+    with np.load(out / "tracks.npz") as data:
+        np.testing.assert_array_equal(data["stamp_s"], stamps)
+        assert np.isnan(data["sensor_s"]).all()
+    rows = [line.split(",") for line in (out / "frames.csv").read_text().splitlines()]
+    assert rows[0][1:4] == ["time_s", "stamp_s", "sensor_s"]
+    assert [float(row[2]) for row in rows[1:]] == stamps.tolist()
 
 
 def test_json_holds_the_summary_and_no_other_word(frames, tmp_path, capsys):

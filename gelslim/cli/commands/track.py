@@ -145,6 +145,7 @@ def _follow(
     try:
         for frame in frames:
             result = tracking.follow(frame.image, frame.index, frame.time_s)
+            result = replace(result, stamp_s=frame.stamp_s, sensor_s=frame.sensor_s)
             if frame.problem:
                 result = replace(result, problems=(frame.problem,))
             record.take(result)
