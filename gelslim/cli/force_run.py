@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +14,11 @@ from gelslim.cli.answer import print_json, say
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import out_folder
 from gelslim.cli.output import require_own_file
+from gelslim.ending import Terminated
+from gelslim_core.files.held_interrupt import interrupts_held
 
 if TYPE_CHECKING:
+    from gelslim_force.frames.frame import Frame
     from gelslim_force.outputs.overlay import Overlay
     from gelslim_force.outputs.sinks import PictureSink
     from gelslim_force.pipeline import ForcePipeline
@@ -73,6 +77,27 @@ def result_sinks(
 
     kept = PictureSink(overlay, outputs.folder / "pictures", outputs.pictures)
     return [*sinks, kept], kept
+
+
+def until_interrupted(frames: Iterable[Frame]) -> Iterator[Frame]:
+    """Yield frames of a camera until Ctrl-C, which is the only way to end them.
+
+    It takes effect while the next frame is waited for, so that the frame in work still goes to all
+    outputs. SIGTERM interrupts as everywhere.
+    """
+    source = iter(frames)
+    with interrupts_held() as let_through:
+        while True:
+            try:
+                with let_through():
+                    frame = next(source, None)
+            except Terminated:
+                raise
+            except KeyboardInterrupt:
+                return
+            if frame is None:
+                return
+            yield frame
 
 
 def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -> Any:

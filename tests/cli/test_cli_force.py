@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
-from itertools import count
+from collections.abc import Iterator
+from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "force"))
 from sensor_samples import NORMAL_N, SHEAR_N, frame, press, sensor_bundle, stream
 
+from gelslim.cli.force_run import until_interrupted
 from gelslim.cli.main import main
+from gelslim.ending import Terminated
+from gelslim_force.frames.frame import Frame
 from gelslim_force.frames.opencv_frames import LiveCamera
 from gelslim_force.outputs.canvas import encoded
 from gelslim_force.outputs.recorded_run import read_run
@@ -145,6 +150,39 @@ def test_a_camera_gives_stamped_frames_until_the_number_wanted(
     else:
         assert (np.diff(stamps) >= 1).all()
         assert answer["frames_dropped"] >= stamps[-1] - 2
+
+
+def interrupted(at: int, by: signal.Signals) -> Iterator[Frame]:
+    """Frames of a camera; the signal arrives while frame `at` is waited for."""
+    for k in count():
+        if k == at:
+            signal.raise_signal(by)
+        yield Frame(k, float(k), None)
+
+
+def test_ctrl_c_ends_the_frames_of_a_camera() -> None:
+    """In the wait for a frame at once; in the work on one, after that work."""
+    assert [f.index for f in until_interrupted(interrupted(3, signal.SIGINT))] == [0, 1, 2]
+    done = []
+    for seen in until_interrupted(interrupted(9, signal.SIGINT)):
+        if seen.index == 1:
+            signal.raise_signal(signal.SIGINT)
+        done.append(seen.index)
+    assert done == [0, 1]
+    assert [f.index for f in until_interrupted(islice(interrupted(9, signal.SIGINT), 2))] == [0, 1]
+
+
+def test_termination_and_errors_are_passed_on() -> None:
+    def terminate(number: int, place: object) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        with pytest.raises(Terminated):
+            list(until_interrupted(interrupted(2, signal.SIGTERM)))
+        assert signal.getsignal(signal.SIGTERM) is terminate
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 class Still:

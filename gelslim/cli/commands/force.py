@@ -12,7 +12,13 @@ from gelslim.cli import force_run as option
 from gelslim.cli.answer import BAD_INPUT, progress_bar
 from gelslim.cli.budget import FieldError, FrameTime, budget_of, note_choice, on_this_machine
 from gelslim.cli.failure import CommandError
-from gelslim.cli.force_run import RunOutputs, answer_json, report, result_sinks
+from gelslim.cli.force_run import (
+    RunOutputs,
+    answer_json,
+    report,
+    result_sinks,
+    until_interrupted,
+)
 from gelslim.cli.options import AsJson, MostFrames, OverlayPictures, SensorBundle
 
 if TYPE_CHECKING:
@@ -67,6 +73,7 @@ def force(
     bundle. Writes a run folder with the wrench of each frame and its standard deviation
     (wrenches.csv), the force at every node (fields), and overlay pictures. The object may have any
     shape where the camera has colour; otherwise the normal force needs an indenter or depth maps.
+    Ctrl-C ends a run with a camera and keeps its files.
     """
     from gelslim_force.built_sensor import built_gel, built_light
     from gelslim_force.frames.source import is_camera, open_frames
@@ -182,7 +189,8 @@ def _run(
     frames_per_s = source.frames_per_s or 30.0
     with ExitStack() as stack, progress_bar(quiet=outputs.quiet) as tell:
         sinks, kept = result_sinks(stack, pipeline, outputs, chosen, frames_per_s)
-        frames = source if most_frames is None else islice(source, most_frames)
+        every = until_interrupted(source) if source.live else source
+        frames = every if most_frames is None else islice(every, most_frames)
         summary = run_frames(pipeline, frames, sinks, source.count, progress=tell)
         summary = replace(summary, dropped=source.dropped)
     return summary, [] if kept is None else [str(f) for f in kept.write()]
