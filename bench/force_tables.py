@@ -12,6 +12,7 @@ SHORT = {
 }
 STAGES = {
     "track": "find and match markers",
+    "drift": "drift of the camera",
     "look": "find the contact patch",
     "normal": "normal motion",
     "displace": "compensate projection",
@@ -40,6 +41,8 @@ def full_latency(data: dict[str, Any]) -> str:
             "|---|" + "---:|" * len(rows),
         ]
         for name in names:
+            if not any(name in r for r in rows):
+                continue
             cells = [ms(r[name]["median"]) if name in r else "" for r in rows]
             lines.append(f"| {STAGES.get(name, '**whole chain**')} | " + " | ".join(cells) + " |")
         for tail, label in (("p95", "whole chain, 95 %"), ("p99", "whole chain, 99 %")):

@@ -47,11 +47,13 @@ if TYPE_CHECKING:
     from gelslim_force.run import run_frames
     from gelslim_force.sensor import indenter_source, open_sensor
     from gelslim_force.settings import PipelineSettings
+    from gelslim_force.tracking.drift_filter import DriftSettings, TareError, TareRecord
 
 __all__ = [
     "Calibration",
     "CalibrationError",
     "DepthMapSource",
+    "DriftSettings",
     "ForceField",
     "ForcePipeline",
     "ForceSettings",
@@ -69,6 +71,8 @@ __all__ = [
     "PressError",
     "RecorderSink",
     "RunRecorder",
+    "TareError",
+    "TareRecord",
     "Wrench",
     "calibrate",
     "calibrate_gel",

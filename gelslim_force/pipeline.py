@@ -1,8 +1,7 @@
 """Marker frames to forces: tracking, compensation, interpolation, stiffness, wrench.
 
-Build one `ForcePipeline` per sensor and give it the frames in order. From frame to frame it keeps
-the markers' last positions and the last forces, nothing else. What is wrong with a frame is
-reported in its result, and the pipeline goes on with the next one.
+Build one `ForcePipeline` per sensor and give it the frames in order. It keeps the last positions of
+the markers, drift and forces. What is wrong with a frame is reported in its result.
 """
 
 from __future__ import annotations
@@ -16,15 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.contact.normal_source import (
-    FoundForces,
-    NormalReading,
-    NormalSource,
-    Remembering,
-)
+from gelslim_force.contact.normal_source import NormalReading, NormalSource, Remembering
+from gelslim_force.forces import frame_problems
 from gelslim_force.forces.frame_clock import FrameClock
-from gelslim_force.forces.frame_result import ForceField, FrameResult
+from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.forces.wrench import WrenchNoise
+from gelslim_force.forces.wrench_covariance import WrenchCovariance
 from gelslim_force.frames.frame import Frame, FrameTimes
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.unknown_shape import UnknownShape
@@ -32,23 +28,23 @@ from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.presses.gel_share import GelShare
 from gelslim_force.settings import PipelineSettings
+from gelslim_force.tracking.drift_filter import (
+    LIGHT_CHANGED,
+    DriftFilter,
+    FrameDrift,
+    TareError,
+    TareRecord,
+)
 from gelslim_force.tracking.marker_noise import noise_px
+from gelslim_force.tracking.tracker import TrackedFrame
 from gelslim_force.tracking.tracks import Tracks
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.errors import IfemError
-from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 from ifem_export.operators.single_thread import single_threaded
 
 Array = NDArray[np.float64]
 _SHIFT_MM = 0.03
 """Change of the lateral motion in the contact for which the normal motion need not be redone."""
-_LARGEST_MISFIT = 0.35
-_MISFIT = "forces on the contact seen leave {:.0%} of the motion unexplained"
-_LARGEST_CONTRADICTION = 4.0
-"""Apparent motion that the depth should cause, over the motion seen, above which the patch is no
-contact. For correct patches the ratio stays below 2."""
-_CONTRADICTED = "a contact as seen would show {:.0f} times the motion that the markers show"
-_NO_PATCH = "the markers move, but no contact patch is seen"
 
 
 class ForcePipeline:
@@ -63,11 +59,7 @@ class ForcePipeline:
         gel: What the uncertain gel adds to the covariance of the wrench; by default nothing.
 
     Attributes:
-        bundle: As given.
-        calibration: As given.
-        settings: As given, or the defaults.
-        normal: As given.
-        gel: As given.
+        bundle, calibration, settings, normal, gel: As given, or the defaults.
 
     Raises:
         IfemError: No operator keeps the budget, or the bundle has no markers.
@@ -109,13 +101,21 @@ class ForcePipeline:
         self._forces = self.settings.contact_forces(bundle, operator, self._motion)
         self._forces.prepare()
         self._prepare_edge()
-        self._kept_gains: tuple[bytes, Array] | None = None
+        self._drift = DriftFilter(reference, self.settings.drift)
+        self._covariance = WrenchCovariance(
+            self._wrench, self._motion, self._drift.field, self.settings.unknown_normal_mm
+        )
         self.reset()
 
     @property
     def points_mm(self) -> Array:
         """(c, 3) surface nodes at rest."""
         return self._forces.direct.points_mm
+
+    @property
+    def rests(self) -> tuple[TareRecord, ...]:
+        """The rests taken since the calibration, oldest first."""
+        return self._drift.log
 
     @property
     def operator_name(self) -> str:
@@ -129,6 +129,7 @@ class ForcePipeline:
         """
         other = copy.copy(self)
         other.normal, other._tracker = normal, self.calibration.tracker()
+        other._drift = self._drift.copy()
         other._prepare_edge()
         other.reset()
         return other
@@ -136,6 +137,7 @@ class ForcePipeline:
     def reset(self) -> None:
         """Forget all motion and count frames from 0."""
         self._tracker.reset()
+        self._drift.reset()
         self._index = 0
         self._last_force: Array | None = None
         self._last_lateral: Array | None = None
@@ -190,41 +192,41 @@ class ForcePipeline:
         if isinstance(frame, Frame) and frame.image is None:
             return self._numbered(times, problems=(frame.problem,))
         image: Any = frame.image if isinstance(frame, Frame) else frame
-        image = upright(image, self.calibration.camera)
-        problem = self._size_problem(image)
-        if problem:
-            return self._numbered(times, problems=(problem,))
         try:
-            tracked = self._tracker.update(image)
+            image, tracked = self._followed(image)
         except ValueError as error:
             return self._numbered(times, problems=(str(error),))
         clock.stage("track")
         problems, tracks = tracked.problems, tracked.tracks
-        if tracks.coverage < self.settings.least_coverage:
-            problems = (
-                *problems,
-                f"{tracks.coverage:.0%} of the markers are seen: under "
-                f"{self.settings.least_coverage:.0%} forces are not given",
-            )
+        problem = frame_problems.refusal(tracked, self.settings.least_coverage)
+        if not problem:
+            noise = self._noise_px(tracks)
+            drift = self._drift.update(tracks, noise)
+            problem = drift.problem
+        clock.stage("drift")
+        if problem:
+            problems = (*problems, problem)
             return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
-        given = None
-        if normal_mm is not None:
-            given = NormalReading.given(len(self.points_mm), normal_mm, normal_sigma_mm)
-        reading, motion = self._motions(image, tracks.positions_px, given, clock)
+        size = len(self.points_mm)
+        given = None if normal_mm is None else NormalReading.given(size, normal_mm, normal_sigma_mm)
+        reading, motion = self._motions(image, drift.positions_px, given, clock)
+        self._drift.loaded = self._motion.loaded(reading)
         if reading is not None and not reading.known:
             problems = (*problems, reading.problem)
         try:
-            found = self._forces_of(motion, reading, noise=self._noise_px(tracks), clock=clock)
+            found = self._forces_of(motion, reading, noise, drift, clock)
         except IfemError as error:
             problems = (*problems, str(error))
             return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
         field = found["field"]
         if self.gel is not None:
             found["wrench"] = self.gel.added(found["wrench"], field.displacement_mm, reading)
-        if field.misfit > _LARGEST_MISFIT and self._motion.moved(motion):
-            problems = (*problems, _MISFIT.format(field.misfit))
+        if self._motion.moved(motion):
+            problems = (*problems, *frame_problems.misfit_problem(field.misfit))
         known = reading is not None and reading.known
+        seen = {} if reading is None else {"normal": reading.summary()}
         self._last_force = field.force_n if known else None
+        self._drift.rezero(drift, self._index if times.time_s is None else times.time_s)
         return self._numbered(
             times,
             tracks=tracks,
@@ -232,25 +234,54 @@ class ForcePipeline:
             normal_known=known,
             stage_ms=clock.stages,
             problems=problems,
-            extra=_findings(field, reading),
+            extra={**seen, **field.summary(), **self._drift.findings(drift)},
             **found,
         )
+
+    @single_threaded
+    def tare(self, frame: Frame | NDArray[np.uint8], *, time_s: float | None = None) -> TareRecord:
+        """Take a frame of the untouched gel as the new rest; it is not counted as a frame.
+
+        Args:
+            frame: As for `process`.
+            time_s: When it was taken; by default as for `process`.
+
+        Returns:
+            The drift since the calibration, which is also appended to `rests`.
+
+        Raises:
+            TareError: The frame cannot be read, too few markers are seen, something touches the
+                gel, or the camera has moved too far.
+        """
+        time_s = FrameTimes.of(frame, time_s, None).time_s
+        image: Any = frame.image if isinstance(frame, Frame) else frame
+        try:
+            image, tracked = self._followed(image)
+        except ValueError as error:
+            raise TareError(str(error)) from error
+        problem = frame_problems.refusal(tracked, self.settings.least_coverage)
+        if problem:
+            raise TareError(problem)
+        # A normal source looks at this frame; the frame before may have been touched.
+        self._drift.loaded = self._drift.loaded if self.normal is None else None
+        drift = self._drift.update(tracked.tracks, self._noise_px(tracked.tracks))
+        if self.normal is not None and self.normal.look(image, drift.positions_px) is not None:
+            raise TareError(LIGHT_CHANGED)
+        return self._drift.tare(drift, tracked.tracks, self._index if time_s is None else time_s)
+
+    def _followed(self, image: Any) -> tuple[NDArray[np.uint8], TrackedFrame]:
+        """The picture upright, and its markers. Raises ValueError for what is no picture."""
+        image = upright(image, self.calibration.camera)
+        problem = frame_problems.size_problem(image, self.calibration.camera)
+        if problem:
+            raise ValueError(problem)
+        return image, self._tracker.update(image)
 
     def _numbered(self, times: FrameTimes, **found: Any) -> FrameResult:
         index, self._index = self._index, self._index + 1
         time_s = float(index) if times.time_s is None else times.time_s
         found |= {"stamp_s": times.stamp_s, "sensor_s": times.sensor_s}
         return FrameResult(index, time_s, **found)
-
-    def _size_problem(self, image: Any) -> str:
-        camera = self.calibration.camera
-        size = (camera.image_height_px, camera.image_width_px)
-        if isinstance(image, np.ndarray) and image.shape[:2] == size:
-            return ""
-        got = type(image).__name__
-        if isinstance(image, np.ndarray) and image.ndim >= 2:
-            got = f"{image.shape[1]} x {image.shape[0]} px"
-        return f"frame of {got}: this sensor's frames are {size[1]} x {size[0]} px"
 
     def _motions(
         self,
@@ -273,10 +304,10 @@ class ForcePipeline:
         clock.stage("displace")
         if seen is None and self._motion.moved(motion):
             # The gel moves although no patch is seen: zero force would be a false statement.
-            return replace(reading, problem=_NO_PATCH), motion_of(positions_px, None)
+            return replace(reading, problem=frame_problems.NO_PATCH), motion_of(positions_px, None)
         ratio = self._motion.apparent_over_seen(motion, reading)
-        if ratio > _LARGEST_CONTRADICTION:
-            doubtful = replace(reading, problem=_CONTRADICTED.format(ratio))
+        if ratio > frame_problems.LARGEST_CONTRADICTION:
+            doubtful = replace(reading, problem=frame_problems.CONTRADICTED.format(ratio))
             return doubtful, motion_of(positions_px, None)
         lateral = self._motion.in_contact(motion, reading)
         used, self._last_lateral = self._last_lateral, lateral
@@ -294,51 +325,26 @@ class ForcePipeline:
         return noise_px(self._tracker.reference, tracks.displacement_px)
 
     def _forces_of(
-        self, motion: Array, reading: NormalReading | None, noise: float, clock: FrameClock
+        self,
+        motion: Array,
+        reading: NormalReading | None,
+        noise: float,
+        drift: FrameDrift,
+        clock: FrameClock,
     ) -> dict[str, Any]:
         """Force field and wrench for a motion (n, 3) of the markers. Raises IfemError."""
         if reading is not None and reading.forces is not None:
-            return self._found(reading.forces, reading.touched)
+            force, moved = reading.forces.force_n, reading.forces.displacement_mm
+            covariance = self._covariance.of_forces(reading.forces, drift)
+            wrench = self._wrench.wrench(force, covariance)
+            field = self._forces.direct.field_of(force, moved, reading.touched)
+            return {"field": field, "wrench": wrench}
         interpolation, displacement = self._motion.of_nodes(motion, reading)
         clock.stage("interpolate")
         touched = reading.touched if reading is not None and reading.known else None
         field = self._forces.estimate(displacement, touched, self._last_force, noise)
         clock.stage("force")
-        covariance = self._covariance(interpolation, motion, noise, reading)
+        covariance = self._covariance.of_motion(interpolation, motion, noise, reading, drift)
         wrench = self._wrench.wrench(field.force_n, covariance)
         clock.stage("wrench")
         return {"field": field, "wrench": wrench}
-
-    def _found(self, forces: FoundForces, touched: NDArray[np.bool_] | None) -> dict[str, Any]:
-        """Force field and wrench of forces that the normal source found itself."""
-        field = self._forces.direct.field_of(forces.force_n, forces.displacement_mm, touched)
-        return {"field": field, "wrench": self._wrench.wrench(forces.force_n, forces.covariance)}
-
-    def _covariance(
-        self,
-        interpolation: MarkerInterpolation,
-        motion: Array,
-        noise: float,
-        reading: NormalReading | None,
-    ) -> Array:
-        gains = self._gains(interpolation)
-        spread = self._motion.covariance_mm2(np.isfinite(motion[:, 0]), noise)
-        if reading is not None and reading.known:
-            lateral = self._motion.compensation_change(reading.sigma_mm)
-            return self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
-        apparent = self._motion.apparent_motion(motion, self.settings.unknown_normal_mm)
-        return self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
-
-    def _gains(self, interpolation: MarkerInterpolation) -> Array:
-        """Wrench per motion of each marker; computed anew only where other markers are lost."""
-        lost = interpolation.lost.tobytes()
-        if self._kept_gains is None or self._kept_gains[0] != lost:
-            self._kept_gains = lost, self._wrench.gains(interpolation)
-        return self._kept_gains[1]
-
-
-def _findings(field: ForceField, reading: NormalReading | None) -> dict[str, Any]:
-    found: dict[str, Any] = {} if reading is None else {"normal": reading.summary()}
-    if field.low_pass_mm is not None:
-        found["low_pass_mm"] = [round(float(width), 4) for width in field.low_pass_mm]
-    return found

@@ -11,6 +11,7 @@ from gelslim_force.forces.estimator import ForceEstimator, ForceSettings
 from gelslim_force.forces.finite_strain import DepthLaw, FiniteStrainForce, deep_mm
 from gelslim_force.motion.marker_motion import COMPENSATIONS, Compensation
 from gelslim_force.motion.surface_motion import SurfaceMotion
+from gelslim_force.tracking.drift_filter import DriftSettings
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.contact_columns import ContactCompliance
 from ifem_export.errors import IfemError, MeshError
@@ -38,6 +39,7 @@ class PipelineSettings:
         unknown_normal_mm: Depth in mm that may remain unnoticed without a normal source. Its
             apparent motion enters the covariance of the wrench.
         least_coverage: Smallest share of the markers seen with which a frame gives forces.
+        drift: How drift of the camera against the gel is treated.
 
     Raises:
         ValueError: A value is impossible.
@@ -52,6 +54,7 @@ class PipelineSettings:
     noise_px: float | None = None
     unknown_normal_mm: float = 0.3
     least_coverage: float = 0.3
+    drift: DriftSettings = field(default_factory=DriftSettings)
 
     def __post_init__(self) -> None:
         if self.rung is not None and self.rung not in RUNGS:

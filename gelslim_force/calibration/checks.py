@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.detection.detection import as_planes
+from gelslim_force.lattice.picture_turn import picture_turn
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from ifem_export.markers.grid import ANCHOR_LARGE, MarkerGrid
 
@@ -36,16 +37,6 @@ CONTACT_MM = 0.03
 """Common displacement of neighbouring dots that counts as contact, if it is local and larger than
 the noise."""
 _ANCHOR_STEP = 0.5
-_ORIENTATIONS = {
-    (1, 0, 0, 1): "",
-    (0, -1, 1, 0): "turned by 90° clockwise",
-    (-1, 0, 0, -1): "turned by 180°",
-    (0, 1, -1, 0): "turned by 90° anticlockwise",
-    (-1, 0, 0, 1): "mirrored left to right",
-    (1, 0, 0, -1): "mirrored top to bottom",
-    (0, 1, 1, 0): "transposed",
-    (0, -1, -1, 0): "transposed and turned by 180°",
-}
 
 
 def require_size(image: NDArray[np.uint8], camera: VirtualCamera) -> None:
@@ -190,17 +181,3 @@ def require_fit(fit: CameraFit, pitch_mm: float, pitch_px: float) -> None:
             f"{fit.tolerance[worst]:g}; use the bundle of the sensor that took the picture, or "
             "check how camera and mirror are mounted",
         )
-
-
-def picture_turn(expected_px: ArrayLike, seen_px: ArrayLike) -> str:
-    """Return how the picture is turned or mirrored; empty if it is upright.
-
-    `expected_px` (n, 2) are the positions of the dots by the design, `seen_px` (n, 2) those in
-    the picture. The affine map between them is compared with the eight turns and mirror images of
-    the picture; small rotations and changes of scale have no effect.
-    """
-    expected, seen = (np.asarray(v, dtype=float) for v in (expected_px, seen_px))
-    apart = expected - expected.mean(axis=0)
-    affine = np.linalg.lstsq(apart, seen - seen.mean(axis=0), rcond=None)[0].T
-    fits = {k: float((affine * np.array(k).reshape(2, 2)).sum()) for k in _ORIENTATIONS}
-    return _ORIENTATIONS[max(fits, key=lambda k: fits[k])]

@@ -74,6 +74,12 @@ class ForceField(Immutable):
             low_pass_mm=read.known_reals("low_pass_mm", 2),
         )
 
+    def summary(self) -> dict[str, Any]:
+        """How the field was smoothed, as plain numbers; empty for masked forces."""
+        if self.low_pass_mm is None:
+            return {}
+        return {"low_pass_mm": [round(float(width), 4) for width in self.low_pass_mm]}
+
     def _repr_png_(self) -> bytes | None:
         """Picture for a notebook; None where matplotlib is not installed."""
         return _png(self)
@@ -96,9 +102,10 @@ class FrameResult(Immutable):
         field: Forces at the nodes of the surface.
         wrench: Resultant force and torque.
         normal_known: Whether the normal motion, and thus the normal force, is known.
-        stage_ms: Time in ms per stage: track, look, normal, displace, interpolate, force, wrench.
+        stage_ms: Time in ms per stage: track, drift, look, normal, displace, interpolate, force,
+            wrench.
         problems: What was wrong with the frame, one sentence each.
-        extra: Further findings, such as the fitted contact patch.
+        extra: Further findings, such as the fitted contact patch and the drift.
         stamp_s: When it was taken, in seconds since 1970 (UTC); None if that is not known.
         sensor_s: The same by the clock of the camera or its driver; None without one.
     """

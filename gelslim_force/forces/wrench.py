@@ -45,8 +45,8 @@ class Wrench(Immutable):
     Attributes:
         force_n: (3,) in N; z is NaN where the normal motion is unknown.
         torque_nmm: (3,) in N mm; x and y are NaN where the normal motion is unknown.
-        covariance: (6, 6) of (force, torque) in N and N mm, from the noise of the markers and of
-            the normal motion; NaN where unknown.
+        covariance: (6, 6) of (force, torque) in N and N mm, from the noise of the markers, of the
+            normal motion and of the drift; NaN where unknown.
     """
 
     force_n: Array

@@ -63,6 +63,13 @@ class SurfaceMotion:
         inside = self._seen_in_contact(motion_mm, reading)
         return motion_mm[inside, :2].mean(axis=0) if inside.any() else None
 
+    def loaded(self, reading: NormalReading | None) -> NDArray[np.bool_]:
+        """(n,) markers on gel that is known to be touched, or pressed in; none if unknown."""
+        if reading is None or not reading.known:
+            return np.zeros(len(self.markers), dtype=bool)
+        pressed = reading.w_mm < -_MOVED_MM if reading.touched is None else reading.touched
+        return np.asarray(self.nodes_to_markers @ pressed.astype(float) > 0.5)
+
     def apparent_over_seen(self, motion_mm: Array, reading: NormalReading) -> float:
         """How much larger the markers' apparent motion should be than the motion that is seen.
 

@@ -131,6 +131,7 @@ class RunRecorder(AbstractContextManager["RunRecorder"]):
             "settings": plain(settings or {}),
         }
         self._counts = RunCounts()
+        self._rests: list[Any] = []
         self._last_index: int | None = None
         self._open = False
         self._chunk = _OpenChunk(0)
@@ -172,6 +173,7 @@ class RunRecorder(AbstractContextManager["RunRecorder"]):
             raise self._failed(f"writing frame {result.index}", error) from error
         self._last_index = int(result.index)
         self._counts.add(result)
+        self._rests += plain(result.extra.get("rests", []))
 
     def finish(self, reason: str = "") -> None:
         """Write the last chunk and the state of the run; `reason` if it stopped early.
@@ -269,6 +271,7 @@ class RunRecorder(AbstractContextManager["RunRecorder"]):
                 "fields": asdict(self._keep),
                 "units": dict(UNITS),
                 "counts": asdict(self._counts),
+                "rests": self._rests,
             },
         )
 

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from gelslim_force.detection.detection import Detector, as_planes
 from gelslim_force.detection.detections import Detections
 from gelslim_force.lattice.growth import LatticeError
+from gelslim_force.lattice.picture_turn import picture_turn
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.lattice.registration import register
 from gelslim_force.tracking.matching import match
@@ -32,6 +33,10 @@ _FULL_EVERY = 30
 """Number of frames after which the whole frame is searched in any case."""
 _AREA_STEP = 0.45
 """Change of the logarithm of a dot's area that shows another kind of dot: a factor of 1.6."""
+_MOST_CHANGED = 0.15
+"""Largest share of the dots whose area may change by such a factor where most dots have moved."""
+_LITTLE_PITCH = 0.2
+"""Median motion per coordinate, over the pitch, up to which no other marker can be taken."""
 Route = Literal["near", "full", "registered"]
 """How markers were found: near predictions, in the whole frame, or by registration."""
 
@@ -44,7 +49,9 @@ class TrackedFrame:
     detections: Detections
     route: Route
     slipped: bool
-    """The anchors contradict the tracks, and registration did not help."""
+    """The sizes of the dots contradict the tracks, and registration did not help."""
+    turn: str = ""
+    """How the picture is turned or mirrored relative to the reference; empty if it is upright."""
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -84,6 +91,7 @@ class Tracker:
         if grid is not None:
             self._large = grid.kind[reference.markers] == ANCHOR_LARGE
         self._rest_moments = reference_dots.moments_px2
+        self._little_px = _LITTLE_PITCH * float(np.median(reference.pitch_px))
         self.reset()
 
     @property
@@ -113,7 +121,10 @@ class Tracker:
             self._age = _FULL_EVERY if blind else 0
             self._usual = int(result.tracks.tracked.sum())
         self._age += 1
-        self._remember(result)
+        if result.slipped:
+            self.reset()
+        else:
+            self._remember(result)
         return result
 
     def _near(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame | None:
@@ -125,6 +136,8 @@ class Tracker:
         if tracks.tracked.sum() < self._usual:
             dots, tracks = self._search_lost(image, dots, tracks, expected)
         if tracks.tracked.sum() < _LEAST_COVERAGE * self._usual:
+            return None
+        if self._contradicted(tracks, dots):
             return None
         return TrackedFrame(tracks, dots, "near", False)
 
@@ -152,23 +165,40 @@ class Tracker:
     def _full(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame:
         dots = self._detector.detect(image)
         tracks = match(self._reference, dots.centres_px, expected)
-        if not _anchors_slipped(tracks, dots.area_px, self._area, self._large):
+        if not self._contradicted(tracks, dots):
             return TrackedFrame(tracks, dots, "full", False)
-        registered = self._registered(dots, image.shape)
-        if registered is None:
+        places = self._registered(dots, image.shape)
+        if places is None:
+            return TrackedFrame(tracks, dots, "full", True)
+        known = np.isfinite(places).all(axis=1)
+        turn = picture_turn(self._reference.positions_px[known], places[known])
+        if turn:
+            return TrackedFrame(tracks, dots, "full", True, turn)
+        registered = match(self._reference, dots.centres_px, places)
+        if self._contradicted(registered, dots):
             return TrackedFrame(tracks, dots, "full", True)
         return TrackedFrame(registered, dots, "registered", False)
 
-    def _registered(self, dots: Detections, shape: tuple[int, ...]) -> Tracks | None:
-        if self._grid is None:
+    def _registered(self, dots: Detections, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
+        """Places (n, 2) of the markers by the anchors, NaN for those not found; None without."""
+        if self._grid is None or not self._large.any():
             return None
         try:
             found = register(dots, self._grid, shape)
         except LatticeError:
             return None
-        tracks = match(self._reference, dots.centres_px, found.centres_px[self._reference.markers])
-        slipped = _anchors_slipped(tracks, dots.area_px, self._area, self._large)
-        return None if slipped else tracks
+        return found.centres_px[self._reference.markers]
+
+    def _contradicted(self, tracks: Tracks, dots: Detections) -> bool:
+        """Return whether the sizes of the dots show that the tracks are those of other markers."""
+        if _anchors_slipped(tracks, dots.area_px, self._area, self._large):
+            return True
+        seen = tracks.tracked
+        if not seen.any() or np.median(np.abs(tracks.displacement_px[seen])) < self._little_px:
+            return False
+        # In another part of a tilted view dots are larger or smaller.
+        change = _area_change(tracks, dots.area_px, self._area)
+        return bool((np.abs(change) > _AREA_STEP).mean() > _MOST_CHANGED)
 
     def _remember(self, result: TrackedFrame) -> None:
         tracks = result.tracks
@@ -193,10 +223,17 @@ def _anchors_slipped(
     markers, and `large` (n,) tells which of them are large anchors. A change that is common to
     all areas, due to exposure or focus, has no effect.
     """
-    seen = np.flatnonzero(tracks.tracked)
-    if len(seen) == 0:
+    if not tracks.tracked.any():
         return False
-    change = np.log(area_px[tracks.dots[seen]] / reference_area_px[seen])
-    change -= np.median(change)
-    shrunk = change[large[seen]] < -_AREA_STEP
+    change = _area_change(tracks, area_px, reference_area_px)
+    shrunk = change[large[tracks.tracked]] < -_AREA_STEP
     return len(shrunk) >= 2 and bool(shrunk.mean() > 0.5)
+
+
+def _area_change(
+    tracks: Tracks, area_px: NDArray[np.float64], reference_area_px: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Logarithm of the relative change of the tracked dots' areas, beyond that of most dots."""
+    seen = np.flatnonzero(tracks.tracked)
+    change = np.log(area_px[tracks.dots[seen]] / reference_area_px[seen])
+    return np.asarray(change - np.median(change))

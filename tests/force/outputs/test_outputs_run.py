@@ -19,6 +19,7 @@ from gelslim_core.optional_library import MissingLibraryError
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.outputs.recorded_run import read_run
 from gelslim_force.outputs.run_recorder import RecorderSettings, RunRecorder
+from gelslim_force.tracking.drift_filter import TareRecord
 
 SAMPLES = Path(__file__).parents[1]
 STAMP_S = 1_795_441_687.125
@@ -81,6 +82,18 @@ def test_wrenches_and_counts(tmp_path: Path) -> None:
     assert (counts["first_stamp_s"], counts["last_stamp_s"]) == (STAMP_S, STAMP_S)
     assert run.manifest["settings"] == {"method": "masked"}
     assert run.manifest["versions"]["numpy"] == np.__version__
+
+
+def test_the_manifest_lists_new_rests(tmp_path: Path) -> None:
+    records = [TareRecord(2.0 * k, (0.1 * k, -0.2), 0.01, 1.001, 0.04, k > 1) for k in range(3)]
+    told = ([], records[:1], [], records[1:])
+    frames = [
+        FrameResult(k, float(k), extra={"rests": [r.summary() for r in of]} if of else {})
+        for k, of in enumerate(told)
+    ]
+    run = read_run(recorded(tmp_path, frames, RecorderSettings(fields=None)))
+    found = [{**r, "shift_px": tuple(r["shift_px"])} for r in run.manifest["rests"]]
+    assert [TareRecord(**r) for r in found] == records
 
 
 def test_csv_is_read_by_another_reader(tmp_path: Path) -> None:

@@ -111,7 +111,8 @@ def test_rest_gives_no_force(calibration) -> None:
 
 
 def test_scatter_of_the_wrench_is_within_its_covariance(calibration) -> None:
-    """The covariance counts the reference's own error too, which does not scatter."""
+    """The covariance counts errors that do not scatter: the reference's own, and the motion of
+    markers round the contact that may be drift."""
     chain = pipeline(calibration)
     still = [frame(0.5, Look(noise=4.0, seed=300 + k)) for k in range(24)]
     found, sigma = [], []
@@ -121,7 +122,7 @@ def test_scatter_of_the_wrench_is_within_its_covariance(calibration) -> None:
         found.append(result.wrench.vector)
         sigma.append(result.wrench.standard_deviation)
     ratio = np.std(found, axis=0, ddof=1) / np.median(sigma, axis=0)
-    assert ((ratio > 0.25) & (ratio < 1.3)).all(), ratio
+    assert ((ratio > 0.05) & (ratio < 1.3)).all(), ratio
 
 
 @pytest.mark.parametrize("missing", [0.05, 0.5])

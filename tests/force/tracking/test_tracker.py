@@ -193,6 +193,28 @@ def test_the_anchors_show_a_shift_of_all_markers_by_a_pitch(rest, step, monkeypa
     assert median == pytest.approx(np.median(tracker.reference.pitch_px), rel=0.25)
 
 
+@pytest.mark.parametrize("running", [False, True])
+def test_a_turned_or_mirrored_picture_is_told(rest, running):
+    """Rows mirrored by a tilted view fall on other rows, with dots of other sizes."""
+    tracker = tracker_for(rest)
+    image = frame_at(0.8, seed=4).image
+    for turned, words in (
+        (image[::-1, ::-1], "turned by 180°"),
+        (image[:, ::-1], "mirrored left to right"),
+        (image[::-1], "mirrored top to bottom"),
+    ):
+        tracker.reset()
+        if running:
+            tracker.update(rest.image)
+            tracker.update(rest.image)
+        tracked = tracker.update(np.ascontiguousarray(turned))
+        assert tracked.slipped
+        assert tracked.turn == words
+        upright = tracker.update(image)
+        assert not upright.slipped
+        assert upright.tracks.coverage > 0.99
+
+
 @pytest.mark.parametrize(
     "image",
     [np.zeros((480, 640, 3)), np.zeros((0, 640, 3), np.uint8), np.zeros((480, 640, 5), np.uint8),

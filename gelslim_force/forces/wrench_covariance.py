@@ -1,0 +1,68 @@
+"""Covariance of a frame's wrench: noise of the markers, normal motion and drift together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.contact.normal_source import FoundForces, NormalReading
+from gelslim_force.forces.drift_noise import DriftNoise
+from gelslim_force.forces.wrench import WrenchNoise
+from gelslim_force.motion.surface_motion import SurfaceMotion
+from gelslim_force.tracking.drift import FarField
+from gelslim_force.tracking.drift_filter import FrameDrift
+from ifem_export.markers.interpolation_matrix import MarkerInterpolation
+
+Array = NDArray[np.float64]
+
+
+class WrenchCovariance:
+    """Covariances for one sensor.
+
+    Args:
+        wrench: Linear propagation to the wrench.
+        motion: From the markers to the surface.
+        field: The fit of the drift.
+        unknown_normal_mm: Depth that may remain unnoticed where the normal motion is unknown.
+    """
+
+    def __init__(
+        self,
+        wrench: WrenchNoise,
+        motion: SurfaceMotion,
+        field: FarField,
+        unknown_normal_mm: float,
+    ) -> None:
+        self._wrench, self._motion = wrench, motion
+        self._unknown_normal_mm = unknown_normal_mm
+        self._drift = DriftNoise.of(motion, wrench.gains(motion.interpolation), field)
+        self._kept_gains: tuple[bytes, Array] | None = None
+
+    def of_forces(self, forces: FoundForces, drift: FrameDrift) -> Array:
+        """(6, 6) in N and N mm for forces that the normal source found itself."""
+        return forces.covariance + self._drift.covariance(drift)
+
+    def of_motion(
+        self,
+        interpolation: MarkerInterpolation,
+        motion_mm: Array,
+        noise_px: float,
+        reading: NormalReading | None,
+        drift: FrameDrift,
+    ) -> Array:
+        """(6, 6) in N and N mm for forces that follow from the motion (n, 3) of the markers."""
+        gains = self._drift.corrected(self._gains(interpolation), drift)
+        rigid = self._drift.covariance(drift)
+        spread = self._motion.covariance_mm2(np.isfinite(motion_mm[:, 0]), noise_px)
+        if reading is not None and reading.known:
+            lateral = self._motion.compensation_change(reading.sigma_mm)
+            return rigid + self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
+        apparent = self._motion.apparent_motion(motion_mm, self._unknown_normal_mm)
+        return rigid + self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
+
+    def _gains(self, interpolation: MarkerInterpolation) -> Array:
+        """Wrench per motion of each marker; computed anew only where other markers are lost."""
+        lost = interpolation.lost.tobytes()
+        if self._kept_gains is None or self._kept_gains[0] != lost:
+            self._kept_gains = lost, self._wrench.gains(interpolation)
+        return self._kept_gains[1]
