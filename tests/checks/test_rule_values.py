@@ -145,6 +145,7 @@ def test_caution_is_judged_only_where_the_limit_holds() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_batch_fails_where_single_designs_fail() -> None:
     rng = np.random.default_rng(8)
     count = 16

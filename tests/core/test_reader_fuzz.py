@@ -159,6 +159,7 @@ def _mutate(tree, mutation):
 
 @settings(FUZZ, max_examples=60)
 @given(st.lists(MUTATION, min_size=1, max_size=3))
+@pytest.mark.slow
 def test_a_mutated_spec(mutations):
     _mutated(mutations)
 

@@ -68,6 +68,7 @@ def problem() -> FoldProblem:
     )
 
 
+@pytest.mark.slow
 def test_scores_are_those_of_the_reference(problem: FoldProblem) -> None:
     rng = np.random.default_rng(8)
     kept = seen = 0
@@ -84,6 +85,7 @@ def test_scores_are_those_of_the_reference(problem: FoldProblem) -> None:
     assert 2 < kept < seen - 10
 
 
+@pytest.mark.slow
 def test_measures_are_those_of_the_reference(problem: FoldProblem) -> None:
     rng = np.random.default_rng(12)
     design = rng.integers(len(problem), size=200)

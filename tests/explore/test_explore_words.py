@@ -85,6 +85,7 @@ def test_words_do_not_send_a_chunk_to_the_slow_search(monkeypatch: pytest.Monkey
     assert len(set(columns["status"])) == 2
 
 
+@pytest.mark.slow
 def test_designs_of_one_fold_are_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
     from gelslim_cad.dimensions import fold_search
 

@@ -49,6 +49,7 @@ def test_every_file_is_the_same_in_fresh_processes_and_in_another_order(here):
     assert len(set(here.values())) == len(here)
 
 
+@pytest.mark.slow
 def test_repeating_in_one_process_changes_nothing(here):
     assert export_digests.digests(export_digests.NAMES[::-1]) == here
 

@@ -224,6 +224,7 @@ def test_reads_models_of_another_writer(tmp_path):
     assert out["drawn"] == 24
 
 
+@pytest.mark.slow
 def test_without_webgl_a_picture_and_a_word_take_its_place(tmp_path):
     picture = io.BytesIO()
     Image.new("RGB", (60, 40), (200, 0, 200)).save(picture, "PNG")

@@ -31,6 +31,7 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_margin_is_the_least_that_gives_the_yield(tmp_path: Path) -> None:
     spec = read_spec(written(tmp_path, SPEC)).spec
     margin = spec.design.optics.image_margin

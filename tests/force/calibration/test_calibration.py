@@ -110,6 +110,7 @@ def test_diagnosis_gives_the_deviations():
     assert all(str(k) in text for k in found.missing[:5])
 
 
+@pytest.mark.slow
 def test_poor_builds_and_prints_are_warned_of():
     values = BUILD.copy()
     values[PARAMETERS.index("rotation_x_deg")] = 3.2

@@ -103,6 +103,7 @@ def test_a_missing_entry_is_refused(tmp_path: Path, missing: str) -> None:
         read_intrinsics(tmp_path / "none.yaml")
 
 
+@pytest.mark.slow
 def test_the_focal_length_is_known_with_the_lens_measured() -> None:
     """Pose, print and picture are as in `test_clean_frame_gives_the_camera...`."""
     grid = grid_of_dots()

@@ -123,7 +123,7 @@ def moved_pictures(image: np.ndarray, pitch_px: float) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
-@pytest.mark.parametrize("running", [False, True])
+@pytest.mark.parametrize("running", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_turned_mirrored_or_shifted_picture_is_no_force(
     chain: ForcePipeline, share: float, running: bool
 ) -> None:

@@ -85,6 +85,7 @@ def test_frames_are_the_same_bytes_in_a_fresh_process():
     assert done.stdout.strip() == hashlib.sha256(picture(Look(**ACTIVE)).tobytes()).hexdigest()
 
 
+@pytest.mark.slow
 def test_effects_left_out_are_not_loaded():
     code = (
         f"import sys; sys.path[:0] = {FOLDERS!r}\n"
