@@ -243,7 +243,11 @@ def answer_json(
 
 def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures: list[str]) -> None:
     """Print the number of frames with forces, the last wrench, problems, times and folder."""
-    say(f"{summary.frames} frames, {summary.with_forces} with forces, by {pipeline.operator_name}.")
+    from gelslim_force.joint.unknown_shape import UnknownShape
+
+    unknown = isinstance(pipeline.normal, UnknownShape)
+    by = "light and markers" if unknown else pipeline.operator_name
+    say(f"{summary.frames} frames, {summary.with_forces} with forces, by {by}.")
     if summary.dropped:
         say(f"{summary.dropped} frames of the camera were dropped for newer ones.")
     wrench = summary.last.wrench if summary.last is not None else None

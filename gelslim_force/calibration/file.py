@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.files.json_record import read_json_record
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.built_deviation import BuiltDeviation
 from gelslim_force.calibration.camera_deviation import PARAMETERS
@@ -119,32 +119,17 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         CalibrationError: There is no such file, or it is damaged.
     """
     place = Path(path)
-    try:
-        record = json.loads(place.read_bytes().decode("utf-8"))
-    except OSError as error:
-        reason = error.strerror or "cannot be read"
-        raise CalibrationError(
+
+    def refused(reason: str, opened: bool) -> CalibrationError:
+        make = "`gelslim calibrate BUNDLE REFERENCE -o FILE`"
+        if not opened:
+            return CalibrationError("file", f"{place}: {reason}; make it with {make}")
+        return CalibrationError(
             "file",
-            f"{place}: {reason.lower()}; make it with `gelslim calibrate BUNDLE REFERENCE -o FILE`",
-        ) from error
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise _unusable(place, f"it is not JSON ({error})") from error
-    if not isinstance(record, Mapping):
-        raise _unusable(place, "it does not hold a JSON object")
-    try:
-        return calibration_of(record)
-    except KeyError as error:
-        raise _unusable(place, f"{error.args[0]} is missing") from error
-    except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
-        raise _unusable(place, str(error)) from error
+            f"{place} is not a calibration that can be used: {reason}; calibrate again with {make}",
+        )
 
-
-def _unusable(place: Path, reason: str) -> CalibrationError:
-    return CalibrationError(
-        "file",
-        f"{place} is not a calibration that can be used: {reason}; calibrate again with "
-        "`gelslim calibrate BUNDLE REFERENCE -o FILE`",
-    )
+    return read_json_record(place, calibration_of, refused)
 
 
 def _deviation_record(deviation: BuiltDeviation) -> dict[str, Any]:

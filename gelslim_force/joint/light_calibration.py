@@ -7,7 +7,6 @@ says. The gain of a channel is a polynomial of second degree over the gel. Store
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.files.json_record import read_json_record
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.error import CalibrationError
 
@@ -158,34 +158,29 @@ def read_light_calibration(path: str | os.PathLike[str]) -> LightCalibration:
         CalibrationError: There is no such file, or it is damaged or of another kind.
     """
     place = Path(path)
-    try:
-        record = json.loads(place.read_bytes().decode("utf-8"))
-        if not isinstance(record, Mapping) or record.get("format") != FORMAT:
-            raise ValueError(f"its format is not {FORMAT}")
-        return LightCalibration(
-            str(record["geometry_hash"]),
-            tuple(int(channel) for channel in record["channels"]),
-            np.array(record["middle_mm"], dtype=float),
-            np.array(record["half_mm"], dtype=float),
-            np.array(record["gain"], dtype=float),
-            np.array(record["covariance"], dtype=float),
-            float(record["gamma"]),
-            float(record["gain_sigma"]),
-            float(record["light_error"]),
-            float(record["ball_mm"]),
-            tuple(dict(press) for press in record["presses"]),
-            tuple(str(line) for line in record["diagnosis"]),
-            tuple(str(line) for line in record["warnings"]),
-        )  # fmt: skip
-    except OSError as error:
-        reason = (error.strerror or "cannot be read").lower()
-        raise CalibrationError("file", f"{place}: {reason}; {_MAKE}") from error
-    except KeyError as error:
-        reason = f"{error.args[0]} is missing"
-        raise CalibrationError(
-            "file", f"{place} is no light calibration: {reason}; {_MAKE}"
-        ) from error
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise CalibrationError(
-            "file", f"{place} is no light calibration: {error}; {_MAKE}"
-        ) from error
+
+    def refused(reason: str, opened: bool) -> CalibrationError:
+        what = f"{place} is no light calibration" if opened else f"{place}"
+        return CalibrationError("file", f"{what}: {reason}; {_MAKE}")
+
+    return read_json_record(place, _calibration_of, refused)
+
+
+def _calibration_of(record: Mapping[str, Any]) -> LightCalibration:
+    if record.get("format") != FORMAT:
+        raise ValueError(f"its format is not {FORMAT}")
+    return LightCalibration(
+        str(record["geometry_hash"]),
+        tuple(int(channel) for channel in record["channels"]),
+        np.array(record["middle_mm"], dtype=float),
+        np.array(record["half_mm"], dtype=float),
+        np.array(record["gain"], dtype=float),
+        np.array(record["covariance"], dtype=float),
+        float(record["gamma"]),
+        float(record["gain_sigma"]),
+        float(record["light_error"]),
+        float(record["ball_mm"]),
+        tuple(dict(press) for press in record["presses"]),
+        tuple(str(line) for line in record["diagnosis"]),
+        tuple(str(line) for line in record["warnings"]),
+    )  # fmt: skip

@@ -5,7 +5,6 @@ Stored as JSON, format `gelslim-gel-calibration/1`.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_core.files.json_record import read_json_record
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.presses.press_error import PressError
@@ -207,29 +207,28 @@ def read_gel_calibration(path: str | os.PathLike[str]) -> GelCalibration:
         PressError: There is no such file, or it is damaged or of another kind.
     """
     place = Path(path)
-    try:
-        record = json.loads(place.read_bytes().decode("utf-8"))
-        if not isinstance(record, Mapping) or record.get("format") != FORMAT:
-            raise ValueError(f"its format is not {FORMAT}")
-        if tuple(record["parameters"]) != PARAMETERS:
-            raise ValueError(f"its parameters are not {', '.join(PARAMETERS)}")
-        return GelCalibration(
-            str(record["geometry_hash"]),
-            float(record["youngs_modulus_mpa"]),
-            float(record["thickness_mm"]),
-            float(record["poissons_ratio"]),
-            np.array(record["covariance"], dtype=float),
-            {str(name): float(value) for name, value in record["design"].items()},
-            float(record["ball_mm"]),
-            tuple(dict(press) for press in record["presses"]),
-            tuple(str(line) for line in record["diagnosis"]),
-            tuple(str(line) for line in record["warnings"]),
-        )
-    except OSError as error:
-        reason = (error.strerror or "cannot be read").lower()
-        raise PressError("file", f"{place}: {reason}; {_MAKE}") from error
-    except KeyError as error:
-        reason = f"{error.args[0]} is missing"
-        raise PressError("file", f"{place} is no gel calibration: {reason}; {_MAKE}") from error
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise PressError("file", f"{place} is no gel calibration: {error}; {_MAKE}") from error
+
+    def refused(reason: str, opened: bool) -> PressError:
+        what = f"{place} is no gel calibration" if opened else f"{place}"
+        return PressError("file", f"{what}: {reason}; {_MAKE}")
+
+    return read_json_record(place, _calibration_of, refused)
+
+
+def _calibration_of(record: Mapping[str, Any]) -> GelCalibration:
+    if record.get("format") != FORMAT:
+        raise ValueError(f"its format is not {FORMAT}")
+    if tuple(record["parameters"]) != PARAMETERS:
+        raise ValueError(f"its parameters are not {', '.join(PARAMETERS)}")
+    return GelCalibration(
+        str(record["geometry_hash"]),
+        float(record["youngs_modulus_mpa"]),
+        float(record["thickness_mm"]),
+        float(record["poissons_ratio"]),
+        np.array(record["covariance"], dtype=float),
+        {str(name): float(value) for name, value in record["design"].items()},
+        float(record["ball_mm"]),
+        tuple(dict(press) for press in record["presses"]),
+        tuple(str(line) for line in record["diagnosis"]),
+        tuple(str(line) for line in record["warnings"]),
+    )
