@@ -20,7 +20,7 @@ from gelslim_cad.electronics.kicad_project import kicad_files
 KICAD = shutil.which("kicad-cli")
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(KICAD is None, reason="NO KICAD: its checks did not run; install KiCad 8 or later"),
+    pytest.mark.skipif(KICAD is None, reason="NO KICAD: its checks did not run; install KiCad 8"),
 ]
 
 

@@ -12,13 +12,12 @@ from typing import Any
 
 import cadquery as cq
 import pytest
+from shipped_fingers import NAMES, dimensions
 
-from gelslim_cad.dimensions import derive
 from gelslim_cad.export.step import step_bytes
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.sensor import marker_grid
 from gelslim_cad.solids.finger import finger_parts, tooling_parts
-from gelslim_cad.spec.reader import read_spec
 
 FREECAD = shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
 pytestmark = [
@@ -27,7 +26,6 @@ pytestmark = [
         FREECAD is None, reason="NO FREECAD: no file was read; apt-get install freecad-python3"
     ),
 ]
-DESIGNS = Path(__file__).parents[2] / "designs"
 SCRIPT = Path(__file__).parent / "freecad_inspection.py"
 LEAST_OVERLAP_MM3 = 1e-4
 """Faces that touch have none; the kernel's tolerance of 1e-7 mm over 100 mm² gives 1e-5."""
@@ -56,9 +54,9 @@ def inspect(solids: Solids, folder: Path) -> dict[str, Any]:
     return answer
 
 
-@pytest.mark.parametrize("design", ["gelslim2", "gelslim3_lens", "long50", "mini20", "thin", "wide"])
+@pytest.mark.parametrize("design", NAMES)
 def test_freecad_finds_no_fault(design: str, tmp_path: Path) -> None:
-    d = derive(read_spec(DESIGNS / f"{design}.yaml").spec)
+    d = dimensions(design)
     finger = finger_parts(d)
     tooling = tooling_parts(d, marker_grid(d))
     solids: Solids = {part.name: (part.as_made(),) for part in (*finger, *tooling)}
@@ -73,7 +71,7 @@ def test_freecad_finds_no_fault(design: str, tmp_path: Path) -> None:
 
 
 def test_freecad_sees_an_overlap(tmp_path: Path) -> None:
-    parts = finger_parts(derive(read_spec(DESIGNS / "mini20.yaml").spec))
+    parts = finger_parts(dimensions("mini20"))
     body, cover = (part for part in parts if part.name in ("body", "back_cover"))
     pressed_in = replace(cover, solid=cover.solid.translate(cq.Vector(0, 0, 0.1)))
     (overlap,) = inspect({"pair": (body, pressed_in)}, tmp_path)["pair"]["overlaps_mm3"]
