@@ -12,11 +12,13 @@ from gelslim_core.lazy import lazy_exports
 if TYPE_CHECKING:
     from ifem_export.assembly.assembly import mesh_stiffness
     from ifem_export.bundle.bundle import Bundle, build_bundle
-    from ifem_export.bundle.export_matrix import export_matrix
     from ifem_export.bundle.files import load_bundle, summarise_bundle, write_bundle
     from ifem_export.elements.hex8 import hex8_stiffness
     from ifem_export.elements.material import Material
     from ifem_export.errors import BundleError, IfemError
+    from ifem_export.exports.matrix_files import export_matrix
+    from ifem_export.exports.solver_files import export_mesh
+    from ifem_export.exports.surface_matrices import export_surface_matrix
     from ifem_export.finite_strain.neo_hookean import NeoHookeanPad
     from ifem_export.inverse.contact_inverse import masked_force
     from ifem_export.markers.grid import MarkerGrid, build_marker_grid
@@ -45,6 +47,8 @@ __all__ = [
     "build_marker_grid",
     "build_pad_mesh",
     "export_matrix",
+    "export_mesh",
+    "export_surface_matrix",
     "hex8_stiffness",
     "load_bundle",
     "marker_to_node",

@@ -44,7 +44,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "gelslim_optics": ("camera", "guide", "light"),
     "ifem_export": (
         "errors", "mesh", "assembly", "elements", "finite_strain", "operators", "inverse",
-        "markers", "bundle", "compliance",
+        "markers", "bundle", "compliance", "exports",
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -129,16 +130,7 @@ class DenseOperator(_WithCompliance):
     @cached_property
     def matrix(self) -> NDArray[np.float32]:
         """S (3c, 3c) in N/mm, symmetric."""
-        s = self.system
-        factor = SparseFactor(s.inner).factor
-        n = s.surface.shape[0]
-        dense = np.empty((n, n), dtype=np.float32)
-        coupling = sparse.csc_array(s.surface_to_inner)
-        for first in range(0, n, DENSE_BATCH):
-            part = slice(first, first + DENSE_BATCH)
-            inner = factor.solve(coupling[:, part].toarray())
-            dense[:, part] = s.surface[:, part].toarray() - s.inner_to_surface @ inner
-        return np.asarray((dense + dense.T) / 2, dtype=np.float32)
+        return condensed_stiffness(self.system, np.float32)
 
     def force(self, displacement_mm: ArrayLike) -> Array:
         """One matrix-vector product."""
@@ -149,6 +141,29 @@ class DenseOperator(_WithCompliance):
     def n_bytes(self) -> int:
         """Bytes of the matrix."""
         return int(self.matrix.nbytes)
+
+
+def condensed_stiffness(system: PadSystem, dtype: type[np.floating[Any]]) -> NDArray[Any]:
+    """S = K_ss - K_si K_ii⁻¹ K_is as a dense matrix, computed in batches of columns.
+
+    Args:
+        system: The pad's equations.
+        dtype: `np.float32` or `np.float64`, in which it is kept.
+
+    Returns:
+        (3c, 3c) in N/mm, symmetric.
+    """
+    if system.inner.shape[0] == 0:
+        return np.asarray(system.surface.toarray(), dtype=dtype)
+    factor = SparseFactor(system.inner).factor
+    n = system.surface.shape[0]
+    dense = np.empty((n, n), dtype=dtype)
+    coupling = sparse.csc_array(system.surface_to_inner)
+    for first in range(0, n, DENSE_BATCH):
+        part = slice(first, first + DENSE_BATCH)
+        inner = factor.solve(coupling[:, part].toarray())
+        dense[:, part] = system.surface[:, part].toarray() - system.inner_to_surface @ inner
+    return np.asarray((dense + dense.T) / 2, dtype=dtype)
 
 
 def _matrix_bytes(matrix: sparse.csr_array) -> int:

@@ -73,6 +73,36 @@ def test_a_matrix_is_exported(
     assert ".safetensors" in error
 
 
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("pad.inp", ["--element", "C3D20R", "--law", "neo_hookean"]),
+        ("pad.msh", []),
+        ("s.npz", ["--matrix", "surface_stiffness"]),
+    ],
+)
+def test_an_export_may_be_replaced_but_not_a_file_of_the_user(
+    bundle: Path, tmp_path: Path, name: str, options: list[str]
+) -> None:
+    file = tmp_path / name
+    command = ["bundle-export", str(bundle), str(file), *options]
+    assert main(command) == main(command) == 0
+    first = file.read_bytes()
+    file.write_text("mine")
+    assert main(command) != 0
+    assert file.read_text() == "mine"
+    assert len(first) > 1000
+
+
+def test_an_option_of_another_format_is_refused(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "k.mtx"
+    assert main(["bundle-export", str(bundle), str(file), "--law", "linear"]) == 2
+    assert ".inp" in capsys.readouterr().err
+    assert not file.exists()
+
+
 @pytest.mark.slow
 def test_a_budget_chooses_the_operator(
     tmp_path: Path,

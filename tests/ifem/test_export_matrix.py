@@ -10,9 +10,9 @@ from ifem_bundles import make_bundle
 from scipy.io import loadmat, mmread
 
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.bundle.export_matrix import export_matrix
 from ifem_export.elements.material import Material
 from ifem_export.errors import IfemError
+from ifem_export.exports.matrix_files import export_matrix
 
 
 def small_bundle() -> Bundle:

@@ -26,6 +26,9 @@ MARKS = {
     ".mtx": b"K in N/mm of geometry",
     ".mat": b"gelslim-bundle",
     ".safetensors": b"gelslim-bundle/",
+    ".npz": b"surface_",
+    ".inp": b"Gel pad of geometry",
+    ".msh": b'"GEL"',
 }
 """Text near the beginning of each kind of export, by which an export is recognised."""
 _KINDS = {
@@ -192,25 +195,38 @@ def bundle_export(
     path: BundleFolder,
     file: Annotated[
         Path,
-        typer.Argument(
-            metavar="FILE", help="File to write: NAME.mtx, NAME.mat or NAME.safetensors."
-        ),
+        typer.Argument(metavar="FILE", help="File to write; its ending chooses the format."),
     ],
+    matrix: Annotated[
+        str | None,
+        typer.Option(
+            "--matrix",
+            help="Matrix of the outer surface alone, surface_stiffness or surface_compliance "
+            "(.npz, .mat).",
+        ),
+    ] = None,
+    element: Annotated[
+        str | None,
+        typer.Option(
+            "--element",
+            help="C3D8, C3D8I, C3D20 or C3D20R (.inp, .msh); by default as in the bundle.",
+        ),
+    ] = None,
+    law: Annotated[
+        str | None, typer.Option("--law", help="Material of a .inp: linear or neo_hookean.")
+    ] = None,
 ) -> int:
-    """Write the stiffness matrix of a bundle for other programs.
+    """Write mesh or stiffness of a bundle for other programs.
 
-    The ending of the file chooses the format: Matrix Market (.mtx), MATLAB (.mat, indices from 1)
-    or safetensors. The bundle is verified first.
+    Stiffness matrix of the whole pad: Matrix Market (.mtx), MATLAB (.mat, indices from 1),
+    safetensors. Dense matrix of its surface with --matrix: NumPy (.npz), MATLAB (.mat). Mesh with
+    sets and material: Abaqus and CalculiX (.inp), gmsh (.msh). The bundle is verified first.
     """
-    from ifem_export.bundle.export_matrix import EXPORTS, export_matrix
     from ifem_export.bundle.files import load_bundle
+    from ifem_export.exports.export import export_bundle, export_options
 
-    if file.suffix not in EXPORTS:
-        raise CommandError(
-            f"{file}: the ending {file.suffix!r} names no format; use {', '.join(EXPORTS)}",
-            BAD_INPUT,
-        )
+    options = export_options(file, matrix=matrix, element=element, law=law)
     require_own_file(file, MARKS[file.suffix], "export of a bundle")
-    export_matrix(load_bundle(path), file)
+    export_bundle(load_bundle(path), file, options)
     print(f"Wrote {file} ({file.stat().st_size / 1e6:.2f} MB)")
     return 0

@@ -1,4 +1,4 @@
-"""Exports of a bundle's matrices for other programs: Matrix Market, MATLAB and safetensors.
+"""Exports of a bundle's stiffness matrix for other programs: Matrix Market, MATLAB and safetensors.
 
 `stiffness` is K (3n, 3n) in N/mm, where unknown 3a+i is displacement i of node a. `free_unknowns`
 are the rows that are not bonded, counted from 0 (in the .mat file from 1, as MATLAB does).

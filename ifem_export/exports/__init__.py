@@ -1,0 +1,1 @@
+"""A bundle's mesh and matrices for other programs."""
