@@ -24,13 +24,12 @@ from ifem_export.errors import MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.layered_operator import (
     Blocks,
-    EmbeddedPreconditioner,
     LayeredOperator,
     inverse,
-    layered_operator,
     padding_columns,
 )
 from ifem_export.operators.pad_system import PadSystem, node_weight
+from ifem_export.operators.preconditioner import EmbeddedPreconditioner, mirrored_operator
 
 Array = NDArray[np.float64]
 
@@ -143,7 +142,7 @@ class CrownedSystem(PadSystem):
         element = np.asarray(self.element_matrix)
         k, j, i = self._grid[nodes].T
         return EmbeddedPreconditioner(
-            uniform=layered_operator(element, layers, columns, padding, inverse),
+            uniform=mirrored_operator(element, layers, columns, padding, inverse),
             layers=layers,
             columns=len(columns),
             layer=k - 1,

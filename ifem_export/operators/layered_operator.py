@@ -3,7 +3,8 @@
 Far from the rim all columns of nodes see the same neighbourhood, so the stiffness is a
 convolution: one Hermitian 3L x 3L block per lateral wave vector for L layers of free nodes. Its
 inverse, padded with zeros and restricted to the existing columns, is symmetric and positive
-definite for every crop, and preconditions the equations of the cropped pad.
+definite for every crop, and preconditions the equations of the cropped pad: `preconditioner`
+applies it in less time.
 """
 
 from __future__ import annotations
@@ -11,16 +12,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, sparse
+from scipy import fft
 
 from ifem_export.assembly.occupancy_table import occupancy_table
 
 Array = NDArray[np.float64]
 Blocks = NDArray[np.complex128]
+AnyBlocks = TypeVar("AnyBlocks", NDArray[np.complex128], NDArray[np.float64])
+"""Hermitian blocks; where the pad is its own mirror image they can be real (`preconditioner`)."""
 PADDING_THICKNESSES = 1.7
 LEAST_PADDING, MOST_PADDING = 4, 2.0
 """Bounds of the padding: at least in columns, at most in extents of the pad."""
@@ -99,30 +102,38 @@ def even_fast_length(least: int) -> int:
     return length
 
 
-def stiffness_symbol(element_matrix: Array, layers: int, shape: tuple[int, int]) -> Blocks:
-    """Stiffness blocks (ky, kx half, 3L, 3L) in N/mm of the infinite pad on a lattice."""
+def stiffness_symbol(
+    element_matrix: Array, layers: int, shape: tuple[int, int], rows: int | None = None
+) -> Blocks:
+    """Stiffness blocks (ky, kx half, 3L, 3L) in N/mm of the infinite pad on a lattice.
+
+    Of the wave numbers ky only the first `rows` are taken, all of them by default.
+    """
     table = occupancy_table(element_matrix)
-    phase_y = np.exp(2j * np.pi * np.fft.fftfreq(shape[0]))
+    phase_y = np.exp(2j * np.pi * np.fft.fftfreq(shape[0])[:rows])
     phase_x = np.exp(2j * np.pi * np.fft.rfftfreq(shape[1]))
-    blocks = np.zeros((shape[0], len(phase_x), layers, 3, layers, 3), dtype=complex)
-    for layer in range(layers):
-        mask = TOP_NODE if layer == layers - 1 else INNER_NODE
+    blocks = np.zeros((len(phase_y), len(phase_x), layers, 3, layers, 3), dtype=complex)
+    for mask in (INNER_NODE, TOP_NODE):
+        of_mask = range(layers - 1) if mask == INNER_NODE else [layers - 1]
         for dz in (-1, 0, 1):
-            other = layer + dz
-            if not 0 <= other < layers:
+            pairs = [(layer, layer + dz) for layer in of_mask if 0 <= layer + dz < layers]
+            if not pairs:
                 continue
+            part = np.zeros((len(phase_y), len(phase_x), 3, 3), dtype=complex)
             for dy in (-1, 0, 1):
                 for dx in (-1, 0, 1):
                     wave = phase_y[:, None] ** dy * phase_x[None, :] ** dx
-                    slot = 9 * (dz + 1) + 3 * (dy + 1) + (dx + 1)
-                    part = wave[..., None, None] * table[mask, slot]
-                    blocks[:, :, layer, :, other, :] += part
-    return blocks.reshape(shape[0], len(phase_x), 3 * layers, 3 * layers)
+                    part += (
+                        wave[..., None, None] * table[mask, 9 * (dz + 1) + 3 * (dy + 1) + dx + 1]
+                    )
+            for layer, other in pairs:
+                blocks[:, :, layer, :, other, :] = part
+    return blocks.reshape(len(phase_y), len(phase_x), 3 * layers, 3 * layers)
 
 
-def inverse(blocks: Blocks) -> Blocks:
+def inverse(blocks: AnyBlocks) -> AnyBlocks:
     """Compliance blocks, Hermitian to rounding."""
-    found = np.linalg.inv(blocks)
+    found: Any = np.linalg.inv(blocks)
     return np.asarray((found + found.conj().swapaxes(-1, -2)) / 2)
 
 
@@ -140,77 +151,6 @@ def surface_compliance(blocks: Blocks) -> Blocks:
     return inverse(surface_stiffness(blocks))
 
 
-def inner_compliance(blocks: Blocks) -> Blocks:
+def inner_compliance(blocks: AnyBlocks) -> AnyBlocks:
     """Compliance blocks of the inner layers with the surface fixed."""
     return inverse(blocks[..., :-3, :-3])
-
-
-class Preconditioner(Protocol):
-    """An approximate inverse that acts on fields (L, n, 3)."""
-
-    @property
-    def blocks(self) -> Blocks:
-        """The spectral blocks that it stores."""
-
-    def __call__(self, field: Array) -> Array:
-        """Apply to a field."""
-
-
-@dataclass(frozen=True, eq=False)
-class ScaledPreconditioner:
-    """D^-1/2 G D^-1/2 for a pad with cut cells, where D is the filled fraction around a node.
-
-    Attributes:
-        uniform: Preconditioner G of the pad without cut cells, for (L, c, 3) fields.
-        weight: (L, c) D^-1/2.
-    """
-
-    uniform: LayeredOperator
-    weight: Array
-
-    @property
-    def blocks(self) -> Blocks:
-        """Those of the uniform pad."""
-        return self.uniform.blocks
-
-    def __call__(self, field: Array) -> Array:
-        """Apply to a field (L, c, 3)."""
-        weight = self.weight[..., None]
-        return np.asarray(weight * self.uniform(weight * field))
-
-
-@dataclass(frozen=True, eq=False)
-class EmbeddedPreconditioner:
-    """The same where the unknowns are only some of the nodes of a full lattice (crowned pads).
-
-    Attributes:
-        uniform: Preconditioner of the full pad of `layers` layers over its columns.
-        layers: Layers of free nodes of the full pad.
-        columns: Its columns.
-        layer: (n,) layer of each unknown node there.
-        column: (n,) column of each unknown node there.
-        weight: (n,) D^-1/2.
-        transformation: (n, n), unknowns = transformation @ node values; None for the identity.
-    """
-
-    uniform: LayeredOperator
-    layers: int
-    columns: int
-    layer: NDArray[np.int64]
-    column: NDArray[np.int64]
-    weight: Array
-    transformation: sparse.csr_array | None = None
-
-    @property
-    def blocks(self) -> Blocks:
-        """Those of the uniform pad."""
-        return self.uniform.blocks
-
-    def __call__(self, field: Array) -> Array:
-        """Apply to a field (1, n, 3)."""
-        t = self.transformation
-        r = field[0] if t is None else t.T @ field[0]
-        lattice = np.zeros((self.layers, self.columns, 3))
-        lattice[self.layer, self.column] = self.weight[:, None] * r
-        u = self.weight[:, None] * self.uniform(lattice)[self.layer, self.column]
-        return np.asarray(u if t is None else t @ u)[None]

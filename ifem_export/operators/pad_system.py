@@ -20,14 +20,17 @@ from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.layered_operator import (
     Blocks,
     LayeredOperator,
-    Preconditioner,
-    ScaledPreconditioner,
     inner_compliance,
     inverse,
     layered_operator,
     padding_columns,
     surface_compliance,
     surface_stiffness,
+)
+from ifem_export.operators.preconditioner import (
+    Preconditioner,
+    ScaledPreconditioner,
+    mirrored_operator,
 )
 
 Array = NDArray[np.float64]
@@ -136,12 +139,12 @@ class PadSystem:
     @cached_property
     def preconditioner(self) -> Preconditioner:
         """Inverse of the infinite pad's stiffness, which preconditions `stiffness`."""
-        return self._scaled(self._operator(inverse))
+        return self._scaled(inverse)
 
     @cached_property
     def inner_preconditioner(self) -> Preconditioner:
         """The same for `inner`."""
-        return self._scaled(self._operator(inner_compliance))
+        return self._scaled(inner_compliance)
 
     @cached_property
     def infinite_stiffness(self) -> LayeredOperator:
@@ -153,7 +156,8 @@ class PadSystem:
         """Surface compliance of the infinite pad."""
         return self._operator(surface_compliance)
 
-    def _scaled(self, uniform: LayeredOperator) -> Preconditioner:
+    def _scaled(self, transform: Callable[[Array], Array]) -> Preconditioner:
+        uniform = mirrored_operator(*self._infinite, transform)
         if self.mesh.fill is None:
             return uniform
         weight = node_weight(self.mesh)[self.columns :].reshape(self.layers, -1)
@@ -161,11 +165,15 @@ class PadSystem:
         return ScaledPreconditioner(uniform, weight[:-1] if inner else weight)
 
     def _operator(self, transform: Callable[[Blocks], Blocks]) -> LayeredOperator:
-        rows, columns = (int(n) + 1 for n in self.lattice_positions.max(axis=0))
+        return layered_operator(*self._infinite, transform)
+
+    @property
+    def _infinite(self) -> tuple[Array, int, NDArray[np.int64], tuple[int, int]]:
+        """Element, layers, columns and padding of the infinite pad's operators."""
+        positions = self.lattice_positions
+        rows, columns = (int(n) + 1 for n in positions.max(axis=0))
         padding = padding_columns(self.mesh.cell_size_mm, self.layers, (rows, columns))
-        return layered_operator(
-            np.asarray(self.element_matrix), self.layers, self.lattice_positions, padding, transform
-        )
+        return np.asarray(self.element_matrix), self.layers, positions, padding
 
 
 def node_weight(mesh: PadMesh) -> Array:

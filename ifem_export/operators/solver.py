@@ -13,8 +13,8 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from ifem_export.errors import IfemError
-from ifem_export.operators.layered_operator import Preconditioner
 from ifem_export.operators.pad_system import PadSystem
+from ifem_export.operators.preconditioner import Preconditioner
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "iterative", "pcg", "direct"]
@@ -104,6 +104,20 @@ def factored(matrix: sparse.csr_array) -> SuperLU:
     return factor
 
 
+class Matrix(Protocol):
+    """A symmetric matrix, which need not be stored."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of rows and of columns."""
+
+    def __matmul__(self, x: Array) -> Array:
+        """Its product with a vector."""
+
+    def tocsr(self) -> sparse.csr_array:
+        """The matrix itself, to be factored."""
+
+
 class Solver(Protocol):
     """Solves A x = b for one matrix."""
 
@@ -118,7 +132,7 @@ class Solver(Protocol):
 class ConjugateGradients:
     """Conjugate gradients, preconditioned by the infinite pad."""
 
-    matrix: sparse.csr_array
+    matrix: Matrix
     preconditioner: Preconditioner
     layers: int
     most_iterations: int = MOST_ITERATIONS
@@ -217,7 +231,7 @@ class GradientsThenFactor:
     @cached_property
     def factor(self) -> SparseFactor:
         """The factor, computed when it is needed."""
-        return SparseFactor(self.first.matrix)
+        return SparseFactor(self.first.matrix.tocsr())
 
 
 def pad_solver(system: PadSystem, method: Method = "auto") -> Solver:
@@ -260,7 +274,7 @@ def _direct(matrix: sparse.csr_array, method: Method) -> SparseFactor | None:
 
 
 def _iterate(
-    matrix: sparse.csr_array,
+    matrix: Matrix,
     b: Array,
     precondition: Callable[[Array], Array],
     tolerance: float,

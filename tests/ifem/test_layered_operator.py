@@ -12,9 +12,7 @@ from ifem_export.errors import IfemError
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.convolved_operator import ComplianceProducts, truncated
 from ifem_export.operators.layered_operator import (
-    EmbeddedPreconditioner,
     LayeredOperator,
-    ScaledPreconditioner,
     even_fast_length,
     inner_compliance,
     inverse,
@@ -23,6 +21,11 @@ from ifem_export.operators.layered_operator import (
     stiffness_symbol,
     surface_compliance,
     surface_stiffness,
+)
+from ifem_export.operators.preconditioner import (
+    EmbeddedPreconditioner,
+    ScaledPreconditioner,
+    mirrored_operator,
 )
 
 SIZE = (0.5, 0.7, 0.4)
@@ -93,6 +96,31 @@ def test_a_cropped_operator_takes_its_columns_of_the_padded_lattice() -> None:
     assert dense(small, LAYERS) == pytest.approx(expected, abs=1e-11)
     wider = layered_operator(ELEMENT, LAYERS, columns, (4, 9), inverse)
     assert wider.shape == (8, 16)
+
+
+@pytest.mark.parametrize("transform", [inverse, inner_compliance])
+@pytest.mark.parametrize(("layers", "padding"), [(2, (1, 2)), (4, (5, 3))])
+@pytest.mark.parametrize("formulation", ["full", "bbar"])
+def test_half_the_blocks_as_reals_are_the_whole_operator(
+    transform, layers: int, padding: tuple[int, int], formulation: str
+) -> None:
+    columns = np.array([[0, 0], [0, 3], [2, 1], [2, 2], [1, 3]])
+    element = hex8_stiffness(SIZE, Material(0.147, 0.4, 1.0), formulation)
+    made = mirrored_operator(element, layers, columns, padding, transform)
+    expected = layered_operator(element, layers, columns, padding, transform)
+    size = expected.blocks.shape[-1] // 3
+    found, whole = dense(made, size), dense(expected, size)
+    assert found == pytest.approx(whole, abs=1e-13 * np.abs(whole).max())
+    rows = expected.shape[0]
+    assert made.blocks.nbytes / expected.blocks.nbytes == (rows // 2 + 1) / (2 * rows)
+
+
+def test_an_element_that_is_not_its_mirror_image_has_no_real_blocks() -> None:
+    sheared = ELEMENT.copy()
+    sheared[0, 1] *= 1.01
+    sheared[1, 0] *= 1.01
+    with pytest.raises(IfemError, match="mirror"):
+        mirrored_operator(sheared, LAYERS, EVERYWHERE, (1, 2), inverse)
 
 
 def random_operator(seed: int, layers: int = 2) -> LayeredOperator:
