@@ -306,7 +306,9 @@ def load_libraries(kinds: Collection[str]) -> None:
     A process that does this before it forks its workers spares each of them the import.
     """
     if not {"part", "bundle", "light"}.isdisjoint(kinds):
-        import numba  # noqa: F401
+        from gelslim_core.first_kernel import load_numba
+
+        load_numba()
     if not {"part", "glb", "robot"}.isdisjoint(kinds):
         import trimesh  # noqa: F401
     if "part" in kinds:
