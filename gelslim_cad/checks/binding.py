@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gelslim_cad.checks.relaxation import Relaxation, derive_each, growing_changes, relaxations
-from gelslim_cad.dimensions import Dimensions, DimensionsBatch
+from gelslim_cad.checks.relaxation import Relaxation, growing_changes, relaxations
+from gelslim_cad.checks.trials import Changes, Trial, Trials
+from gelslim_cad.dimensions import Dimensions
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.design import Envelope
 
-Figures = Dimensions | DimensionsBatch
+Figures = Dimensions | Mapping[str, float]
 
 ACTIVE, ACTIVE_MM = 0.004, 0.02
 LEAST_GAIN = 0.05
 """In the unit of the goal: mm or px."""
 SENTENCES_AT_MOST = 6
+AT_ONCE = 12
+"""Pairs of steps that are solved together."""
 
 
 SETTERS = {
@@ -110,31 +113,27 @@ def binding_sentences(spec: Spec, d: Dimensions) -> tuple[str, ...]:
 
     The goal is the thickness unless `design.envelope` states another.
     """
-    steps = relaxations(spec)
+    steps, trials = relaxations(spec), Trials(spec)
     if not d.feasible():
-        return _infeasible(spec, d, steps)
+        return _infeasible(d, steps, trials)
     aim = aim_of(spec.design.envelope)
-    return _what_binds(d, aim), *_gains(spec, d, aim, steps), *_outside(spec, d, steps)
+    return _what_binds(d, aim), *_gains(d, aim, steps, trials), *_outside(d, steps, trials)
 
 
-def _try(
-    spec: Spec, sets: Sequence[tuple[Relaxation, ...]], aim: Aim = THINNEST
-) -> tuple[Any, Any]:
-    """Cost of the spec under each set of relaxations, and whether it keeps the envelope.
+def _keeps_envelope(envelope: Envelope, chosen: Changes, trial: Trial, aim: Aim) -> bool:
+    """Whether a relaxed design is feasible and within its envelope.
 
     The thickness is a limit only where it is not what is made least.
     """
-    values = [{s.path: s.value for s in chosen} for chosen in sets]
-    batch = derive_each(spec, values)
-    envelope, kept = spec.design.envelope, batch.feasible()
-    sizes = {"max_length_mm": (envelope.max_length_mm, batch["finger.length_mm"])}
+    given = {"max_length_mm": envelope.max_length_mm}
     if aim is not THINNEST:
-        sizes["max_thickness_mm"] = (envelope.max_thickness_mm, batch["finger.thickness_mm"])
-    for name, (given, size) in sizes.items():
-        limit = math.inf if given is None else given
-        most = np.array([v.get(f"design.envelope.{name}", limit) for v in values])
-        kept = kept & (size <= most + 1e-9)
-    return aim.cost(batch), kept
+        given["max_thickness_mm"] = envelope.max_thickness_mm
+    changed = {s.path: s.value for s in chosen}
+    return trial.is_feasible and all(
+        trial.figures[f"finger.{name.removeprefix('max_')}"]
+        <= changed.get(f"design.envelope.{name}", math.inf if limit is None else limit) + 1e-9
+        for name, limit in given.items()
+    )
 
 
 def _what_binds(d: Dimensions, aim: Aim) -> str:
@@ -164,25 +163,26 @@ def _active(d: Dimensions) -> list[str]:
     ]
 
 
-def _gains(spec: Spec, d: Dimensions, aim: Aim, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
+def _gains(
+    d: Dimensions, aim: Aim, steps: tuple[Relaxation, ...], trials: Trials
+) -> tuple[str, ...]:
     """What each concession would gain, the largest first."""
-    here = float(aim.cost(d))
-    costs, kept = _try(spec, [(s,) for s in steps], aim)
+    here, envelope = float(aim.cost(d)), trials.spec.design.envelope
     gains = [
-        (here - float(cost), s.words)
-        for s, cost, ok in zip(steps, costs, kept, strict=True)
-        if ok and here - cost > LEAST_GAIN
+        (here - float(aim.cost(trial.figures)), step.words)
+        for step, trial in zip(steps, trials.of([(s,) for s in steps]), strict=True)
+        if _keeps_envelope(envelope, (step,), trial, aim)
     ]
-    gains.sort(key=lambda g: -g[0])
+    gains = sorted((g for g in gains if g[0] > LEAST_GAIN), key=lambda g: -g[0])
     return tuple(
         f"{words[0].upper()}{words[1:]} {aim.gain.format(gain)}."
         for gain, words in gains[:SENTENCES_AT_MOST]
     )
 
 
-def _outside(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
+def _outside(d: Dimensions, steps: tuple[Relaxation, ...], trials: Trials) -> tuple[str, ...]:
     """By how much the finger is outside its envelope, and what would make it fit."""
-    envelope = spec.design.envelope
+    envelope = trials.spec.design.envelope
     over = [
         f"design.envelope.max_{side}_mm allows {limit:g} mm; {size - limit:.2f} mm must be saved."
         for side, size, limit in (
@@ -194,57 +194,77 @@ def _outside(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[
     if not over:
         return ()
     thickness = math.inf if envelope.max_thickness_mm is None else envelope.max_thickness_mm
-    return *over, *_what_fits(spec, steps, thickness)
+    return *over, *_what_fits(trials, steps, thickness)
 
 
-def _infeasible(spec: Spec, d: Dimensions, steps: tuple[Relaxation, ...]) -> tuple[str, ...]:
+def _infeasible(d: Dimensions, steps: tuple[Relaxation, ...], trials: Trials) -> tuple[str, ...]:
     missed = sorted(
         ((float(np.reshape(v, -1)[0]), n) for n, v in d.fold.violations.items()), reverse=True
     )
     names = [LIMITS.get(n, n) for v, n in missed if v > 1e-6]
-    limit = spec.design.envelope.max_thickness_mm
+    limit = trials.spec.design.envelope.max_thickness_mm
     within = "" if limit is None else f", let alone within {limit:g} mm"
     text = f"No finger of this gel and camera keeps every limit{within}; missed: {_list(names)}."
     if limit is None:
-        return (text, *_what_fits(spec, steps, math.inf))
+        return (text, *_what_fits(trials, steps, math.inf))
     thicker = "In a thicker finger it would fit with"
     return (
         text,
-        *_what_fits(spec, steps, limit),
-        *(s.replace("It would fit with", thicker) for s in _what_fits(spec, steps, math.inf)),
+        *_what_fits(trials, steps, limit),
+        *(s.replace("It would fit with", thicker) for s in _what_fits(trials, steps, math.inf)),
     )
 
 
-def _what_fits(spec: Spec, steps: tuple[Relaxation, ...], limit: float) -> tuple[str, ...]:
+def _what_fits(trials: Trials, steps: tuple[Relaxation, ...], limit: float) -> tuple[str, ...]:
     """Changes that make the design feasible and thin enough: one step, one field or two steps."""
-    if smaller := _smaller_camera(spec, limit):
+    if smaller := _smaller_camera(trials, limit):
         return (smaller,)
     steps = tuple(s for s in steps if not s.path.startswith("design.envelope."))
-    series = growing_changes(spec)
-    sets = [(s,) for s in steps] + [(s,) for changes in series for s in changes]
-    fits = _fitting(spec, sets, limit)
-    single = [(fits[(s,)], s.words) for s in steps if (s,) in fits]
+    series = growing_changes(trials.spec)
+    fits = _fitting(trials, [(s,) for s in steps], limit)
+    single = [(thickness, s.words) for (s,), thickness in fits.items()]
     if single:
         best, words = min(single)
         return (f"It would fit with {words}: {best:.2f} mm.",)
+    fits = _fitting(trials, [(s,) for changes in series for s in changes], limit)
     alone = [next((s for s in changes if (s,) in fits), None) for changes in series]
     ways = [f"{s.words} ({fits[(s,)]:.2f} mm)" for s in alone if s is not None]
     if ways:
         return (f"It would fit with {' or with '.join(ways)}.",)
-    pairs = [(a, b) for i, a in enumerate(steps) for b in steps[i + 1 :]]
-    fits = _fitting(spec, pairs, limit)
-    if fits:
-        chosen = min(fits, key=lambda c: fits[c])
-        return (f"It would fit with {_list([s.words for s in chosen])}: {fits[chosen]:.2f} mm.",)
+    if pair := _fitting_pair(trials, steps, limit):
+        chosen, thickness = pair
+        return (f"It would fit with {_list([s.words for s in chosen])}: {thickness:.2f} mm.",)
     return (
         "No one field alone and no two of the usual steps make it fit: use a smaller gel and "
         "a camera with a wider field of view or a smaller aperture, or allow a thicker finger.",
     )
 
 
-def _smaller_camera(spec: Spec, limit: float) -> str | None:
+def _fitting_pair(trials: Trials, steps: Changes, limit: float) -> tuple[Changes, float] | None:
+    """Of the pairs of steps that fit a thin one, with its thickness; None if no pair fits.
+
+    A step only widens a limit or shrinks what must fit. Where a step does not fit together with
+    all weaker ones, it therefore fits with none of them. The pairs that are left are solved in
+    lists, the most promising first; the thinnest of the first list that holds any is taken.
+    """
+    alone = trials.of([(step,) for step in steps])
+    saving = {s: trial.thickness_mm for s, trial in zip(steps, alone, strict=True)}
+    order = tuple(sorted(steps, key=lambda s: saving[s]))
+    groups = [order[k:] for k in range(len(order) - 1)]
+    fits = _fitting(trials, groups, limit)
+    pairs = [(group[0], other) for group in groups if group in fits for other in group[1:]]
+    pairs.sort(key=lambda pair: sum(saving[s] for s in pair))
+    for start in range(0, len(pairs), AT_ONCE):
+        found = _fitting(trials, pairs[start : start + AT_ONCE], limit)
+        if found:
+            chosen = min(found, key=lambda c: found[c])
+            return chosen, found[chosen]
+    return None
+
+
+def _smaller_camera(trials: Trials, limit: float) -> str | None:
     """The largest camera housing with which a finger fits whose camera stands on a large board."""
-    camera = spec.camera
+    camera = trials.spec.camera
     if camera.module_height_mm < LARGE_CAMERA_MM:
         return None
     least = max(1.0, camera.lens_diameter_mm)
@@ -259,7 +279,7 @@ def _smaller_camera(spec: Spec, limit: float) -> str | None:
         )
         for size in map(float, sizes)
     ]
-    fits = _fitting(spec, sets, limit)
+    fits = _fitting(trials, sets, limit)
     if not fits:
         return None
     (height, width), thickness = next(iter(fits.items()))
@@ -270,17 +290,13 @@ def _smaller_camera(spec: Spec, limit: float) -> str | None:
     )
 
 
-def _fitting(
-    spec: Spec, sets: Sequence[tuple[Relaxation, ...]], limit: float
-) -> dict[tuple[Relaxation, ...], float]:
+def _fitting(trials: Trials, sets: Sequence[Changes], limit: float) -> dict[Changes, float]:
     """Those sets of relaxations that fit, each with the thickness it gives."""
-    if not sets:
-        return {}
-    thickness, feasible = _try(spec, sets)
+    envelope = trials.spec.design.envelope
     return {
-        chosen: float(t)
-        for chosen, t, ok in zip(sets, thickness, feasible, strict=True)
-        if ok and t <= limit + 1e-9
+        chosen: trial.thickness_mm
+        for chosen, trial in zip(sets, trials.of(sets), strict=True)
+        if _keeps_envelope(envelope, chosen, trial, THINNEST) and trial.thickness_mm <= limit + 1e-9
     }
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 
 import pytest
 from rule_samples import shipped, varied
 
-from gelslim_cad.checks.binding import binding_sentences
-from gelslim_cad.checks.relaxation import growing_changes, relaxations
-from gelslim_cad.dimensions import derive
+from gelslim_cad.checks.binding import _fitting, _fitting_pair, binding_sentences
+from gelslim_cad.checks.relaxation import derive_each, growing_changes, relaxations
+from gelslim_cad.checks.trials import FIGURES, Trials
+from gelslim_cad.dimensions import DimensionsBatch, derive
 from gelslim_cad.spec import Spec
 
 
@@ -114,6 +118,61 @@ def test_a_50_mm_gel_in_18_mm_is_refused_with_the_limit_and_a_way_out() -> None:
         thickness, feasible = solved(spec, words)
         assert feasible
         assert thickness > 18.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("mini20", {"design.envelope.max_thickness_mm": 15.5}),
+        ("mini20", {"design.envelope.max_thickness_mm": 17.0, "design.gel.length_mm": 24.0}),
+        ("mini20", {"design.envelope.max_length_mm": 50.0}),
+        ("gelslim2", {"design.envelope.max_thickness_mm": 15.0}),
+        ("gelslim2", {"design.optics.min_px_per_marker": 14.0, "camera.f_number": 2.0}),
+        ("thin", {"design.envelope.max_thickness_mm": 12.0}),
+    ],
+)
+def test_a_pair_is_found_wherever_one_of_all_pairs_fits(
+    name: str, changes: dict[str, float]
+) -> None:
+    """Groups of steps rule out only pairs that do not fit; the limit is where the pairs end."""
+    spec = varied(shipped(name), changes)
+    steps = tuple(s for s in relaxations(spec) if not s.path.startswith("design.envelope."))
+    trials = Trials(spec)
+    every = _fitting(trials, list(combinations(steps, 2)), math.inf)
+    limit = min(every.values(), default=20.0)
+    for most in (limit - 0.01, limit, limit + 0.5, limit + 2.0):
+        fitting = {pair: t for pair, t in every.items() if t <= most + 1e-9}
+        found = _fitting_pair(trials, steps, most)
+        assert (found is None) == (not fitting)
+        if found is not None:
+            pair, thickness = found
+            stated = fitting.get(pair, fitting.get(pair[::-1]))
+            assert thickness == pytest.approx(stated, abs=1e-6)
+
+
+def test_a_trial_is_the_design_with_its_changes_and_is_solved_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    spec = shipped("mini20")
+    trials, steps = Trials(spec), relaxations(spec)[:2]
+    solved_sets: list[int] = []
+
+    def counted(spec: Spec, designs: Sequence[Mapping[str, float]]) -> DimensionsBatch:
+        solved_sets.append(len(designs))
+        return derive_each(spec, designs)
+
+    monkeypatch.setattr("gelslim_cad.checks.trials.derive_each", counted)
+    sets = [(steps[0],), (steps[1],), steps]
+    found = trials.of(sets)
+    assert trials.of([sets[2], sets[0]]) == [found[2], found[0]]
+    assert trials.of([]) == []
+    assert solved_sets == [3]
+    for chosen, trial in zip(sets, found, strict=True):
+        d = derive(varied(spec, {s.path: s.value for s in chosen}))
+        assert trial.is_feasible == d.feasible()
+        for figure in FIGURES:
+            assert trial.figures[figure] == pytest.approx(d[figure], abs=2e-3)
 
 
 @pytest.mark.slow
