@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 from gelslim_cad.build.fingerprint import code_hash, combined
 from gelslim_cad.build.kept_checks import KeptChecks, solid_checks
 from gelslim_cad.build.order_files import order_unit
 from gelslim_cad.build.printing import print_options
 from gelslim_cad.build.work import PackedPart, Unit
-from gelslim_cad.build.writers import LADDER_JSON
+from gelslim_cad.build.writers import LADDER_JSON, glb_path
 from gelslim_cad.checks import Check, check
 from gelslim_cad.checks.binding import binding_sentences
 from gelslim_cad.dimensions import Dimensions, derive
@@ -144,9 +143,8 @@ class Stages:
         units = [
             *self.units_without_solids,
             Unit("assembly", "assembly", whole, named, cost=8),
-            Unit("glb", "glb", whole, named, cost=6),
+            self._models_unit(whole),
             self._order_unit(finger, whole),
-            Unit("robot", "robot", whole, named + self._robot_values(), cost=3),
             self._mould_unit(packed["gel_pad"]),
         ]
         if has_markers(self.dimensions):
@@ -173,10 +171,14 @@ class Stages:
         steps = finger_order(self.dimensions, [p.name for p in finger])
         return order_unit(whole, self.name, steps, tail_x_mm(self.dimensions), self.overlays)
 
-    def _robot_values(self) -> tuple[tuple[str, Any], ...]:
+    def _models_unit(self, whole: tuple[PackedPart, ...]) -> Unit:
+        """Models of the finger for viewers and for simulators, which show more than its parts."""
         from gelslim_cad.robot.model import robot_inputs
 
-        return tuple(robot_inputs(self.dimensions).items())
+        named = (("name", self.name),)
+        glb = ((glb_path(self.name), Unit("models", "models", whole, named).key()),)
+        values = named + tuple(robot_inputs(self.dimensions).items())
+        return Unit("models", "models", whole, values, cost=7, file_keys=glb)
 
     def _mould_unit(self, gel: PackedPart) -> Unit:
         """Unit that compares the cavity with the gel enlarged by the shrinkage."""

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from gelslim_cad.dimensions import Dimensions
     from gelslim_cad.spec import Spec
 
-GLB_LINEAR_MM = 0.1
-GLB_ANGULAR_DEG = 20.0
 PROOF_DECIMALS = 8
 LIGHT_JSON = "light.json"
 LIGHT_PATHS_JSON = "light_paths.json"
@@ -73,14 +71,42 @@ def write_assembly(parts: Sequence[Part], name: str) -> Written:
     return Written(files, _on_disk(files, lambda written: prove_step(written, parts)))
 
 
-def write_glb(parts: Sequence[Part], name: str) -> Written:
-    """GLB of the whole finger, for viewers and for the report."""
-    from gelslim_cad.export.glb import glb_bytes
-    from gelslim_cad.proof.mesh import prove_glb
+def write_models(
+    parts: Sequence[Part], name: str, known: Mapping[str, bytes] | None = None, **values: Any
+) -> Written:
+    """GLB of the finger for viewers, and models for simulators of robots, from the same meshes.
 
-    data = glb_bytes(parts, linear_mm=GLB_LINEAR_MM, angular_deg=GLB_ANGULAR_DEG)
-    files: Files = {f"{name}.glb": (data, "coloured mesh of the assembly, metres")}
-    return Written(files, _on_disk(files, lambda written: prove_glb(written, parts)))
+    `values` are `robot_inputs`. A GLB that is `known` is proved, but not written again.
+    """
+    from gelslim_cad.export.glb import ANGULAR_DEG, LINEAR_MM, glb_bytes
+    from gelslim_cad.export.mesh import face_patches, welded
+    from gelslim_cad.proof.mesh import prove_glb
+    from gelslim_cad.robot.files import FOLDER, robot_files
+    from gelslim_cad.robot.model import record, robot_finger
+    from gelslim_cad.robot.proof import prove_robot
+
+    faces = [face_patches(part.solid, LINEAR_MM, ANGULAR_DEG) for part in parts]
+    path = glb_path(name)
+    glb = known[path] if known and path in known else glb_bytes(parts, patches=faces)
+    viewer: Files = {path: (glb, "coloured mesh of the assembly, metres")}
+    proofs = _on_disk(viewer, lambda written: prove_glb(written, parts))
+    meshes = {part.name: welded(patches) for part, patches in zip(parts, faces, strict=True)}
+    finger = robot_finger(name, parts, values, meshes)
+    files: Files = robot_files(finger, values)
+    model = json_bytes(record(finger))
+    files[f"{FOLDER}/model.json"] = (model, "masses with sources, frames and contact")
+    with scratch_folder() as scratch:
+        for place, (data, _) in files.items():
+            target = scratch / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+        proofs += _recorded(prove_robot(scratch / FOLDER, parts, values))
+    return Written(viewer | files, proofs)
+
+
+def glb_path(name: str) -> str:
+    """Path of the GLB of a finger."""
+    return f"{name}.glb"
 
 
 def write_mould(parts: Sequence[Part], scale: float) -> Written:
@@ -189,24 +215,6 @@ def write_tolerance(parts: Sequence[Part], spec: str) -> Written:
     return Written({TOLERANCE_JSON: (data, "yields of the rules, causes, force errors")})
 
 
-def write_robot(parts: Sequence[Part], name: str, **values: Any) -> Written:
-    """Models for simulators of robots; `values` are `robot_inputs`."""
-    from gelslim_cad.robot.files import FOLDER, robot_files
-    from gelslim_cad.robot.model import record, robot_finger
-    from gelslim_cad.robot.proof import prove_robot
-
-    finger = robot_finger(name, parts, values)
-    files: Files = robot_files(finger, values)
-    model = json_bytes(record(finger))
-    files[f"{FOLDER}/model.json"] = (model, "masses with sources, frames and contact")
-    with scratch_folder() as scratch:
-        for path, (data, _) in files.items():
-            target = scratch / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(data)
-        return Written(files, _recorded(prove_robot(scratch / FOLDER, parts, values)))
-
-
 def _light_proofs(study: Any) -> tuple[dict[str, Any], ...]:
     """The fluxes add up to that of the sources, and no ray is lost."""
     lost = max(g.value("lost") for g in (study.light, study.glued, study.air_gap))
@@ -287,7 +295,7 @@ def _recorded(results: Proofs) -> tuple[dict[str, Any], ...]:
 WRITERS: dict[str, Callable[..., Written]] = {
     "part": write_part,
     "assembly": write_assembly,
-    "glb": write_glb,
+    "models": write_models,
     "order": write_order,
     "markers": write_markers,
     "mould": write_mould,
@@ -295,7 +303,6 @@ WRITERS: dict[str, Callable[..., Written]] = {
     "light": write_light,
     "bundle": write_bundle_files,
     "tolerance": write_tolerance,
-    "robot": write_robot,
 }
 """The function that does each kind of unit."""
 
@@ -309,7 +316,7 @@ def load_libraries(kinds: Collection[str]) -> None:
         from gelslim_core.first_kernel import load_numba
 
         load_numba()
-    if not {"part", "glb", "robot"}.isdisjoint(kinds):
+    if not {"part", "models"}.isdisjoint(kinds):
         import trimesh  # noqa: F401
     if "part" in kinds:
         import gelslim_cad.printability.thickness_kernel  # noqa: F401

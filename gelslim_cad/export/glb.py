@@ -19,6 +19,8 @@ from gelslim_cad.export.mesh import Patch, face_patches
 from gelslim_cad.geometry.overlay import linear_light
 from gelslim_cad.geometry.part import Part
 
+LINEAR_MM, ANGULAR_DEG = 0.1, 20.0
+"""Tolerances of the meshes of viewers: from chord to curve, and between neighbouring chords."""
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
 _HALF = 0.7071067811865476
@@ -58,7 +60,13 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def glb_bytes(parts: Sequence[Part], *, linear_mm: float = 0.1, angular_deg: float = 20.0) -> bytes:
+def glb_bytes(
+    parts: Sequence[Part],
+    *,
+    linear_mm: float = LINEAR_MM,
+    angular_deg: float = ANGULAR_DEG,
+    patches: Sequence[Sequence[Patch]] | None = None,
+) -> bytes:
     """Write parts as GLB in metres, y up, with the surfaces' own normals and sharp edges.
 
     Each node has the part's name and `extras`: `explode_mm` (sensor frame), `process`,
@@ -68,6 +76,7 @@ def glb_bytes(parts: Sequence[Part], *, linear_mm: float = 0.1, angular_deg: flo
         parts: The parts.
         linear_mm: Largest distance between a chord and its curve.
         angular_deg: Largest angle between neighbouring chords.
+        patches: The triangulated faces of each part, where they are known already.
 
     Returns:
         Content of the file.
@@ -79,8 +88,9 @@ def glb_bytes(parts: Sequence[Part], *, linear_mm: float = 0.1, angular_deg: flo
         raise ExportError("GLB: 0 parts given, at least 1 needed")
     buffer = _Buffer()
     meshes = []
-    for number, part in enumerate(parts):
-        attributes, indices = _geometry(buffer, face_patches(part.solid, linear_mm, angular_deg))
+    faces = patches or (face_patches(part.solid, linear_mm, angular_deg) for part in parts)
+    for number, (part, of_part) in enumerate(zip(parts, faces, strict=True)):
+        attributes, indices = _geometry(buffer, of_part)
         primitive = {"attributes": attributes, "indices": indices, "material": number}
         meshes.append({"name": part.name, "primitives": [primitive]})
     root = {

@@ -21,8 +21,6 @@ from gelslim_core.errors import GelslimError
 
 Read = Callable[[Path], LoadedSpec]
 """Reads a spec file; raises GelslimError where it is refused."""
-LINEAR_MM, ANGULAR_DEG = 0.1, 20.0
-"""Of the mesh on the page, as in the report."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class Modeller:
         from gelslim_cad.solids.finger import finger_parts
 
         parts = finger_parts(d, own, self.store)
-        return glb_bytes(parts, linear_mm=LINEAR_MM, angular_deg=ANGULAR_DEG)
+        return glb_bytes(parts)
 
 
 def problem_lines(error: GelslimError) -> list[str]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gelslim_cad.export.mesh import TriangleMesh
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.jaw import JawBolts
 from gelslim_cad.geometry.lookup import Lookup
@@ -107,13 +108,19 @@ class RobotFinger:
         return (*self.visuals, *self.collisions)
 
 
-def robot_finger(name: str, parts: Sequence[Part], d: Lookup) -> RobotFinger:
+def robot_finger(
+    name: str,
+    parts: Sequence[Part],
+    d: Lookup,
+    meshes: Mapping[str, TriangleMesh] | None = None,
+) -> RobotFinger:
     """Describe a finger for simulators.
 
     Args:
         name: Name of the finger.
         parts: Its assembled parts, in the sensor frame.
         d: Dimensions and spec fields (`NAMES`).
+        meshes: Meshes of the parts by their names, where they are known already.
 
     Returns:
         The description. Needs the CAD kernel.
@@ -128,7 +135,7 @@ def robot_finger(name: str, parts: Sequence[Part], d: Lookup) -> RobotFinger:
     )
     mass = combined_mass(m.properties for m in moved)
     optical = optical_frame(d)
-    meshes = part_meshes(parts)
+    meshes = meshes or part_meshes(parts)
     return RobotFinger(
         name=name,
         mass=mass,

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_cad.export.glb import ANGULAR_DEG, LINEAR_MM
 from gelslim_cad.export.mesh import TriangleMesh, stored, tessellate, volume_mm3
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
 
-LINEAR_MM = 0.1
-ANGULAR_DEG = 25.0
-"""Tolerances of the meshes: those of a viewer. Masses do not depend on them."""
 ADAPTER = "gripper_adapter"
 GEL = "gel_pad"
 CABLE = "camera_cable"
@@ -42,7 +40,10 @@ class Piece:
 
 
 def part_meshes(parts: Sequence[Part]) -> dict[str, TriangleMesh]:
-    """Meshes of parts by their names, from which all pieces are made."""
+    """Meshes of parts by their names, from which all pieces are made: as fine as a viewer's.
+
+    Masses do not depend on them.
+    """
     return {part.name: tessellate(part.solid, LINEAR_MM, ANGULAR_DEG) for part in parts}
 
 

@@ -289,6 +289,6 @@ def test_a_build_follows_an_own_part(tmp_path: Path) -> None:
     assert build_variant(loaded.path, folder, jobs=1).up_to_date
     (tmp_path / "my_parts.py").write_text(code.replace("DEPTH_MM = 0.3", "DEPTH_MM = 0.25"))
     again = build_variant(loaded.path, folder, jobs=1)
-    assert {"part body", "assembly", "glb"} <= set(again.rebuilt)
+    assert {"part body", "assembly", "models"} <= set(again.rebuilt)
     assert not {"light", "bundle", "part back_cover"} & set(again.rebuilt)
     assert {"bundle", "light"} <= set(first.rebuilt)
