@@ -25,9 +25,8 @@ from machine import machine
 from surface_deviation import deviation_um
 
 from gelslim_cad.build.work import VOLUME_TOLERANCE
-from gelslim_cad.build.writers import GLB_ANGULAR_DEG, GLB_LINEAR_MM
 from gelslim_cad.dimensions import derive
-from gelslim_cad.export.glb import glb_bytes
+from gelslim_cad.export.glb import ANGULAR_DEG, LINEAR_MM, glb_bytes
 from gelslim_cad.export.mesh import RUNGS, face_patches, mesh_for, tessellate, volume_mm3, welded
 from gelslim_cad.export.print_files import stl_bytes
 from gelslim_cad.geometry.part import Part
@@ -93,11 +92,14 @@ def built_stl_files(parts: Parts) -> list[bytes]:
 
 
 def glb_rows(parts: Parts, rungs: Sequence[Tolerances], repeats: int) -> list[dict[str, Any]]:
-    """GLB of the whole finger at each pair of tolerances; a build's own is among them."""
-    own = (GLB_LINEAR_MM, GLB_ANGULAR_DEG)
+    """GLB of the whole finger at each pair of tolerances; a build's own is among them.
+
+    A build gives the light guide finer chords.
+    """
+    own = (LINEAR_MM, ANGULAR_DEG)
     rows = []
     for linear, angular in sorted({*rungs, own}, reverse=True):
-        work = partial(glb_bytes, parts, linear_mm=linear, angular_deg=angular)
+        work = partial(glb_bytes, parts, tolerances=(linear, angular))
         data, cpu_s = timed(work, repeats)
         chosen = [(linear, angular)] * len(parts)
         is_own = (linear, angular) == own

@@ -78,14 +78,14 @@ def write_models(
 
     `values` are `robot_inputs`. A GLB that is `known` is proved, but not written again.
     """
-    from gelslim_cad.export.glb import ANGULAR_DEG, LINEAR_MM, glb_bytes
+    from gelslim_cad.export.glb import glb_bytes, viewer_tolerances
     from gelslim_cad.export.mesh import face_patches, welded
     from gelslim_cad.proof.mesh import prove_glb
     from gelslim_cad.robot.files import FOLDER, robot_files
     from gelslim_cad.robot.model import record, robot_finger
     from gelslim_cad.robot.proof import prove_robot
 
-    faces = [face_patches(part.solid, LINEAR_MM, ANGULAR_DEG) for part in parts]
+    faces = [face_patches(part.solid, *viewer_tolerances(part)) for part in parts]
     path = glb_path(name)
     glb = known[path] if known and path in known else glb_bytes(parts, patches=faces)
     viewer: Files = {path: (glb, "coloured mesh of the assembly, metres")}

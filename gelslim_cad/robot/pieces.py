@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.export.glb import ANGULAR_DEG, LINEAR_MM
+from gelslim_cad.export.glb import LINEAR_MM, viewer_tolerances
 from gelslim_cad.export.mesh import TriangleMesh, stored, tessellate, volume_mm3
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.part import Part
@@ -44,7 +44,7 @@ def part_meshes(parts: Sequence[Part]) -> dict[str, TriangleMesh]:
 
     Masses do not depend on them.
     """
-    return {part.name: tessellate(part.solid, LINEAR_MM, ANGULAR_DEG) for part in parts}
+    return {part.name: tessellate(part.solid, *viewer_tolerances(part)) for part in parts}
 
 
 def visual_pieces(

@@ -12,12 +12,12 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from gelslim_cad.export.glb import LINEAR_MM
 from gelslim_cad.geometry.lookup import Lookup
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.proof import ProofResult, at_most, equal, unreadable
 from gelslim_cad.robot.frames import mount_origin_mm
 from gelslim_cad.robot.mass import MassProperties, combined_mass, part_mass
-from gelslim_cad.robot.pieces import LINEAR_MM
 
 MASS_LIMIT = 1e-6
 """Relative, of masses and inertias; texts keep nine digits."""

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 import trimesh
 from sampled import quick
+from shipped_fingers import dimensions
 
 from gelslim_cad.export import ExportError
-from gelslim_cad.export.glb import glb_bytes
+from gelslim_cad.export.glb import glb_bytes, viewer_tolerances
 from gelslim_cad.export.mesh import (
     RUNGS,
     bad_edges,
@@ -25,8 +26,10 @@ from gelslim_cad.export.mesh import (
     rotation,
     tessellate,
     volume_mm3,
+    welded,
 )
 from gelslim_cad.export.print_files import stl_bytes, threemf_bytes
+from gelslim_cad.solids.guide import light_guide
 
 VOLUMES_MM3 = {
     "plate": samples.drilled_plate_area_mm2() * 6,
@@ -168,6 +171,7 @@ def test_glb_holds_one_node_per_part_with_extras_and_linear_colours():
         "process": "buy",
         "quantity": 4,
         "material": "resin",
+        "chord_deg": 20.0,
     }
     glass, grey = document["materials"]
     assert glass["alphaMode"] == "BLEND"
@@ -187,6 +191,19 @@ def test_glb_is_in_metres_with_the_gel_facing_up():
     assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume == pytest.approx(64e-9, rel=1e-6)
     with pytest.raises(ExportError):
         glb_bytes([])
+
+
+def test_the_bend_of_a_guide_has_fine_chords():
+    """Its faces turn by 0.5 degrees at most, or by the sharp angle of an edge."""
+    guide = light_guide(dimensions("gelslim2"))
+    patches = face_patches(guide.solid, *viewer_tolerances(guide))
+    mesh = welded(patches)
+    angles = np.degrees(trimesh.Trimesh(mesh.vertices_mm, mesh.faces).face_adjacency_angles)
+    bends = angles[(angles > 1e-3) & (angles < 10)]
+    assert len(bends) > 300
+    assert bends.max() < 0.51
+    document = glb_json(glb_bytes([guide]))
+    assert document["nodes"][1]["extras"]["chord_deg"] == 0.5
 
 
 def test_rotation_turns_about_x_then_y_then_z():

@@ -157,7 +157,7 @@ def test_glb_proof_passes_metres_and_catches_millimetres_and_a_shift(tmp_path, p
     path = written(tmp_path, "all.glb", glb_bytes(parts))
     assert failures(prove_glb(path, parts)) == []
     big = [samples.part(p.name, p.solid.scale(1000)) for p in parts[:1]]
-    wrong = written(tmp_path, "wrong.glb", glb_bytes(big, linear_mm=100))
+    wrong = written(tmp_path, "wrong.glb", glb_bytes(big, tolerances=(100, 20)))
     assert failed(prove_glb(wrong, parts[:1])) == {"bounds in metres"}
     shifted = [samples.part("plate", parts[0].solid.translate(cq.Vector(0, 0, 0.5)))]
     moved = written(tmp_path, "moved.glb", glb_bytes(shifted))

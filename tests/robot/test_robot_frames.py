@@ -11,11 +11,12 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from gelslim_cad.export.brep import bounds_mm
+from gelslim_cad.export.glb import LINEAR_MM, viewer_tolerances
 from gelslim_cad.export.mesh import tessellate
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.optics import virtual_camera
 from gelslim_cad.robot.frames import quaternion_wxyz, roll_pitch_yaw
-from gelslim_cad.robot.pieces import ANGULAR_DEG, LINEAR_MM, convex_hull, crown_top_mm
+from gelslim_cad.robot.pieces import convex_hull, crown_top_mm
 
 
 def in_mount(written: WrittenFinger, points_mm: np.ndarray) -> np.ndarray:
@@ -143,7 +144,7 @@ def test_no_part_reaches_out_of_the_collision_meshes(
     for part in finger.parts:
         if part.name == "camera_cable" or "wire" in part.tags:
             continue  # they leave the case, and yield
-        points = tessellate(part.solid, LINEAR_MM, ANGULAR_DEG).vertices_mm - origin
+        points = tessellate(part.solid, *viewer_tolerances(part)).vertices_mm - origin
         out = np.full(len(points), np.inf)
         for piece in finger.finger.collisions:
             planes = ConvexHull(piece.mesh.vertices_mm).equations
