@@ -1,24 +1,20 @@
-"""Contact forces at the candidate nodes of a tool, with or without Coulomb friction.
+"""Contact forces with Coulomb friction at the candidate nodes of a tool.
 
-Frictionless contact is a linear complementarity problem, which an active-set method solves to
-rounding. Contact with friction is solved by block Gauss-Seidel sweeps; where these converge slowly,
-semismooth Newton steps on the sets of sticking and slipping nodes take over (Alart and Curnier
-1991).
+Block Gauss-Seidel sweeps solve the contact; where these converge slowly, semismooth Newton steps on
+the sets of sticking and slipping nodes take over (Alart and Curnier 1991).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, lu_factor, lu_solve
+from scipy.linalg import LinAlgError, lu_factor, lu_solve
 
+from gelslim_twin.contact.contact_forces import SLIP, ContactForces
+from gelslim_twin.contact.coulomb_kernel import answers, motion, sweep
 from gelslim_twin.contact.gel_state import ContactError
 
 Array = NDArray[np.float64]
-Touches = NDArray[np.int8]
-FREE, STICK, SLIP = 0, 1, 2
 MOST_SWEEPS = 1000
 CHECK_EVERY = 6
 SLOW = 0.7
@@ -32,87 +28,6 @@ LEAST_RATE = 0.5
 """Least rate of convergence assumed for the sweeps."""
 
 
-@dataclass(frozen=True, eq=False)
-class ContactForces:
-    """Forces (n, 3) in N, displacements (n, 3) in mm and contact status (n,) of the nodes.
-
-    `residual` is the root mean square of the change of forces if every node were solved alone,
-    over the root mean square of the forces.
-    """
-
-    force_n: Array
-    motion_mm: Array
-    touch: Touches
-    residual: float
-    sweeps: int
-
-
-def solve_contact_forces(
-    compliance: Array | NDArray[np.float32],
-    height_mm: Array,
-    target_mm: Array,
-    friction: float,
-    start_n: Array | None = None,
-    tolerance: float = 1e-3,
-    frames: Array | None = None,
-    start_mm: Array | None = None,
-) -> ContactForces:
-    """Solve the contact of n nodes with a rigid tool.
-
-    Args:
-        compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite; single
-            precision halves the time of a large one.
-        height_mm: (n,) largest displacement of each node along its normal (the gap at rest);
-            inf for a node that is never in contact.
-        target_mm: (n, 2) displacement along its tangents of a node that sticks.
-        friction: coefficient μ >= 0.
-        start_n: (n, 3) forces to start from.
-        tolerance: on `ContactForces.residual`, and on the error of the forces that follows from
-            the rate of convergence; frictionless contact is solved to rounding.
-        frames: (n, 3, 3), in the columns each node's tangents and the normal into the tool;
-            None for x, y, z.
-        start_mm: (n, 3) displacement C f under `start_n`, if it is known.
-
-    Raises:
-        ContactError: the tolerance is not reached, or the input is invalid.
-    """
-    n = len(height_mm)
-    if not (np.isfinite(friction) and friction >= 0):
-        raise ContactError(f"friction = {friction}: must be finite and at least 0")
-    if np.isnan(height_mm).any() or not np.isfinite(target_mm).all():
-        raise ContactError("the heights or the targets of the nodes hold NaN")
-    start = np.zeros((n, 3)) if start_n is None else np.array(start_n, dtype=float)
-    if not (height_mm < 0).any():
-        nothing = np.zeros((n, 3))
-        return ContactForces(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
-    if friction == 0:
-        return _frictionless(compliance, height_mm, start, frames)
-    found = _Frictional(compliance, height_mm, target_mm, friction, frames)
-    return found.balance(start, start_mm, tolerance)
-
-
-def _frictionless(
-    compliance: Array | NDArray[np.float32], height: Array, start: Array, frames: Array | None
-) -> ContactForces:
-    n = len(height)
-    if frames is None:
-        across = compliance[:, 2::3].astype(float)
-        normal, normals = across[2::3], np.array([[0.0, 0.0, 1.0]])
-    else:
-        normals = frames[:, :, 2]
-        across = np.einsum("ijb,jb->ij", compliance.reshape(3 * n, n, 3), normals)
-        normal = np.einsum("iaj,ia->ij", across.reshape(n, 3, n), normals)
-    # Contact forces act against the normals.
-    push, pivots = lcp_forces(normal, height, (start * normals).sum(axis=1) < 0)
-    force = push[:, None] * normals
-    motion = np.asarray(across @ push).reshape(n, 3)
-    own = np.minimum((height - normal @ push) / np.diag(normal) + push, 0.0)
-    size = float(np.linalg.norm(push))
-    residual = float(np.linalg.norm(own - push)) / size if size > 0 else 0.0
-    touch = np.where(push < 0, SLIP, FREE).astype(np.int8)
-    return ContactForces(force, motion, touch, residual, pivots)
-
-
 def _left(changes: list[float], relaxation: float) -> float:
     """Estimated error of the forces: remainder of a geometric series of the last changes."""
     first, _, last = changes[-3], changes[-2], changes[-1]
@@ -120,7 +35,9 @@ def _left(changes: list[float], relaxation: float) -> float:
     return last * (rate / (1 - rate) if rate < 1 else np.inf) / relaxation
 
 
-class _Frictional:
+class FrictionalContact:
+    """The contact of n nodes with friction; for the arguments see `solve_contact_forces`."""
+
     def __init__(
         self,
         compliance: Array | NDArray[np.float32],
@@ -141,8 +58,6 @@ class _Frictional:
 
     def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> ContactForces:
         """Sweep until no node changes its force."""
-        from gelslim_twin.contact.coulomb_kernel import sweep
-
         f = np.ascontiguousarray(start).reshape(-1).copy()
         beside = np.isinf(self.height)
         if f.reshape(-1, 3)[beside].any():
@@ -195,16 +110,12 @@ class _Frictional:
 
     def _motion(self, f: Array) -> Array:
         """The displacement C f."""
-        from gelslim_twin.contact.coulomb_kernel import motion
-
         u = np.zeros_like(f)
         motion(self.c, f, u)
         return u
 
     def _residual(self, f: Array, u: Array) -> float:
         """Relative residual under the displacement C f; sets the contact status `touch`."""
-        from gelslim_twin.contact.coulomb_kernel import answers
-
         own = np.empty_like(f)
         answers(self.own, self.frames, self.height, self.target, self.mu, f, u, own, self.touch)
         size = float(np.linalg.norm(own))
@@ -241,7 +152,7 @@ class _Frictional:
         c = (q.transpose(0, 2, 1) @ self.c[np.ix_(dof, dof)].reshape(m, 3, 3 * m)).reshape(-1, m, 3)
         c = np.ascontiguousarray(np.einsum("imb,mbd->imd", c, q)).reshape(3 * m, 3 * m)
         present = np.einsum("mba,mb->ma", q, f.reshape(n, 3)[on]).reshape(-1)
-        motion = (c @ present).reshape(m, 3)
+        moved = (c @ present).reshape(m, 3)
         matrix = c.copy().reshape(m, 3, 3 * m)
         right = np.column_stack([self.target[on], self.height[on]])
         at = np.flatnonzero(self.touch[on] == SLIP)
@@ -249,7 +160,7 @@ class _Frictional:
         own = matrix.reshape(m, 3, m, 3)[at, :, at, :]
         # G = f_t + μ f_z d with d along f_t - ρ slip, ρ of the size of the node's stiffness.
         rho = 2.0 / (own[:, 0, 0] + own[:, 1, 1])
-        along = force[:, :2] - rho[:, None] * (motion[at, :2] - right[at, :2])
+        along = force[:, :2] - rho[:, None] * (moved[at, :2] - right[at, :2])
         size = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-300)
         d = along / size[:, None]
         swing = (self.mu * np.maximum(-force[:, 2], 0.0) / size)[:, None, None] * (
@@ -265,49 +176,3 @@ class _Frictional:
         local = lu_solve(lu_factor(matrix.reshape(3 * m, 3 * m)), right.reshape(-1))
         x[dof] = np.einsum("mab,mb->ma", q, local.reshape(m, 3)).reshape(-1)
         return x - f
-
-
-BLOCK_TRIES = 10
-ROUNDING = 1e-12
-
-
-def lcp_forces(normal: Array, height: Array, guess: NDArray[np.bool_]) -> tuple[Array, int]:
-    """Solve the linear complementarity problem f <= 0, A f <= height, f (A f - height) = 0.
-
-    Block principal pivoting (Júdice and Pires 1994): all nodes that violate a condition change
-    their status at once. Where that cycles, one node at a time does (Murty 1974), which terminates
-    for every positive definite matrix.
-
-    Args:
-        normal: A (n, n) in mm/N, symmetric positive definite.
-        height: (n,) in mm; inf for a node that is never pressed.
-        guess: (n,) initial active set.
-
-    Returns the forces (n,) and the number of factorisations. Raises ContactError where rounding
-    prevents convergence of the active set.
-    """
-    active, reachable = guess & np.isfinite(height), np.isfinite(height)
-    # Rounding must not change the status of a node whose force or gap is zero.
-    narrow = ROUNDING * float(np.abs(height[reachable]).max())
-    fewest, tries = len(height) + 1, BLOCK_TRIES
-    for factors in range(1, 20 * len(height) + 200):
-        force = np.zeros(len(height))
-        if active.any():
-            factor = cho_factor(normal[np.ix_(active, active)], check_finite=False)
-            force[active] = cho_solve(factor, height[active], check_finite=False)
-        slight = ROUNDING * float(np.abs(force).max())
-        wrong = (active & (force > slight)) | (~active & (height - normal @ force < -narrow))
-        count = int(wrong.sum())
-        if count == 0:
-            return np.minimum(force, 0.0), factors
-        if count < fewest:
-            fewest, tries = count, BLOCK_TRIES
-        elif tries > 0:
-            tries -= 1
-        else:
-            wrong &= np.arange(len(height)) == np.flatnonzero(wrong)[-1]
-        active = active ^ wrong
-    raise ContactError(
-        f"the active set of {len(height)} nodes does not converge: the compliance is too close to "
-        "singular; use cells of an aspect nearer 1 or a Poisson's ratio further from 0.5"
-    )

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.finite_strain import Anderson
-from gelslim_twin.contact.coulomb_contact import FREE, STICK, ContactForces, solve_contact_forces
+from gelslim_twin.contact.contact_forces import FREE, STICK, ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_body import GelBody, Tangent
 from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState
 from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.coulomb_contact import ContactForces, solve_contact_forces
+from gelslim_twin.contact.contact_forces import ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.tool import Tool, ToolSurface, tool_surface
 from gelslim_twin.scene.pose import Pose

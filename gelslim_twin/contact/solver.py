@@ -6,7 +6,7 @@ tangential direction t, the conditions at each pose are
     n·u <= h,  n·f <= 0,  n·f (n·u - h) = 0
     |f_t| <= μ |n·f|;  no slip inside the cone, slip against the tool opposed to f_t on the cone
 
-(Kalker 1990; for the forces see `coulomb_contact`). The tool is replaced by its tangent plane at
+(Kalker 1990; for the forces see `contact_forces`). The tool is replaced by its tangent plane at
 each node, which is updated until all nodes in contact lie on the tool (`plane_iteration`). The set
 of candidate nodes grows until no other node penetrates the tool. Where a step to a pose does not
 converge, it is halved.
@@ -22,7 +22,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.coulomb_contact import STICK
+from gelslim_twin.contact.contact_forces import STICK
 from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState, anchor_mm
 from gelslim_twin.contact.plane_iteration import (
     PlaneIteration,

@@ -127,7 +127,7 @@ FRICTION = Effect(
     formula="hypot(min(mu F, (G A/h + 8 G a/(2-nu)) s), min(mu, 1) (F_stick - F)); s + depth",
     ladder=friction_ladder,
     does_nothing=lambda c: c.friction == 0,
-    implementation="gelslim_twin.contact.coulomb_kernel",
+    implementation="gelslim_twin.contact.coulomb_contact",
     needs=("poses",),
     refines=("displacement", "force"),
 )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.coulomb_contact import FREE, SLIP, STICK, solve_contact_forces
+from gelslim_twin.contact.contact_forces import FREE, SLIP, STICK, solve_contact_forces
 from gelslim_twin.contact.coulomb_kernel import node_force
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.tool import Tool

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-from gelslim_twin.contact.coulomb_contact import (
+from gelslim_twin.contact.contact_forces import (
     FREE,
     SLIP,
     STICK,

@@ -11,7 +11,7 @@ from contact_pads import YOUNGS_MPA, small_pad
 from numpy.typing import NDArray
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.coulomb_contact import solve_contact_forces
+from gelslim_twin.contact.contact_forces import solve_contact_forces
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver

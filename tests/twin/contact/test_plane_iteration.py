@@ -9,7 +9,7 @@ import pytest
 from contact_pads import dense_compliance, small_pad
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.coulomb_contact import SLIP, STICK
+from gelslim_twin.contact.contact_forces import SLIP, STICK
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.plane_iteration import (
     AveragedNormals,
