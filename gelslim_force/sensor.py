@@ -75,9 +75,10 @@ def open_sensor(
         calibration: A calibration of this sensor, or its file. Contacts show in comparison with
             the reference; without one, with the picture that the calibration keeps.
         indenter: By default forces are those of an object of unknown shape, found from light and
-            markers, where the camera has colour and the bundle light; otherwise the normal force
-            is unknown. `"unknown"` insists on the former and `"none"` on the latter. A known
-            shape, such as `"sphere:10"` (mm), is stronger knowledge.
+            markers, where the camera has colour and the bundle light, and from the markers alone
+            where the pictures are grey; otherwise the normal force is unknown. `"unknown"` insists
+            on the former and `"none"` on the latter. A known shape, such as `"sphere:10"` (mm), is
+            stronger knowledge.
         depth_mm: Known depth of the indenter in mm, which a flat punch needs.
         normal: Another source of the normal motion, in place of an indenter.
         settings: Choices of the pipeline; the defaults if None.
@@ -90,8 +91,8 @@ def open_sensor(
         The pipeline; `process` takes one frame after the other.
 
     Raises:
-        SensorError: Arguments are missing, or contradict one another, or an indenter is to be found
-            in the pictures of a mono camera.
+        SensorError: Arguments are missing, or contradict one another, or an indenter of known shape
+            is to be found in the pictures of a mono camera.
         IfemError: The bundle cannot be read, or no operator keeps the budget.
         CalibrationError: The reference does not show this sensor at rest, or the calibration
             cannot be read or belongs to another sensor.
@@ -105,9 +106,9 @@ def open_sensor(
             "a calibration of the light serves objects of unknown shape: leave the indenter out",
         )
     sensor = bundle if isinstance(bundle, Bundle) else load_bundle(Path(bundle))
-    if indenter not in (None, NO_INDENTER):
+    if indenter not in (None, NO_INDENTER, UNKNOWN):
         require_colour(sensor)
-        indenter = indenter if indenter == UNKNOWN else _shape(indenter)
+        indenter = _shape(indenter)
     picture = reference
     if picture is not None and not isinstance(picture, np.ndarray):
         picture = read_reference(picture)
@@ -145,16 +146,25 @@ def normal_source(
         The source; None where the normal force stays unknown.
 
     Raises:
-        SensorError: An indenter is given and there is no picture without contact, or the camera
-            is mono.
+        SensorError: An indenter is given and there is no picture without contact, or its shape is
+            known and the camera mono, or a light is given and the pictures are grey.
         CalibrationError: The calibration belongs to another bundle.
         IndenterError: The indenter's description cannot be read.
         ValueError: An indenter is given and the reference is dark or of another size.
     """
     bundle, calibration = sensor.bundle, sensor.calibration
     picture = calibration.picture if reference is None else reference
-    if indenter == NO_INDENTER or (indenter is None and not _shows_shapes(bundle, picture)):
+    grey = _is_grey(bundle, picture)
+    if indenter == NO_INDENTER or (indenter is None and not _shows_shapes(bundle, picture, grey)):
         return None
+    if grey and indenter in (None, UNKNOWN):
+        if light is not None:
+            raise SensorError(
+                "light_calibration",
+                "the pictures of this sensor are grey, and the markers alone are used: leave the "
+                "calibration of the light out",
+            )
+        return unknown_source(bundle, calibration, None, settings)
     if picture is None:
         raise SensorError(
             "reference",
@@ -167,11 +177,17 @@ def normal_source(
     return sensor.varied(named, settings)
 
 
-def _shows_shapes(bundle: Bundle, picture: Picture | None) -> bool:
+def _is_grey(bundle: Bundle, picture: Picture | None) -> bool:
+    """Whether the pictures of a sensor show brightness alone, be it in three equal channels."""
+    if is_mono(bundle.camera) or picture is None:
+        return is_mono(bundle.camera)
+    return picture.ndim == 2 or bool((picture == picture[..., :1]).all())
+
+
+def _shows_shapes(bundle: Bundle, picture: Picture | None, grey: bool) -> bool:
     """Whether forces of objects of unknown shape can be found in the pictures of a sensor."""
-    coloured = picture is not None and picture.ndim == 3
     small = len(bundle.mesh.surface) <= _MOST_NODES
-    return coloured and bool(bundle.light) and not is_mono(bundle.camera) and small
+    return small and (grey or (picture is not None and bool(bundle.light)))
 
 
 def indenter_source(
@@ -223,16 +239,16 @@ def indenter_source(
 def unknown_source(
     bundle: Bundle,
     calibration: Calibration,
-    reference: Picture,
+    reference: Picture | None,
     settings: PipelineSettings | None = None,
     light: LightCalibration | None = None,
 ) -> UnknownShape:
-    """Make a normal source for objects of unknown shape, from light and markers together.
+    """Make a normal source for objects of unknown shape, from light and markers.
 
     Args:
         bundle: The sensor.
         calibration: Its camera, and its markers at rest.
-        reference: (h, w, 3) uint8 picture without contact.
+        reference: (h, w, 3) uint8 picture without contact; None for forces from the markers alone.
         settings: Choose the law of the gel; the defaults if None.
         light: The light as built; None takes it as traced.
 
@@ -240,13 +256,14 @@ def unknown_source(
         The source, for the constructor of `ForcePipeline`.
 
     Raises:
-        SensorError: The sensor's camera is mono, or its bundle has no light.
+        SensorError: A reference is given, and the camera is mono or the bundle has no light.
         CalibrationError: The calibration belongs to another bundle.
         MeshError: The pad has too many surface nodes.
         ValueError: The reference is dark or of another size.
     """
-    require_colour(bundle)
-    if not bundle.light:
+    if reference is not None:
+        require_colour(bundle)
+    if reference is not None and not bundle.light:
         raise SensorError(
             "indenter",
             "the bundle has no light, by which the contact of an unknown shape is seen: make it "

@@ -4,7 +4,8 @@ Nodal forces on the region where the light changed are fitted to the motion of t
 picture and to the change of the light. A marker shows height too, as the camera looks at the gel
 at an angle; light shows the slope. The forces push, keep within a friction cone, and their
 traction is smooth. The model is linearised at the last estimate and solved again a few times; the
-nodes that hardly press are then removed, and the rest is solved again.
+nodes that hardly press are then removed, and the rest is solved again. Without light, the region
+and the forces follow from the markers alone.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy import sparse
 
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import NormalEquations, huber
 from gelslim_force.joint.region import contact_nodes, pressing_nodes
@@ -34,7 +36,7 @@ _MARKER_LIMIT = 3.0
 """Standard deviations beyond which a marker counts linearly."""
 _LEAST_NODES = 3
 _LEAST_ACROSS = 0.1
-"""Difference of the sensitivities of two channels that shows a slope across."""
+"""Sensitivity, or difference of those of two channels, that shows a slope across."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +74,11 @@ class JointEstimator:
         nodes_to_markers: (n, c) interpolation.
         marker_node: (n,) the node nearest to each marker.
         by_height: (n, 2) lateral motion that a picture shows per mm less of the marker's height.
-        light: The bins of the picture.
-        law: Change of light with the slope.
+        light: The bins of the picture; None where the markers alone are used.
+        law: Change of light with the slope; None without light.
         youngs_modulus_mpa: Of the gel.
         settings: What is assumed.
+        moved: Finds the region where there is no light.
         strained: Another law of the gel, from motion (c, 3) to forces (c, 3), and None for the
             linear one.
         strained_from_mm: Depth from which it is used.
@@ -90,10 +93,11 @@ class JointEstimator:
     nodes_to_markers: Any
     marker_node: Nodes
     by_height: Array
-    light: LightView
-    law: LightLaw
+    light: LightView | None
+    law: LightLaw | None
     youngs_modulus_mpa: float
     settings: JointSettings
+    moved: MovedRegion | None = None
     strained: Any = None
     strained_from_mm: float = 0.0
 
@@ -107,30 +111,29 @@ class JointEstimator:
         """Forces of a frame.
 
         Args:
-            image: (h, w, 3) uint8.
+            image: (h, w, 3) uint8; not looked at without light.
             markers_px: (n, 2) followed markers; NaN for lost ones.
             noise_px: Standard deviation of their positions.
             last: Forces of the frame before.
 
         Returns:
-            The forces; None where the light shows no contact.
+            The forces; None where no contact is seen.
 
         Raises:
             IfemError: The strained law does not converge.
         """
-        seen = self.light.look(image, markers_px)
-        region = contact_nodes(seen.shading, self._rise(seen), self.light.rest_mm, self.lattice)
+        seen = None if self.light is None else self.light.look(image, markers_px)
+        frame = _Frame(seen, markers_px, noise_px)
+        region = self._region(frame)
         if region.sum() < _LEAST_NODES:
             return None
-        frame = _Frame(seen, markers_px, noise_px)
-        if last is not None and (last.region & region).any():
-            nodes, state = last.region, _State(last.force_n, last.displacement_mm, last.gain)
-        else:
+        if last is None or not (last.region & region).any():
             still = np.zeros_like(self.points_mm)
-            state = _State(still, still, 1.0)
-            nodes, state = self._rounds(frame, region, state, self.settings.rounds)
-        nodes = region & self.lattice.widened(nodes, 1)
-        return self._found(*self._rounds(frame, nodes, state, self.settings.following_rounds))
+            begun = self._rounds(frame, region, _State(still, still, 1.0), self.settings.rounds)
+        else:
+            begun = last.region, _State(last.force_n, last.displacement_mm, last.gain)
+        nodes = region & self.lattice.widened(begun[0], 1)
+        return self._found(*self._rounds(frame, nodes, begun[1], self.settings.following_rounds))
 
     def _rounds(
         self, frame: _Frame, nodes: Mask, state: _State, rounds: tuple[int, ...]
@@ -144,15 +147,32 @@ class JointEstimator:
                 state = self._round(frame, np.flatnonzero(nodes), state)
         return nodes, state
 
-    def _rise(self, seen: SeenLight) -> Array | None:
+    def _region(self, frame: _Frame) -> Mask:
+        """(c,) nodes that the frame shows as possibly in contact."""
+        if self.light is not None and frame.seen is not None:
+            rise = self._rise(self.light, frame.seen)
+            return contact_nodes(frame.seen.shading, rise, self.light.rest_mm, self.lattice)
+        if self.moved is None:
+            return np.zeros(len(self.points_mm), dtype=bool)
+        lateral = self.markers.lateral_motion(frame.markers_px)
+        sigma = np.hypot(self.settings.marker_mm, self._noise_mm(frame))
+        return self.moved.nodes(lateral, sigma)
+
+    def _rise(self, light: LightView, seen: SeenLight) -> Array | None:
         """(rows, columns) change that grows with a rise along y; None where no light tells it."""
-        if len(self.light.channels) < 2:
-            return None
-        apart = self.light.share[:, 0] - self.light.share[:, 1]
-        falling = float(self.law.sensitivity[:, 1] @ apart.mean(axis=(1, 2)))
+        assert self.law is not None
+        by_slope = self.law.sensitivity[:, 1] @ light.share.mean(axis=(2, 3))
+        if len(by_slope) == 1:
+            falling, change = by_slope[0], seen.log_change[0]
+        else:
+            falling, change = by_slope[0] - by_slope[1], seen.log_change[0] - seen.log_change[1]
         if abs(falling) < _LEAST_ACROSS:
             return None
-        return np.asarray(-np.sign(falling) * (seen.log_change[0] - seen.log_change[1]))
+        return np.asarray(-np.sign(falling) * change)
+
+    def _noise_mm(self, frame: _Frame) -> Array:
+        """(n,) standard deviation of the markers' places on the gel by the noise of the image."""
+        return np.asarray(frame.noise_px * np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px))))
 
     def _round(self, frame: _Frame, nodes: Nodes, state: _State) -> _State:
         """Linearise at the state, and solve."""
@@ -160,10 +180,11 @@ class JointEstimator:
         moved = self.responses.displacement(nodes, state.force_n[nodes]) + offset
         chosen, near = self.settings, np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
-        light = self._light(frame, near, moved, state.gain)
-        heights = self.responses.of_heights(nodes, light.nodes)
         equations = self._with_markers(NormalEquations.of(len(start)), frame, near, moved)
-        equations = equations.with_light(light, heights, (1 - state.gain, chosen.gain_sigma))
+        light = self._light(frame, near, moved, state.gain)
+        if light is not None:
+            heights = self.responses.of_heights(nodes, light.nodes)
+            equations = equations.with_light(light, heights, (1 - state.gain, chosen.gain_sigma))
         young = self.youngs_modulus_mpa
         equations = equations.with_prior(
             start,
@@ -176,14 +197,12 @@ class JointEstimator:
         found = equations.solved(start, chosen.friction)
         force = np.zeros_like(state.force_n)
         force[nodes] = found.reshape(-1, 3)
+        motion = self.responses.displacement(nodes, force[nodes]) + offset
+        if light is None:
+            return _State(force, motion, state.gain, equations)
         higher = np.asarray(heights @ (found - start).astype(heights.dtype), dtype=float)
-        return _State(
-            force,
-            self.responses.displacement(nodes, force[nodes]) + offset,
-            light.gain_after(higher, chosen.gain_sigma),
-            equations,
-            light.unexplained(higher),
-        )
+        gain = light.gain_after(higher, chosen.gain_sigma)
+        return _State(force, motion, gain, equations, light.unexplained(higher))
 
     def _offset(self, state: _State) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -204,13 +223,14 @@ class JointEstimator:
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         residual = (lateral[used] - model[used, :2]).ravel()
         share = np.abs(lateral[used]).ravel() * self.settings.marker_share
-        scale = np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px[used])))
-        noise = np.repeat(frame.noise_px * scale, 2)
+        noise = np.repeat(self._noise_mm(frame)[used], 2)
         sigma = np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2)
         return equations.with_rows(rows, residual, huber(residual, sigma, _MARKER_LIMIT))
 
-    def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums:
+    def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums | None:
         """The change of light near the contact, linear about the present motion (c, 3)."""
+        if self.light is None or self.law is None or frame.seen is None:
+            return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide)
         return bins.sums(self.law, moved_mm[:, 2], gain, self.settings.light_error)
@@ -231,7 +251,7 @@ class JointEstimator:
 
 @dataclass(frozen=True, eq=False)
 class _Frame:
-    seen: SeenLight
+    seen: SeenLight | None
     markers_px: Array
     noise_px: float
 

@@ -31,6 +31,9 @@ class JointSettings:
         unseen_force: Normal force of a contact that the light may not show, over Young's modulus,
             in mm². On drawn pictures contacts of half this force are not seen, and those of twice
             it are.
+        unseen_by_markers: The same where there is no light.
+        most_sigma: Standard deviation of the normal force by the markers alone, over the force,
+            beyond which it is unknown.
         least_pressure: Share of the mean pressure below which a node is taken to be free.
         light_reach: Steps along the lattice around the region whose light is used.
         marker_reach: The same for the markers.
@@ -52,6 +55,8 @@ class JointSettings:
     normal_stress: float = 1.4
     tangential_stress: float = 0.07
     unseen_force: float = 0.2
+    unseen_by_markers: float = 0.4
+    most_sigma: float = 0.4
     least_pressure: float = 0.15
     light_reach: int = 4
     marker_reach: int = 8
@@ -74,7 +79,7 @@ class JointSettings:
     def __post_init__(self) -> None:
         positive = (
             "friction", "marker_mm", "light_error", "gain_sigma", "gamma", "roughness",
-            "normal_stress", "tangential_stress",
+            "normal_stress", "tangential_stress", "unseen_force", "unseen_by_markers", "most_sigma",
         )  # fmt: skip
         for name in positive:
             if not getattr(self, name) > 0:

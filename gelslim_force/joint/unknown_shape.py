@@ -1,7 +1,12 @@
-"""A source of the normal motion for objects of unknown shape: light and markers together."""
+"""A source of the normal motion for objects of unknown shape: light and markers together.
+
+Without light, as in the pictures of a mono camera, the markers alone are used: in a tilted view
+they show height.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +20,7 @@ from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.light_view import LightView
+from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
@@ -34,6 +40,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _LARGEST_UNEXPLAINED = 0.7
 _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the light unexplained"
+_UNCERTAIN = (
+    "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
+    "which is more than {:.0%} of it: it is unknown"
+)
 
 
 class UnknownShape:
@@ -83,6 +93,10 @@ class UnknownShape:
             return NormalReading(np.zeros(count), unseen, np.zeros(count, dtype=bool))
         if seen.unexplained > _LARGEST_UNEXPLAINED:
             return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
+        normal_n, most = abs(float(seen.force_n[:, 2].sum())), self.estimator.settings.most_sigma
+        sigma_n = float(np.sqrt(seen.covariance[2, 2]))
+        if self.estimator.light is None and sigma_n > most * normal_n:
+            return NormalReading.unknown(count, _UNCERTAIN.format(normal_n, sigma_n, most))
         height = seen.displacement_mm[:, 2]
         forces = FoundForces(
             seen.force_n, seen.displacement_mm, seen.covariance, seen.gain, seen.unexplained
@@ -94,7 +108,7 @@ class UnknownShape:
 def unknown_shape(
     bundle: Bundle,
     calibration: Calibration,
-    reference: NDArray[np.uint8],
+    reference: NDArray[np.uint8] | None,
     *,
     gel: str = "linear",
     settings: JointSettings | None = None,
@@ -105,7 +119,7 @@ def unknown_shape(
     Args:
         bundle: The sensor, with markers and light.
         calibration: Its camera, and its markers at rest.
-        reference: (h, w, 3) uint8 picture without contact.
+        reference: (h, w, 3) uint8 picture without contact; None for forces from the markers alone.
         gel: Law of the gel as in `PipelineSettings`.
         settings: What is assumed; the defaults if None.
         light: The light as built; see `JointSettings.with_light`.
@@ -127,8 +141,9 @@ def unknown_shape(
     heights_mm = marker_heights_mm(bundle)[followed.markers]
     view = MarkerView(calibration.camera, followed.positions_px, heights_mm)
     to_markers = marker_to_node(points_mm, view.rest_mm)
-    radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
-    traced = LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
+    seen = None
+    if reference is not None:
+        seen = _light_view(bundle, calibration, reference, lattice, light)
     estimator = JointEstimator(
         points_mm,
         surface_share_mm2(bundle.mesh),
@@ -139,23 +154,53 @@ def unknown_shape(
         to_markers,
         lattice.nearest_node(view.rest_mm[:, :2]),
         view.by_height(),
-        LightView(
-            calibration.camera,
-            upright(reference, calibration.camera),
-            followed.positions_px,
-            radius_px[np.searchsorted(calibration.markers, followed.markers)],
-            lattice,
-            traced,
-            light,
-        ),
-        LightLaw.of(traced, chosen.gamma),
+        seen,
+        None if seen is None else LightLaw.of(_traced(bundle), chosen.gamma),
         bundle.material.youngs_modulus_mpa,
         chosen,
-        None if gel == "linear" else FiniteStrainForce(bundle),
-        deep_mm(bundle) if gel == "auto" else 0.0,
+        strained=None if gel == "linear" else FiniteStrainForce(bundle),
+        strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
     )
-    unseen_n = chosen.unseen_force * bundle.material.youngs_modulus_mpa
+    if seen is None:
+        estimator = replace(estimator, moved=_moved_region(estimator))
+    least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
+    unseen_n = least * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / _stiffness_n_mm(bundle, estimator))
+
+
+def _traced(bundle: Bundle) -> LightMap:
+    return LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
+
+
+def _moved_region(estimator: JointEstimator) -> MovedRegion:
+    return MovedRegion(
+        estimator.responses,
+        estimator.by_height,
+        estimator.area_mm2,
+        estimator.neighbours,
+        estimator.lattice,
+        estimator.youngs_modulus_mpa,
+    )
+
+
+def _light_view(
+    bundle: Bundle,
+    calibration: Calibration,
+    reference: NDArray[np.uint8],
+    lattice: NodeLattice,
+    light: LightCalibration | None,
+) -> LightView:
+    followed = calibration.reference
+    radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
+    return LightView(
+        calibration.camera,
+        upright(reference, calibration.camera),
+        followed.positions_px,
+        radius_px[np.searchsorted(calibration.markers, followed.markers)],
+        lattice,
+        _traced(bundle),
+        light,
+    )
 
 
 def _stiffness_n_mm(bundle: Bundle, estimator: JointEstimator) -> float:

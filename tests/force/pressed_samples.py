@@ -30,6 +30,7 @@ from ifem_export.operators.surface_operator import SurfaceOperator, surface_oper
 Array = NDArray[np.float64]
 FRICTION = 0.6
 SIZE_MM = (22.0, 20.5)
+CONVERGED_MM = 1e-5
 _TIP = 0.4
 """Of the blue light: its slope over that of the others."""
 
@@ -116,6 +117,25 @@ def pressed(
     return drawn(force, moved, seed + 1000 * frame, noise=noise, brightness=brightness)
 
 
+@cache
+def _sight() -> tuple[Array, Array]:
+    return lines_of_sight(off_centre_view())
+
+
+def _material(splines: list[RectBivariateSpline]) -> Array:
+    """(n, 2) places at rest of what the pixels see, by iteration to convergence."""
+    rest, lean = _sight()
+    material, left = rest.copy(), np.arange(len(rest))
+    for _ in range(20):
+        u, v, w = (s.ev(*material[left].T) for s in splines)
+        found = rest[left] + lean[left] * w[:, None] - np.column_stack([u, v])
+        off = np.abs(found - material[left]).max(axis=1)
+        material[left] = found
+        left = left[off > CONVERGED_MM]
+    assert not len(left)
+    return material
+
+
 def drawn(
     force_n: Array, moved_mm: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
@@ -126,13 +146,11 @@ def drawn(
     place = [np.searchsorted(axis, np.round(points[:, k], 9)) for k, axis in enumerate((x, y))]
     filled[:, place[0], place[1]] = moved_mm.T
     splines = [RectBivariateSpline(x, y, part, kx=3, ky=3) for part in filled]
-    rest, lean = lines_of_sight(off_centre_view())
-    material = rest.copy()
-    for _ in range(8):
-        u, v, w = (s.ev(*material.T) for s in splines)
-        material = rest + lean * w[:, None] - np.column_stack([u, v])
-    inside = (np.abs(material) < np.array(SIZE_MM) / 2).all(axis=1)
-    slopes = [np.where(inside, splines[2].ev(*material.T, *d), 0.0) for d in ((1, 0), (0, 1))]
+    material = _material(splines)
+    inside = np.flatnonzero((np.abs(material) < np.array(SIZE_MM) / 2).all(axis=1))
+    slopes = np.zeros((2, len(material)))
+    for slope, order in zip(slopes, ((1, 0), (0, 1)), strict=True):
+        slope[inside] = splines[2].ev(*material[inside].T, *order)
     dots = np.column_stack([s.ev(*sensor_grid().positions_mm.T) for s in splines])
     frame = shaded(
         (slopes[0], slopes[1]),

@@ -72,8 +72,8 @@ def force(
     Follows the markers, corrects their motion for projection, and applies the stiffness of the
     bundle. Writes a run folder with the wrench of each frame and its standard deviation
     (wrenches.csv), the force at every node (fields), and overlay pictures. The object may have any
-    shape where the camera has colour; otherwise the normal force needs an indenter or depth maps.
-    Ctrl-C ends a run with a camera and keeps its files.
+    shape; in grey pictures a weak normal force is unknown without depth maps. Ctrl-C ends a run
+    with a camera and keeps its files.
     """
     from gelslim_force.built_sensor import built_gel, built_light
     from gelslim_force.frames.source import is_camera, open_frames

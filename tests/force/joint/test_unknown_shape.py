@@ -22,7 +22,7 @@ from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
-from gelslim_force.sensor import SensorError, open_sensor
+from gelslim_force.sensor import SensorError, open_sensor, unknown_source
 from gelslim_force.settings import PipelineSettings
 from ifem_export.operators.solver import ConvergenceError
 
@@ -222,7 +222,7 @@ def test_light_and_colour_are_needed() -> None:
         open_sensor(sensor_bundle(), reference=reference().image, indenter="unknown")
     mono = replace(lit_bundle(), camera={**lit_bundle().camera, "picture": "mono"})
     with pytest.raises(SensorError, match="mono"):
-        open_sensor(mono, reference=reference().image, indenter="unknown")
+        unknown_source(mono, calibration(), reference().image)
     with pytest.raises(SensorError, match="depth"):
         open_sensor(lit_bundle(), reference=reference().image, indenter="unknown", depth_mm=0.2)
 
