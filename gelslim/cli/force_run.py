@@ -175,7 +175,8 @@ KnownIndenter = Annotated[
     str | None,
     typer.Option(
         help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm). Without it the shape "
-        "is unknown, and forces are found from light and markers; none: tangential forces alone."
+        "is unknown, and forces are found from light and markers, in grey pictures from the markers "
+        "alone; none: tangential forces alone."
     ),
 ]
 KnownDepth = Annotated[
@@ -245,8 +246,10 @@ def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures:
     """Print the number of frames with forces, the last wrench, problems, times and folder."""
     from gelslim_force.joint.unknown_shape import UnknownShape
 
-    unknown = isinstance(pipeline.normal, UnknownShape)
-    by = "light and markers" if unknown else pipeline.operator_name
+    by = pipeline.operator_name
+    if isinstance(pipeline.normal, UnknownShape):
+        lit = pipeline.normal.estimator.light is not None
+        by = "light and markers" if lit else "the markers alone"
     say(f"{summary.frames} frames, {summary.with_forces} with forces, by {by}.")
     if summary.dropped:
         say(f"{summary.dropped} frames of the camera were dropped for newer ones.")
