@@ -25,6 +25,7 @@ from ladder_record import LadderRecord, records_of
 from ladders_of_camera import camera
 from ladders_of_force import force
 from ladders_of_solids import light, stiffness, tessellation
+from ladders_of_sources import sources
 from ladders_of_twin import rendering, twin
 
 Convert = Callable[[Mapping[str, Any], Mapping[str, Any]], list[LadderRecord]]
@@ -34,6 +35,7 @@ SOURCES: dict[str, Convert] = {
     "tessellation": tessellation,
     "camera_models": camera,
     "force_ladders": force,
+    "normal_sources": sources,
     "twin_ladders": twin,
     "rendering": rendering,
 }

@@ -43,6 +43,7 @@ STEPS = (
     Step("tessellation"),
     Step("camera_models"),
     Step("force_ladders"),
+    Step("normal_sources"),
     Step("twin_ladders"),
     Step("rendering"),
     Step("assembly"),

@@ -175,8 +175,8 @@ KnownIndenter = Annotated[
     str | None,
     typer.Option(
         help="Known indenter: sphere:10, cylinder:6, flat:5 or flat:4x8 (mm). Without it the shape "
-        "is unknown, and forces are found from light and markers, in grey pictures from the markers "
-        "alone; none: tangential forces alone."
+        "is unknown, and forces are found from light and markers, in grey pictures from markers; "
+        "none: tangential forces alone."
     ),
 ]
 KnownDepth = Annotated[

@@ -35,6 +35,8 @@ OURS_AT_MOST = {
     "matching": 0.001,
     "interpolation": 0.06,
     "compensation": 1e-9,
+    "normal-sources-any-object": 0.02,
+    "normal-sources-ball": 0.02,
     "contact-tolerance": 0.05,
     "drawing": 0.003,
     "shading": 2.0,

@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 FRICTION = 0.6
 SIZE_MM = (22.0, 20.5)
 CONVERGED_MM = 1e-5
+_ROUND = 0.75
+"""Exponent of the pressure of a ball: Hertz's is 0.5 on a thick gel, and 1 holds on a very thin
+one."""
 _TIP = 0.4
 """Of the blue light: its slope over that of the others."""
 
@@ -44,6 +47,8 @@ class Pressed:
     """(c, 3) on the nodes of the bundle."""
     wrench: Array
     """(6,) about the origin."""
+    moved_mm: Array
+    """(c, 3) motion of the nodes of the bundle."""
 
 
 @cache
@@ -109,12 +114,41 @@ def pressed(
     seed: int, *, share: float = 1.0, frame: int = 0, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
     """The picture of a share of random tractions; frames differ by their noise."""
-    rng = np.random.default_rng([11, seed])
-    mesh, operator, points = _fine()
-    cell = float(np.prod(mesh.cell_size_mm[:2]))
-    force = tractions(points, rng) * cell * share
-    moved = operator.displacement(force)
-    return drawn(force, moved, seed + 1000 * frame, noise=noise, brightness=brightness)
+    traction = share * tractions(fine_points_mm(), np.random.default_rng([11, seed]))
+    return pressed_by(traction, seed + 1000 * frame, noise=noise, brightness=brightness)
+
+
+def pressed_by(
+    traction_mpa: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
+) -> Pressed:
+    """The picture of tractions (n, 3) on the finer pad's nodes; the seed is that of its noise."""
+    mesh, operator, _ = _fine()
+    force = traction_mpa * float(np.prod(mesh.cell_size_mm[:2]))
+    return drawn(force, operator.displacement(force), seed, noise=noise, brightness=brightness)
+
+
+def round_patch(
+    place_mm: tuple[float, float],
+    radius_mm: float,
+    pressure_mpa: float,
+    shear: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Tractions (n, 3) of a round patch whose dent is that of a ball to 1 % of its depth.
+
+    Args:
+        place_mm: Its middle.
+        radius_mm: Its radius.
+        pressure_mpa: Pressure in the middle.
+        shear: Tangential traction over the pressure, along x and y.
+    """
+    away = (fine_points_mm()[:, :2] - place_mm) / radius_mm
+    pressure = pressure_mpa * np.maximum(1 - (away**2).sum(axis=1), 0.0) ** _ROUND
+    return pressure[:, None] * np.array([*shear, -1.0])
+
+
+def fine_points_mm() -> Array:
+    """(n, 3) surface nodes of the finer pad."""
+    return _fine()[2]
 
 
 @cache
@@ -161,4 +195,10 @@ def drawn(
         camera=off_centre_view(),
     )
     wrench = np.concatenate([force_n.sum(axis=0), np.cross(points, force_n).sum(axis=0)])
-    return Pressed(frame.image, lumped(force_n, mesh, sensor_bundle().mesh), wrench)
+    nodes = np.asarray(sensor_bundle().mesh.surface_mm)[:, :2]
+    return Pressed(
+        frame.image,
+        lumped(force_n, mesh, sensor_bundle().mesh),
+        wrench,
+        np.column_stack([s.ev(*nodes.T) for s in splines]),
+    )
