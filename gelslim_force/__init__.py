@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gelslim_force.calibration.sensor_calibration import Calibration
     from gelslim_force.contact.depth_map_source import DepthMapSource, read_depth_maps
     from gelslim_force.contact.normal_source import NormalReading, NormalSource
+    from gelslim_force.forces.contact_patches import PatchForce, contact_patches
     from gelslim_force.forces.estimator import ForceSettings
     from gelslim_force.forces.frame_result import ForceField, FrameResult
     from gelslim_force.forces.wrench import Wrench
@@ -66,6 +67,7 @@ __all__ = [
     "NormalReading",
     "NormalSource",
     "Overlay",
+    "PatchForce",
     "PictureSink",
     "PipelineSettings",
     "PressError",
@@ -77,6 +79,7 @@ __all__ = [
     "calibrate",
     "calibrate_gel",
     "calibrate_light",
+    "contact_patches",
     "indenter_source",
     "open_frames",
     "open_sensor",

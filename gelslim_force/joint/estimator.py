@@ -47,6 +47,7 @@ class JointForces:
         force_n: (c, 3) on the surface nodes.
         displacement_mm: (c, 3) of the surface nodes.
         region: (c,) nodes in contact.
+        seen: (c,) nodes that the picture showed as possibly in contact.
         covariance: (6, 6) of force and torque about the origin; the gel is taken as specified.
         gain: Gain of the light found in this frame.
         unexplained: Share of the change of light in the region that the forces do not explain.
@@ -55,6 +56,7 @@ class JointForces:
     force_n: Array
     displacement_mm: Array
     region: Mask
+    seen: Mask
     covariance: Array
     gain: float
     unexplained: float
@@ -132,8 +134,13 @@ class JointEstimator:
             begun = self._rounds(frame, region, _State(still, still, 1.0), self.settings.rounds)
         else:
             begun = last.region, _State(last.force_n, last.displacement_mm, last.gain)
+            if (region & ~self.lattice.widened(last.seen, 1)).any():
+                # A contact that was not there before is not next to the nodes that pressed.
+                begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
-        return self._found(*self._rounds(frame, nodes, begun[1], self.settings.following_rounds))
+        return self._found(
+            region, *self._rounds(frame, nodes, begun[1], self.settings.following_rounds)
+        )
 
     def _rounds(
         self, frame: _Frame, nodes: Mask, state: _State, rounds: tuple[int, ...]
@@ -235,7 +242,7 @@ class JointEstimator:
         bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide)
         return bins.sums(self.law, moved_mm[:, 2], gain, self.settings.light_error)
 
-    def _found(self, region: Mask, state: _State) -> JointForces:
+    def _found(self, seen: Mask, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
         nodes = np.flatnonzero(region)
         sums = np.reshape(rigid_motions(self.points_mm[nodes]), (6, -1))
@@ -243,6 +250,7 @@ class JointEstimator:
             state.force_n,
             state.displacement_mm,
             region,
+            seen,
             state.equations.covariance_of(sums, state.force_n[nodes].ravel()),
             state.gain,
             state.unexplained,

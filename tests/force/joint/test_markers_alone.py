@@ -130,3 +130,15 @@ def test_random_tractions() -> None:
     assert np.median(shear) < 0.002
     spread = np.sqrt(np.mean(np.square(scores), axis=0))
     assert (spread < 1.3).all()
+
+
+@pytest.mark.slow
+def test_a_contact_elsewhere_is_seen_at_once() -> None:
+    """The two presses overlap in part: what the frame before knew is not all."""
+    mono().reset()
+    for seed in (13, 20, 13):
+        truth = pressed(seed)
+        found = mono().process(grey(truth.image))
+        assert found.wrench is not None
+        off = found.wrench.force_n - truth.wrench[:3]
+        assert (np.abs(off) < 3 * found.wrench.standard_deviation[:3]).all()
