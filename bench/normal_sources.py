@@ -154,9 +154,10 @@ def sources(kind: str) -> dict[str, Process]:
 
 def shape_source(colours: int | None) -> UnknownShape:
     """An unknown shape from the light of some colours, or None from the markers alone."""
-    picture = None if colours is None else reference().image
+    if colours is None:
+        return unknown_shape(lit_bundle(), calibration(), None)
     settings = JointSettings(gamma=1.0)
-    return unknown_shape(lit_bundle(colours or 2), calibration(), picture, settings=settings)
+    return unknown_shape(lit_bundle(colours), calibration(), reference().image, settings=settings)
 
 
 def row(kind: str, name: str, presses: list[Press], process: Process) -> dict[str, Any]:

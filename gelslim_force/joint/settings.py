@@ -55,7 +55,7 @@ class JointSettings:
     normal_stress: float = 1.4
     tangential_stress: float = 0.07
     unseen_force: float = 0.2
-    unseen_by_markers: float = 0.4
+    unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
     least_pressure: float = 0.15
     light_reach: int = 4
@@ -88,3 +88,7 @@ class JointSettings:
             raise ValueError(f"least_pressure = {self.least_pressure!r}: must be in 0 ... 1")
         if min(*self.rounds, *self.following_rounds) < 1:
             raise ValueError("rounds and following_rounds must be at least 1")
+
+
+MARKERS_ALONE = JointSettings(least_pressure=0.2, rounds=(2, 1, 1))
+"""Without light: markers show the region less sharply, so that more nodes have to be removed."""

@@ -23,7 +23,7 @@ from gelslim_force.joint.light_view import LightView
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.responses import Responses
-from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.settings import MARKERS_ALONE, JointSettings
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_force.tracking.marker_noise import noise_px
@@ -131,7 +131,7 @@ def unknown_shape(
         ValueError: The reference is dark or of another size.
         MeshError: The pad has too many surface nodes.
     """
-    chosen = settings or JointSettings()
+    chosen = settings or (MARKERS_ALONE if reference is None else JointSettings())
     if light is not None:
         chosen = chosen.with_light(light)
     followed = calibration.reference
