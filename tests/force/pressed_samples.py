@@ -30,10 +30,11 @@ from ifem_export.operators.surface_operator import SurfaceOperator, surface_oper
 Array = NDArray[np.float64]
 FRICTION = 0.6
 SIZE_MM = (22.0, 20.5)
-CONVERGED_MM = 1e-5
+CONVERGED_MM, RIM_MM = 1e-5, 0.2
 _ROUND = 0.75
 """Exponent of the pressure of a ball: Hertz's is 0.5 on a thick gel, and 1 holds on a very thin
 one."""
+KINDS = ("disc", "rod", "ring", "tilted", "texture", "edge")
 _TIP = 0.4
 """Of the blue light: its slope over that of the others."""
 
@@ -110,6 +111,38 @@ def tractions(points_mm: Array, rng: np.random.Generator) -> Array:
     return total
 
 
+def shaped(seed: int) -> Pressed:
+    """The picture of an object of one of the kinds in `KINDS`, which take turns."""
+    rng = np.random.default_rng([12, seed])
+    kind = KINDS[seed % len(KINDS)]
+    return pressed_by(_traction_of(kind, fine_points_mm(), rng), seed)
+
+
+def _traction_of(kind: str, points_mm: Array, rng: np.random.Generator) -> Array:
+    """Tractions (n, 3) in MPa of one object at a random place and angle."""
+    reach = np.array([8.5, 8.0]) if kind == "edge" else np.array([5.0, 5.0])
+    middle, angle = rng.uniform(-reach, reach), rng.uniform(0, np.pi)
+    if kind == "edge":
+        side = int(rng.integers(2))
+        middle[side] = rng.choice([-1.0, 1.0]) * rng.uniform(reach[side], SIZE_MM[side] / 2)
+    x, y = (points_mm[:, :2] - middle).T
+    along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
+    half = (rng.uniform(3.5, 6.0), rng.uniform(0.9, 1.4)) if kind == "rod" else (3.0, 2.5)
+    away = np.sqrt((along / half[0]) ** 2 + (across / half[1]) ** 2)
+    pressure = np.maximum(1 - away**2, 0.0) ** rng.choice([0.5, 1.0])
+    if kind == "ring":
+        pressure = np.maximum(1 - ((away - 0.75) / 0.35) ** 2, 0.0)
+    elif kind == "tilted":
+        pressure = (away < 1) * np.maximum(0.5 + 0.6 * along / half[0], 0.0)
+    elif kind == "texture":
+        pressure *= 0.5 + 0.5 * np.cos(2 * np.pi * along / rng.uniform(1.8, 2.6))
+    pressure *= rng.uniform(0.012, 0.035)
+    shear, turn = rng.uniform(0, 0.5 * FRICTION), rng.uniform(0, 2 * np.pi)
+    twist = rng.uniform(-0.1, 0.1)
+    tangential = (shear * np.cos(turn) - twist * y, shear * np.sin(turn) + twist * x)
+    return np.column_stack([pressure * tangential[0], pressure * tangential[1], -pressure])
+
+
 def pressed(
     seed: int, *, share: float = 1.0, frame: int = 0, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
@@ -157,7 +190,10 @@ def _sight() -> tuple[Array, Array]:
 
 
 def _material(splines: list[RectBivariateSpline]) -> Array:
-    """(n, 2) places at rest of what the pixels see, by iteration to convergence."""
+    """(n, 2) places at rest of what the pixels see, by iteration to convergence.
+
+    Pixels at the rim may alternate between the pad and what is beside it.
+    """
     rest, lean = _sight()
     material, left = rest.copy(), np.arange(len(rest))
     for _ in range(20):
@@ -166,7 +202,8 @@ def _material(splines: list[RectBivariateSpline]) -> Array:
         off = np.abs(found - material[left]).max(axis=1)
         material[left] = found
         left = left[off > CONVERGED_MM]
-    assert not len(left)
+    rim = np.abs(np.abs(material[left]) - np.array(SIZE_MM) / 2).min(axis=1)
+    assert (rim < RIM_MM).all()
     return material
 
 
