@@ -11,6 +11,7 @@ and the forces follow from the markers alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -154,6 +155,16 @@ class JointEstimator:
                 state = self._round(frame, np.flatnonzero(nodes), state)
         return nodes, state
 
+    @cached_property
+    def _mm_per_px(self) -> Array:
+        """(n,) of the markers at rest, the geometric mean over all directions."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px))))
+
+    @cached_property
+    def _rigid(self) -> Array:
+        """(6, c, 3) whose products with forces are force and torque about the origin."""
+        return np.asarray(rigid_motions(self.points_mm))
+
     def _region(self, frame: _Frame) -> Mask:
         """(c,) nodes that the frame shows as possibly in contact."""
         if self.light is not None and frame.seen is not None:
@@ -168,7 +179,7 @@ class JointEstimator:
     def _rise(self, light: LightView, seen: SeenLight) -> Array | None:
         """(rows, columns) change that grows with a rise along y; None where no light tells it."""
         assert self.law is not None
-        by_slope = self.law.sensitivity[:, 1] @ light.share.mean(axis=(2, 3))
+        by_slope = self.law.sensitivity[:, 1] @ light.mean_share
         if len(by_slope) == 1:
             falling, change = by_slope[0], seen.log_change[0]
         else:
@@ -179,7 +190,7 @@ class JointEstimator:
 
     def _noise_mm(self, frame: _Frame) -> Array:
         """(n,) standard deviation of the markers' places on the gel by the noise of the image."""
-        return np.asarray(frame.noise_px * np.sqrt(np.abs(np.linalg.det(self.markers.mm_per_px))))
+        return frame.noise_px * self._mm_per_px
 
     def _round(self, frame: _Frame, nodes: Nodes, state: _State) -> _State:
         """Linearise at the state, and solve."""
@@ -195,7 +206,7 @@ class JointEstimator:
         young = self.youngs_modulus_mpa
         equations = equations.with_prior(
             start,
-            self.neighbours[nodes][:, nodes].toarray(),
+            self.lattice.adjacent(nodes),
             self.area_mm2[nodes],
             chosen.roughness * young,
             chosen.normal_stress * young,
@@ -223,10 +234,11 @@ class JointEstimator:
         self, equations: NormalEquations, frame: _Frame, near: Mask, moved_mm: Array
     ) -> NormalEquations:
         """With the markers near the contact: lateral motion by the picture and the height."""
-        wide = self.lattice.widened(near, self.settings.marker_reach)
+        wide = self.lattice.widened(near, self.settings.marker_reach)[self.marker_node]
         model = self.nodes_to_markers @ moved_mm
-        lateral = self.markers.lateral_motion(frame.markers_px, model[:, 2])
-        used = np.flatnonzero(np.isfinite(lateral).all(axis=1) & wide[self.marker_node])
+        positions = np.where(wide[:, None], frame.markers_px, np.nan)
+        lateral = self.markers.lateral_motion(positions, model[:, 2])
+        used = np.flatnonzero(np.isfinite(lateral).all(axis=1))
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         residual = (lateral[used] - model[used, :2]).ravel()
         share = np.abs(lateral[used]).ravel() * self.settings.marker_share
@@ -245,7 +257,7 @@ class JointEstimator:
     def _found(self, seen: Mask, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
         nodes = np.flatnonzero(region)
-        sums = np.reshape(rigid_motions(self.points_mm[nodes]), (6, -1))
+        sums = np.reshape(self._rigid[:, nodes], (6, -1))
         return JointForces(
             state.force_n,
             state.displacement_mm,

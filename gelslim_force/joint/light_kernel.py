@@ -56,6 +56,34 @@ def cubic_taps(at: Any, step: Any, number: Any, nodes: Any, along: Any, across: 
 
 
 @njit(**COMPILED)
+def bilinear(at: Any, number: Any, values: Any, found: Any) -> None:
+    """Bilinear interpolation of nodal values.
+
+    Args:
+        at: (n, 2) in steps of the lattice; beyond it the values at its edge are taken.
+        number: (nx, ny) number of the node at each place; -1 where there is none, which counts as
+            the value 0.
+        values: (c, k).
+        found: Receives (n, k).
+    """
+    rows, columns = number.shape
+    for k in range(len(at)):
+        i = min(max(int(np.floor(at[k, 0])), 0), rows - 2)
+        j = min(max(int(np.floor(at[k, 1])), 0), columns - 2)
+        u = min(max(at[k, 0] - i, 0.0), 1.0)
+        v = min(max(at[k, 1] - j, 0.0), 1.0)
+        for column in range(values.shape[1]):
+            found[k, column] = 0.0
+        for di in range(2):
+            for dj in range(2):
+                node = number[i + di, j + dj]
+                weight = (u if di else 1 - u) * (v if dj else 1 - v)
+                if node >= 0:
+                    for column in range(values.shape[1]):
+                        found[k, column] += weight * values[node, column]
+
+
+@njit(**COMPILED)
 def slope_sums(
     nodes: Any,
     along: Any,

@@ -64,6 +64,7 @@ class LightView:
         area_mm2: (rows, columns) of a bin on the gel.
         level: (c, rows, columns) grey value of the reference over itself plus the floor.
         share: (k, c, rows, columns) share of each source in the light of each channel.
+        mean_share: (k, c) its mean over the picture.
         gain: (c, rows, columns) gain of the light over the traced one; 1 where not calibrated.
 
     Raises:
@@ -95,6 +96,7 @@ class LightView:
         if dark:
             raise ValueError(f"channel {dark[0]} of the reference picture is dark")
         self.level, self.share = self._references(light)
+        self.mean_share = self.share.mean(axis=(2, 3))
         self.gain = np.ones(self.level.shape)
         if built is not None:
             if list(built.channels) != self.channels:
@@ -133,8 +135,10 @@ class LightView:
         from gelslim_force.joint.light_kernel import saturated_bins
 
         found = np.zeros((len(self.channels), *self._light.shape), dtype=bool)
-        channels = np.array(self.channels)
-        saturated_bins(picture, channels, self._light.bin_px, _SATURATED, found)
+        # Most pictures have no such pixel, which the maximum shows much faster.
+        if picture.max() >= _SATURATED:
+            channels = np.array(self.channels)
+            saturated_bins(picture, channels, self._light.bin_px, _SATURATED, found)
         return found
 
 

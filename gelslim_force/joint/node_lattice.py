@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from gelslim_force.joint.morphology import widened
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
@@ -87,16 +89,18 @@ class NodeLattice:
 
     def values_at(self, values: Array, points_mm: Array) -> Array:
         """Bilinear interpolation (n, ...) of nodal values (c, ...) at points (n, 2)."""
-        at = (points_mm - self.origin_mm) / self.step_mm
-        cell = np.clip(np.floor(at), 0, np.array(self.number.shape) - 2).astype(np.intp)
-        (u, v), (i, j) = np.clip(at - cell, 0, 1).T, cell.T
-        found = np.zeros((len(points_mm), *values.shape[1:]))
-        for di, wx in ((0, 1 - u), (1, u)):
-            for dj, wy in ((0, 1 - v), (1, v)):
-                node = self.number[i + di, j + dj]
-                weight = np.where(node >= 0, wx * wy, 0.0)
-                found += weight.reshape(-1, *(1,) * (values.ndim - 1)) * values[node]
-        return found
+        from gelslim_force.joint.light_kernel import bilinear
+
+        at = np.ascontiguousarray((points_mm - self.origin_mm) / self.step_mm)
+        columns = np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
+        found = np.empty((len(at), columns.shape[1]))
+        bilinear(at, self.number, columns, found)
+        return found.reshape(len(at), *values.shape[1:])
+
+    def adjacent(self, nodes: Nodes) -> Array:
+        """(p, p) with 1 where two of the nodes (p,) are one step along x or y apart."""
+        place = self.place[nodes]
+        return np.asarray(np.abs(place[:, None] - place).sum(axis=2) == 1, dtype=float)
 
     def slopes_at(self, points_mm: Array) -> SlopeTaps:
         """Slopes along x and along y at (n, 2), by the heights of the nodes."""
@@ -118,7 +122,7 @@ class NodeLattice:
         """(c,) the nodes and those up to `rings` steps along the lattice away."""
         if rings < 1:
             return nodes
-        wide = ndimage.binary_dilation(self.picture(nodes), iterations=rings)
+        wide = widened(self.picture(nodes), rings)
         return np.asarray(wide[self.place[:, 0], self.place[:, 1]])
 
     def nearest(self, points_mm: Array) -> Mask:

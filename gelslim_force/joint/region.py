@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
 from gelslim_force.contact.shading_change import ShadingChange
+from gelslim_force.joint.morphology import closed, opened
 from gelslim_force.joint.node_lattice import NodeLattice
 
 Array = NDArray[np.float64]
@@ -46,8 +47,7 @@ def contact_nodes(
         return region
     seen = changed & shading.valid
     dent = _dent(lattice, places_mm[seen], rise[seen])
-    picture = ndimage.binary_closing(np.pad(lattice.picture(region) | dent, 2), iterations=1)
-    filled = ndimage.binary_fill_holes(picture)[2:-2, 2:-2]
+    filled = ndimage.binary_fill_holes(closed(lattice.picture(region) | dent, 1))
     return np.asarray(filled[lattice.place[:, 0], lattice.place[:, 1]])
 
 
@@ -98,11 +98,8 @@ def changed_bins(shading: ShadingChange) -> Mask:
 
 def _whole(changed: Mask) -> Mask:
     """Without gaps, such as dots, and specks."""
-    wide = np.pad(changed, 2 * _CLOSED)
-    closed = ndimage.binary_closing(wide, iterations=_CLOSED)
-    inner = slice(2 * _CLOSED, -2 * _CLOSED)
-    filled = ndimage.binary_fill_holes(closed[inner, inner])
-    return np.asarray(ndimage.binary_opening(filled, iterations=_OPENED))
+    filled = ndimage.binary_fill_holes(closed(changed, _CLOSED))
+    return opened(np.asarray(filled), _OPENED)
 
 
 def _dent(lattice: NodeLattice, places_mm: Array, rise: Array) -> Mask:

@@ -47,6 +47,14 @@ def test_slopes_of_a_wave_converge_with_the_square_of_the_spacing() -> None:
     assert rate < -1.8
 
 
+def test_adjacent_nodes_are_one_step_apart() -> None:
+    found, points = lattice(missing=7)
+    chosen = np.random.default_rng(4).choice(len(points), 40, replace=False)
+    apart = np.abs(points[chosen][:, None] - points[chosen]) / STEP_MM
+    expected = np.isclose(apart.sum(axis=2), 1.0) & np.isclose(apart.max(axis=2), 1.0)
+    np.testing.assert_array_equal(found.adjacent(chosen), expected)
+
+
 def test_values_agree_with_scipy() -> None:
     found, nodes = lattice()
     values = np.random.default_rng(2).normal(size=(len(nodes), 3))

@@ -1,0 +1,42 @@
+"""Boolean pictures made wider and narrower by steps along rows and columns.
+
+They are those of `scipy.ndimage` with its cross-shaped element and what lies outside false, by one
+distance each instead of a pass per step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+
+def widened(picture: Mask, steps: int) -> Mask:
+    """Places (rows, columns) up to `steps` away from a true one."""
+    return np.asarray(_distance(picture, False) <= steps)
+
+
+def narrowed(picture: Mask, steps: int) -> Mask:
+    """True places (rows, columns) more than `steps` away from a false one, or from the outside."""
+    return np.asarray(_distance(~picture, True) > steps)
+
+
+def closed(picture: Mask, steps: int) -> Mask:
+    """Without gaps up to twice `steps` wide; the outside does not narrow it at the edge."""
+    wide = np.pad(picture, 2 * steps)
+    inner = slice(2 * steps, -2 * steps)
+    return narrowed(widened(wide, steps), steps)[inner, inner]
+
+
+def opened(picture: Mask, steps: int) -> Mask:
+    """Without specks up to twice `steps` wide."""
+    return widened(narrowed(picture, steps), steps)
+
+
+def _distance(picture: Mask, outside: bool) -> NDArray[np.int64]:
+    from gelslim_force.joint.distance_kernel import city_block
+
+    distance = np.empty(picture.shape, dtype=np.int64)
+    city_block(np.ascontiguousarray(picture), outside, distance)
+    return distance
