@@ -17,6 +17,7 @@ from gelslim_cad.export.mesh import face_patches
 from gelslim_cad.geometry.gel_shape import GelShape
 from gelslim_cad.geometry.optics import corner_rays
 from gelslim_cad.geometry.part import Part
+from gelslim_cad.proof.solids import TOLERANCE_MM3, bounding_box, interferences
 from gelslim_cad.solids.own_parts import OWN, own_source
 from gelslim_cad.solids.shapes import Hole, single
 
@@ -39,8 +40,6 @@ OPENING_MM = 1e-6
 
 def check_solids(d: Dimensions, parts: Sequence[Part]) -> tuple[Check, ...]:
     """Line of sight past the actual solids, and interference between all pairs of parts."""
-    from gelslim_cad.proof.solids import TOLERANCE_MM3, interferences
-
     blocked = blocked_volumes(d, parts)
     pairs = interferences(parts)
     own = {p.name: f"{p.name} ({own_source(p)})" for p in parts if OWN in p.tags}
@@ -185,12 +184,14 @@ def _polyhedron(faces: Iterable[list[Points]], name: str) -> cq.Solid:
 
 def blocked_volumes(d: Dimensions, parts: Iterable[Part]) -> dict[str, float]:
     """Volume in mm³ by which each part obstructs the view; empty when the view is free."""
-    pieces = view_corridor(d)
+    pieces = [(piece, bounding_box(piece)) for piece in view_corridor(d)]
     taken: dict[str, float] = {}
     for part in parts:
         if part.name in OPTICAL_PARTS:
             continue
-        volume = sum(abs(part.solid.intersect(piece).Volume()) for piece in pieces)
+        box = bounding_box(part.solid)
+        near = [piece for piece, around in pieces if not around.IsOut(box)]
+        volume = sum(abs(part.solid.intersect(piece).Volume()) for piece in near)
         if volume > 1e-4:
             taken[part.name] = volume
     return taken

@@ -285,9 +285,8 @@ def _begun(units: list[Unit], jobs: int) -> Iterator[Doing]:
     if jobs <= 1 or not units:
         yield {}
         return
-    if _forks():
-        load_libraries({unit.kind for unit in units})
-    # Forked before the CAD kernel is loaded: it is not needed here, nor are its threads.
+    # Forked before the CAD kernel is loaded: it is not needed here, nor are its threads. What the
+    # units import is left to the worker, as both processes wait for what is loaded before.
     with worker_pool(1, "fork" if _forks() else "spawn") as pool:
         yield {u.name: pool.submit(run, u).result for u in _by_cost(units)}
 

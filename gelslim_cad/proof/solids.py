@@ -44,7 +44,7 @@ def interferences(parts: Sequence[Part]) -> list[Interference]:
 
 def _suspects(solids: Sequence[Any]) -> Iterator[tuple[int, int]]:
     """Pairs of solids, smaller number first, that no Boolean with several has shown to be apart."""
-    boxes = [_box(solid) for solid in solids]
+    boxes = [bounding_box(solid) for solid in solids]
     left = {(a, b) for a, b in combinations(range(len(solids)), 2) if not boxes[a].IsOut(boxes[b])}
     while left:
         near: dict[int, list[int]] = {}
@@ -75,7 +75,8 @@ def _apart(numbers: Sequence[int], boxes: Sequence[Any]) -> list[list[int]]:
     return groups
 
 
-def _box(shape: Any) -> Any:
+def bounding_box(shape: Any) -> Any:
+    """A box (OCP.Bnd.Bnd_Box) around a shape, which may be wider than it."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
 
