@@ -47,6 +47,9 @@ LIMITS = {
     "mirror between baffles": "the mirror between the baffles",
     "clamp before seat": "the camera clamp before the mirror's seat",
     "clamp beside channel": "the camera clamp beside the LED channels",
+    "cable over cover": "the camera's cable over the back cover",
+    "cable under roof": "the roof of the body over the camera's cable",
+    "clamp floor": "the clamp's floor under a cable that leaves at the bottom",
 }
 LARGE_CAMERA_MM = 12.0
 """From this height on a camera is taken for one on a board."""

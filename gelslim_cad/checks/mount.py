@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
-from gelslim_cad.dimensions.fold_housing import CHANNEL_WALL_MM
+from gelslim_cad.dimensions.cable import LEAST_PLUG_MM, LEAST_ROOF_MM, OVER_COVER_MM
+from gelslim_cad.dimensions.fold_housing import CHANNEL_WALL_MM, LEAST_FLOOR_MM
 from gelslim_cad.dimensions.housing import TONGUE_LEAST_MM
 from gelslim_cad.dimensions.registry import Real
 from gelslim_cad.geometry.fasteners import SCREWS
 
-CABLE_GAP_MM = 0.2
-LEAST_PLUG_MM = 0.6
-LEAST_ROOF_MM = 1.2
-LEAST_FLOOR_MM = 1.0
 OUTSIDE_MM = 10.0
 LONGEST_MM = 5000.0
 """Longest cable that a spec may give, for one whose length is not given."""
@@ -143,7 +140,7 @@ def cable_cover(
     housing_back_wall_mm: Real,
 ) -> Finding:
     """Least of the space under the cable in the chamber and of the plug under its pad."""
-    under = cable_level_z_mm - cable_thickness_mm / 2 - cover_top_z_mm - CABLE_GAP_MM
+    under = cable_level_z_mm - cable_thickness_mm / 2 - cover_top_z_mm - OVER_COVER_MM
     plug = cable_plug_z_mm - (cover_top_z_mm - housing_back_wall_mm) - LEAST_PLUG_MM
     return Finding(np.minimum(under, plug), 0.0, least=True)
 

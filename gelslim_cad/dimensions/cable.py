@@ -7,20 +7,28 @@ it runs straight through a groove of the mount that is open towards the cover.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM
+from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM, cable_level_mm
 from gelslim_cad.dimensions.registry import Real, dimension
 from gelslim_cad.geometry.led_strips import NO_TIP
 from gelslim_cad.geometry.lookup import Lookup
 
 LEAST_RADIUS_MM = 0.2
 """Least inner radius that is drawn, for a cable that may be folded."""
+OVER_COVER_MM = 0.2
+LEAST_PLUG_MM = 0.6
+"""Of the cover's plug under the pad that presses the cable."""
+LEAST_ROOF_MM = 1.2
 LANE_GAP_MM = 0.15
 """Between an LED wire and the sides of its lane."""
 STACK_RATIO = 1.15
 """Distance of the two wires of a board over their diameter: one lies above the other, and goes
 down to the cover as much later."""
+SIDES = {"top": 1.0, "rear": 0.0, "bottom": -1.0}
+"""Sign of the direction in which the cable leaves the middle of the module's rear face."""
 PAD_LENGTH_MM = 3.0
 PAD_INSET_MM = 0.5
 """Of the pad from the mount's front face: there the cover's screws stand beside it."""
@@ -86,14 +94,18 @@ def cable_level_z_mm(
     """Middle of the cable in the mount."""
     p = np.radians(camera_pose_pitch_deg)
     back = camera_pose_face_mm + camera_module_depth_mm
-    if camera_cable_exit == "rear":
-        straight = back + CLAMP_BAR_MM + clamp_play_mm
-        rise = np.sign(p) * cable_radius_mm * (1 - np.cos(p))
-        return camera_pose_z_mm + straight * np.sin(p) + rise
-    plane, half = back - cable_thickness_mm / 2, camera_module_height_mm / 2
-    side = 1.0 if camera_cable_exit == "top" else -1.0
-    edge = camera_pose_z_mm + plane * np.sin(p) + side * half * np.cos(p)
-    return edge + side * cable_radius_mm * (1 + side * np.sin(p))
+    level: Any = cable_level_mm(
+        camera_pose_z_mm,
+        np.cos(p),
+        np.sin(p),
+        back,
+        back + CLAMP_BAR_MM + clamp_play_mm,
+        camera_module_height_mm / 2,
+        cable_thickness_mm / 2,
+        cable_radius_mm,
+        SIDES[camera_cable_exit],
+    )
+    return level[()]
 
 
 @dimension("cable.bend_end_x_mm", formula="exit - R cos p, or exit - bar - R sin |p| behind")
@@ -232,6 +244,17 @@ def cable_hold_n(
     least = np.maximum(cable_squeeze_mm - 2 * manufacturing_print_tolerance_mm, 0.0)
     pressure = PAD_MODULUS_MPA * least / housing_shim_thickness_mm
     return RELAXED * FRICTION * pressure * camera_cable_width_mm * PAD_LENGTH_MM
+
+
+def over_cover_mm(half_mm: Real, pad_mm: Real, back_wall_mm: Real) -> Real:
+    """Least height of the cable's middle over the cover, in the chamber and on the cover's plug.
+
+    Args:
+        half_mm: Half the cable's thickness.
+        pad_mm: Thickness of the squeezed pad between plug and cable.
+        back_wall_mm: Thickness of the cover, of which the plug is a part.
+    """
+    return half_mm + np.maximum(OVER_COVER_MM, pad_mm + LEAST_PLUG_MM - back_wall_mm)
 
 
 def wires_under_board(d: Lookup) -> bool:

@@ -285,7 +285,14 @@ def measures(p: FoldProblem, mid_rad: Array, spread: Array, mirror_rad: Array) -
         camera_depth_mm(p, low[5]),
     )
     pixels = marker_sides_px(p, at.sight, at.distances)
-    rest = (housing.mirror_between_baffles, housing.clamp_before_seat, housing.clamp_beside_channel)
+    rest = (
+        housing.mirror_between_baffles,
+        housing.clamp_before_seat,
+        housing.clamp_beside_channel,
+        housing.cable_over_cover,
+        housing.cable_under_roof,
+        housing.clamp_floor,
+    )
     tops = room.camera_parts_below_window(p, at.camera)
     below = (tops[0] / room.SCALE_MM, tops[1] / room.SCALE_MM, tops[2] / room.SCALE_MM)
     return depths + pixels + lengths + (tie,) + below + view[:3] + view[4:8] + view[9:] + rest

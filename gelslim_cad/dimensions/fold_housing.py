@@ -1,6 +1,7 @@
-"""What the printed finger asks of the fold: its length, the envelope, clamp, seat and baffles.
+"""What the printed finger asks of the fold: length, envelope, clamp, seat, baffles and cable.
 
-The formulas of the clamp and of the ends stand here once: `housing` makes dimensions of them.
+The formulas of clamp, ends and cable stand here once: `housing`, `seat` and `cable` make dimensions
+of them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from gelslim_cad.dimensions.fold_mirror import (
     lower_end_x_mm,
     mirror_half_width_mm,
 )
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold_problem import NO_LIMIT_MM, Array, FoldProblem, larger, smaller
 from gelslim_cad.dimensions.fold_sight import Sight
 from gelslim_cad.dimensions.registry import Real
 from gelslim_optics.camera.refraction_newton import choose
@@ -28,6 +29,8 @@ CHANNEL_WALL_MM = 1.2
 SEAT_STOP_MM = 1.0
 LIP_GAP_MM = 0.2
 """From the clamp's lips to the front of the lens."""
+LEAST_FLOOR_MM = 1.0
+"""Of the clamp under a module whose cable leaves at the bottom and parts the clamp's rear."""
 LEDGE_GAP_MM = 0.2
 """From the gel to the ledges that carry the window's ends."""
 
@@ -40,6 +43,9 @@ class HousingMissed(NamedTuple):
     mirror_between_baffles: Array
     clamp_before_seat: Array
     clamp_beside_channel: Array
+    cable_over_cover: Array
+    cable_under_roof: Array
+    clamp_floor: Array
 
 
 def finger_length_mm(
@@ -104,6 +110,39 @@ def lip_front_mm(face: Real, proud: Real, play: Real) -> Real:
     return play + larger(smaller(CLAMP_LIP_MM, proud - play - LIP_GAP_MM), 0.0) - face
 
 
+def cable_level_mm(
+    z: Real,
+    cos: Real,
+    sin: Real,
+    back: Real,
+    bar: Real,
+    half_height: Real,
+    half_cable: Real,
+    radius: Real,
+    side: Real,
+) -> Real:
+    """Height of the cable's middle in the mount.
+
+    The camera's pinhole is at height z, its pitch has this cosine and sine; `back` is from the
+    pinhole to the module's rear face and `bar` to the clamp's. The cable leaves at the top or
+    bottom of the rear face (`side` 1 or -1), or behind its middle (0). All lengths in mm.
+    """
+    behind = z + bar * sin + choose(sin < 0, -1.0, 1.0) * radius * (1 - cos)
+    edge = z + (back - half_cable) * sin + side * half_height * cos
+    return choose(side == 0, behind, edge + side * radius * (1 + side * sin))
+
+
+def clamp_floor_mm(
+    z: Real, cos: Real, sin: Real, face: Real, bar: Real, below: Real, cover_z: Real
+) -> Real:
+    """Thickness of the clamp's floor over the cover, at its front or rear, the lower of both.
+
+    The module reaches `below` under the pinhole's axis, from `face` before the pinhole to `bar`
+    behind it. All lengths in mm.
+    """
+    return z - below * cos - cover_z + smaller(face * sin, bar * sin)
+
+
 def housing_missed(
     p: FoldProblem, s: Sight, m: Mirror, c: Camera, ledge_x_mm: Array, depth: Array
 ) -> HousingMissed:
@@ -115,12 +154,24 @@ def housing_missed(
     channel_x = ledge_x_mm - p.end_support_mm - fit - CHANNEL_WALL_MM
     beside = larger(p.baffle_inner_y_mm - p.clamp_width_mm / 2, channel_x - largest(c.corners_x_mm))
     half_width = mirror_half_width_mm(s, m) + p.mirror_border_mm
+    back, half_height = c.face_mm + p.module_depth_mm, p.module_height_mm / 2
+    bar = back + p.clamp_play_mm + CLAMP_BAR_MM
+    level = cable_level_mm(
+        c.z_mm, c.cos, c.sin, back, bar, half_height, p.cable_half_mm, p.cable_radius_mm,
+        p.cable_side,
+    )  # fmt: skip
+    floor = clamp_floor_mm(
+        c.z_mm, c.cos, c.sin, c.face_mm, bar, half_height + p.clamp_play_mm, cover_z
+    )
     return HousingMissed(
         thickness=depth - p.max_depth_mm,
         length=finger_length_mm(p, m, c, ledge_x_mm, depth) - p.max_length_mm,
         mirror_between_baffles=half_width + 2 * fit - p.baffle_inner_y_mm,
         clamp_before_seat=lips_x - (lower_x - SEAT_STOP_MM) + fit,
         clamp_beside_channel=CLAMP_GAP_MM - beside,
+        cable_over_cover=cover_z + p.cable_over_cover_mm - level,
+        cable_under_roof=level + p.cable_under_skin_mm,
+        clamp_floor=choose(p.cable_side < 0, LEAST_FLOOR_MM - floor, -NO_LIMIT_MM),
     )
 
 
@@ -131,5 +182,7 @@ SHARED = (
     clamp_ends_x_mm,
     clamp_front_x_mm,
     lip_front_mm,
+    cable_level_mm,
+    clamp_floor_mm,
     housing_missed,
 )

@@ -70,6 +70,16 @@ class FoldProblem:
     end_support_mm: Array
     tip_wall_mm: Array
     cable_behind_mm: Array
+    cable_side: Array
+    """Where the cable leaves the module: 1 at the top, -1 at the bottom, 0 behind."""
+    cable_radius_mm: Array
+    """Of the bend along the cable's middle."""
+    cable_half_mm: Array
+    """Half the cable's thickness across the bend."""
+    cable_over_cover_mm: Array
+    """Least from the cover to the cable's middle."""
+    cable_under_skin_mm: Array
+    """Least from the plane of the gel's top to the cable's middle."""
     mount_length_mm: Array
     baffle_inner_y_mm: Array
     clamp_width_mm: Array

@@ -10,7 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM, CLAMP_LIP_MM, LIP_GAP_MM
+from gelslim_cad.dimensions.fold_housing import (
+    CLAMP_BAR_MM,
+    CLAMP_LIP_MM,
+    LIP_GAP_MM,
+    clamp_floor_mm,
+)
 from gelslim_cad.dimensions.registry import Real, dimension
 
 FLATNESS_MM = {"sla": 0.05, "fdm": 0.1, "sls": 0.1}
@@ -149,8 +154,9 @@ def clamp_base_mm(
     p = np.radians(camera_pose_pitch_deg)
     below = camera_module_height_mm / 2 + clamp_play_mm
     back = camera_pose_face_mm + camera_module_depth_mm + clamp_play_mm + CLAMP_BAR_MM
-    low = camera_pose_z_mm - below * np.cos(p) - cover_top_z_mm
-    return low + np.minimum(camera_pose_face_mm * np.sin(p), back * np.sin(p))
+    return clamp_floor_mm(
+        camera_pose_z_mm, np.cos(p), np.sin(p), camera_pose_face_mm, back, below, cover_top_z_mm
+    )
 
 
 @dimension(

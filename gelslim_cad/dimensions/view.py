@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gelslim_cad.dimensions.cable import LEAST_ROOF_MM, SIDES, over_cover_mm
 from gelslim_cad.dimensions.distortion import is_fisheye
 from gelslim_cad.dimensions.fold import Fold
 from gelslim_cad.dimensions.fold_problem import NO_LIMIT_MM, FoldProblem
@@ -71,6 +72,12 @@ PROBLEM: dict[str, Name] = {
     "end_support_mm": "design.light_guide.end_support_mm",
     "tip_wall_mm": "design.housing.tip_wall_mm",
     "cable_behind_mm": "cable.behind_mm",
+    "cable_side": "camera.cable_exit",
+    "cable_radius_mm": "cable.radius_mm",
+    "cable_half_mm": "cable.thickness_mm",
+    "shim_thickness_mm": "design.housing.shim_thickness_mm",
+    "cable_squeeze_mm": "cable.squeeze_mm",
+    "gel_proud_mm": "design.housing.gel_proud_mm",
     "mount_length_mm": "mount.length_mm",
     "baffle_inner_y_mm": "baffle.inner_y_mm",
     "clamp_width_mm": "clamp.width_mm",
@@ -102,6 +109,7 @@ def fold_layout(values: Mapping[str, Any]) -> Fold:
     given["fisheye"] = is_fisheye(given["fisheye"])
     given["moving_lens"] = float(given["moving_lens"] == "unit")
     given |= _worths(given.pop("goal"), given["length_worth"], given["pixel_worth_mm"])
+    given |= _cable_room(given)
     taken_mm = given.pop("back_wall_mm") + given["guide_thickness_mm"] + given["gel_total_mm"]
     given["max_depth_mm"] = _limit_mm(given["max_depth_mm"]) - taken_mm
     # The strip at the tip lengthens every fold alike.
@@ -122,6 +130,18 @@ def _solved_alone(names: tuple[str, ...], values: tuple[float, ...]) -> Fold:
         for array in value.values() if isinstance(value, dict) else (value,):
             array.setflags(write=False)
     return found
+
+
+def _cable_room(given: dict[str, Any]) -> dict[str, Real]:
+    """What the cable asks of the fold; takes what only this needs out of the given values."""
+    half = given["cable_half_mm"] / 2
+    pad = given.pop("shim_thickness_mm") - given.pop("cable_squeeze_mm")
+    return {
+        "cable_side": SIDES[given["cable_side"]],
+        "cable_half_mm": half,
+        "cable_over_cover_mm": over_cover_mm(half, pad, given["back_wall_mm"]),
+        "cable_under_skin_mm": half + given.pop("gel_proud_mm") + LEAST_ROOF_MM,
+    }
 
 
 def _limit_mm(given_mm: Real | None) -> Real:

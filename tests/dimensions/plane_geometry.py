@@ -413,13 +413,39 @@ class Layout:
         beside = max(
             p.baffle_inner_y_mm - p.clamp_width_mm / 2, channel - max(c.real for c in self.corners)
         )
+        cable, cover_z = self._cable_z(), self.window_z - self.depth
         return {
             "thickness": self.depth - p.max_depth_mm,
             "length": self.length_mm - p.max_length_mm,
             "mirror between baffles": half_width + 2 * fit - p.baffle_inner_y_mm,
             "clamp before seat": foremost + fit + 1.0 - self.glass_end.real,
             "clamp beside channel": 0.15 - beside,
+            "cable over cover": p.cable_over_cover_mm - (cable - cover_z),
+            "cable under roof": cable + p.cable_under_skin_mm,
+            "clamp floor": 1.0 - (self._clamp_bottom_z() - cover_z) if p.cable_side == -1 else -1e4,
         }
+
+    def _cable_z(self) -> float:
+        """Height at which the cable runs: behind the end of a bend that turns it to -x."""
+        p = self.p
+        rear = self.pinhole - (self.face + p.module_depth_mm) * self.ahead
+        if p.cable_side == 0:
+            out, start = -self.ahead, rear - (p.clamp_play_mm + 1.5) * self.ahead
+        else:
+            out = p.cable_side * self.above
+            start = rear + p.cable_half_mm * self.ahead + p.module_height_mm / 2 * out
+        # An arc to the left or right ends in the direction of -x.
+        turn = math.copysign(1.0, out.imag)
+        end = start + turn * p.cable_radius_mm * (1j * out - 1j * -1.0)
+        return float(end.imag)
+
+    def _clamp_bottom_z(self) -> float:
+        """Lowest point under the module between its front face and the clamp's rear."""
+        p = self.p
+        below = -(p.module_height_mm / 2 + p.clamp_play_mm) * self.above
+        rear = -(p.module_depth_mm + p.clamp_play_mm + 1.5)
+        ends = [self.pinhole + (part - self.face) * self.ahead + below for part in (0.0, rear)]
+        return float(min(end.imag for end in ends))
 
     def objective(self) -> float:
         if self.worst() > 1e-9:

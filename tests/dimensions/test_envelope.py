@@ -133,3 +133,32 @@ def test_a_large_board_is_told_which_module_would_fit() -> None:
     assert fits["finger.thickness_mm"] <= 20.0
     larger = {"camera.module_height_mm": size + 0.5, "camera.module_width_mm": size + 0.5}
     assert wide({**changes, **larger})["finger.thickness_mm"] > 20.0
+
+
+CABLE_LIMITS = ("cable over cover", "cable under roof", "clamp floor")
+
+
+@pytest.mark.parametrize(
+    ("name", "goal"),
+    [("wide", "shortest"), ("wide", "best_picture"), ("gelslim3_lens", "best_picture")],
+)
+def test_the_search_ends_where_the_camera_cable_has_room(name: str, goal: str) -> None:
+    """The cable leaves at the bottom: the goal alone would put the camera onto the cover."""
+    d = finger(name, {"design.envelope.goal": goal, "design.envelope.max_thickness_mm": 24.0})
+    assert d["camera.cable_exit"] == "bottom"
+    assert failed(d) == set()
+    assert max(float(np.max(d.fold.housing[limit])) for limit in CABLE_LIMITS) < 1e-6
+
+
+@pytest.mark.parametrize("exit_side", ["rear", "top", "bottom"])
+def test_limits_of_the_cable_are_those_of_its_rules(exit_side: str) -> None:
+    d = finger("gelslim2", {"camera.cable_exit": exit_side})
+    values = {c.id: c.value - c.limit for c in check(d) if c.id.startswith("cable.")}
+    missed = {limit: float(np.reshape(d.fold.housing[limit], -1)[0]) for limit in CABLE_LIMITS}
+    assert missed["cable over cover"] == pytest.approx(-values["cable.cover_mm"], abs=1e-9)
+    top = max(d["cable.level_z_mm"] + d["cable.thickness_mm"] / 2, d["wire.lane_top_z_mm"])
+    roof = -d["design.housing.gel_proud_mm"] - top
+    assert values["cable.roof_mm"] == pytest.approx(roof - 1.2)
+    assert missed["cable under roof"] <= -values["cable.roof_mm"] + 1e-9
+    if exit_side == "bottom":
+        assert missed["clamp floor"] == pytest.approx(-values["cable.floor_mm"], abs=1e-9)

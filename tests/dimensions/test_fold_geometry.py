@@ -76,6 +76,13 @@ SPANS = {
     "length_worth": (0.0, 1.0),
     "pixel_worth_mm": (0.0, 1.0),
 }
+CABLE_SPANS = {
+    "cable_side": (-1.5, 1.5),
+    "cable_radius_mm": (0.2, 6.0),
+    "cable_half_mm": (0.05, 1.0),
+    "cable_over_cover_mm": (0.3, 3.0),
+    "cable_under_skin_mm": (0.5, 4.0),
+}
 
 
 Compared = tuple[Fold, list[Layout], FoldProblem]
@@ -87,7 +94,10 @@ def candidates() -> Compared:
     rng = np.random.default_rng(31)
     columns = {name: rng.uniform(*span, (COUNT, 1, 1)) for name, span in SPANS.items()}
     columns["clamp_play_mm"] = np.random.default_rng(32).uniform(0.0, 0.4, (COUNT, 1, 1))
-    columns["moving_lens"] = np.round(columns["moving_lens"])
+    cable = np.random.default_rng(33)
+    columns |= {name: cable.uniform(*span, (COUNT, 1, 1)) for name, span in CABLE_SPANS.items()}
+    for name in ("moving_lens", "cable_side"):
+        columns[name] = np.round(columns[name])
     for name in ("fixed_focus_mm", "fixed_image_mm"):
         columns[name] = np.where(rng.random((COUNT, 1, 1)) < 0.7, 0.0, columns[name])
     ideal, wide = rng.random((2, COUNT, 1, 1)) < [[[[0.5]]], [[[0.4]]]]
