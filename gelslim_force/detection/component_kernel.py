@@ -23,35 +23,52 @@ def _root(parent: Any, label: Any) -> Any:
 
 
 @njit(**COMPILED)
-def components(dark: Any, left: Any, top: Any, right: Any, bottom: Any, least: Any) -> Any:
-    """Return the components (n, 11) of pixels whose darkness exceeds `least`.
+def whole_rows(height: Any, width: Any) -> Any:
+    """Runs (height, 3) that are the rows of a picture."""
+    runs = np.zeros((height, 3), dtype=np.int32)
+    for y in range(height):
+        runs[y, 0], runs[y, 2] = y, width
+    return runs
 
-    Only columns left <= x < right and rows top <= y < bottom are searched. Pixels that share an
-    edge or a corner belong together. Centroids and second moments are weighted by darkness.
+
+@njit(**COMPILED)
+def components(dark: Any, within: Any, least: Any) -> Any:
+    """Find the components of pixels whose darkness exceeds `least`.
+
+    A run (row, begin, end) holds the pixels begin <= x < end of a row. Only the runs `within`
+    (k, 3), in order of rows and columns, are searched. Pixels that share an edge or a corner
+    belong together. Centroids and second moments are weighted by darkness.
+
+    Returns a table (n, 11) of the components, their runs (m, 3) in order, and the component (m,)
+    of each run.
     """
-    most = (bottom - top) * ((right - left) // 2 + 1)
-    begin = np.empty(most, dtype=np.int32)
-    end = np.empty(most, dtype=np.int32)
-    line = np.empty(most, dtype=np.int32)
+    most = 0
+    for i in range(len(within)):
+        most += (within[i, 2] - within[i, 1]) // 2 + 1
+    runs = np.empty((most, 3), dtype=np.int32)
     parent = np.empty(most, dtype=np.int32)
-    count = 0
-    previous = 0
-    for y in range(top, bottom):
-        first = count
-        candidate = previous
-        x = left
+    count = first = candidate = 0
+    row = -1
+    for i in range(len(within)):
+        y, x, right = within[i, 0], within[i, 1], within[i, 2]
+        if y != row:
+            # Runs from `candidate` to `first` are those of the row above.
+            candidate = first if y == row + 1 else count
+            first, row = count, y
+        line = dark[y]
         while x < right:
-            if not dark[y, x] > least:
+            if not line[x] > least:
                 x += 1
                 continue
             start = x
-            while x < right and dark[y, x] > least:
+            while x < right and line[x] > least:
                 x += 1
-            begin[count], end[count], line[count], parent[count] = start, x, y, count
-            while candidate < first and end[candidate] < start:
+            runs[count, 0], runs[count, 1], runs[count, 2] = y, start, x
+            parent[count] = count
+            while candidate < first and runs[candidate, 2] < start:
                 candidate += 1
             k = candidate
-            while k < first and begin[k] <= x:
+            while k < first and runs[k, 1] <= x:
                 a, b = _root(parent, k), _root(parent, count)
                 if a < b:
                     parent[b] = a
@@ -59,41 +76,48 @@ def components(dark: Any, left: Any, top: Any, right: Any, bottom: Any, least: A
                     parent[a] = b
                 k += 1
             count += 1
-        previous = first
-    return _summed(dark, begin[:count], end[:count], line[:count], parent[:count])
+    return _summed(dark, runs[:count].copy(), parent[:count])
 
 
 @njit(**COMPILED)
-def _summed(dark: Any, begin: Any, end: Any, line: Any, parent: Any) -> Any:
-    number = np.full(parent.size, -1, dtype=np.int32)
+def _summed(dark: Any, runs: Any, parent: Any) -> Any:
+    number = np.empty(parent.size, dtype=np.int32)
     total = 0
     for k in range(parent.size):
-        if parent[k] == k:
+        root = _root(parent, k)
+        if root == k:
             number[k] = total
             total += 1
+        else:
+            number[k] = number[root]
     table = np.zeros((total, 11))
     mass = np.zeros(total)
     for i in range(total):
         table[i, LEFT] = table[i, TOP] = 1e9
         table[i, RIGHT] = table[i, BOTTOM] = -1.0
     for k in range(parent.size):
-        i = number[_root(parent, k)]
-        row = table[i]
-        y = float(line[k])
-        row[AREA] += end[k] - begin[k]
-        row[LEFT] = min(row[LEFT], begin[k])
-        row[RIGHT] = max(row[RIGHT], end[k] - 1)
+        i = number[k]
+        row, line = table[i], dark[runs[k, 0]]
+        begin, end, y = runs[k, 1], runs[k, 2], float(runs[k, 0])
+        row[AREA] += end - begin
+        row[LEFT] = min(row[LEFT], begin)
+        row[RIGHT] = max(row[RIGHT], end - 1)
         row[TOP] = min(row[TOP], y)
         row[BOTTOM] = max(row[BOTTOM], y)
-        for x in range(begin[k], end[k]):
-            d = float(dark[line[k], x])
-            row[PEAK] = max(row[PEAK], d)
-            mass[i] += d
-            row[X] += d * x
-            row[Y] += d * y
-            row[XX] += d * x * x
-            row[XY] += d * x * y
-            row[YY] += d * y * y
+        peak, d0, d1, d2 = row[PEAK], 0.0, 0.0, 0.0
+        for x in range(begin, end):
+            d = float(line[x])
+            peak = max(peak, d)
+            d0 += d
+            d1 += d * x
+            d2 += d * x * x
+        row[PEAK] = peak
+        mass[i] += d0
+        row[X] += d1
+        row[Y] += d0 * y
+        row[XX] += d2
+        row[XY] += d1 * y
+        row[YY] += d0 * y * y
     for i in range(total):
         row = table[i]
         if mass[i] > 0:
@@ -102,4 +126,4 @@ def _summed(dark: Any, begin: Any, end: Any, line: Any, parent: Any) -> Any:
         row[XX] -= row[X] * row[X]
         row[XY] -= row[X] * row[Y]
         row[YY] -= row[Y] * row[Y]
-    return table
+    return table, runs, number

@@ -15,7 +15,7 @@ COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"
 
 @njit(**COMPILED)
 def channel_sums(image: Any, sums: Any) -> None:
-    """Write the sum over channels of `image` (h, w, c) uint8 to `sums` (h, w) uint16."""
+    """Write the sum over channels of `image` (h, w, c) uint8 to `sums` (h, >= w) uint16."""
     height, width, channels = image.shape
     if channels == 3:
         for y in range(height):
@@ -35,7 +35,7 @@ def channel_sums(image: Any, sums: Any) -> None:
 def cell_means(sums: Any, cell: Any, means: Any) -> None:
     """Write the means of cell x cell squares of `sums` to `means` (h // cell, w // cell)."""
     rows, columns = means.shape
-    strip = np.empty(sums.shape[1], dtype=np.uint32)
+    strip = np.empty(columns * cell, dtype=np.uint32)
     for i in range(rows):
         strip[:] = 0
         for y in range(i * cell, (i + 1) * cell):
@@ -56,10 +56,11 @@ def darkness(sums: Any, background: Any, cell: Any, floor: Any, slack: Any, dark
     the cells and interpolated bilinearly; it is at least `floor`, because a black picture holds no
     information. `slack` allows for noise, which matters more where the light is weak.
     """
-    height, width = sums.shape
+    height, width = dark.shape
     rows, columns = background.shape
-    strip = np.empty(width, dtype=np.uint32)
+    strip = np.zeros(width + 2, dtype=np.int32)
     across = np.empty(columns, dtype=np.float32)
+    ground = np.empty(width, dtype=np.float32)
     left = np.empty(width, dtype=np.int32)
     part = np.empty(width, dtype=np.float32)
     for x in range(width):
@@ -67,6 +68,7 @@ def darkness(sums: Any, background: Any, cell: Any, floor: Any, slack: Any, dark
         left[x] = min(int(at), max(columns - 2, 0))
         part[x] = at - left[x]
     step = 1 if columns > 1 else 0
+    one, slack = np.float32(1), np.float32(slack)
     for y in range(height):
         at = min(max((y + 0.5) / cell - 0.5, 0.0), rows - 1.0)
         top = min(int(at), max(rows - 2, 0))
@@ -75,14 +77,14 @@ def darkness(sums: Any, background: Any, cell: Any, floor: Any, slack: Any, dark
         for j in range(columns):
             value = background[top, j] + share * (background[below, j] - background[top, j])
             across[j] = max(value, np.float32(floor))
-        before, after = max(0, y - 1), min(height - 1, y + 1)
-        for x in range(width):
-            strip[x] = sums[before, x] + 2 * np.uint32(sums[y, x]) + sums[after, x]
         for x in range(width):
             j = left[x]
-            ground = across[j] + part[x] * (across[j + step] - across[j])
-            near = strip[max(0, x - 1)] + 2 * strip[x] + strip[min(width - 1, x + 1)]
-            dark[y, x] = (
-                np.float32(1.0)
-                - (np.float32(near) * np.float32(0.0625) + np.float32(slack)) / ground
-            )
+            ground[x] = across[j] + part[x] * (across[j + step] - across[j])
+        before, after = sums[max(0, y - 1)], sums[min(height - 1, y + 1)]
+        here, found = sums[y], dark[y]
+        for x in range(width):
+            strip[x + 1] = before[x] + 2 * np.int32(here[x]) + after[x]
+        strip[0], strip[width + 1] = strip[1], strip[width]
+        for x in range(width):
+            near = np.float32(np.int32(strip[x] + 2 * strip[x + 1] + strip[x + 2]))
+            found[x] = one - (near * np.float32(0.0625) + slack) / ground[x]

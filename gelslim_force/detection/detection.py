@@ -30,7 +30,15 @@ from gelslim_force.frames.read_only import read_only
 
 _NOISE_FACTOR = 1.5
 _MAX_ASPECT = 3.0
+_LARGEST = 1.3
+"""Diameter of a dot, at most, over that of the largest one expected."""
 _NEIGHBOURS = 8
+_GIVE_UP = 1.4
+"""How far what a search has reached may be beyond what a dot can be, before it ends."""
+_SPECK = 0.25
+"""Area of a speck, at most, over that of a dot beside it."""
+_PALE = 0.7
+"""Darkness of the wedge at a corner of the pad, at most, over that of the dots around it."""
 _MAX_STEPS = 16
 _CONVERGED_PX = 0.01
 _FLOOR = 8.0
@@ -50,13 +58,14 @@ class Detector:
         Raises ValueError if the array is no such frame.
         """
         planes = as_planes(image)
-        starts, moments = _candidates(planes, self.settings)
-        dots = _measured(planes, starts, moments, self.settings)
+        sums = _channel_sums(planes)
+        starts, moments = _candidates(sums, planes.shape, self.settings)
+        dots = _measured(sums, planes.shape[1], starts, moments, self.settings)
         dots = dots[_plausible(dots, self.settings)]
         found = _flagged(_without_duplicates(dots))
         if self.settings.shape == "double":
             return found
-        return found.take(np.flatnonzero(~_dark_corners(found.flags)))
+        return found.take(np.flatnonzero(~_dark_corners(found)))
 
     def detect_near(
         self,
@@ -89,17 +98,10 @@ class Detector:
             raise ValueError(
                 f"positions {starts.shape} and moments {moments.shape} must be (n, 2) and (n, 3)"
             )
-        height, width = planes.shape[:2]
-        inside = np.all((starts >= 0) & (starts <= [width - 1, height - 1]), axis=1)
-        inside &= np.isfinite(moments).all(axis=1)
-        dots = np.zeros((len(starts), 10))
-        dots[inside] = _measured(planes, starts[inside], moments[inside], self.settings)
-        dots[~inside, :2] = starts[~inside]
-        moved = np.hypot(*(dots[:, :2] - starts).T)
-        reach = 2.0 * np.sqrt(np.abs(moments).max(axis=1)) + 1.5
-        lost = ~_plausible(dots, self.settings) | ~(moved <= reach)
-        lost |= _duplicates(dots, moved, lost)
-        dots[lost, 2:] = 0.0
+        from gelslim_force.detection.plausible_kernel import discard_lost
+
+        dots = _measured(_channel_sums(planes), planes.shape[1], starts, moments, self.settings)
+        discard_lost(dots, starts, moments, _plausible(dots, self.settings))
         return _flagged(dots, compare)
 
 
@@ -124,14 +126,24 @@ def as_planes(image: Any) -> NDArray[np.uint8]:
     return read_only(image)
 
 
+def _channel_sums(planes: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Sums of the channels (h, w + LANES), as `window_kernel` needs them."""
+    from gelslim_force.detection import darkness_kernel as dk
+    from gelslim_force.detection.window_kernel import LANES
+
+    sums = np.empty((planes.shape[0], planes.shape[1] + LANES), dtype=np.uint16)
+    dk.channel_sums(planes, sums)
+    return sums
+
+
 def _candidates(
-    planes: NDArray[np.uint8], settings: DetectorSettings
+    sums: NDArray[np.uint16], shape: tuple[int, ...], settings: DetectorSettings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions (n, 2) and second moments (n, 3) of dark components of the size of a dot."""
     from gelslim_force.detection import component_kernel as ck
 
     least, limit = settings.least_contrast, settings.largest_diameter_px
-    table = _components(darkness_of(planes, settings), least, limit)
+    table = _components(_darkness(sums, shape, settings), least, limit)
     size = np.pi / 4 * settings.smallest_diameter_px**2
     keep = (table[:, ck.PEAK] > least) & (table[:, ck.AREA] >= 0.4 * size)
     keep &= table[:, ck.AREA] <= 1.3 * np.pi / 4 * limit**2
@@ -149,38 +161,24 @@ def _components(dark: NDArray[np.float32], least: float, limit: float) -> NDArra
     """
     from gelslim_force.detection import component_kernel as ck
 
-    height, width = dark.shape
-    boxes = [(0, 0, width, height)]
+    runs = ck.whole_rows(*dark.shape)
     kept = np.zeros((0, ck.COLUMNS))
     level = _FIRST_LEVEL * least
-    while boxes and level < 1.0:
-        table = np.vstack([ck.components(dark, *box, level) for box in boxes])
+    while len(runs) and level < 1.0:
+        table, runs, owner = ck.components(dark, runs, level)
         across = table[:, ck.RIGHT] - table[:, ck.LEFT]
         wide = np.maximum(across, table[:, ck.BOTTOM] - table[:, ck.TOP]) >= limit
-        kept = np.vstack([kept, _new(table[~wide & (table[:, ck.PEAK] > least)], kept)])
+        kept = np.vstack([kept, table[~wide & (table[:, ck.PEAK] > least)]])
         level = max(_NEXT_LEVEL * level, least)
         wide &= table[:, ck.PEAK] > level
-        ends = table[wide][:, [ck.LEFT, ck.TOP, ck.RIGHT, ck.BOTTOM]].astype(int)
-        ends[:, 2:] += 1
-        boxes = [(int(a), int(b), int(c), int(d)) for a, b, c, d in np.unique(ends, axis=0)]
+        runs = runs[wide[owner]]
     return kept
 
 
-def _new(table: NDArray[np.float64], kept: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Components that are not in the bounding box of one that was kept at a lower level."""
-    from gelslim_force.detection import component_kernel as ck
-
-    if len(table) == 0 or len(kept) == 0:
-        return table
-    _, near = cKDTree(kept[:, [ck.X, ck.Y]]).query(table[:, [ck.X, ck.Y]])
-    box = kept[near]
-    inside = (table[:, ck.X] >= box[:, ck.LEFT]) & (table[:, ck.X] <= box[:, ck.RIGHT])
-    inside &= (table[:, ck.Y] >= box[:, ck.TOP]) & (table[:, ck.Y] <= box[:, ck.BOTTOM])
-    return table[~inside]
-
-
-def darkness_of(planes: NDArray[np.uint8], settings: DetectorSettings) -> NDArray[np.float32]:
-    """Return the share of light that is missing at each pixel (h, w).
+def _darkness(
+    sums: NDArray[np.uint16], shape: tuple[int, ...], settings: DetectorSettings
+) -> NDArray[np.float32]:
+    """Return the share of light that is missing at each pixel (h, w) of planes (h, w, c).
 
     The light is the grey-scale closing of the means of small cells, lightly smoothed. A closing
     keeps every gradient of light and every dark region that is larger than its window, and fills
@@ -188,16 +186,14 @@ def darkness_of(planes: NDArray[np.uint8], settings: DetectorSettings) -> NDArra
     """
     from gelslim_force.detection import darkness_kernel as dk
 
-    height, width, channels = planes.shape
-    sums = np.empty((height, width), dtype=np.uint16)
-    dk.channel_sums(planes, sums)
+    height, width, channels = shape
     cell = int(np.clip(settings.largest_diameter_px // 6, 1, min(height, width) // 4))
     means = np.empty((height // cell, width // cell), dtype=np.float32)
     dk.cell_means(sums, cell, means)
     half = int(np.ceil(0.65 * settings.largest_diameter_px / cell)) + 1
     background = _smoothed(grey_closing(means, 2 * half + 1, mode="nearest"))
     dark = np.empty((height, width), dtype=np.float32)
-    slack = _NOISE_FACTOR * noise_of(sums)
+    slack = _NOISE_FACTOR * noise_of(sums[:, :width])
     dk.darkness(sums, background, cell, _FLOOR * channels, slack, dark)
     return dark
 
@@ -220,7 +216,8 @@ def noise_of(sums: NDArray[np.uint16]) -> float:
 
 
 def _measured(
-    planes: NDArray[np.uint8],
+    sums: NDArray[np.uint16],
+    width: int,
     starts: NDArray[np.float64],
     moments: NDArray[np.float64],
     settings: DetectorSettings,
@@ -228,8 +225,11 @@ def _measured(
     from gelslim_force.detection import centroid_kernel
 
     dots = np.zeros((len(starts), 10))
+    widest = _GIVE_UP * (_LARGEST * settings.largest_diameter_px / 4) ** 2
+    faintest = settings.least_contrast / _GIVE_UP
+    low, high = settings.weight_from, settings.weight_to
     centroid_kernel.measure(
-        planes, starts, moments, settings.weight_from, settings.weight_to, _MAX_STEPS, dots
+        sums, width, starts, moments, widest, faintest, low, high, _MAX_STEPS, dots
     )
     return dots
 
@@ -242,51 +242,64 @@ def _axes(dots: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.fl
     return 2 * np.sqrt(middle + spread), 2 * np.sqrt(np.maximum(middle - spread, 0.0))
 
 
+def _most_aspect(settings: DetectorSettings) -> float:
+    """Largest ratio of the semi-axes of a dot."""
+    return _MAX_ASPECT * (1.5 if settings.shape == "double" else 1.0)
+
+
 def _plausible(dots: NDArray[np.float64], settings: DetectorSettings) -> NDArray[np.bool_]:
-    long, short = _axes(dots)
-    area = dots[:, 2]
-    keep = (area > 0) & (dots[:, 3] >= settings.least_contrast)
-    keep &= area >= 0.6 * np.pi / 4 * settings.smallest_diameter_px**2
-    keep &= 2 * long <= 1.3 * settings.largest_diameter_px
-    aspect = _MAX_ASPECT * (1.5 if settings.shape == "double" else 1.0)
-    keep &= long <= aspect * np.maximum(short, 0.5)
-    return keep & (area >= 0.55 * np.pi * long * short)
+    """(n,) whether measured dots have the contrast, size and shape of a dot."""
+    from gelslim_force.detection.plausible_kernel import plausible
 
-
-def _duplicates(
-    dots: NDArray[np.float64], moved: NDArray[np.float64], lost: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """(n,) whether the same dot was also found from a nearer prediction."""
-    twice = np.zeros(len(dots), dtype=bool)
-    live = np.flatnonzero(~lost)
-    if len(live) < 2:
-        return twice
-    for a, b in cKDTree(dots[live, :2]).query_pairs(1.0):
-        a, b = live[a], live[b]
-        twice[a if moved[a] > moved[b] else b] = True
-    return twice
+    keep = np.empty(len(dots), dtype=bool)
+    plausible(
+        dots,
+        settings.least_contrast,
+        settings.smallest_diameter_px,
+        _LARGEST * settings.largest_diameter_px,
+        _most_aspect(settings),
+        keep,
+    )
+    return keep
 
 
 def _without_duplicates(dots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Remove dots that were found from two components, and specks near a larger dot."""
+    """Remove dots that were found from two components, and what lies in another dot.
+
+    Of two dots one of which is a speck, the larger remains; otherwise the darker, because a shadow
+    beside a dot is large but pale.
+    """
     if len(dots) < 2:
         return dots
     long, _ = _axes(dots)
+    area, contrast = dots[:, 2], dots[:, 3]
     drop = np.zeros(len(dots), dtype=bool)
     for a, b in cKDTree(dots[:, :2]).query_pairs(float(1.2 * long.max() + 1)):
         gap = np.hypot(*(dots[a, :2] - dots[b, :2]))
         if gap < max(long[a], long[b]):
-            drop[a if dots[a, 2] < dots[b, 2] else b] = True
+            small, large = (a, b) if area[a] < area[b] else (b, a)
+            speck = area[small] < _SPECK * area[large]
+            drop[small if speck or contrast[small] < contrast[large] else large] = True
     return dots[~drop]
 
 
-def _dark_corners(flags: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _dark_corners(found: Detections) -> NDArray[np.bool_]:
     """(n,) whether a region is the dark wedge between a corner of the pad and the border.
 
-    It is cut by the border of the picture, is no ellipse, and is too faint or too large for a
-    dot. A double dot that the border cuts looks the same."""
-    cut = (flags & BORDER > 0) & (flags & ODD_SHAPE > 0)
-    return np.asarray(cut & (flags & (FAINT | LARGE) > 0))
+    It is cut by the border of the picture, is no ellipse, and is too large or not as dark as the
+    dots around it. A double dot that the border cuts looks the same."""
+    flags = found.flags
+    wedge = (flags & BORDER > 0) & (flags & ODD_SHAPE > 0)
+    suspects = np.flatnonzero(wedge)
+    if len(found) <= _NEIGHBOURS:
+        return np.zeros_like(wedge)
+    if len(suspects):
+        tree = cKDTree(found.centres_px)
+        _, near = tree.query(found.centres_px[suspects], _NEIGHBOURS + 1)
+        usual = np.median(found.contrast[near], axis=1)
+        pale = found.contrast[suspects] < _PALE * usual
+        wedge[suspects] = pale | (flags[suspects] & LARGE > 0)
+    return wedge
 
 
 def _flagged(dots: NDArray[np.float64], compare: bool = True) -> Detections:

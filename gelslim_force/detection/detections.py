@@ -64,6 +64,8 @@ class Detections:
     def take(self, which: ArrayLike) -> Detections:
         """Return the dots chosen by indices or by (n,) booleans."""
         chosen = np.asarray(which)
+        if chosen.dtype == bool and len(chosen) == len(self) and chosen.all():
+            return self
         return Detections(**{name: getattr(self, name)[chosen] for name in _ARRAYS})
 
     def joined(self, more: Detections) -> Detections:
