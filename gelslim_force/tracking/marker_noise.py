@@ -35,4 +35,9 @@ def robust_sigma(values: Array) -> float:
     """
     if len(values) < _MIN_VALUES:
         return 0.0
-    return float(np.quantile(np.abs(values), 0.25) / _QUARTILE)
+    sizes = np.abs(values).ravel()
+    at = 0.25 * (sizes.size - 1)
+    below = int(at)
+    # np.quantile gives the same and takes six times as long.
+    first, second = np.partition(sizes, (below, below + 1))[below : below + 2].tolist()
+    return float((first + (at - below) * (second - first)) / _QUARTILE)

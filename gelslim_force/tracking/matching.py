@@ -72,7 +72,12 @@ def _matched(
     mk.mutual(expected, points, pitch, _TOLERANCE, dots)
     offered = dots >= 0
     trusted = offered.copy()
-    sure = mk.verify(rest, near, pitch, points, dots, trusted, _AGREEMENT, _ROUNDS)
+    sure = mk.verify(rest, near, pitch, points, dots, trusted, _AGREEMENT, 1)
+    if sure == len(reference) and _one_patch(reference, points, dots, trusted):
+        # All markers are verified by all their neighbours: nothing below would change a match.
+        status = np.full(len(reference), MarkerStatus.TRACKED, dtype=np.int64)
+        return _tracks(reference, points, dots, status, np.empty((len(reference), 2)))
+    sure = mk.verify(rest, near, pitch, points, dots, trusted, _AGREEMENT, _ROUNDS - 1)
     dots, trusted = _grown(reference, points, dots, trusted)
     if sure < _NEARLY_ALL * min(len(reference), len(points)):
         dots, trusted = _shifted(reference, points, expected, dots, trusted)
@@ -92,6 +97,19 @@ def _matched(
         elif offered[i]:
             status[i] = MarkerStatus.REJECTED
     return _tracks(reference, points, dots, status, guess)
+
+
+def _one_patch(
+    reference: ReferenceLattice,
+    points: NDArray[np.float64],
+    dots: NDArray[np.int64],
+    trusted: NDArray[np.bool_],
+) -> bool:
+    """Whether the motion is smooth over all markers."""
+    from gelslim_force.tracking import matching_kernel as mk
+
+    rest, near, pitch = reference.positions_px, reference.neighbours, reference.pitch_px
+    return not mk.patches(rest, near, pitch, points, dots, trusted, _SMOOTHNESS[0]).any()
 
 
 def _grown(

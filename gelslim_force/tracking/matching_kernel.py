@@ -24,6 +24,10 @@ _MAX_LEVEL = 12
 FOR_QUADRATIC = 12
 """Least number of neighbours for a quadratic motion, which has 6 coefficients per axis."""
 _PIVOT = 1e-3
+_MOST_CELLS = 128
+"""Cells per side of the square in which the nearest dots are looked up."""
+_FAR_PX = 1e6
+"""Beyond this nothing is in a picture; also for positions that are not finite."""
 
 
 @njit(**COMPILED)
@@ -41,18 +45,48 @@ def nearest(points: Any, x: Any, y: Any) -> Any:
 @njit(**COMPILED)
 def mutual(expected: Any, points: Any, pitch: Any, gate: Any, match: Any) -> None:
     """Match markers and dots that are mutual nearest neighbours, within `gate` pitches."""
+    match[:] = -1
+    if len(points) == 0:
+        return
     owner = np.full(points.shape[0], -1, dtype=np.int64)
     least = np.full(points.shape[0], 1e300)
+    left, top = points[:, 0].min(), points[:, 1].min()
+    extent = max(points[:, 0].max() - left, points[:, 1].max() - top)
+    size = max(gate * pitch.max(), extent / _MOST_CELLS, 1e-9)
+    count = int(extent / size) + 1
+    first, following = _cells(points, left, top, size, count)
     for i in range(expected.shape[0]):
-        match[i] = -1
-        if not math.isfinite(expected[i, 0] + expected[i, 1]):
+        x, y = expected[i, 0], expected[i, 1]
+        if not (abs(x) < _FAR_PX and abs(y) < _FAR_PX):
             continue
-        k, gap = nearest(points, expected[i, 0], expected[i, 1])
-        if k >= 0 and gap < (gate * pitch[i]) ** 2 and gap < least[k]:
-            owner[k], least[k] = i, gap
+        best, gap = -1, (gate * pitch[i]) ** 2
+        row, column = math.floor((y - top) / size), math.floor((x - left) / size)
+        for r in range(max(row - 1, 0), min(row + 2, count)):
+            for c in range(max(column - 1, 0), min(column + 2, count)):
+                k = first[r, c]
+                while k >= 0:
+                    dx, dy = points[k, 0] - x, points[k, 1] - y
+                    away = dx * dx + dy * dy
+                    if away < gap or (away == gap and 0 <= k < best):
+                        best, gap = k, away
+                    k = following[k]
+        if best >= 0 and gap < least[best]:
+            owner[best], least[best] = i, gap
     for k in range(points.shape[0]):
         if owner[k] >= 0:
             match[owner[k]] = k
+
+
+@njit(**COMPILED)
+def _cells(points: Any, left: Any, top: Any, size: Any, count: Any) -> Any:
+    """First dot of each cell (count, count), and next dot (m,) of the same cell; or -1."""
+    first = np.full((count, count), -1, dtype=np.int64)
+    following = np.empty(points.shape[0], dtype=np.int64)
+    for k in range(points.shape[0]):
+        row, column = int((points[k, 1] - top) / size), int((points[k, 0] - left) / size)
+        following[k] = first[row, column]
+        first[row, column] = k
+    return first, following
 
 
 @njit(**COMPILED)

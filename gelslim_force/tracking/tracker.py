@@ -1,8 +1,9 @@
 """Markers followed from frame to frame; the tracker is the only part of detection with a state.
 
-A frame is first searched only near the predicted positions. If too few markers are verified, or
-at regular intervals, the whole frame is searched and matched again; if the anchors contradict the
-result, the lattice is registered again.
+A frame is first searched only near the predicted positions. If too few markers are verified, the
+whole of the same frame is searched and matched again; if the anchors contradict the result, the
+lattice is registered again. The whole frame is also searched at intervals, which are short while
+markers are missing.
 """
 
 from __future__ import annotations
@@ -30,7 +31,12 @@ _MIN_COVERAGE = 0.25
 _LEAST_COVERAGE = 0.97
 """Share of the markers of the last full search that a search near predictions must find."""
 _FULL_EVERY = 30
-"""Number of frames after which the whole frame is searched in any case."""
+"""Number of frames after which the whole frame is searched while markers are missing."""
+_GUARD_EVERY = 300
+"""The same where nearly all are seen. It is rarer than one frame in a hundred, so that it does not
+set the 99th percentile of the time per frame."""
+_FEW_MISSING = 0.01
+"""Share of the markers that may be missing with the longer interval, if their places are known."""
 _AREA_STEP = 0.45
 """Change of the logarithm of a dot's area that shows another kind of dot: a factor of 1.6."""
 _MOST_CHANGED = 0.15
@@ -105,22 +111,24 @@ class Tracker:
         self._velocity = np.zeros_like(self._positions)
         self._moments = self._rest_moments.copy()
         self._usual = 0
-        self._age = _FULL_EVERY
+        self._age = _GUARD_EVERY
+        self._every = _FULL_EVERY
 
     def update(self, image: NDArray[np.uint8]) -> TrackedFrame:
         """Return the markers of the next frame. Raises ValueError if the array is no picture."""
         as_planes(image)
         expected = self._positions + self._velocity
         result = None
-        if self._age < _FULL_EVERY:
+        if self._age < self._every:
             result = self._near(image, expected)
         if result is None:
             result = self._full(image, expected)
             # A frame with hardly any markers does not tell where they are in the next one.
             blind = result.tracks.coverage < _MIN_COVERAGE
-            self._age = _FULL_EVERY if blind else 0
+            self._age = _GUARD_EVERY if blind else 0
             self._usual = int(result.tracks.tracked.sum())
         self._age += 1
+        self._every = _FULL_EVERY if _many_missing(result.tracks) else _GUARD_EVERY
         if result.slipped:
             self.reset()
         else:
@@ -191,13 +199,17 @@ class Tracker:
 
     def _contradicted(self, tracks: Tracks, dots: Detections) -> bool:
         """Return whether the sizes of the dots show that the tracks are those of other markers."""
-        if _anchors_slipped(tracks, dots.area_px, self._area, self._large):
+        seen = np.flatnonzero(tracks.tracked)
+        if not len(seen):
+            return False
+        change = _area_change(dots.area_px[tracks.dots[seen]], self._area[seen])
+        shrunk = change[self._large[seen]] < -_AREA_STEP
+        if len(shrunk) >= 2 and shrunk.mean() > 0.5:
+            # Most of the large anchors lie on regular dots.
             return True
-        seen = tracks.tracked
-        if not seen.any() or np.median(np.abs(tracks.displacement_px[seen])) < self._little_px:
+        if np.median(np.abs(tracks.displacement_px[seen])) < self._little_px:
             return False
         # In another part of a tilted view dots are larger or smaller.
-        change = _area_change(tracks, dots.area_px, self._area)
         return bool((np.abs(change) > _AREA_STEP).mean() > _MOST_CHANGED)
 
     def _remember(self, result: TrackedFrame) -> None:
@@ -211,29 +223,17 @@ class Tracker:
         self._moments[seen] = result.detections.moments_px2[tracks.dots[seen]]
 
 
-def _anchors_slipped(
-    tracks: Tracks,
-    area_px: NDArray[np.float64],
-    reference_area_px: NDArray[np.float64],
-    large: NDArray[np.bool_],
-) -> bool:
-    """Return whether most of the tracked large anchors lie on regular dots now.
-
-    `area_px` (m,) are the areas of the dots of the frame, `reference_area_px` (n,) those of the
-    markers, and `large` (n,) tells which of them are large anchors. A change that is common to
-    all areas, due to exposure or focus, has no effect.
-    """
-    if not tracks.tracked.any():
-        return False
-    change = _area_change(tracks, area_px, reference_area_px)
-    shrunk = change[large[tracks.tracked]] < -_AREA_STEP
-    return len(shrunk) >= 2 and bool(shrunk.mean() > 0.5)
+def _many_missing(tracks: Tracks) -> bool:
+    """Whether more than a few markers are not seen, or one has not even a predicted place."""
+    return tracks.coverage < 1 - _FEW_MISSING or tracks.count(MarkerStatus.LOST) > 0
 
 
 def _area_change(
-    tracks: Tracks, area_px: NDArray[np.float64], reference_area_px: NDArray[np.float64]
+    area_px: NDArray[np.float64], before_px: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Logarithm of the relative change of the tracked dots' areas, beyond that of most dots."""
-    seen = np.flatnonzero(tracks.tracked)
-    change = np.log(area_px[tracks.dots[seen]] / reference_area_px[seen])
+    """Logarithm of the relative change of the dots' areas (n,), beyond that of most dots.
+
+    A change that is common to all areas, due to exposure or focus, has no effect.
+    """
+    change = np.log(area_px / before_px)
     return np.asarray(change - np.median(change))

@@ -2,62 +2,27 @@
 
 import numpy as np
 import pytest
-from camera_rig import finger_view
-from synthetic import Look, grid_of_dots, render
+from synthetic import Look, render
+from tracker_samples import (
+    CAMERA,
+    GRID,
+    PITCH_MM,
+    PLACE,
+    FullSearch,
+    errors,
+    frame_at,
+    tracker_for,
+)
 
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.detections import Detections
-from gelslim_force.detection.settings import DetectorSettings
-from gelslim_force.lattice.reference_lattice import ReferenceLattice
-from gelslim_force.lattice.registration import register
 from gelslim_force.tracking.tracker import Tracker
 from gelslim_force.tracking.tracks import MarkerStatus
-
-GRID = grid_of_dots()
-CAMERA = finger_view()
-PITCH_MM = 1.1
-PLACE = np.array([1.5, -2.0])
 
 
 @pytest.fixture(scope="module")
 def rest():
     return render(GRID, CAMERA, Look(noise=5))
-
-
-class FullSearch(Tracker):
-    """Searches the whole of every frame."""
-
-    def _near(self, image, expected):
-        return None
-
-
-def tracker_for(frame, kind=Tracker):
-    detector = Detector(DetectorSettings.for_diameters(frame.diameter_px))
-    dots = detector.detect(frame.image)
-    registration = register(dots, GRID, frame.image.shape)
-    found = np.flatnonzero(registration.found)
-    sites = np.column_stack([GRID.row, GRID.column])[found]
-    reference = ReferenceLattice.connected(sites, registration.centres_px[found], found)
-    return kind(detector, reference, dots.take(registration.dots[reference.markers]), GRID)
-
-
-def press(amount_pitch):
-    """Shear and spread under a contact of 3 mm."""
-    off = GRID.positions_mm - PLACE
-    bump = np.exp(-np.sum(off**2, axis=1) / (2 * 3.0**2))[:, None]
-    moved = bump * (np.array([0.8, 0.6]) + 0.12 * off)
-    return moved * amount_pitch * PITCH_MM / np.hypot(*moved.T).max()
-
-
-def frame_at(amount_pitch, **look):
-    return render(GRID, CAMERA, Look(**{"noise": 5, **look}), press(amount_pitch))
-
-
-def errors(tracker, tracked, frame):
-    """Distance (k,) of the tracked markers from their true centres, and which they are."""
-    seen = np.flatnonzero(tracked.tracks.tracked)
-    true = frame.centres_px[tracker.reference.markers[seen]]
-    return np.hypot(*(tracked.tracks.positions_px[seen] - true).T), tracker.reference.markers[seen]
 
 
 def test_a_press_is_followed_on_the_fast_path(rest):
@@ -84,8 +49,8 @@ def test_the_fast_path_gives_what_the_full_search_gives(rest):
         both = a.tracks.tracked & b.tracks.tracked
         assert both.mean() > 0.99
         apart = np.hypot(*(a.tracks.positions_px - b.tracks.positions_px)[both].T)
-        assert np.percentile(apart, 99) < 0.01
-        assert apart.max() < 0.1
+        assert np.percentile(apart, 98) < 1e-5, "both converge to one centre"
+        assert apart.max() < 0.03, "a few windows are rounded to another size"
     assert (a.route, b.route) == ("near", "full")
 
 
