@@ -20,7 +20,7 @@ from gelslim_core.immutable import Immutable
 from gelslim_core.uncertainty import two_digits, with_sigma
 from gelslim_force.forces.record import RecordReader, plain
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
-from ifem_export.operators.adjoint_fields import AdjointFields, rigid_motions
+from ifem_export.operators.adjoint_fields import AdjointFields, resultants, rigid_motions
 from ifem_export.operators.surface_operator import SurfaceOperator
 
 Array = NDArray[np.float64]
@@ -145,7 +145,8 @@ class WrenchNoise:
                 their apparent motion is taken off for a depth that is wrong or unknown.
         """
         count = len(marker_covariance_mm2)
-        spread = np.einsum("aki,kij->akj", gains, marker_covariance_mm2)
+        spread = gains[:, :, :1] * marker_covariance_mm2[:, 0]
+        spread += gains[:, :, 1:] * marker_covariance_mm2[:, 1]
         total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
         common = np.zeros(6)
         if normal_sigma_mm is not None:
@@ -171,4 +172,5 @@ class WrenchNoise:
 def resultant(points_mm: ArrayLike, force_n: ArrayLike) -> tuple[Array, Array]:
     """Sum of forces (c, 3) and their torque about the origin, acting at points (c, 3)."""
     points, force = np.asarray(points_mm, dtype=float), np.asarray(force_n, dtype=float)
-    return force.sum(axis=0), np.cross(points, force).sum(axis=0)
+    found = resultants(points, force)
+    return found[:3], found[3:]

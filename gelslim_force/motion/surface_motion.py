@@ -130,10 +130,15 @@ class SurfaceMotion:
 
     def covariance_mm2(self, known: NDArray[np.bool_], noise_px: float) -> Array:
         """(k, 2, 2) of the markers' motion, for noise of their positions; 0 where not seen."""
-        scale = self.view.mm_per_px
-        spread = noise_px**2 * scale @ scale.transpose(0, 2, 1)
+        spread = noise_px**2 * self._squared_scale
         spread[~known] = 0.0
         return self._of_all(spread, 0.0)
+
+    @cached_property
+    def _squared_scale(self) -> Array:
+        """(n, 2, 2) covariance on the gel in mm² per variance in the picture in px²."""
+        scale = self.view.mm_per_px
+        return np.asarray(scale @ scale.transpose(0, 2, 1))
 
     def of_noise(self, noise_px: Array) -> Array:
         """Motion (c, 3) of the nodes for errors (n, 2) of the positions; no normal motion."""
