@@ -95,6 +95,20 @@ def round_moments(diameter_px: Array) -> Array:
     return np.column_stack([square, np.zeros_like(square), square])
 
 
+def blob_detector(sizes: DetectorSettings) -> tuple[Any, Any]:
+    """OpenCV's blob detector for dots of these sizes, and its parameters."""
+    import cv2
+
+    asked = cv2.SimpleBlobDetector_Params()
+    asked.filterByArea = True
+    asked.minArea = 0.5 * np.pi / 4 * sizes.smallest_diameter_px**2
+    asked.maxArea = 1.5 * np.pi / 4 * sizes.largest_diameter_px**2
+    asked.filterByCircularity = asked.filterByConvexity = asked.filterByInertia = False
+    asked.minDistBetweenBlobs = sizes.smallest_diameter_px
+    asked.minThreshold, asked.maxThreshold, asked.thresholdStep = 10, 220, 10
+    return cv2.SimpleBlobDetector_create(asked), asked
+
+
 def opencv_detectors(
     sizes: DetectorSettings, frames: list[RenderedFrame]
 ) -> dict[str, Callable[[int], Array]]:
@@ -105,14 +119,7 @@ def opencv_detectors(
         print("OpenCV is not installed: its detectors are left out (pip install '.[vision]')")
         return {}
     cv2.setNumThreads(1)
-    asked = cv2.SimpleBlobDetector_Params()
-    asked.filterByArea = True
-    asked.minArea = 0.5 * np.pi / 4 * sizes.smallest_diameter_px**2
-    asked.maxArea = 1.5 * np.pi / 4 * sizes.largest_diameter_px**2
-    asked.filterByCircularity = asked.filterByConvexity = asked.filterByInertia = False
-    asked.minDistBetweenBlobs = sizes.smallest_diameter_px
-    asked.minThreshold, asked.maxThreshold, asked.thresholdStep = 10, 220, 10
-    blob = cv2.SimpleBlobDetector_create(asked)
+    blob, asked = blob_detector(sizes)
     block = 2 * int(sizes.largest_diameter_px) + 1
 
     def grey(k: int) -> Image:
