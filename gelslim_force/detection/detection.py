@@ -41,6 +41,8 @@ _PALE = 0.7
 """Darkness of the wedge at a corner of the pad, at most, over that of the dots around it."""
 _MAX_STEPS = 16
 _CONVERGED_PX = 0.01
+_EVEN_FILL = 0.85
+"""Area of a dot, at least, over that of the ellipse with its moments, to be an ellipse."""
 _FLOOR = 8.0
 _FIRST_LEVEL, _NEXT_LEVEL = 0.7, 1.6
 """Lowest threshold of darkness as a share of the least contrast, and the factor to the next."""
@@ -303,8 +305,11 @@ def _dark_corners(found: Detections) -> NDArray[np.bool_]:
 
 
 def _flagged(dots: NDArray[np.float64], compare: bool = True) -> Detections:
+    from gelslim_force.detection.plausible_kernel import own_flags
+
+    flags = np.empty(len(dots), dtype=np.int64)
+    own_flags(dots, _EVEN_FILL, _CONVERGED_PX, BORDER, ODD_SHAPE, NOT_CONVERGED, flags)
     area, contrast = dots[:, 2], dots[:, 3]
-    flags = np.zeros(len(dots), dtype=np.int64)
     seen = np.flatnonzero(area > 0)
     if compare and len(seen) > _NEIGHBOURS:
         _, near = cKDTree(dots[seen, :2]).query(dots[seen, :2], _NEIGHBOURS + 1)
@@ -313,11 +318,6 @@ def _flagged(dots: NDArray[np.float64], compare: bool = True) -> Detections:
         flags[seen] |= np.where(area[seen] > 1.6 * usual_area, LARGE, 0)
         flags[seen] |= np.where(area[seen] < 0.5 * usual_area, SMALL, 0)
         flags[seen] |= np.where(contrast[seen] < 0.5 * usual_contrast, FAINT, 0)
-    long, short = _axes(dots)
-    with np.errstate(invalid="ignore"):
-        flags |= np.where((area > 0) & (area < 0.85 * np.pi * long * short), ODD_SHAPE, 0)
-    flags |= np.where((area > 0) & (dots[:, 8] < 1.0), BORDER, 0)
-    flags |= np.where((area > 0) & (dots[:, 9] > _CONVERGED_PX), NOT_CONVERGED, 0)
     return Detections(
         centres_px=dots[:, :2],
         area_px=area,

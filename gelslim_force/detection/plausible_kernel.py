@@ -12,7 +12,17 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from gelslim_force.detection.centroid_kernel import AREA, CONTRAST, CX, CY, MXX, MXY, MYY
+from gelslim_force.detection.centroid_kernel import (
+    AREA,
+    CONTRAST,
+    CX,
+    CY,
+    INSIDE,
+    MXX,
+    MXY,
+    MYY,
+    SHIFT,
+)
 from gelslim_force.detection.darkness_kernel import COMPILED
 
 _LEAST_AREA = 0.6
@@ -43,6 +53,22 @@ def plausible(
             and 2 * long <= largest
             and long <= aspect * max(short, 0.5)
         )
+
+
+@njit(**COMPILED)
+def own_flags(
+    dots: Any, least_fill: Any, least_shift: Any, border: Any, odd: Any, restless: Any, flags: Any
+) -> None:
+    """Write flags (n,) of what is unusual about each found dot by itself: it is cut by the border,
+    fills less than `least_fill` of its ellipse, or moved by more than `least_shift` px at last."""
+    for i in range(len(dots)):
+        dot = dots[i]
+        flags[i] = 0
+        if dot[AREA] > 0:
+            ellipse = 4 * math.pi * math.sqrt(max(dot[MXX] * dot[MYY] - dot[MXY] ** 2, 0.0))
+            flags[i] |= odd if dot[AREA] < least_fill * ellipse else 0
+            flags[i] |= border if dot[INSIDE] < 1.0 else 0
+            flags[i] |= restless if dot[SHIFT] > least_shift else 0
 
 
 @njit(**COMPILED)
