@@ -87,16 +87,23 @@ class MarkerView:
             raise ValueError(f"compensation {compensation!r}: one of {', '.join(COMPENSATIONS)}")
         w = np.broadcast_to(np.asarray(normal_mm, dtype=float), len(positions))
         known = np.isfinite(positions).all(axis=1) & np.isfinite(w)
+        if known.all():
+            return self._lateral(positions, self.rest_mm, w, compensation)
         motion = np.full(positions.shape, np.nan)
         if not known.any():
             return motion
-        rest = self.rest_mm[known]
-        height = w[known] if compensation == "exact" else 0.0
-        now = self._at(positions[known], rest[:, 2] + height)
-        motion[known] = now[:, :2] - rest[:, :2]
-        if compensation in ("printed", "arctan"):
-            motion[known] -= projection_error_mm(self.camera, rest, w[known], compensation)
+        motion[known] = self._lateral(positions[known], self.rest_mm[known], w[known], compensation)
         return motion
+
+    def _lateral(
+        self, positions: Array, rest: Array, w: Array, compensation: Compensation
+    ) -> Array:
+        """Displacements (k, 2) of markers that are all known."""
+        now = self._at(positions, rest[:, 2] + (w if compensation == "exact" else 0.0))
+        motion = now[:, :2] - rest[:, :2]
+        if compensation in ("printed", "arctan"):
+            motion -= projection_error_mm(self.camera, rest, w, compensation)
+        return np.asarray(motion)
 
     def _at(self, positions_px: Array, height_mm: Array) -> Array:
         return self.camera.points_along(self.camera.pixel_slopes(positions_px), height_mm)

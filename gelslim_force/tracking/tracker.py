@@ -42,7 +42,8 @@ _AREA_STEP = 0.45
 _MOST_CHANGED = 0.15
 """Largest share of the dots whose area may change by such a factor where most dots have moved."""
 _LITTLE_PITCH = 0.2
-"""Median motion per coordinate, over the pitch, up to which no other marker can be taken."""
+"""Motion per coordinate, over the pitch, that half of the markers must have before another marker
+can be taken."""
 Route = Literal["near", "full", "registered"]
 """How markers were found: near predictions, in the whole frame, or by registration."""
 
@@ -207,7 +208,8 @@ class Tracker:
         if len(shrunk) >= 2 and shrunk.mean() > 0.5:
             # Most of the large anchors lie on regular dots.
             return True
-        if np.median(np.abs(tracks.displacement_px[seen])) < self._little_px:
+        moved = np.abs(tracks.displacement_px[seen]) >= self._little_px
+        if 2 * np.count_nonzero(moved) < moved.size:
             return False
         # In another part of a tilted view dots are larger or smaller.
         return bool((np.abs(change) > _AREA_STEP).mean() > _MOST_CHANGED)
@@ -236,4 +238,6 @@ def _area_change(
     A change that is common to all areas, due to exposure or focus, has no effect.
     """
     change = np.log(area_px / before_px)
-    return np.asarray(change - np.median(change))
+    middle = len(change) // 2
+    # The upper median serves as well, and np.median takes four times as long.
+    return np.asarray(change - np.partition(change, middle)[middle])
