@@ -180,6 +180,16 @@ def test_the_whole_frame_is_searched_seldom_while_all_is_well(
     assert searched(missing) == [0, 3, 6, 9, 12, 15]
 
 
+@pytest.mark.slow
+def test_fewer_than_one_frame_in_a_hundred_of_a_long_stream_is_searched_whole(rest: Frame) -> None:
+    """Presses and releases of two pitches a second at 60 frames a second, each with other noise."""
+    tracker = tracker_for(rest)
+    images = [frame_at(0.5 - 0.5 * np.cos(2 * np.pi * k / 40), seed=k + 2).image for k in range(40)]
+    routes = [tracker.update(images[k % 40]).route for k in range(2000)]
+    assert 6 <= routes.count("full") <= 12
+    assert routes.count("near") + routes.count("full") == 2000
+
+
 def test_windows_and_full_search_follow_a_stream_alike(rest: Frame) -> None:
     """Centres within rounding, apart from a few windows that are rounded to another size."""
     near, full = tracker_for(rest), tracker_for(rest, FullSearch)
