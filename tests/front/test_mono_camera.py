@@ -125,7 +125,7 @@ def test_pictures_are_grey_and_carry_the_motion(
     assert rest.image.shape == moved.image.shape == shape
     assert Compression(80).apply(rest.image).shape == shape
     assert 40 < rest.image.mean() < 220
-    pipeline = open_sensor(sensor, reference=rest.image)
+    pipeline = open_sensor(sensor, reference=rest.image, indenter="none")
     result = pipeline.process(moved.image)
     found = np.nanmedian(result.marker_displacement_mm[:, :2], axis=0)
     assert found == pytest.approx(SHIFT_MM[:2], abs=0.01)
