@@ -254,16 +254,35 @@ class JointEstimator:
         bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide)
         return bins.sums(self.law, moved_mm[:, 2], gain, self.settings.light_error)
 
+    def _off_design(self, force_n: Array) -> Array:
+        """(6, 6) by a gel and a print that are not as specified, for the markers alone.
+
+        Light tells the scale of the heights. Without it such errors change the size of all forces,
+        and a height that is wrong shows as shear, which acts where the pressure does.
+        """
+        wrench = np.einsum("kcd,cd->k", self._rigid, force_n)
+        normal = float(wrench[2])
+        if normal == 0:
+            return np.zeros((6, 6))
+        x, y = -wrench[4] / normal, wrench[3] / normal
+        shear = np.array([[1.0, 0, 0, 0, 0, -y], [0, 1.0, 0, 0, 0, x]])
+        shear *= self.settings.shear_by_markers * normal
+        scale = self.settings.scale_by_markers * wrench
+        return np.asarray(np.outer(scale, scale) + shear.T @ shear)
+
     def _found(self, seen: Mask, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
         nodes = np.flatnonzero(region)
         sums = np.reshape(self._rigid[:, nodes], (6, -1))
+        covariance = state.equations.covariance_of(sums, state.force_n[nodes].ravel())
+        if self.light is None:
+            covariance = covariance + self._off_design(state.force_n)
         return JointForces(
             state.force_n,
             state.displacement_mm,
             region,
             seen,
-            state.equations.covariance_of(sums, state.force_n[nodes].ravel()),
+            covariance,
             state.gain,
             state.unexplained,
         )

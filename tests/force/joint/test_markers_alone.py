@@ -142,3 +142,38 @@ def test_a_contact_elsewhere_is_seen_at_once() -> None:
         assert found.wrench is not None
         off = found.wrench.force_n - truth.wrench[:3]
         assert (np.abs(off) < 3 * found.wrench.standard_deviation[:3]).all()
+
+
+def test_deviations_hold_a_gel_that_is_not_as_specified() -> None:
+    """15 % of force and torque, and shear of 2 % of the normal force at the centre of pressure."""
+    source = mono().normal
+    assert isinstance(source, UnknownShape)
+    estimator = source.estimator
+    bare = replace(
+        estimator, settings=replace(estimator.settings, scale_by_markers=0.0, shear_by_markers=0.0)
+    )
+    positions = pushed_positions()
+    found, without = (e.estimate(reference().image, positions, 0.02) for e in (estimator, bare))
+    assert found is not None
+    assert without is not None
+    added = found.covariance - without.covariance
+    force, points = found.force_n, estimator.points_mm
+    wrench = np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])
+    x, y = -wrench[4] / wrench[2], wrench[3] / wrench[2]
+    expected = (0.15 * wrench) ** 2
+    shear = (0.02 * wrench[2]) ** 2
+    expected += shear * np.array([1, 1, 0, 0, 0, x * x + y * y])
+    np.testing.assert_allclose(np.diag(added), expected, rtol=1e-6)
+
+
+def pushed_positions() -> NDArray[np.float64]:
+    """(n, 2) markers in the picture, of which those near a place move as under a press."""
+    source = mono().normal
+    assert isinstance(source, UnknownShape)
+    view, estimator = source.estimator.markers, source.estimator
+    force = np.zeros_like(estimator.points_mm)
+    near = np.hypot(*(estimator.points_mm[:, :2] - [1.0, 2.0]).T) < 2.0
+    force[near, 2] = -0.01
+    moved = estimator.responses.displacement(np.flatnonzero(near), force[near])
+    now = view.rest_mm + estimator.nodes_to_markers @ moved
+    return np.asarray(view.camera.project(now))
