@@ -7,7 +7,6 @@ the markers, drift and forces. What is wrong with a frame is reported in its res
 from __future__ import annotations
 
 import copy
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.contact.normal_source import NormalReading, NormalSource, Remembering
+from gelslim_force.contact.normal_source import NormalReading, NormalSource
 from gelslim_force.forces import frame_problems
+from gelslim_force.forces.contact_motion import ContactMotion
 from gelslim_force.forces.frame_clock import FrameClock
+from gelslim_force.forces.frame_problems import FrameCheck
 from gelslim_force.forces.frame_result import FrameResult
+from gelslim_force.forces.untouched import untouched, with_untouched
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.forces.wrench_covariance import WrenchCovariance
 from gelslim_force.frames.frame import Frame, FrameTimes
@@ -43,8 +45,6 @@ from ifem_export.errors import IfemError
 from ifem_export.operators.single_thread import single_threaded
 
 Array = NDArray[np.float64]
-_SHIFT_MM = 0.03
-"""Change of the lateral motion in the contact for which the normal motion need not be redone."""
 
 
 class ForcePipeline:
@@ -98,6 +98,8 @@ class ForcePipeline:
             points_mm,
             self.settings.compensation,
         )
+        self._check = FrameCheck.of(bundle, calibration, self._motion, self.settings.least_coverage)
+        self._contact = ContactMotion(self._motion, self._check.unseen, normal)
         self._forces = self.settings.contact_forces(bundle, operator, self._motion)
         self._forces.prepare()
         self._prepare_edge()
@@ -129,6 +131,7 @@ class ForcePipeline:
         """
         other = copy.copy(self)
         other.normal, other._tracker = normal, self.calibration.tracker()
+        other._contact = ContactMotion(self._motion, self._check.unseen, normal)
         other._drift = self._drift.copy()
         other._prepare_edge()
         other.reset()
@@ -140,9 +143,7 @@ class ForcePipeline:
         self._drift.reset()
         self._index = 0
         self._last_force: Array | None = None
-        self._last_lateral: Array | None = None
-        if isinstance(self.normal, Remembering):
-            self.normal.reset()
+        self._contact.reset()
 
     def _prepare_edge(self) -> None:
         """Columns near the edge, for a source that says where the gel is touched."""
@@ -198,7 +199,7 @@ class ForcePipeline:
             return self._numbered(times, problems=(str(error),))
         clock.stage("track")
         problems, tracks = tracked.problems, tracked.tracks
-        problem = frame_problems.refusal(tracked, self.settings.least_coverage)
+        problem = self._check.refusal(tracked)
         if not problem:
             noise = self._noise_px(tracks)
             drift = self._drift.update(tracks, noise)
@@ -209,16 +210,18 @@ class ForcePipeline:
             return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
         size = len(self.points_mm)
         given = None if normal_mm is None else NormalReading.given(size, normal_mm, normal_sigma_mm)
-        reading, motion = self._motions(image, drift.positions_px, given, clock)
+        reading, motion = self._contact.of(image, drift.positions_px, tracks.tracked, given, clock)
         self._drift.loaded = self._motion.loaded(reading)
         if reading is not None and not reading.known:
             problems = (*problems, reading.problem)
         try:
-            found = self._forces_of(motion, reading, noise, drift, clock)
+            found = self._forces_of(motion, tracks.tracked, reading, noise, drift, clock)
         except IfemError as error:
             problems = (*problems, str(error))
             return self._numbered(times, tracks=tracks, stage_ms=clock.stages, problems=problems)
         field = found["field"]
+        if untouched(reading, self._check.unseen.thickness_mm):
+            found["wrench"] = with_untouched(found["wrench"])
         if self.gel is not None:
             found["wrench"] = self.gel.added(found["wrench"], field.displacement_mm, reading)
         if self._motion.moved(motion):
@@ -259,7 +262,7 @@ class ForcePipeline:
             image, tracked = self._followed(image)
         except ValueError as error:
             raise TareError(str(error)) from error
-        problem = frame_problems.refusal(tracked, self.settings.least_coverage)
+        problem = self._check.refusal(tracked)
         if problem:
             raise TareError(problem)
         # A normal source looks at this frame; the frame before may have been touched.
@@ -273,51 +276,16 @@ class ForcePipeline:
         """The picture upright, and its markers. Raises ValueError for what is no picture."""
         image = upright(image, self.calibration.camera)
         problem = frame_problems.size_problem(image, self.calibration.camera)
+        problem = problem or self._check.faults.broken(image)
         if problem:
             raise ValueError(problem)
-        return image, self._tracker.update(image)
+        return image, self._check.whole.of(self._tracker.update(image))
 
     def _numbered(self, times: FrameTimes, **found: Any) -> FrameResult:
         index, self._index = self._index, self._index + 1
         time_s = float(index) if times.time_s is None else times.time_s
         found |= {"stamp_s": times.stamp_s, "sensor_s": times.sensor_s}
         return FrameResult(index, time_s, **found)
-
-    def _motions(
-        self,
-        image: NDArray[np.uint8],
-        positions_px: Array,
-        given: NormalReading | None,
-        clock: FrameClock,
-    ) -> tuple[NormalReading | None, Array]:
-        """Normal motion, and the motion (n, 3) of the reference's markers."""
-        motion_of = self._motion.of_markers
-        if given is not None or self.normal is None:
-            motion = motion_of(positions_px, given)
-            clock.stage("displace")
-            return given, motion
-        seen = self.normal.look(image, positions_px)
-        clock.stage("look")
-        reading = self.normal.motion(seen, self._last_lateral)
-        clock.stage("normal")
-        motion = motion_of(positions_px, reading)
-        clock.stage("displace")
-        if seen is None and self._motion.moved(motion):
-            # The gel moves although no patch is seen: zero force would be a false statement.
-            return replace(reading, problem=frame_problems.NO_PATCH), motion_of(positions_px, None)
-        ratio = self._motion.apparent_over_seen(motion, reading)
-        if ratio > frame_problems.LARGEST_CONTRADICTION:
-            doubtful = replace(reading, problem=frame_problems.CONTRADICTED.format(ratio))
-            return doubtful, motion_of(positions_px, None)
-        lateral = self._motion.in_contact(motion, reading)
-        used, self._last_lateral = self._last_lateral, lateral
-        before = 0.0 if used is None else used
-        if lateral is not None and np.hypot(*(lateral - before)) > _SHIFT_MM:
-            reading = self.normal.motion(seen, lateral)
-            clock.stage("normal")
-            motion = motion_of(positions_px, reading)
-            clock.stage("displace")
-        return reading, motion
 
     def _noise_px(self, tracks: Tracks) -> float:
         if self.settings.noise_px is not None:
@@ -327,24 +295,27 @@ class ForcePipeline:
     def _forces_of(
         self,
         motion: Array,
+        tracked: NDArray[np.bool_],
         reading: NormalReading | None,
         noise: float,
         drift: FrameDrift,
         clock: FrameClock,
     ) -> dict[str, Any]:
         """Force field and wrench for a motion (n, 3) of the markers. Raises IfemError."""
-        if reading is not None and reading.forces is not None:
+        if reading is not None and reading.known and reading.forces is not None:
             force, moved = reading.forces.force_n, reading.forces.displacement_mm
-            covariance = self._covariance.of_forces(reading.forces, drift)
+            covariance = self._covariance.of_forces(reading, drift)
             wrench = self._wrench.wrench(force, covariance)
             field = self._forces.direct.field_of(force, moved, reading.touched)
             return {"field": field, "wrench": wrench}
-        interpolation, displacement = self._motion.of_nodes(motion, reading)
+        noise_mm = noise * self._motion.view.usual_mm_per_px
+        filled = self._check.unseen.filled(motion, tracked, noise_mm)
+        interpolation, displacement = self._motion.of_nodes(filled.motion_mm, reading)
         clock.stage("interpolate")
         touched = reading.touched if reading is not None and reading.known else None
         field = self._forces.estimate(displacement, touched, self._last_force, noise)
         clock.stage("force")
-        covariance = self._covariance.of_motion(interpolation, motion, noise, reading, drift)
+        covariance = self._covariance.of_motion(interpolation, filled, noise, reading, drift)
         wrench = self._wrench.wrench(field.force_n, covariance)
         clock.stage("wrench")
         return {"field": field, "wrench": wrench}

@@ -2,19 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gelslim_force.calibration.sensor_calibration import Calibration
+from gelslim_force.motion.surface_motion import SurfaceMotion
+from gelslim_force.motion.unseen_motion import UnseenMotion
+from gelslim_force.tracking.picture_faults import PictureFaults
 from gelslim_force.tracking.tracker import TrackedFrame
+from gelslim_force.tracking.whole_dots import WholeDots
 from gelslim_optics.camera.virtual_camera import VirtualCamera
+
+if TYPE_CHECKING:
+    from ifem_export.bundle.bundle import Bundle
 
 LARGEST_CONTRADICTION = 4.0
 """Apparent motion that the depth should cause, over the motion seen, above which the patch is no
 contact. For correct patches the ratio stays below 2."""
 CONTRADICTED = "a contact as seen would show {:.0f} times the motion that the markers show"
+COVERED = (
+    "the markers are not seen in {:.0%} of the contact: clear the camera's view of the gel, or "
+    "look for dirt and damage of the print"
+)
 NO_PATCH = "the markers move, but no contact patch is seen"
 _LARGEST_MISFIT = 0.35
+_LARGEST_BLUR = 0.4
+"""Of the logarithm of the size of most dots."""
+_TURNED = (
+    "the picture is {} relative to the calibration: correct the camera's orientation, or calibrate "
+    "again with pictures in this one"
+)
+_TOO_FEW = "{:.0%} of the markers are seen: under {:.0%} forces are not given"
+_SLIPPED = (
+    "the sizes of the dots are not those of the calibration: the picture is turned, mirrored or "
+    "shifted, or shows another sensor; correct the camera's orientation or calibrate again"
+)
+_BLURRED = (
+    "the dots are half as large again as in the calibration: the picture is out of focus, or "
+    "something is on the lens"
+)
 
 
 def size_problem(image: Any, camera: VirtualCamera) -> str:
@@ -35,23 +63,54 @@ def misfit_problem(misfit: float) -> tuple[str, ...]:
     return (f"forces on the contact seen leave {misfit:.0%} of the motion unexplained",)
 
 
-def refusal(tracked: TrackedFrame, least_coverage: float) -> str:
-    """Why the tracks of a frame give no forces; empty if they do."""
-    if tracked.turn:
-        return (
-            f"the picture is {tracked.turn} relative to the calibration: correct the camera's "
-            "orientation, or calibrate again with pictures in this one"
+@dataclass(frozen=True, eq=False)
+class FrameCheck:
+    """Says which frames of one sensor give no forces.
+
+    Attributes:
+        whole: Finds the dots that are seen whole.
+        faults: Finds frozen rows and torn pictures.
+        unseen: Gaps among the markers.
+        least_coverage: Smallest share of the markers seen with which a frame gives forces.
+    """
+
+    whole: WholeDots
+    faults: PictureFaults
+    unseen: UnseenMotion
+    least_coverage: float
+
+    @classmethod
+    def of(
+        cls,
+        bundle: Bundle,
+        calibration: Calibration,
+        motion: SurfaceMotion,
+        least_coverage: float,
+    ) -> FrameCheck:
+        """Make it for one sensor with its followed markers."""
+        followed = calibration.reference
+        dots = np.searchsorted(calibration.markers, followed.markers)
+        heights_mm = np.asarray(bundle.mesh.nodes_mm)[:, 2]
+        return cls(
+            WholeDots(followed, calibration.dots.moments_px2[dots]),
+            PictureFaults(followed),
+            UnseenMotion(
+                motion.view.rest_mm[:, :2], motion.points_mm[:, :2], float(np.ptp(heights_mm))
+            ),
+            least_coverage,
         )
-    coverage = tracked.tracks.coverage
-    if coverage < least_coverage:
-        return (
-            f"{coverage:.0%} of the markers are seen: under {least_coverage:.0%} forces are not "
-            "given"
-        )
-    if tracked.slipped:
-        return (
-            "the sizes of the dots are not those of the calibration: the picture is turned, "
-            "mirrored or shifted, or shows another sensor; correct the camera's orientation or "
-            "calibrate again"
-        )
-    return ""
+
+    def refusal(self, tracked: TrackedFrame) -> str:
+        """Why the tracks of a frame give no forces; empty if they do."""
+        tracks = tracked.tracks
+        if tracked.turn:
+            return _TURNED.format(tracked.turn)
+        if tracks.coverage < self.least_coverage:
+            return _TOO_FEW.format(tracks.coverage, self.least_coverage)
+        if tracked.slipped:
+            return _SLIPPED
+        growth, _ = self.whole.changes(tracked)
+        if np.nanmedian(growth) > _LARGEST_BLUR:
+            return _BLURRED
+        moved_px = np.where(tracks.tracked[:, None], tracks.displacement_px, np.nan)
+        return self.faults.torn(moved_px, growth) or self.unseen.problem(tracks.tracked)

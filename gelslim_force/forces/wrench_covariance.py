@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.contact.normal_source import FoundForces, NormalReading
+from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.forces.drift_noise import DriftNoise
 from gelslim_force.forces.wrench import WrenchNoise
 from gelslim_force.motion.surface_motion import SurfaceMotion
+from gelslim_force.motion.unseen_motion import FilledMotion
 from gelslim_force.tracking.drift import FarField
 from gelslim_force.tracking.drift_filter import FrameDrift
 from ifem_export.markers.interpolation_matrix import MarkerInterpolation
@@ -38,27 +39,38 @@ class WrenchCovariance:
         self._drift = DriftNoise.of(motion, wrench.gains(motion.interpolation), field)
         self._kept_gains: tuple[bytes, Array] | None = None
 
-    def of_forces(self, forces: FoundForces, drift: FrameDrift) -> Array:
+    def of_forces(self, reading: NormalReading, drift: FrameDrift) -> Array:
         """(6, 6) in N and N mm for forces that the normal source found itself."""
-        return forces.covariance + self._drift.covariance(drift)
+        assert reading.forces is not None
+        besides = self._wrench.response[:, :, 2] @ reading.sigma_mm
+        found = reading.forces.covariance + self._drift.covariance(drift)
+        return np.asarray(found + np.outer(besides, besides))
 
     def of_motion(
         self,
         interpolation: MarkerInterpolation,
-        motion_mm: Array,
+        filled: FilledMotion,
         noise_px: float,
         reading: NormalReading | None,
         drift: FrameDrift,
     ) -> Array:
-        """(6, 6) in N and N mm for forces that follow from the motion (n, 3) of the markers."""
-        gains = self._drift.corrected(self._gains(interpolation), drift)
-        rigid = self._drift.covariance(drift)
-        spread = self._motion.covariance_mm2(np.isfinite(motion_mm[:, 0]), noise_px)
+        """(6, 6) in N and N mm for forces that follow from the motion of the markers."""
+        whole = self._gains(interpolation)
+        gains = self._drift.corrected(whole, drift)
+        rigid = self._drift.covariance(drift) + self._unseen(whole, filled)
+        motion_mm, seen = filled.motion_mm, np.ones(len(filled.motion_mm), dtype=bool)
+        seen[filled.unseen] = False
+        spread = self._motion.covariance_mm2(seen, noise_px)
         if reading is not None and reading.known:
             lateral = self._motion.compensation_change(reading.sigma_mm)
             return rigid + self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
         apparent = self._motion.apparent_motion(motion_mm, self._unknown_normal_mm)
         return rigid + self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
+
+    def _unseen(self, gains: Array, filled: FilledMotion) -> Array:
+        """(6, 6) by the motion of the markers that were not seen."""
+        own = gains[:, self._motion.markers[filled.unseen]]
+        return np.einsum("ani,nm,bmi->ab", own, filled.covariance_mm2, own, optimize=True)
 
     def _gains(self, interpolation: MarkerInterpolation) -> Array:
         """Wrench per motion of each marker; computed anew only where other markers are lost."""

@@ -20,6 +20,7 @@ from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.light_view import LightView
+from gelslim_force.joint.marker_misfit import with_misfit
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.responses import Responses
@@ -43,6 +44,11 @@ _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the lig
 _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
     "which is more than {:.0%} of it: it is unknown"
+)
+_MOST_SIGMAS = 3
+_OTHER_GAIN = (
+    "the light changes {:.1f} times as much as the contact explains, and more than 1 ± {:.1f} is "
+    "not expected: something else changes it, or the light has to be calibrated"
 )
 
 
@@ -76,9 +82,10 @@ class UnknownShape:
         noise = noise_px(self.reference, markers_px - self.reference.positions_px)
         last, self._last = self._last, None
         try:
-            self._last = self.estimator.estimate(image, markers_px, noise, last)
+            found = self.estimator.estimate(image, markers_px, noise, last)
         except IfemError as error:
             return str(error)
+        self._last = found and with_misfit(self.estimator, found, markers_px, noise)
         return self._last
 
     def motion(
@@ -97,6 +104,9 @@ class UnknownShape:
         sigma_n = float(np.sqrt(seen.covariance[2, 2]))
         if self.estimator.light is None and sigma_n > most * normal_n:
             return NormalReading.unknown(count, _UNCERTAIN.format(normal_n, sigma_n, most))
+        sigma = self.estimator.settings.gain_sigma
+        if abs(seen.gain - 1) > _MOST_SIGMAS * sigma:
+            return NormalReading.unknown(count, _OTHER_GAIN.format(seen.gain, _MOST_SIGMAS * sigma))
         height = seen.displacement_mm[:, 2]
         forces = FoundForces(
             seen.force_n, seen.displacement_mm, seen.covariance, seen.gain, seen.unexplained

@@ -59,6 +59,11 @@ class MarkerView:
         """(n, 2, 2) motion on the gel per motion in the picture, at rest."""
         return np.asarray(np.linalg.inv(self.camera.jacobian(self.rest_mm)), dtype=float)
 
+    @cached_property
+    def usual_mm_per_px(self) -> float:
+        """Median over the markers of the length on the gel per length in the picture."""
+        return float(np.median(np.sqrt(np.abs(np.linalg.det(self.mm_per_px)))))
+
     def by_height(self) -> Array:
         """(n, 2) by how much the exact lateral motion of each marker grows per mm of its height."""
         still, step_mm = self.reference_px, 1e-3

@@ -1,0 +1,63 @@
+"""How well the forces of a frame explain its markers, and what a misfit does to their covariance.
+
+Light that changes for another reason than a contact, such as a shadow or dirt, pulls the forces
+away from what the markers show. The markers in the contact then keep residuals. The covariance
+grows by their size, as that of a mean of values that do not agree (R. T. Birge, "The calculation of
+errors by the method of least squares", Phys. Rev. 40, 1932).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.joint.estimator import JointEstimator, JointForces
+
+Array = NDArray[np.float64]
+_INSIDE = 0.3
+"""Share of the nodes around a marker in contact from which it belongs to the contact."""
+_LEAST = 4
+_MOST_SIGMAS = 3.0
+"""Of the mean square of the noise, which is no misfit."""
+_USUAL = 0.12
+"""Root mean square of the residuals over their deviations in contacts that the light shows as it
+should. It is far below 1, because the deviations hold errors of print and camera, which most frames
+have in common with the reference."""
+
+
+def with_misfit(
+    estimator: JointEstimator, found: JointForces, markers_px: Array, noise_px: float
+) -> JointForces:
+    """The forces with a covariance that holds what the markers in the contact do not confirm.
+
+    Args:
+        estimator: Which found them.
+        found: The forces.
+        markers_px: (n, 2) markers of the frame; NaN for lost ones.
+        noise_px: Standard deviation of their positions.
+    """
+    growth = marker_misfit(estimator, found, markers_px, noise_px) / _USUAL
+    return found if growth <= 1 else replace(found, covariance=growth**2 * found.covariance)
+
+
+def marker_misfit(
+    estimator: JointEstimator, found: JointForces, markers_px: Array, noise_px: float
+) -> float:
+    """Root mean square residual of the markers in the contact beyond noise, over their deviation.
+
+    0 where fewer than four are seen. Arguments as in `with_misfit`.
+    """
+    model = estimator.nodes_to_markers @ found.displacement_mm
+    seen = estimator.markers.lateral_motion(markers_px, model[:, 2])
+    inside = estimator.nodes_to_markers @ found.region.astype(float) > _INSIDE
+    inside &= np.isfinite(seen).all(axis=1)
+    if inside.sum() < _LEAST:
+        return 0.0
+    chosen, seen = estimator.settings, seen[inside]
+    noise_mm = noise_px * estimator.markers.usual_mm_per_px
+    by_chance = noise_mm**2 * (1 + _MOST_SIGMAS / np.sqrt(len(seen)))
+    beyond = float(np.mean(np.square(seen - model[inside, :2]))) - by_chance
+    expected = chosen.marker_mm**2 + float(np.mean(np.square(chosen.marker_share * seen)))
+    return float(np.sqrt(max(beyond, 0.0) / expected))

@@ -1,0 +1,122 @@
+"""Motion of the gel where no marker is seen, and where a contact could hide.
+
+The motion of a bonded layer varies over its thickness T. Around a gap it is therefore taken for a
+random field of the correlation (1 + √3 r/T) exp(-√3 r/T) (Matérn's, of order 3/2: C. E. Rasmussen
+and C. K. I. Williams, "Gaussian processes for machine learning", 2006, section 4.2), whose size is
+that of the motion seen around the gap. Its mean, given the markers seen, keeps within their motion
+and falls to zero inside the gap, and its covariance grows there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_WIDEST = 1.3
+"""Distance of a marker that is not seen from the nearest one seen, over the thickness, beyond which
+a contact could hide: the motion around it decays over the thickness."""
+_REACH = 2.5
+"""Distance, over the thickness, up to which markers tell of the motion in a gap."""
+_UNSEEN = 0.02
+"""Motion in a gap that markers around it do not show, and depth, over the thickness."""
+_HIDDEN = (
+    "the markers are not seen over {:.1f} mm of the gel: a contact could hide there, and forces "
+    "are not given; clear the camera's view of the gel"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class FilledMotion:
+    """Motion of all n markers, of which m were not seen.
+
+    Attributes:
+        motion_mm: (n, 3), filled in x and y.
+        unseen: (m,) indices of the markers not seen.
+        covariance_mm2: (m, m) of their motion along x, and the same along y.
+    """
+
+    motion_mm: Array
+    unseen: NDArray[np.intp]
+    covariance_mm2: Array
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenMotion:
+    """Gaps among the n followed markers of one sensor.
+
+    Attributes:
+        places_mm: (n, 2) markers at rest.
+        points_mm: (c, 2) surface nodes at rest.
+        thickness_mm: Of the gel.
+    """
+
+    places_mm: Array
+    points_mm: Array
+    thickness_mm: float
+
+    def problem(self, seen: Mask) -> str:
+        """Why markers seen (n,) leave too much of the gel unseen; empty if they do not."""
+        if not seen.any():
+            return _HIDDEN.format(np.ptp(self.places_mm, axis=0).max())
+        away = self._apart[:, seen].min(axis=1)
+        widest = float(away.max())
+        return _HIDDEN.format(2 * widest) if widest > _WIDEST * self.thickness_mm else ""
+
+    def hidden_mm(self, seen: Mask) -> Array:
+        """(c,) depth that markers seen (n,) do not show at the nodes; 0 where they do."""
+        unseen = self.nodes(~seen)
+        return np.where(unseen, _UNSEEN * self.thickness_mm, 0.0)
+
+    def nodes(self, markers: Mask) -> Mask:
+        """(c,) nodes to which one of the chosen markers (n,) is the nearest."""
+        return np.asarray(markers[self._nearest])
+
+    def filled(self, motion_mm: Array, seen: Mask, noise_mm: float) -> FilledMotion:
+        """Fill in the lateral motion of markers that were not seen.
+
+        Args:
+            motion_mm: (n, 3) of the markers.
+            seen: (n,) those whose motion is known.
+            noise_mm: Standard deviation of their motion.
+        """
+        unseen = np.flatnonzero(~seen)
+        if not len(unseen) or not seen.any():
+            return FilledMotion(motion_mm, unseen[:0], np.zeros((0, 0)))
+        about = self._apart[unseen].min(axis=0) < _REACH * self.thickness_mm
+        near = np.flatnonzero(seen & about)
+        known = motion_mm[near, :2]
+        unseen_mm = _UNSEEN * self.thickness_mm
+        size = float(np.mean(np.square(known))) + unseen_mm**2 if len(near) else unseen_mm**2
+        own = size * self._correlation(near, near) + noise_mm**2 * np.eye(len(near))
+        cross = size * self._correlation(unseen, near)
+        prior = size * self._correlation(unseen, unseen)
+        found = motion_mm.copy()
+        if not len(near):
+            found[unseen, :2] = 0.0
+            return FilledMotion(found, unseen, prior)
+        factor = cho_factor(own + 1e-9 * size * np.eye(len(near)))
+        found[unseen, :2] = cross @ cho_solve(factor, known)
+        left = prior - cross @ cho_solve(factor, cross.T)
+        return FilledMotion(found, unseen, (left + left.T) / 2)
+
+    @cached_property
+    def _apart(self) -> Array:
+        """(n, n) distances of the markers."""
+        gap = self.places_mm[:, None] - self.places_mm[None]
+        return np.asarray(np.hypot(gap[..., 0], gap[..., 1]))
+
+    @cached_property
+    def _nearest(self) -> NDArray[np.intp]:
+        """(c,) the marker nearest to each node."""
+        gap = self.points_mm[:, None] - self.places_mm[None]
+        return np.asarray(np.argmin(np.square(gap).sum(axis=2), axis=1))
+
+    def _correlation(self, some: NDArray[np.intp], others: NDArray[np.intp]) -> Array:
+        ratio = np.sqrt(3) * self._apart[np.ix_(some, others)] / self.thickness_mm
+        return np.asarray((1 + ratio) * np.exp(-ratio))
