@@ -19,6 +19,7 @@ from gelslim_force.contact.indenter import Indenter, parse_indenter
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
 from gelslim_force.frames.upright import upright
+from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
@@ -174,7 +175,11 @@ def normal_source(
     if indenter is None or indenter == UNKNOWN:
         return unknown_source(bundle, calibration, picture, settings, light)
     named = indenter_source(bundle, calibration, picture, indenter, depth_mm, settings)
-    return sensor.varied(named, settings)
+    named = sensor.varied(named, settings)
+    checked = (settings or PipelineSettings()).check_indenter
+    if grey or not (checked and _shows_shapes(bundle, picture, grey)):
+        return named
+    return CheckedIndenter(named, unknown_shape(bundle, calibration, picture))
 
 
 def _is_grey(bundle: Bundle, picture: Picture | None) -> bool:

@@ -40,6 +40,8 @@ class PipelineSettings:
             apparent motion enters the covariance of the wrench.
         least_coverage: Smallest share of the markers seen with which a frame gives forces.
         drift: How drift of the camera against the gel is treated.
+        check_indenter: Whether a named indenter is compared with the forces of an unknown shape,
+            where light and colour allow these.
 
     Raises:
         ValueError: A value is impossible.
@@ -55,6 +57,7 @@ class PipelineSettings:
     unknown_normal_mm: float = 0.3
     least_coverage: float = 0.3
     drift: DriftSettings = field(default_factory=DriftSettings)
+    check_indenter: bool = True
 
     def __post_init__(self) -> None:
         if self.rung is not None and self.rung not in RUNGS:

@@ -98,7 +98,8 @@ class NormalModel:
         w[touched] = -gap[touched]
         mask = np.zeros(len(w), dtype=bool)
         mask[touched] = True
-        return NormalReading(w, np.sqrt(np.maximum(variance, 0)), mask, depth_mm=depth)
+        sigma = np.sqrt(np.maximum(variance, 0))
+        return NormalReading(w, sigma, mask, depth_mm=depth, push_n=float(push.sum()))
 
     def cap_only(self, patch: ContactPatch, indenter: Indenter) -> NormalReading:
         """The paper's model: the indenter's cap below the rim of the patch, and no motion outside.

@@ -55,6 +55,7 @@ class NormalReading:
         forces: Forces found together with the motion; None where they follow from it.
         by_gel_mm: (p, c) derivative of the motion by ln thickness and by Poisson's ratio of the
             gel; None where it does not depend on them, or is not computed.
+        push_n: Normal force of the contact model, positive; NaN without one.
     """
 
     w_mm: Array
@@ -65,6 +66,7 @@ class NormalReading:
     problem: str = ""
     forces: FoundForces | None = None
     by_gel_mm: Array | None = None
+    push_n: float = float("nan")
 
     @classmethod
     def given(cls, count: int, normal_mm: ArrayLike, sigma_mm: ArrayLike) -> NormalReading:

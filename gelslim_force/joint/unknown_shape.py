@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from ifem_export.bundle.bundle import Bundle
 
 Array = NDArray[np.float64]
-_LARGEST_UNEXPLAINED = 0.7
+LARGEST_UNEXPLAINED = 0.7
 _UNEXPLAINED = "forces on the contact seen leave {:.0%} of the change of the light unexplained"
 _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
@@ -73,6 +73,11 @@ class UnknownShape:
         """Forget the last frame."""
         self._last = None
 
+    @property
+    def most_gain(self) -> float:
+        """Difference of the gain of the light from 1 beyond which something else changes it."""
+        return _MOST_SIGMAS * self.estimator.settings.gain_sigma
+
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> JointForces | str | None:
         """Estimate the forces of a frame whose markers are at (n, 2).
 
@@ -98,15 +103,14 @@ class UnknownShape:
         if seen is None:
             unseen = np.full(count, self.unseen_mm)
             return NormalReading(np.zeros(count), unseen, np.zeros(count, dtype=bool))
-        if seen.unexplained > _LARGEST_UNEXPLAINED:
+        if seen.unexplained > LARGEST_UNEXPLAINED:
             return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
         normal_n, most = abs(float(seen.force_n[:, 2].sum())), self.estimator.settings.most_sigma
         sigma_n = float(np.sqrt(seen.covariance[2, 2]))
         if self.estimator.light is None and sigma_n > most * normal_n:
             return NormalReading.unknown(count, _UNCERTAIN.format(normal_n, sigma_n, most))
-        sigma = self.estimator.settings.gain_sigma
-        if abs(seen.gain - 1) > _MOST_SIGMAS * sigma:
-            return NormalReading.unknown(count, _OTHER_GAIN.format(seen.gain, _MOST_SIGMAS * sigma))
+        if abs(seen.gain - 1) > self.most_gain:
+            return NormalReading.unknown(count, _OTHER_GAIN.format(seen.gain, self.most_gain))
         height = seen.displacement_mm[:, 2]
         forces = FoundForces(
             seen.force_n, seen.displacement_mm, seen.covariance, seen.gain, seen.unexplained

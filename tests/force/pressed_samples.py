@@ -85,7 +85,8 @@ def calibration() -> Calibration:
 
 
 @cache
-def _fine() -> tuple[PadMesh, SurfaceOperator, Array]:
+def fine_pad() -> tuple[PadMesh, SurfaceOperator, Array]:
+    """The pad of the truth, its exact operator, and its (n, 3) surface nodes."""
     bundle = sensor_bundle()
     mesh = refined(bundle.mesh)
     return mesh, surface_operator(mesh, bundle.material, "bbar", "pcg"), np.asarray(mesh.surface_mm)
@@ -155,7 +156,7 @@ def pressed_by(
     traction_mpa: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
     """The picture of tractions (n, 3) on the finer pad's nodes; the seed is that of its noise."""
-    mesh, operator, _ = _fine()
+    mesh, operator, _ = fine_pad()
     force = traction_mpa * float(np.prod(mesh.cell_size_mm[:2]))
     return drawn(force, operator.displacement(force), seed, noise=noise, brightness=brightness)
 
@@ -181,7 +182,7 @@ def round_patch(
 
 def fine_points_mm() -> Array:
     """(n, 3) surface nodes of the finer pad."""
-    return _fine()[2]
+    return fine_pad()[2]
 
 
 @cache
@@ -211,7 +212,7 @@ def drawn(
     force_n: Array, moved_mm: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
     """The picture of a motion (n, 3) of the finer pad's nodes under forces (n, 3)."""
-    mesh, _, points = _fine()
+    mesh, _, points = fine_pad()
     x, y = (np.unique(np.round(points[:, k], 9)) for k in (0, 1))
     filled = np.zeros((3, len(x), len(y)))
     place = [np.searchsorted(axis, np.round(points[:, k], 9)) for k, axis in enumerate((x, y))]

@@ -1,0 +1,119 @@
+"""A named indenter that light and markers have to confirm.
+
+The contact patch of a ball of half the radius looks like that of the ball, and the force that
+follows from it is twice as large. The estimate for objects of unknown shape uses no name: where
+both forces differ by more than their errors, something else than the named indenter touches the
+gel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.contact.normal_motion import IndenterSource
+from gelslim_force.contact.normal_source import NormalReading
+from gelslim_force.contact.patch import ContactPatch
+from gelslim_force.joint.estimator import JointForces
+from gelslim_force.joint.unknown_shape import LARGEST_UNEXPLAINED, UnknownShape
+
+Array = NDArray[np.float64]
+_SIGMAS = 2.0
+_MODEL_ERROR = 0.15
+"""Error of the named indenter's force by outline, mesh and friction, over the larger force."""
+_FRAMES = 10
+"""Frames of a contact after which it is compared again."""
+_GROWN = 0.1
+"""Change of the patch's size from which it is compared before that."""
+_ANOTHER = (
+    "light and markers show a force of {seen:.2f} ± {sigma:.2f} N, the indenter as named would "
+    "press with {named:.2f} N: another shape or size touches the gel; name that, or leave the "
+    "indenter out"
+)
+_NO_CONTACT = (
+    "the light is not that of a contact with the indenter as named: light and markers show none, "
+    "where it would press with {named:.2f} N"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SeenIndenter:
+    """What one frame shows.
+
+    Attributes:
+        patch: The contact patch.
+        witness: The forces of an unknown shape, None without contact, or why there are none.
+        compared: Whether `witness` was looked for in this frame.
+    """
+
+    patch: ContactPatch
+    witness: JointForces | str | None
+    compared: bool
+
+
+class CheckedIndenter:
+    """`NormalSource` of a named indenter that another one confirms.
+
+    It compares the forces in the first frame of a contact, when the patch grows or shrinks, and
+    every ten frames; the verdict holds in between.
+
+    Attributes:
+        named: The named indenter.
+        witness: Forces of objects of unknown shape on the same sensor, with a linear gel.
+    """
+
+    def __init__(self, named: IndenterSource, witness: UnknownShape) -> None:
+        self.named, self.witness = named, witness
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last frame."""
+        self.witness.reset()
+        self._size_mm, self._age, self._verdict = 0.0, 0, ""
+
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | None:
+        """The patch of a frame whose markers are at (n, 2), and what is compared with it."""
+        patch = self.named.look(image, markers_px)
+        if patch is None:
+            self.reset()
+            return None
+        changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
+        self._age += 1
+        if not changed and self._age < _FRAMES:
+            return SeenIndenter(patch, None, False)
+        self._size_mm, self._age = patch.size_mm, 0
+        return SeenIndenter(patch, self.witness.look(image, markers_px), True)
+
+    def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
+        """Motion under the named indenter; unknown where it is not the one that touches."""
+        patch = None if seen is None else seen.patch
+        reading = self.named.motion(patch, lateral_mm)
+        if seen is None or not reading.known:
+            return reading
+        if seen.compared:
+            self._verdict = self._compared(reading, seen.witness)
+        return replace(reading, problem=self._verdict)
+
+    def _compared(self, reading: NormalReading, found: JointForces | str | None) -> str:
+        """Why the reading is that of another indenter; empty if it may be of this one."""
+        if isinstance(found, str):
+            return ""
+        named = -reading.push_n
+        if found is None or found.unexplained > LARGEST_UNEXPLAINED:
+            return _NO_CONTACT.format(named=named) if -named > _SIGMAS * self._unseen_n else ""
+        if abs(found.gain - 1) > self.witness.most_gain:
+            return ""  # The light itself is not the traced one, and is no witness.
+        seen, sigma = float(found.force_n[:, 2].sum()), float(np.sqrt(found.covariance[2, 2]))
+        allowed = _SIGMAS * sigma + _MODEL_ERROR * max(abs(seen), abs(named))
+        if abs(named - seen) <= allowed:
+            return ""
+        return _ANOTHER.format(seen=seen, sigma=sigma, named=named)
+
+    @property
+    def _unseen_n(self) -> float:
+        """Force that the light may not show."""
+        estimator = self.witness.estimator
+        return estimator.settings.unseen_force * estimator.youngs_modulus_mpa
