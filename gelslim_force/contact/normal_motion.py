@@ -13,6 +13,7 @@ from gelslim_force.contact.normal_compliance import Compliant, NormalCompliance
 from gelslim_force.contact.normal_source import NormalReading
 from gelslim_force.contact.patch import ContactPatch, rotated
 from gelslim_force.contact.patch_finder import PatchFinder
+from gelslim_force.contact.shading_change import LostColourError
 from ifem_export.compliance.contact_columns import ContactCompliance
 
 Array = NDArray[np.float64]
@@ -249,16 +250,23 @@ class IndenterSource:
     cap_only: bool = False
     varied: tuple[tuple[NormalModel, float], ...] = ()
 
-    def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | None:
-        """Return the patch of a frame whose markers are at (n, 2)."""
-        return self.finder.find(image, markers_px)
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | str | None:
+        """The patch of a frame whose markers are at (n, 2), or why none can be seen."""
+        try:
+            return self.finder.find(image, markers_px)
+        except LostColourError as error:
+            return str(error)
 
-    def motion(self, seen: ContactPatch | None, lateral_mm: Array | None = None) -> NormalReading:
-        """Normal motion for a patch; zero without one.
+    def motion(
+        self, seen: ContactPatch | str | None, lateral_mm: Array | None = None
+    ) -> NormalReading:
+        """Normal motion for a patch; zero without one, unknown with a reason in its place.
 
         `lateral_mm` (2,) is the mean lateral motion of the gel in the patch, where it is known.
         """
         count = len(self.model.points_mm)
+        if isinstance(seen, str):
+            return NormalReading.unknown(count, seen)
         if seen is None:
             zero = np.zeros(count)
             return NormalReading(zero, zero, np.zeros(count, dtype=bool))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from gelslim_core.errors import GelslimError
 from gelslim_force.frames.read_only import read_only
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -26,8 +27,16 @@ FLOOR = 5.0
 LEAST_FREE = 0.34
 """Smallest share of a bin's pixels that must be free of ink and glare."""
 MEDIAN_OF = 1500
+_SAMPLE_PX = 8
+_GREY, _LEAST_GREY = 2, 0.95
+"""Difference of the channels, in grey values, up to which a pixel has no colour, and the share of
+such pixels in a picture without colour: noise alone gives the pixels of a colour camera more."""
 ROBUST = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
+
+
+class LostColourError(GelslimError, ValueError):
+    """A grey picture of a camera whose reference has colour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +67,7 @@ class ShadingReference:
         self.shape = (height // bin_px, width // bin_px)
         self.on_pad = np.ones(self.shape, dtype=bool)
         self._radius = radius_px
+        self._coloured = not is_grey(self.image)
         from gelslim_force.contact.shading_kernel import bin_sums, block_discs
 
         self._blocked = np.zeros((height, width), dtype=np.uint8)
@@ -103,7 +113,8 @@ class ShadingReference:
     ) -> ShadingChange:
         """Change from the reference to `image`, without the markers of either picture.
 
-        Raises ValueError for an image of another shape.
+        Raises ValueError for an image of another shape, LostColourError for a grey one where the
+        reference has colour.
         """
         from gelslim_force.contact.shading_kernel import bin_sums, block_discs, light_ratios
 
@@ -112,6 +123,11 @@ class ShadingReference:
             raise ValueError(
                 f"the frame has shape {picture.shape}, the reference {self.image.shape}: "
                 "use frames of one camera mode"
+            )
+        if self._coloured and is_grey(picture):
+            raise LostColourError(
+                "the picture is grey, the reference has colour, and contacts show by the colours: "
+                "set the camera to colour"
             )
         blocked, touched = self._scratch
         np.copyto(blocked, self._blocked)
@@ -134,6 +150,12 @@ class ShadingReference:
         return _relative_to_median(
             _combined(np.log(self._ratios[self.used])), free & self.on_pad, noise_level
         )
+
+
+def is_grey(picture: NDArray[np.uint8]) -> bool:
+    """Whether a picture (h, w, c) has no colour, by a part of its pixels."""
+    some = picture[::_SAMPLE_PX, ::_SAMPLE_PX]
+    return bool((some.max(axis=2) - some.min(axis=2) <= _GREY).mean() >= _LEAST_GREY)
 
 
 def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

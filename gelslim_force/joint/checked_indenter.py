@@ -74,12 +74,15 @@ class CheckedIndenter:
         self.witness.reset()
         self._size_mm, self._age, self._verdict = 0.0, 0, ""
 
-    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | None:
-        """The patch of a frame whose markers are at (n, 2), and what is compared with it."""
+    def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | str | None:
+        """The patch of a frame whose markers are at (n, 2), and what is compared with it.
+
+        Or, as of the named indenter, why none can be seen, and None without contact.
+        """
         patch = self.named.look(image, markers_px)
-        if patch is None:
+        if patch is None or isinstance(patch, str):
             self.reset()
-            return None
+            return patch
         changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
         self._age += 1
         if not changed and self._age < _FRAMES:
@@ -89,9 +92,10 @@ class CheckedIndenter:
 
     def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
         """Motion under the named indenter; unknown where it is not the one that touches."""
-        patch = None if seen is None else seen.patch
-        reading = self.named.motion(patch, lateral_mm)
-        if seen is None or not reading.known:
+        if not isinstance(seen, SeenIndenter):
+            return self.named.motion(seen, lateral_mm)
+        reading = self.named.motion(seen.patch, lateral_mm)
+        if not reading.known:
             return reading
         if seen.compared:
             self._verdict = self._compared(reading, seen.witness)

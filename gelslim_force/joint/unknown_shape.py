@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gelslim_force.calibration.design import marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import FoundForces, NormalReading
+from gelslim_force.contact.shading_change import LostColourError
 from gelslim_force.forces.finite_strain import FiniteStrainForce, deep_mm
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.estimator import JointEstimator, JointForces
@@ -88,7 +89,7 @@ class UnknownShape:
         last, self._last = self._last, None
         try:
             found = self.estimator.estimate(image, markers_px, noise, last)
-        except IfemError as error:
+        except (IfemError, LostColourError) as error:
             return str(error)
         self._last = found and with_misfit(self.estimator, found, markers_px, noise)
         return self._last

@@ -132,6 +132,14 @@ def colours_apart(image: Picture, rng: Rng, change: float | None = None) -> Pict
     return _picture(image * np.exp(np.array([size, -size, 0.0]) / 2))
 
 
+def light_uneven(image: Picture, rng: Rng) -> Picture:
+    """The two lights change by amounts that differ from side to side."""
+    across = np.linspace(-1, 1, image.shape[1])[None, :, None]
+    size = rng.uniform(0.02, 0.15) * rng.choice([-1, 1])
+    tilt = rng.uniform(0.0, 0.1) * rng.choice([-1, 1])
+    return _picture(image * np.exp(np.array([1.0, -1.0, 0.0]) * (size + tilt * across)))
+
+
 def lamp_out(image: Picture, rng: Rng) -> Picture:
     """One colour is missing."""
     found = image.copy()
@@ -169,6 +177,7 @@ FAULTS: dict[str, Fault] = {
     f.__name__: f
     for f in (
         black_side, hand, glare, soft_glare, torn, frozen_rows, compressed, other_scene, even,
-        grey, swapped_colours, colours_apart, lamp_out, exposure, defocused, noisy, dirt,
+        grey, swapped_colours, colours_apart, light_uneven, lamp_out, exposure, defocused, noisy,
+        dirt,
     )
 }  # fmt: skip

@@ -10,11 +10,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fault_frames import FAULTS, black_side
+from fault_frames import FAULTS, black_side, grey
 from numpy.typing import NDArray
 from pressed_samples import calibration, lit_bundle, pressed, reference
+from pressed_shapes import ball, pressed_shape
 from shaded_frames import shaded
 
+from gelslim_force.contact.shading_change import LostColourError, ShadingReference
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.unknown_shape import unknown_shape
@@ -26,6 +28,7 @@ pytest.importorskip("PIL")
 MODES = ("unknown", "none", "sphere:6", "depth")
 """An object of unknown shape, tangential forces alone, a named ball, and the depth given."""
 COVERING = ("black_side", "hand", "glare", "torn", "frozen_rows")
+BALL = (ball(6.0), 0.5, (1.0, -1.0), 0.0, 3)
 Picture = NDArray[np.uint8]
 
 
@@ -111,6 +114,43 @@ def test_the_next_frame_is_right_again() -> None:
             result = opened("unknown").process(truth.image)
         assert result.normal_known, name
         assert (scores(result, truth.wrench[:3]) < 3.5).all(), name
+
+
+@pytest.mark.parametrize("noise", [0.0, 3.0])
+def test_a_grey_picture_shows_no_contact(noise: float) -> None:
+    """Only where the reference has colour: a mono camera's pictures are grey as they should be."""
+    coloured = untouched()
+    light = ShadingReference(coloured, np.zeros((0, 2)), np.zeros(0), 4)
+    pale = grey(coloured, np.random.default_rng(0))
+    with pytest.raises(LostColourError, match="grey"):
+        light.change(pale, None)
+    mono = ShadingReference(pale, np.zeros((0, 2)), np.zeros(0), 4)
+    assert np.isfinite(mono.change(pale, None).change).all()
+    faint = np.random.default_rng(1).normal(0, noise, coloured.shape) + 0.2 * coloured
+    faint += 0.8 * pale
+    assert np.isfinite(light.change(faint.astype(np.uint8), None).change).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["unknown", "sphere:6"])
+def test_a_grey_picture_has_no_normal_force(mode: str) -> None:
+    """A ball read as -0.07 N for -0.48, an unknown shape as +0.23 N for -0.41."""
+    result = second(mode, grey(pressed_shape(*BALL).image, np.random.default_rng(0)))
+    assert not result.normal_known
+    assert any("grey" in problem for problem in result.problems)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["unknown", "sphere:6"])
+@pytest.mark.parametrize("name", ["colours_apart", "light_uneven", "exposure"])
+def test_lights_that_drift_apart_are_no_force(mode: str, name: str) -> None:
+    truth = pressed_shape(*BALL)
+    for seed in range(4):
+        pressing = second(mode, spoiled(name, truth.image, seed))
+        assert pressing.wrench is not None
+        assert pressing.wrench.force_n[2] == pytest.approx(truth.wrench[2], rel=0.05)
+        assert (scores(pressing, truth.wrench[:3]) < 3).all()
+        assert (scores(second(mode, spoiled(name, untouched(), seed)), np.zeros(3)) < 3).all()
 
 
 def gap(count: int) -> tuple[UnseenMotion, NDArray[np.bool_]]:
