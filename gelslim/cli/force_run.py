@@ -201,6 +201,20 @@ Compensation = Annotated[
 Interpolation = Annotated[str, typer.Option(help="From markers to nodes: sparse or thin_plate.")]
 GelLaw = Annotated[str, typer.Option(help="Law of the gel: linear, neo_hookean or auto.")]
 Friction = Annotated[float, typer.Option(min=0, help="Coefficient of Coulomb friction.")]
+Drift = Annotated[
+    str,
+    typer.Option(
+        help="Small drift of the camera: correct, or count it as an error, for objects that stick "
+        "to most of the gel."
+    ),
+]
+DriftLimit = Annotated[
+    float, typer.Option(min=0, help="Shift of the camera in px beyond which there are no forces.")
+]
+Rezero = Annotated[
+    int | None,
+    typer.Option(min=1, help="Frames without contact after which their drift is the new rest."),
+]
 FieldFormat = Annotated[str, typer.Option(help="Format of the force fields: npz, parquet or none.")]
 OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video to write, .mp4 or .avi.")]
 Recording = Annotated[

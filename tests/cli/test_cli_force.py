@@ -55,6 +55,31 @@ def test_run_folder_and_answer(sensor: Path, tmp_path: Path, capsys) -> None:
     assert np.isnan(last.wrench.force_n[2])
 
 
+@pytest.mark.slow
+def test_the_drift_that_is_allowed_can_be_chosen(sensor: Path, tmp_path: Path, capsys) -> None:
+    """A picture that is shifted by one pixel, of the untouched gel."""
+    (sensor / "shifted").mkdir()
+    shifted = np.roll(frame(0.0).image, 1, axis=1)
+    (sensor / "shifted" / "f0.png").write_bytes(encoded(shifted, ".png"))
+    none = ("--pictures", "0", "--json")
+    assert run(sensor, "-o", str(tmp_path / "a"), *none, frames="shifted") == 2
+    sizes = []
+    for name, more in {"b": (), "c": ("--drift", "count")}.items():
+        given = (*none, "--drift-px", "1.5", *more)
+        assert run(sensor, "-o", str(tmp_path / name), *given, frames="shifted") == 0
+        (result,) = read_run(tmp_path / name).results()
+        force_n = result.wrench.force_n[:2]
+        assert (np.abs(force_n) < 3 * result.wrench.standard_deviation[:2]).all()
+        sizes.append(np.hypot(*force_n))
+    assert sizes[0] < 0.01
+    assert sizes[1] > 0.1
+
+
+def test_an_unknown_word_for_the_drift_is_refused(sensor: Path, tmp_path: Path, capsys) -> None:
+    assert run(sensor, "-o", str(tmp_path / "run"), "--drift", "never") == 2
+    assert "--drift never" in capsys.readouterr().err
+
+
 def test_depth_maps_give_the_normal_force(sensor: Path, tmp_path: Path, capsys) -> None:
     from scipy.interpolate import griddata
 

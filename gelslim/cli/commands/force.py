@@ -57,6 +57,9 @@ def force(
     interpolation: option.Interpolation = "sparse",
     gel: option.GelLaw = "linear",
     friction: option.Friction = 1.0,
+    drift: option.Drift = "correct",
+    drift_px: option.DriftLimit = 0.5,
+    rezero: option.Rezero = None,
     fields: option.FieldFormat = "npz",
     pictures: OverlayPictures = 6,
     video: option.OverlayVideo = None,
@@ -94,6 +97,7 @@ def force(
     chosen = {
         "operator": operator, "method": method, "compensation": compensation,
         "interpolation": interpolation, "gel": gel, "friction": friction,
+        "drift": drift, "drift_px": drift_px, "rezero": rezero,
     }  # fmt: skip
     settings = _settings(chosen, budget)
     camera, picture = _calibrated(sensor, reference, calibration)
@@ -160,7 +164,10 @@ def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
     """Return the settings of the pipeline for these options. Raises CommandError."""
     from gelslim_force.forces.estimator import ForceSettings
     from gelslim_force.settings import PipelineSettings
+    from gelslim_force.tracking.drift_filter import DriftSettings
 
+    if chosen["drift"] not in ("correct", "count"):
+        raise CommandError(f"--drift {chosen['drift']}: give correct or count")
     try:
         return PipelineSettings(
             rung=chosen["operator"],
@@ -169,6 +176,11 @@ def _settings(chosen: dict[str, Any], budget: Budget) -> PipelineSettings:
             interpolation=chosen["interpolation"],
             gel=chosen["gel"],
             force=ForceSettings(method=chosen["method"], friction=chosen["friction"]),
+            drift=DriftSettings(
+                correct=chosen["drift"] == "correct",
+                most_px=chosen["drift_px"],
+                rezero_frames=chosen["rezero"],
+            ),
         )
     except ValueError as wrong:
         raise CommandError(str(wrong)) from wrong

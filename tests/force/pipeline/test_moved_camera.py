@@ -98,6 +98,23 @@ def test_a_shear_of_the_whole_gel_is_no_drift_where_it_is_known_to_be_pressed(
         chain.tare(sheared)
 
 
+def test_two_thirds_of_the_gel_are_no_drift_either_once_they_are_known_to_be_pressed(
+    chain: ForcePipeline,
+) -> None:
+    """The markers alone take the two thirds for what stands still, and the rest for pushed back."""
+    moved = np.zeros((len(sensor_grid()), 3))
+    moved[:, 0] = np.where(sensor_grid().positions_mm[:, 0] < 3.5, 0.012, 0.0)
+    sheared = render(sensor_grid(), off_centre_view(), Look(noise=2.0, seed=6), moved).image
+    layer_n = 0.147 / 2 / 1.3223 / 2.0 * 20.5 * (11.0 + 3.5) * 0.012
+    pressed = np.where(chain.points_mm[:, 0] < 3.5, -0.05, 0.0)
+    rest = chain.process(picture(0.0), normal_mm=pressed).wrench.force_n
+    found = chain.process(sheared, normal_mm=pressed).wrench.force_n
+    assert (found - rest)[0] == pytest.approx(layer_n, rel=0.3)
+    chain.reset()
+    chain.process(picture(0.0))
+    assert chain.process(sheared).wrench.force_n[0] < 0
+
+
 @pytest.mark.parametrize("share", [0.0, 1.0])
 @pytest.mark.parametrize(
     ("shift", "scale", "words"),
