@@ -200,7 +200,9 @@ class ForcePipeline:
         clock.stage("track")
         problems, tracks = tracked.problems, tracked.tracks
         problem = self._check.refusal(tracked)
-        if not problem:
+        if problem:
+            self._tracker.undo()
+        else:
             noise = self._noise_px(tracks)
             drift = self._drift.update(tracks, noise)
             problem = drift.problem

@@ -107,7 +107,9 @@ class CheckedIndenter:
             return ""
         named = -reading.push_n
         if found is None or found.unexplained > LARGEST_UNEXPLAINED:
-            return _NO_CONTACT.format(named=named) if -named > _SIGMAS * self._unseen_n else ""
+            return (
+                _NO_CONTACT.format(named=named) if -named > _SIGMAS * self.witness.unseen_n else ""
+            )
         if abs(found.gain - 1) > self.witness.most_gain:
             return ""  # The light itself is not the traced one, and is no witness.
         seen, sigma = float(found.force_n[:, 2].sum()), float(np.sqrt(found.covariance[2, 2]))
@@ -115,9 +117,3 @@ class CheckedIndenter:
         if abs(named - seen) <= allowed:
             return ""
         return _ANOTHER.format(seen=seen, sigma=sigma, named=named)
-
-    @property
-    def _unseen_n(self) -> float:
-        """Force that the light may not show."""
-        estimator = self.witness.estimator
-        return estimator.settings.unseen_force * estimator.youngs_modulus_mpa

@@ -75,6 +75,11 @@ class UnknownShape:
         self._last = None
 
     @property
+    def unseen_n(self) -> float:
+        """Normal force that the light may not show."""
+        return self.estimator.settings.unseen_force * self.estimator.youngs_modulus_mpa
+
+    @property
     def most_gain(self) -> float:
         """Difference of the gain of the light from 1 beyond which something else changes it."""
         return _MOST_SIGMAS * self.estimator.settings.gain_sigma
@@ -89,10 +94,19 @@ class UnknownShape:
         last, self._last = self._last, None
         try:
             found = self.estimator.estimate(image, markers_px, noise, last)
+            if found is not None and last is not None and not self._explains(found):
+                # The frame before was spoiled, or showed another contact.
+                found = self.estimator.estimate(image, markers_px, noise)
         except (IfemError, LostColourError) as error:
             return str(error)
-        self._last = found and with_misfit(self.estimator, found, markers_px, noise)
-        return self._last
+        if found is None or self._explains(found):
+            self._last = found and with_misfit(self.estimator, found, markers_px, noise)
+            return self._last
+        return None if -found.force_n[:, 2].sum() < self.unseen_n else found
+
+    def _explains(self, found: JointForces) -> bool:
+        """Whether forces explain the change of the light, with a gain that is expected."""
+        return found.unexplained <= LARGEST_UNEXPLAINED and abs(found.gain - 1) <= self.most_gain
 
     def motion(
         self, seen: JointForces | str | None, lateral_mm: Array | None = None

@@ -62,10 +62,11 @@ class UnseenMotion:
 
     def problem(self, seen: Mask) -> str:
         """Why markers seen (n,) leave too much of the gel unseen; empty if they do not."""
+        if seen.all():
+            return ""
         if not seen.any():
             return _HIDDEN.format(np.ptp(self.places_mm, axis=0).max())
-        away = self._apart[:, seen].min(axis=1)
-        widest = float(away.max())
+        widest = float(self._apart[np.ix_(~seen, seen)].min(axis=1).max())
         return _HIDDEN.format(2 * widest) if widest > _WIDEST * self.thickness_mm else ""
 
     def hidden_mm(self, seen: Mask) -> Array:

@@ -150,8 +150,8 @@ def _medians(values: Array, lines: NDArray[np.int64]) -> Array:
 
 def _grey(part: Any) -> Any:
     """Sum of the colours of a part (h, w) or (h, w, 3) of a picture."""
-    if part.ndim == 2:
-        return part.astype(np.int16)
+    if part.ndim == 2 or part.shape[2] < 3:
+        return part.reshape(*part.shape[:2], -1)[..., 0].astype(np.int16)
     return part[..., 0].astype(np.int16) + part[..., 1] + part[..., 2]
 
 

@@ -114,10 +114,18 @@ class Tracker:
         self._usual = 0
         self._age = _GUARD_EVERY
         self._every = _FULL_EVERY
+        self._before = self._positions, self._moments.copy()
+
+    def undo(self) -> None:
+        """Forget the last frame, which does not show what it should; the next is searched whole."""
+        self._positions, self._moments = self._before
+        self._velocity = np.zeros_like(self._positions)
+        self._age = _GUARD_EVERY
 
     def update(self, image: NDArray[np.uint8]) -> TrackedFrame:
         """Return the markers of the next frame. Raises ValueError if the array is no picture."""
         as_planes(image)
+        self._before = self._positions, self._moments.copy()
         expected = self._positions + self._velocity
         result = None
         if self._age < self._every:

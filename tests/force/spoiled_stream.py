@@ -1,0 +1,128 @@
+"""A stream of presses and releases with faults at random, and what a pipeline makes of it.
+
+Pictures are drawn once for each press and share of its depth. Each frame has noise of its own; a
+fault begins in one of 15 frames and lasts for up to four.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from fault_frames import FAULTS
+from numpy.typing import NDArray
+from pressed_samples import Pressed, calibration
+from shaded_frames import shaded
+
+from gelslim_force.pipeline import ForcePipeline
+
+Picture = NDArray[np.uint8]
+RECOVERY = 2
+"""Frames after a fault until the force is right again."""
+MOST_SIGMAS = 4.0
+_BEGIN = 1 / 15
+_NOISE = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class StreamFrame:
+    """A picture, the force that it shows, and the fault in it; empty for none."""
+
+    image: Picture
+    force_n: NDArray[np.float64]
+    fault: str
+
+
+@dataclass
+class Soak:
+    """What came of a stream.
+
+    Attributes:
+        frames: Number of frames.
+        spoiled: Frames with a fault, by its name.
+        answered: Those of them that gave a force.
+        false: Frames with a force that is off by more than `MOST_SIGMAS`: number, fault, largest
+            score, and error in N.
+        late: Frames without a fault, the second after one or later, without the forces that the
+            stream gives otherwise.
+    """
+
+    frames: int = 0
+    spoiled: Counter[str] = field(default_factory=Counter)
+    answered: Counter[str] = field(default_factory=Counter)
+    false: list[tuple[int, str, float, list[float]]] = field(default_factory=list)
+    late: list[int] = field(default_factory=list)
+
+
+def untouched(count: int = 3) -> list[Pressed]:
+    """Pictures without contact."""
+    none = np.zeros(0)
+    camera = calibration().camera
+    images = [shaded(camera=camera, seed=70 + k, noise=2.5).image for k in range(count)]
+    return [Pressed(image, none, np.zeros(6)) for image in images]
+
+
+def stream(
+    still: list[Pressed], presses: list[tuple[Pressed, Pressed]], count: int, seed: int
+) -> Iterator[StreamFrame]:
+    """Frames of presses, each given at a part of its depth and in full, with rest between them."""
+    rng = np.random.default_rng(seed)
+    noise = np.rint(rng.normal(0, _NOISE, still[0].image.shape)).astype(np.int16)
+    scenes = _scenes(still, presses, rng)
+    fault, left, own = "", 0, 0
+    for _ in range(count):
+        scene = next(scenes)
+        if left == 0 and rng.random() < _BEGIN:
+            fault, left = str(rng.choice(list(FAULTS))), int(rng.integers(1, 5))
+            own = int(rng.integers(2**31))
+        image = _noisy(scene.image, noise, rng)
+        if left > 0:
+            # A fault keeps its shape from frame to frame.
+            image = FAULTS[fault](image, np.random.default_rng(own))
+        yield StreamFrame(image, scene.wrench[:3], fault if left > 0 else "")
+        left = max(left - 1, 0)
+
+
+def _scenes(
+    still: list[Pressed], presses: list[tuple[Pressed, Pressed]], rng: np.random.Generator
+) -> Iterator[Pressed]:
+    while True:
+        for _ in range(rng.integers(3, 12)):
+            yield still[rng.integers(len(still))]
+        half, full = presses[rng.integers(len(presses))]
+        yield half
+        for _ in range(rng.integers(3, 12)):
+            yield full
+        yield half
+
+
+def _noisy(image: Picture, noise: NDArray[np.int16], rng: np.random.Generator) -> Picture:
+    moved = np.roll(noise, int(rng.integers(len(noise))), axis=0)
+    return np.clip(image + moved, 0, 255).astype(np.uint8)
+
+
+def soak(chain: ForcePipeline, frames: Iterator[StreamFrame]) -> Soak:
+    """Process a stream without a reset."""
+    found, since = Soak(), RECOVERY
+    for index, frame in enumerate(frames):
+        result = chain.process(frame.image)
+        found.frames += 1
+        found.spoiled[frame.fault] += bool(frame.fault)
+        since = 0 if frame.fault else since + 1
+        if result.wrench is None:
+            if since >= RECOVERY:
+                found.late.append(index)
+            continue
+        found.answered[frame.fault] += bool(frame.fault)
+        off = result.wrench.force_n - frame.force_n
+        known = np.isfinite(off)
+        sigma = np.maximum(result.wrench.standard_deviation[:3][known], 1e-9)
+        worst = float(np.abs(off[known] / sigma).max(initial=0.0))
+        if worst > MOST_SIGMAS:
+            found.false.append((index, frame.fault, worst, off.round(4).tolist()))
+        normal = chain.normal is None or result.normal_known
+        if since >= RECOVERY and not normal:
+            found.late.append(index)
+    return found
