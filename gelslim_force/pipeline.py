@@ -205,7 +205,7 @@ class ForcePipeline:
         else:
             noise = self._noise_px(tracks)
             drift = self._drift.update(tracks, noise)
-            problem = drift.problem
+            problem = drift.problem or self._check.moved(tracks)
         clock.stage("drift")
         if problem:
             problems = (*problems, problem)

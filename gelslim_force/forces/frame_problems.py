@@ -12,6 +12,7 @@ from gelslim_force.motion.surface_motion import SurfaceMotion
 from gelslim_force.motion.unseen_motion import UnseenMotion
 from gelslim_force.tracking.picture_faults import PictureFaults
 from gelslim_force.tracking.tracker import TrackedFrame
+from gelslim_force.tracking.tracks import Tracks
 from gelslim_force.tracking.whole_dots import WholeDots
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -30,6 +31,13 @@ NO_PATCH = "the markers move, but no contact patch is seen"
 _LARGEST_MISFIT = 0.35
 _LARGEST_BLUR = 0.4
 """Of the logarithm of the size of most dots."""
+_LARGEST_USUAL = 0.25
+"""Motion of most markers over the thickness of the gel: a grip of all of it slips before."""
+_ALL_MOVED = (
+    "most markers have moved by {:.2g} mm, {:.0%} of the gel's thickness, and the gel moves by at "
+    "most {:.0%} as a whole: the picture is shifted or torn, or the camera has moved; calibrate "
+    "again"
+)
 _TURNED = (
     "the picture is {} relative to the calibration: correct the camera's orientation, or calibrate "
     "again with pictures in this one"
@@ -71,12 +79,14 @@ class FrameCheck:
         whole: Finds the dots that are seen whole.
         faults: Finds frozen rows and torn pictures.
         unseen: Gaps among the markers.
+        mm_per_px: Usual length on the gel per length in the picture.
         least_coverage: Smallest share of the markers seen with which a frame gives forces.
     """
 
     whole: WholeDots
     faults: PictureFaults
     unseen: UnseenMotion
+    mm_per_px: float
     least_coverage: float
 
     @classmethod
@@ -97,6 +107,7 @@ class FrameCheck:
             UnseenMotion(
                 motion.view.rest_mm[:, :2], motion.points_mm[:, :2], float(np.ptp(heights_mm))
             ),
+            motion.view.usual_mm_per_px,
             least_coverage,
         )
 
@@ -114,3 +125,10 @@ class FrameCheck:
             return _BLURRED
         moved_px = np.where(tracks.tracked[:, None], tracks.displacement_px, np.nan)
         return self.faults.torn(moved_px, growth) or self.unseen.problem(tracks.tracked)
+
+    def moved(self, tracks: Tracks) -> str:
+        """Why markers that no drift explains have moved too far; empty if they have not."""
+        moved_px = tracks.displacement_px[tracks.tracked]
+        usual_mm = self.mm_per_px * float(np.hypot(*np.median(moved_px, axis=0)))
+        share = usual_mm / self.unseen.thickness_mm
+        return _ALL_MOVED.format(usual_mm, share, _LARGEST_USUAL) if share > _LARGEST_USUAL else ""
