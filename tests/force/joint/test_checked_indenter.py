@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import pytest
 from fault_frames import soft_glare
+from lit_pipelines import checked, opened
 from pressed_samples import Pressed, calibration, lit_bundle, reference
 from pressed_shapes import Shape, ball, edge, pressed_shape, punch, rod, two_balls
 from shaded_frames import shaded
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.joint.checked_indenter import CheckedIndenter
-from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
-from gelslim_force.sensor import indenter_source, open_sensor
+from gelslim_force.sensor import open_sensor
 from gelslim_force.settings import PipelineSettings
 
 LARGEST_OFF = 0.25
@@ -40,35 +38,13 @@ class Trial:
     refused: bool
 
 
-@cache
-def witness() -> UnknownShape:
-    settings = JointSettings(gamma=1.0)
-    return unknown_shape(lit_bundle(), calibration(), reference().image, settings=settings)
-
-
-@cache
-def plain() -> ForcePipeline:
-    return ForcePipeline(lit_bundle(), calibration())
-
-
-@cache
-def named_only(name: str) -> ForcePipeline:
-    source = indenter_source(lit_bundle(), calibration(), reference().image, name)
-    return plain().with_normal(source)
-
-
-@cache
-def checked(name: str) -> ForcePipeline:
-    return plain().with_normal(CheckedIndenter(named_only(name).normal, witness()))
-
-
 def first(chain: ForcePipeline, truth: Pressed) -> FrameResult:
     chain.reset()
     return chain.process(truth.image)
 
 
 def trial(shape: Shape, truth: Pressed, name: str) -> Trial:
-    alone, found = first(named_only(name), truth), first(checked(name), truth)
+    alone, found = first(opened(name), truth), first(checked(name), truth)
     off = np.nan
     if alone.normal_known and alone.wrench is not None:
         off = alone.wrench.force_n[2] / truth.wrench[2] - 1

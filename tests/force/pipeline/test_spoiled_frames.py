@@ -11,18 +11,15 @@ from functools import cache
 import numpy as np
 import pytest
 from fault_frames import FAULTS, black_side, grey
+from lit_pipelines import opened
 from numpy.typing import NDArray
-from pressed_samples import calibration, lit_bundle, pressed, reference
+from pressed_samples import calibration, pressed
 from pressed_shapes import ball, pressed_shape
 from shaded_frames import shaded
 
 from gelslim_force.contact.shading_change import LostColourError, ShadingReference
 from gelslim_force.forces.frame_result import FrameResult
-from gelslim_force.joint.settings import JointSettings
-from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.motion.unseen_motion import UnseenMotion
-from gelslim_force.pipeline import ForcePipeline
-from gelslim_force.sensor import indenter_source
 
 pytest.importorskip("PIL")
 MODES = ("unknown", "none", "sphere:6", "depth")
@@ -30,18 +27,6 @@ MODES = ("unknown", "none", "sphere:6", "depth")
 COVERING = ("black_side", "hand", "glare", "torn", "frozen_rows")
 BALL = (ball(6.0), 0.5, (1.0, -1.0), 0.0, 3)
 Picture = NDArray[np.uint8]
-
-
-@cache
-def opened(mode: str) -> ForcePipeline:
-    if mode in ("none", "depth"):
-        return ForcePipeline(lit_bundle(), calibration())
-    picture = reference().image
-    if mode == "unknown":
-        settings = JointSettings(gamma=1.0)
-        source = unknown_shape(lit_bundle(), calibration(), picture, settings=settings)
-        return opened("none").with_normal(source)
-    return opened("none").with_normal(indenter_source(lit_bundle(), calibration(), picture, mode))
 
 
 @cache

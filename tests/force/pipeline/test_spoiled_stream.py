@@ -8,11 +8,10 @@ from __future__ import annotations
 import os
 
 import pytest
+from lit_pipelines import checked, opened
 from pressed_samples import Pressed, pressed
 from pressed_shapes import ball, pressed_shape
 from spoiled_stream import soak, stream, untouched
-from test_checked_indenter import checked
-from test_spoiled_frames import opened
 
 pytest.importorskip("PIL")
 FRAMES = int(os.environ.get("GELSLIM_SOAK_FRAMES", "300"))

@@ -1,0 +1,38 @@
+"""Pipelines of the lit sensor of `pressed_samples`, for what is known of the object."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from pressed_samples import calibration, lit_bundle, reference
+
+from gelslim_force.joint.checked_indenter import CheckedIndenter
+from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
+from gelslim_force.pipeline import ForcePipeline
+from gelslim_force.sensor import indenter_source
+
+
+@cache
+def witness() -> UnknownShape:
+    """Forces of an unknown shape; the drawn camera is linear."""
+    settings = JointSettings(gamma=1.0)
+    return unknown_shape(lit_bundle(), calibration(), reference().image, settings=settings)
+
+
+@cache
+def opened(mode: str) -> ForcePipeline:
+    """By the mode `unknown`, `none`, `depth` (that the test gives) or the name of an indenter."""
+    if mode in ("none", "depth"):
+        return ForcePipeline(lit_bundle(), calibration())
+    if mode == "unknown":
+        return opened("none").with_normal(witness())
+    source = indenter_source(lit_bundle(), calibration(), reference().image, mode)
+    return opened("none").with_normal(source)
+
+
+@cache
+def checked(name: str) -> ForcePipeline:
+    """A named indenter that light and markers confirm."""
+    named = opened(name).normal
+    return opened("none").with_normal(CheckedIndenter(named, witness()))  # type: ignore[arg-type]
