@@ -65,6 +65,11 @@ class Wrench(Immutable):
         parts = read.reals("force_n", 3), read.reals("torque_nmm", 3)
         return cls(*parts, read.reals("covariance", 6, 6))
 
+    @classmethod
+    def unknown(cls) -> Wrench:
+        """A wrench of which nothing is known."""
+        return cls(np.full(3, np.nan), np.full(3, np.nan), np.full((6, 6), np.nan))
+
     @property
     def vector(self) -> Array:
         """(6,) force, then torque."""
@@ -75,16 +80,21 @@ class Wrench(Immutable):
         """(6,) in N and N mm."""
         return np.sqrt(np.diag(self.covariance))
 
-    def __str__(self) -> str:
-        """One line: value and standard deviation of each component."""
-        names = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-        parts = [
-            f"{name} unknown" if np.isnan(value) else f"{name} {with_sigma(value, sigma)} {unit}"
-            for name, (_, unit), value, sigma in zip(
-                names, _ROWS, self.vector, self.standard_deviation, strict=True
+    def lines(self) -> list[tuple[str, str]]:
+        """Name of each component, and its value and standard deviation as text."""
+        return [
+            (name, text if text == "unknown" else f"{text} {unit}")
+            for name, unit, text in zip(
+                ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz"),
+                (unit for _, unit in _ROWS),
+                map(with_sigma, self.vector, self.standard_deviation),
+                strict=True,
             )
         ]
-        return ", ".join(parts)
+
+    def __str__(self) -> str:
+        """One line: value and standard deviation of each component."""
+        return ", ".join(f"{name} {text}" for name, text in self.lines())
 
     def _repr_html_(self) -> str:
         """Table of the six components for a notebook."""

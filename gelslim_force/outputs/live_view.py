@@ -18,6 +18,7 @@ from typing import Any
 from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.forces.record import plain
+from gelslim_force.forces.wrench import Wrench
 from gelslim_force.outputs.canvas import Image, encoded
 from gelslim_force.outputs.wrench_csv import row
 
@@ -122,10 +123,16 @@ class LiveView(AbstractContextManager["LiveView"]):
 
 
 def live_state(result: FrameResult) -> dict[str, Any]:
-    """Return the columns of `wrench_csv` as JSON values; null where a number is unknown."""
+    """The columns of `wrench_csv` as JSON values, null where unknown, and the wrench as text."""
     numbers = {name: None if math.isnan(v) else v for name, v in row(result).items()}
     stages = plain(dict(result.stage_ms))
-    return {"frame": numbers, "problems": list(result.problems), "stage_ms": stages}
+    wrench = Wrench.unknown() if result.wrench is None else result.wrench
+    return {
+        "frame": numbers,
+        "wrench": wrench.lines(),
+        "problems": list(result.problems),
+        "stage_ms": stages,
+    }
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -16,6 +16,7 @@ import output_samples as samples
 import pytest
 
 from gelslim_core.errors import OutputError
+from gelslim_core.uncertainty import with_sigma
 from gelslim_force.outputs.live_view import LiveView, live_state
 
 Image = pytest.importorskip("PIL.Image")
@@ -59,6 +60,9 @@ def test_page_picture_and_state() -> None:
         assert state["frame"]["fx_n"] == given.wrench.force_n[0]
         assert state["frame"]["fz_n"] is None
         assert state["frame"]["index"] == 7
+        told = with_sigma(given.wrench.force_n[0], given.wrench.standard_deviation[0])
+        assert state["wrench"][0] == ["Fx", f"{told} N"]
+        assert state["wrench"][2] == ["Fz", "unknown"]
         assert state["problems"] == ["no contact patch"]
         assert state["stage_ms"] == dict(given.stage_ms)
         assert get(view, "/../etc/passwd")[0] == 404
