@@ -59,3 +59,13 @@ class Tracks(Immutable):
     def count(self, status: MarkerStatus) -> int:
         """Return how many markers have a status."""
         return int((self.status == status).sum())
+
+    def without(self, rejected: NDArray[np.bool_]) -> Tracks:
+        """The same with the markers `rejected` (n,), whose positions are then unknown."""
+        unknown = rejected[:, None]
+        return Tracks(
+            np.where(unknown, np.nan, self.positions_px),
+            np.where(unknown, np.nan, self.displacement_px),
+            np.where(rejected, int(MarkerStatus.REJECTED), self.status),
+            np.where(rejected, -1, self.dots),
+        )
