@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 
 from gelslim_core.errors import GelslimError
@@ -31,6 +32,9 @@ _SAMPLE_PX = 8
 _GREY, _LEAST_GREY = 2, 0.95
 """Difference of the channels, in grey values, up to which a pixel has no colour, and the share of
 such pixels in a picture without colour: noise alone gives the pixels of a colour camera more."""
+_OPAQUE = 0.75
+"""Share of its light that every colour keeps at a tilt of the gel: light from two sides loses less
+than this in the brighter of the two. Darker is dirt on the gel or on the window."""
 ROBUST = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
@@ -144,12 +148,25 @@ class ShadingReference:
             self.image, picture, blocked, touched, glaring, self.bin_px, self._sums, FLOOR,
             self._ratios, self._counts,
         )  # fmt: skip
-        free = self._counts >= LEAST_FREE * self.bin_px**2
+        free = (self._counts >= LEAST_FREE * self.bin_px**2) & ~self._soiled()
         share = np.sqrt(np.float32(self.bin_px**2) / np.maximum(self._counts, 1))
         noise_level = self._noise_level * share.astype(np.float32)
         return _relative_to_median(
             _combined(np.log(self._ratios[self.used])), free & self.on_pad, noise_level
         )
+
+    def _soiled(self) -> Mask:
+        """(rows, columns) bins that something opaque covers, and those beside them.
+
+        A tilt takes light from one colour and gives it to another; dirt takes it from all.
+        """
+        if len(self.used) < 2:
+            return np.zeros(self.shape, dtype=bool)
+        seen = self._counts > 0
+        brightest = np.where(seen, self._ratios[self.used].max(axis=0), 1.0)
+        usual = np.median(brightest[seen & self.on_pad]) if (seen & self.on_pad).any() else 1.0
+        dark = brightest < _OPAQUE * usual
+        return np.asarray(binary_dilation(dark, np.ones((3, 3)))) if dark.any() else dark
 
 
 def is_grey(picture: NDArray[np.uint8]) -> bool:
