@@ -177,8 +177,8 @@ class ForcePipeline:
                 default the frame's own stamp; unknown for a picture.
             normal_mm: (c,) motion of the surface nodes along z in mm, negative where the gel is
                 pressed in. It takes the place of the normal source.
-            normal_sigma_mm: Standard deviation of `normal_mm` where the gel is pressed in, for all
-                nodes or (c,). The errors of all nodes are taken to be fully correlated.
+            normal_sigma_mm: Standard deviation of `normal_mm`: of all nodes where the gel is
+                pressed in, or (c,) of each node. Their errors are taken to be fully correlated.
 
         Returns:
             What the frame gave. Nothing is raised for the content of a frame: see
@@ -306,7 +306,7 @@ class ForcePipeline:
         """Force field and wrench for a motion (n, 3) of the markers. Raises IfemError."""
         if reading is not None and reading.known and reading.forces is not None:
             force, moved = reading.forces.force_n, reading.forces.displacement_mm
-            covariance = self._covariance.of_forces(reading, drift)
+            covariance = self._covariance.of_forces(reading, noise, drift)
             wrench = self._wrench.wrench(force, covariance)
             field = self._forces.direct.field_of(force, moved, reading.touched)
             return {"field": field, "wrench": wrench}

@@ -30,6 +30,7 @@ class FoundForces:
         force_n: (c, 3) on the surface nodes.
         displacement_mm: (c, 3) of the surface nodes.
         covariance: (6, 6) of force and torque about the origin.
+        by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
         gain: Gain of the light over the light as traced.
         unexplained: Share of the change of the light that the forces do not explain.
     """
@@ -37,6 +38,7 @@ class FoundForces:
     force_n: Array
     displacement_mm: Array
     covariance: Array
+    by_marker: Array
     gain: float
     unexplained: float
 
@@ -75,7 +77,8 @@ class NormalReading:
         Args:
             count: c.
             normal_mm: (c,) motion along z.
-            sigma_mm: Its standard deviation where the gel is pressed in, for all nodes or (c,).
+            sigma_mm: Its standard deviation: of all nodes where the gel is pressed in, or (c,) of
+                each node.
 
         Raises:
             ValueError: A shape is another, or a value is not finite or a deviation negative.
@@ -88,7 +91,7 @@ class NormalReading:
                 f"standard deviation of the normal motion, of shape {sigma.shape}: must be a "
                 f"number or ({count},), finite and at least 0"
             )
-        return cls(w, pressed_sigma_mm(w, sigma), None)
+        return cls(w, sigma if sigma.ndim else pressed_sigma_mm(w, sigma), None)
 
     @classmethod
     def unknown(cls, count: int, problem: str) -> NormalReading:

@@ -36,15 +36,22 @@ class WrenchCovariance:
     ) -> None:
         self._wrench, self._motion = wrench, motion
         self._unknown_normal_mm = unknown_normal_mm
+        self._field = field
         self._drift = DriftNoise.of(motion, wrench.gains(motion.interpolation), field)
         self._kept_gains: tuple[bytes, Array] | None = None
 
-    def of_forces(self, reading: NormalReading, drift: FrameDrift) -> Array:
-        """(6, 6) in N and N mm for forces that the normal source found itself."""
+    def of_forces(self, reading: NormalReading, noise_px: float, drift: FrameDrift) -> Array:
+        """(6, 6) in N and N mm for forces that the normal source found itself.
+
+        These forces rest on the markers near the contact, and less than the stiffness of the whole
+        pad takes them do they take a drift of the picture for a load.
+        """
         assert reading.forces is not None
         besides = self._wrench.response[:, :, 2] @ reading.sigma_mm
-        found = reading.forces.covariance + self._drift.covariance(drift)
-        return np.asarray(found + np.outer(besides, besides))
+        rigid = np.einsum("ani,nip->ap", reading.forces.by_marker, self._field.basis)
+        corrected = noise_px * (rigid @ drift.gain.reshape(4, -1))
+        found = reading.forces.covariance + np.outer(besides, besides)
+        return np.asarray(found + rigid @ drift.covariance @ rigid.T + corrected @ corrected.T)
 
     def of_motion(
         self,

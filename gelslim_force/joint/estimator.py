@@ -10,6 +10,7 @@ and the forces follow from the markers alone.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -50,6 +51,7 @@ class JointForces:
         region: (c,) nodes in contact.
         seen: (c,) nodes that the picture showed as possibly in contact.
         covariance: (6, 6) of force and torque about the origin; the gel is taken as specified.
+        by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
         gain: Gain of the light found in this frame.
         unexplained: Share of the change of light in the region that the forces do not explain.
     """
@@ -59,6 +61,7 @@ class JointForces:
     region: Mask
     seen: Mask
     covariance: Array
+    by_marker: Array
     gain: float
     unexplained: float
 
@@ -198,7 +201,9 @@ class JointEstimator:
         moved = self.responses.displacement(nodes, state.force_n[nodes]) + offset
         chosen, near = self.settings, np.zeros(len(self.points_mm), dtype=bool)
         near[nodes] = True
-        equations = self._with_markers(NormalEquations.of(len(start)), frame, near, moved)
+        markers = self._marker_rows(frame, near, moved)
+        equations = NormalEquations.of(len(start))
+        equations = equations.with_rows(markers.rows, markers.residual, markers.weight)
         light = self._light(frame, near, moved, state.gain)
         if light is not None:
             heights = self.responses.of_heights(nodes, light.nodes)
@@ -217,10 +222,10 @@ class JointEstimator:
         force[nodes] = found.reshape(-1, 3)
         motion = self.responses.displacement(nodes, force[nodes]) + offset
         if light is None:
-            return _State(force, motion, state.gain, equations)
+            return _State(force, motion, state.gain, equations, markers)
         higher = np.asarray(heights @ (found - start).astype(heights.dtype), dtype=float)
         gain = light.gain_after(higher, chosen.gain_sigma)
-        return _State(force, motion, gain, equations, light.unexplained(higher))
+        return _State(force, motion, gain, equations, markers, light.unexplained(higher))
 
     def _offset(self, state: _State) -> Array:
         """Motion (c, 3) by which the strained gel differs from the linear one at this state."""
@@ -230,10 +235,11 @@ class JointEstimator:
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
         return np.asarray(state.displacement_mm - whole)
 
-    def _with_markers(
-        self, equations: NormalEquations, frame: _Frame, near: Mask, moved_mm: Array
-    ) -> NormalEquations:
-        """With the markers near the contact: lateral motion by the picture and the height."""
+    def _marker_rows(self, frame: _Frame, near: Mask, moved_mm: Array) -> _MarkerRows:
+        """The markers near the contact: lateral motion by the picture and the height.
+
+        What mesh and interpolation do not resolve is a share of the motion of them all.
+        """
         wide = self.lattice.widened(near, self.settings.marker_reach)[self.marker_node]
         model = self.nodes_to_markers @ moved_mm
         positions = np.where(wide[:, None], frame.markers_px, np.nan)
@@ -241,10 +247,10 @@ class JointEstimator:
         used = np.flatnonzero(np.isfinite(lateral).all(axis=1))
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         residual = (lateral[used] - model[used, :2]).ravel()
-        share = np.abs(lateral[used]).ravel() * self.settings.marker_share
+        share = self.settings.marker_share * _size(model[used])
         noise = np.repeat(self._noise_mm(frame)[used], 2)
         sigma = np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2)
-        return equations.with_rows(rows, residual, huber(residual, sigma, _MARKER_LIMIT))
+        return _MarkerRows(used, rows, residual, huber(residual, sigma, _MARKER_LIMIT))
 
     def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums | None:
         """The change of light near the contact, linear about the present motion (c, 3)."""
@@ -252,7 +258,9 @@ class JointEstimator:
             return None
         wide = self.lattice.widened(near, self.settings.light_reach)
         bins = placed_bins(self.light, frame.seen, self.lattice, moved_mm, wide)
-        return bins.sums(self.law, moved_mm[:, 2], gain, self.settings.light_error)
+        unresolved = self.settings.light_share * _size(bins.change.T)
+        error = math.hypot(self.settings.light_error, unresolved)
+        return bins.sums(self.law, moved_mm[:, 2], gain, error)
 
     def _off_design(self, force_n: Array) -> Array:
         """(6, 6) by a gel and a print that are not as specified, for the markers alone.
@@ -272,9 +280,11 @@ class JointEstimator:
 
     def _found(self, seen: Mask, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
+        assert state.markers is not None
         nodes = np.flatnonzero(region)
         sums = np.reshape(self._rigid[:, nodes], (6, -1))
-        covariance = state.equations.covariance_of(sums, state.force_n[nodes].ravel())
+        spread = state.equations.spread_of(sums, state.force_n[nodes].ravel())
+        covariance = spread @ sums.T
         if self.light is None:
             covariance = covariance + self._off_design(state.force_n)
         return JointForces(
@@ -283,6 +293,7 @@ class JointEstimator:
             region,
             seen,
             covariance,
+            state.markers.response(spread, self.markers.mm_per_px),
             state.gain,
             state.unexplained,
         )
@@ -296,9 +307,32 @@ class _Frame:
 
 
 @dataclass(frozen=True, eq=False)
+class _MarkerRows:
+    """Data of the markers `used` (m,) of n: rows (2m, 3p), residuals and weights (2m,)."""
+
+    used: Nodes
+    rows: Any
+    residual: Array
+    weight: Array
+
+    def response(self, spread: Array, mm_per_px: Array) -> Array:
+        """Change (6, n, 2) per px of sums with the product (6, 3p) of themselves and H⁻¹."""
+        by_mm = ((spread @ self.rows.T) * self.weight).reshape(len(spread), -1, 2)
+        found = np.zeros((len(spread), len(mm_per_px), 2))
+        found[:, self.used] = np.einsum("ami,mij->amj", by_mm, mm_per_px[self.used])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class _State:
     force_n: Array
     displacement_mm: Array
     gain: float
     equations: NormalEquations | None = None
+    markers: _MarkerRows | None = None
     unexplained: float = 0.0
+
+
+def _size(rows: Array) -> float:
+    """Root mean square of the lengths of vectors (n, k); 0 without any."""
+    return float(np.sqrt((rows**2).sum(axis=1).mean())) if len(rows) else 0.0

@@ -105,17 +105,21 @@ class NormalEquations:
         descend(gram, slope, force, friction, np.float32(step), TOLERANCE, STEPS)
         return force.astype(float)
 
-    def covariance_of(self, sums: Array, force: Array) -> Array:
-        """Covariance (k, k) of linear functions `sums` (k, 3p) of the forces.
+    def spread_of(self, sums: Array, force: Array) -> Array:
+        """Product (k, 3p) of linear functions `sums` (k, 3p) of the forces with their covariance.
 
         Nodes that do not press stay free of force, and the others vary in all components.
         """
         pressing = np.repeat(force.reshape(-1, 3)[:, 2] < 0, 3)
-        if not pressing.any():
-            return np.zeros((len(sums), len(sums)))
-        factor = cho_factor(self.hessian[np.ix_(pressing, pressing)])
-        kept = sums[:, pressing]
-        return np.asarray(kept @ cho_solve(factor, kept.T))
+        found = np.zeros(sums.shape)
+        if pressing.any():
+            factor = cho_factor(self.hessian[np.ix_(pressing, pressing)])
+            found[:, pressing] = cho_solve(factor, sums[:, pressing].T).T
+        return found
+
+    def covariance_of(self, sums: Array, force: Array) -> Array:
+        """Covariance (k, k) of linear functions `sums` (k, 3p) of the forces (3p,)."""
+        return np.asarray(self.spread_of(sums, force) @ sums.T)
 
 
 def huber(residual: Array, sigma: Array, limit: float) -> Array:

@@ -128,7 +128,12 @@ class UnknownShape:
             return NormalReading.unknown(count, _OTHER_GAIN.format(seen.gain, self.most_gain))
         height = seen.displacement_mm[:, 2]
         forces = FoundForces(
-            seen.force_n, seen.displacement_mm, seen.covariance, seen.gain, seen.unexplained
+            seen.force_n,
+            seen.displacement_mm,
+            seen.covariance,
+            seen.by_marker,
+            seen.gain,
+            seen.unexplained,
         )
         depth = max(0.0, -float(height.min()))
         return NormalReading(height, np.zeros(count), seen.region, depth_mm=depth, forces=forces)
