@@ -24,7 +24,7 @@ _LOCAL_SHARE = 0.5
 _LEAST_SHARE = 0.02
 _SHIFTS = ((0.25, 0.25), (0.25, -0.25), (-0.25, 0.25), (-0.25, -0.25))
 _MOST_STEPS = 40
-_DISCRETE = 0.2
+_DISCRETE = 0.1
 """Relative error of the depth for a patch as large as the node spacing; it falls with the square
 of the size."""
 

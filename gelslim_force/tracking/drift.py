@@ -25,7 +25,7 @@ _CUT_SIGMAS = 4.0
 """Largest residual of a free marker; one of 3000 is larger by noise alone."""
 LEAST_NOISE_PX = 0.02
 """Errors of the dots' centres that do not vary from marker to marker as noise does."""
-_UNEVEN_PX = 0.002
+_UNEVEN_PX = 0.001
 """Error of a shift by fractions of a pixel, common to all dots."""
 _WIDEST = 16.0
 """First width of the fit over the last one, from the last known drift."""
