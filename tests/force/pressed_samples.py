@@ -84,12 +84,32 @@ def calibration() -> Calibration:
     return calibrate(lit_bundle(), reference().image)
 
 
+@dataclass(frozen=True, eq=False)
+class FinePad:
+    """A pad of the truth."""
+
+    mesh: PadMesh
+    operator: SurfaceOperator
+
+    @property
+    def points_mm(self) -> Array:
+        """(n, 3) surface nodes."""
+        return np.asarray(self.mesh.surface_mm)
+
+    @property
+    def cell_mm2(self) -> float:
+        """Area of a cell of the surface."""
+        return float(np.prod(self.mesh.cell_size_mm[:2]))
+
+
 @cache
-def fine_pad() -> tuple[PadMesh, SurfaceOperator, Array]:
-    """The pad of the truth, its exact operator, and its (n, 3) surface nodes."""
-    bundle = sensor_bundle()
-    mesh = refined(bundle.mesh)
-    return mesh, surface_operator(mesh, bundle.material, "bbar", "pcg"), np.asarray(mesh.surface_mm)
+def fine_pad(thickness: float = 1.0, poissons_ratio: float | None = None) -> FinePad:
+    """Half the pitch and eight layers, with a thickness relative to the design."""
+    gel = sensor_bundle().material
+    if poissons_ratio is not None:
+        gel = replace(gel, poissons_ratio=poissons_ratio)
+    mesh = refined(sensor_bundle().mesh.stretched(thickness))
+    return FinePad(mesh, surface_operator(mesh, gel, "bbar", "pcg"))
 
 
 def tractions(points_mm: Array, rng: np.random.Generator) -> Array:
@@ -156,9 +176,9 @@ def pressed_by(
     traction_mpa: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
     """The picture of tractions (n, 3) on the finer pad's nodes; the seed is that of its noise."""
-    mesh, operator, _ = fine_pad()
-    force = traction_mpa * float(np.prod(mesh.cell_size_mm[:2]))
-    return drawn(force, operator.displacement(force), seed, noise=noise, brightness=brightness)
+    pad = fine_pad()
+    force = traction_mpa * pad.cell_mm2
+    return drawn(force, pad.operator.displacement(force), seed, noise=noise, brightness=brightness)
 
 
 def round_patch(
@@ -182,7 +202,7 @@ def round_patch(
 
 def fine_points_mm() -> Array:
     """(n, 3) surface nodes of the finer pad."""
-    return fine_pad()[2]
+    return fine_pad().points_mm
 
 
 @cache
@@ -212,12 +232,8 @@ def drawn(
     force_n: Array, moved_mm: Array, seed: int, *, noise: float = 2.5, brightness: float = 1.0
 ) -> Pressed:
     """The picture of a motion (n, 3) of the finer pad's nodes under forces (n, 3)."""
-    mesh, _, points = fine_pad()
-    x, y = (np.unique(np.round(points[:, k], 9)) for k in (0, 1))
-    filled = np.zeros((3, len(x), len(y)))
-    place = [np.searchsorted(axis, np.round(points[:, k], 9)) for k, axis in enumerate((x, y))]
-    filled[:, place[0], place[1]] = moved_mm.T
-    splines = [RectBivariateSpline(x, y, part, kx=3, ky=3) for part in filled]
+    mesh, points = fine_pad().mesh, fine_pad().points_mm
+    splines = surface_splines(points, moved_mm)
     material = _material(splines)
     inside = np.flatnonzero((np.abs(material) < np.array(SIZE_MM) / 2).all(axis=1))
     slopes = np.zeros((2, len(material)))
@@ -240,3 +256,13 @@ def drawn(
         wrench,
         np.column_stack([s.ev(*nodes.T) for s in splines]),
     )
+
+
+def surface_splines(points_mm: Array, moved_mm: Array) -> list[RectBivariateSpline]:
+    """Splines of a motion (n, 3) through the nodes (n, 3) of a lattice."""
+    x, y = (np.unique(np.round(points_mm[:, k], 9)) for k in (0, 1))
+    filled = np.zeros((3, len(x), len(y)))
+    places = zip(np.round(points_mm[:, :2], 9).T, (x, y), strict=True)
+    row, column = (np.searchsorted(axis, at) for at, axis in places)
+    filled[:, row, column] = moved_mm.T
+    return [RectBivariateSpline(x, y, part, kx=3, ky=3) for part in filled]

@@ -76,15 +76,15 @@ def pressed_shape(
     shape: Shape, depth_mm: float, place_mm: tuple[float, float], angle_deg: float, seed: int
 ) -> Pressed:
     """The picture of a shape whose lowest point is `depth_mm` below the untouched surface."""
-    mesh, exact, points = fine_pad()
-    layer = surface_operator(mesh, sensor_bundle().material, "bbar", "fft")
+    pad, points = fine_pad(), fine_pad().points_mm
+    layer = surface_operator(pad.mesh, sensor_bundle().material, "bbar", "fft")
     c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
     dx, dy = points[:, 0] - place_mm[0], points[:, 1] - place_mm[1]
     gap = depth_mm - shape.profile(c * dx + s * dy, c * dy - s * dx)
     push = _contact(layer, gap)
     force = np.zeros_like(points)
     force[:, 2] = -push
-    return drawn(force, exact.displacement(force), seed)
+    return drawn(force, pad.operator.displacement(force), seed)
 
 
 def _contact(layer, gap: Array) -> Array:
