@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import force_sigma
 import force_tables
 import page_tables
 import tolerance_tables
@@ -59,6 +60,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "latency": _from("force_latency", force_tables.full_latency),
         "ladders": _from("force_ladders", force_tables.ladder_tables),
         "large-strain": _from("force_ladders", page_tables.large_strain),
+        "sigma": _from("force_sigma", force_sigma.table),
     },
     "docs/digital_twin.md": {
         "validation": _from("twin_validation", twin_tables.validation_text),

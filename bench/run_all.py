@@ -44,6 +44,7 @@ STEPS = (
     Step("camera_models"),
     Step("force_ladders"),
     Step("normal_sources"),
+    Step("force_sigma", quick=None),
     Step("twin_ladders"),
     Step("rendering"),
     Step("assembly"),

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pressed_samples import calibration, reference
 from sigma_cases import (
+    CONDITIONS,
     Contact,
     ball,
     press,
@@ -102,7 +103,7 @@ def score(mode: str, condition: str, seed: int, contact: Contact) -> Score:
 def _given_depth(height_mm: Array, seed: int) -> dict[str, Any]:
     """Heights with an error, of scale or offset, and the standard deviation that it has."""
     rng = np.random.default_rng([34, seed])
-    if seed % 2:
+    if seed // len(CONDITIONS) % 2:
         sigma = np.exp(rng.uniform(np.log(0.01), np.log(0.08))) * np.abs(height_mm)
     else:
         sigma = np.minimum(np.exp(rng.uniform(np.log(0.002), np.log(0.02))), np.abs(height_mm))
@@ -110,15 +111,19 @@ def _given_depth(height_mm: Array, seed: int) -> dict[str, Any]:
     return {"normal_mm": height_mm + off * sigma, "normal_sigma_mm": sigma}
 
 
+def condition_of(seed: int) -> str:
+    """The condition of a case: they take turns, so that all cases are independent."""
+    return CONDITIONS[seed % len(CONDITIONS)]
+
+
 def scores(
-    mode: str, conditions: Iterable[str], seeds: Iterable[int], stored: Path | None = None
+    mode: str, seeds: Iterable[int], stored: Path | None = None
 ) -> Mapping[str, list[Score]]:
     """Scores by condition. Contacts are kept in the folder `stored`, if it is given."""
-    found: dict[str, list[Score]] = {condition: [] for condition in conditions}
+    found: dict[str, list[Score]] = {condition: [] for condition in CONDITIONS}
     for seed in seeds:
-        contact = _kept(mode, seed, stored)
-        for condition, some in found.items():
-            some.append(score(mode, condition, seed, contact))
+        condition = condition_of(seed)
+        found[condition].append(score(mode, condition, seed, _kept(mode, seed, stored)))
     return found
 
 

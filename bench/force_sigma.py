@@ -1,0 +1,177 @@
+"""Do the standard deviations of forces hold? Scores over random contacts, and their curve.
+
+    python bench/force_sigma.py              # 200 contacts of each mode
+    python bench/force_sigma.py --figure     # draw the figure from the data again
+
+Writes docs/data/force_sigma.json and docs/images/force_sigma.png. Contacts and the scores of each
+slice are kept in a folder, so that a run that was stopped goes on where it ended. The contacts are
+those of tests/force/sigma_cases.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_data import DOCS, write_data, write_whole
+from machine import machine
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+Array = NDArray[np.float64]
+Record = Mapping[str, Any]
+SLICE = 20
+KEPT = Path("out") / "force_sigma"
+COMPONENTS = ("F_x", "F_y", "F_z")
+COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57")
+SIZE_IN, DPI = (9.0, 3.6), 110
+
+
+def main() -> None:
+    """Score the contacts, or draw the figure of stored scores."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cases", type=int, default=200, help="contacts of each mode")
+    parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
+    parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
+    parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
+    options = parser.parse_args()
+    if not options.figure:
+        data = {**machine(31), "cases": options.cases, "modes": scored(options)}
+        write_data("force_sigma", data, options.docs)
+    record = json.loads((options.docs / "data" / "force_sigma.json").read_text("utf-8"))
+    write_whole(options.docs / "images" / "force_sigma.png", drawn(record["modes"]))
+    print(table(record))
+
+
+def scored(options: argparse.Namespace) -> dict[str, Any]:
+    """Scores, median errors and deviations by mode and condition."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "force"))
+    from sigma_cases import CONDITIONS
+    from sigma_gate import MODES, scores
+
+    options.kept.mkdir(parents=True, exist_ok=True)
+    rows: dict[str, dict[str, list[Record]]] = {
+        mode: {condition: [] for condition in CONDITIONS} for mode in MODES
+    }
+    for first in range(0, options.cases, SLICE):
+        for mode in MODES:
+            path = options.kept / f"{mode.split()[0]}-{first}.json"
+            if not path.exists():
+                seeds = range(first, min(first + SLICE, options.cases))
+                some = scores(mode, seeds, options.kept)
+                plain = {name: [vars(s) for s in every] for name, every in some.items()}
+                write_whole(path, json.dumps(plain).encode("utf-8"))
+            for name, every in json.loads(path.read_text("utf-8")).items():
+                rows[mode][name] += every
+        print(first, flush=True)
+    return {
+        mode: {name: _condition(every) for name, every in some.items()}
+        for mode, some in rows.items()
+    }
+
+
+def _condition(rows: Iterable[Record]) -> dict[str, Any]:
+    every = list(rows)
+    given = [row for row in every if row["error_n"]]
+    return {
+        "refused": len(every) - len(given),
+        "error_mn": [[_short(1000 * value) for value in row["error_n"]] for row in given],
+        "sigma_mn": [[_short(1000 * value) for value in row["sigma_n"]] for row in given],
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def table(record: Record) -> str:
+    """The scores as a Markdown table, with what they stand for."""
+    lines = [
+        f"{record['cases']} contacts of each mode, the conditions in turn; three numbers are those "
+        "of F_x, F_y and F_z.",
+        "",
+        "| known, condition | contacts | refused | median error, mN | median σ, mN | "
+        "RMS of error/σ | mean of error/σ | within 1.96 σ |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for mode, conditions in record["modes"].items():
+        every = list(conditions.values())
+        lines += [_row(f"{mode}, {name}", [row]) for name, row in conditions.items()]
+        lines.append(_row(f"**{mode}, all**", every))
+    return "\n".join(lines)
+
+
+def _row(name: str, conditions: list[Record]) -> str:
+    error, sigma = (
+        np.concatenate([row[key] for row in conditions]) for key in ("error_mn", "sigma_mn")
+    )
+    refused, z = sum(row["refused"] for row in conditions), error / sigma
+    cells = [
+        name,
+        f"{len(z) + refused}",
+        f"{refused}",
+        _three(np.median(np.abs(error), axis=0), ".2g"),
+        _three(np.median(sigma, axis=0), ".2g"),
+        _three(np.sqrt((z**2).mean(axis=0)), ".2f"),
+        _three(z.mean(axis=0), "+.2f"),
+        _three(100 * (np.abs(z) < norm.ppf(0.975)).mean(axis=0), ".0f") + " %",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def _three(values: Iterable[float], form: str) -> str:
+    return ", ".join(_plain(format(value, form)) for value in values)
+
+
+def _plain(text: str) -> str:
+    return f"{float(text):g}" if "e" in text else text
+
+
+def drawn(modes: Record) -> bytes:
+    """Observed against nominal coverage, a panel for each mode, as PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=SIZE_IN, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(modes), sharey=True)
+    nominal = np.linspace(0.02, 0.995, 80)
+    limits = norm.ppf((1 + nominal) / 2)
+    for axes, (mode, conditions) in zip(panels, modes.items(), strict=True):
+        error, sigma = (
+            np.concatenate([row[key] for row in conditions.values()])
+            for key in ("error_mn", "sigma_mn")
+        )
+        z = np.abs(error / sigma)
+        _expected(axes, nominal, len(z))
+        for k, colour in enumerate(COLOURS):
+            seen = (z[:, k, None] < limits).mean(axis=0)
+            axes.plot(100 * nominal, 100 * seen, color=colour, lw=1.4, label=f"${COMPONENTS[k]}$")
+        axes.set(title=mode, xlabel="nominal coverage, %", xlim=(0, 100), ylim=(0, 100))
+        axes.set_aspect("equal")
+    panels[0].set_ylabel("observed coverage, %")
+    panels[0].legend(loc="upper left", fontsize=8, frameon=False)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _expected(axes: Any, nominal: Array, count: int) -> None:
+    """The diagonal, with twice the deviation of a share of `count` frames."""
+    spread = 2 * np.sqrt(nominal * (1 - nominal) / max(count, 1))
+    axes.fill_between(
+        100 * nominal, 100 * (nominal - spread), 100 * (nominal + spread), color="#dfe4ea", lw=0
+    )
+    axes.plot([0, 100], [0, 100], color="#9aa3ad", lw=0.8)
+
+
+if __name__ == "__main__":
+    main()
