@@ -1,0 +1,42 @@
+"""A dot that dirt covers in part is no marker, and dirt is no contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from pressed_samples import calibration, lit_bundle, reference
+from shaded_frames import shaded
+
+from gelslim_force.built_sensor import BuiltGel
+from gelslim_force.sensor import normal_source
+from gelslim_force.tracking.tracks import MarkerStatus
+
+
+def soiled(picture: np.ndarray, at_px: np.ndarray, radius_px: float) -> np.ndarray:
+    rows, columns = np.mgrid[: picture.shape[0], : picture.shape[1]]
+    image = picture.copy()
+    image[np.hypot(columns - at_px[0], rows - at_px[1]) < radius_px] = 30
+    return image
+
+
+def test_a_dot_that_is_covered_in_part_is_rejected() -> None:
+    tracker = calibration().tracker()
+    clean = shaded(camera=calibration().camera, seed=41).image
+    assert tracker.update(clean).tracks.tracked.all()
+    marker = len(tracker.reference) // 2 + 3
+    place = tracker.reference.positions_px[marker]
+    for aside in (5.0, -5.0):
+        tracker.reset()
+        tracks = tracker.update(soiled(clean, place + np.array([aside, 0.0]), 3.5)).tracks
+        assert tracks.status[marker] != MarkerStatus.TRACKED
+        others = np.delete(np.arange(len(tracks)), marker)
+        assert tracks.tracked[others].mean() > 0.99
+
+
+def test_an_opaque_speck_is_no_contact() -> None:
+    markers = calibration().reference.positions_px
+    middle = markers[len(markers) // 2] + [13.0, 11.0]
+    source = normal_source(BuiltGel(lit_bundle(), calibration()), reference().image, "sphere:6")
+    assert source is not None
+    clean = shaded(camera=calibration().camera, seed=43).image
+    for radius in (4.0, 9.0):
+        assert source.look(soiled(clean, middle, radius), markers) is None
