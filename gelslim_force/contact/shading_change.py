@@ -32,6 +32,8 @@ _SAMPLE_PX = 8
 _GREY, _LEAST_GREY = 2, 0.95
 """Difference of the channels, in grey values, up to which a pixel has no colour, and the share of
 such pixels in a picture without colour: noise alone gives the pixels of a colour camera more."""
+_BLACK, _WHITE, _LEAST_LIT = 5, 250, 0.05
+"""Grey values outside of which a pixel does not tell its colour, and the least share of others."""
 _OPAQUE = 0.75
 """Share of its light that every colour keeps at a tilt of the gel: light from two sides loses less
 than this in the brighter of the two. Darker is dirt on the gel or on the window."""
@@ -170,9 +172,15 @@ class ShadingReference:
 
 
 def is_grey(picture: NDArray[np.uint8]) -> bool:
-    """Whether a picture (h, w, c) has no colour, by a part of its pixels."""
+    """Whether a picture (h, w, c) has no colour, by a part of its pixels.
+
+    Black and saturated pixels do not tell; a picture that has hardly any others is not grey.
+    """
     some = picture[::_SAMPLE_PX, ::_SAMPLE_PX]
-    return bool((some.max(axis=2) - some.min(axis=2) <= _GREY).mean() >= _LEAST_GREY)
+    low, high = some.min(axis=2), some.max(axis=2)
+    tells = (high > _BLACK) & (low < _WHITE)
+    apart = (high - low)[tells]
+    return bool(tells.mean() >= _LEAST_LIT and (apart <= _GREY).mean() >= _LEAST_GREY)
 
 
 def as_picture(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

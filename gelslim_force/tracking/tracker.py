@@ -8,7 +8,7 @@ markers are missing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -41,9 +41,6 @@ _AREA_STEP = 0.45
 """Change of the logarithm of a dot's area that shows another kind of dot: a factor of 1.6."""
 _MOST_CHANGED = 0.15
 """Largest share of the dots whose area may change by such a factor where most dots have moved."""
-_COVERED = 0.15
-"""Change of the logarithm of a dot's area, beyond that of the dots around it, that shows dirt over
-a part of it. A press to 30 % of the thickness changes it by up to 0.08, noise by 0.05."""
 _LITTLE_PITCH = 0.2
 """Motion per coordinate, over the pitch, that half of the markers must have before another marker
 can be taken."""
@@ -144,25 +141,8 @@ class Tracker:
         if result.slipped:
             self.reset()
         else:
-            result = replace(result, tracks=self._uncovered(result))
             self._remember(result)
         return result
-
-    def _uncovered(self, result: TrackedFrame) -> Tracks:
-        """The tracks without dots that dirt covers in part: their centres are not the markers'."""
-        tracks, seen = result.tracks, np.flatnonzero(result.tracks.tracked)
-        if not len(seen):
-            return tracks
-        change = np.zeros(len(tracks))
-        area_px = result.detections.area_px[tracks.dots[seen]]
-        change[seen] = _area_change(area_px, self._area[seen])
-        near = self._reference.neighbours
-        around = np.where(near >= 0, change[near], change[:, None])
-        around.sort(axis=1)
-        middle = around.shape[1] // 2
-        usual = (around[:, middle - 1] + around[:, middle]) / 2
-        covered = tracks.tracked & (np.abs(change - usual) > _COVERED)
-        return tracks.without(covered) if covered.any() else tracks
 
     def _near(self, image: NDArray[np.uint8], expected: NDArray[np.float64]) -> TrackedFrame | None:
         known = np.isfinite(expected).all(axis=1, keepdims=True)

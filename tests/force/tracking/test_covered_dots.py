@@ -9,6 +9,7 @@ from shaded_frames import shaded
 from gelslim_force.built_sensor import BuiltGel
 from gelslim_force.sensor import normal_source
 from gelslim_force.tracking.tracks import MarkerStatus
+from gelslim_force.tracking.whole_dots import WholeDots
 
 
 def soiled(picture: np.ndarray, at_px: np.ndarray, radius_px: float) -> np.ndarray:
@@ -19,14 +20,18 @@ def soiled(picture: np.ndarray, at_px: np.ndarray, radius_px: float) -> np.ndarr
 
 
 def test_a_dot_that_is_covered_in_part_is_rejected() -> None:
-    tracker = calibration().tracker()
+    found = calibration()
+    dots = np.searchsorted(found.markers, found.reference.markers)
+    whole = WholeDots(found.reference, found.dots.moments_px2[dots])
+    tracker = found.tracker()
     clean = shaded(camera=calibration().camera, seed=41).image
-    assert tracker.update(clean).tracks.tracked.all()
+    assert whole.of(tracker.update(clean)).tracks.tracked.all()
     marker = len(tracker.reference) // 2 + 3
     place = tracker.reference.positions_px[marker]
     for aside in (5.0, -5.0):
         tracker.reset()
-        tracks = tracker.update(soiled(clean, place + np.array([aside, 0.0]), 3.5)).tracks
+        frame = tracker.update(soiled(clean, place + np.array([aside, 0.0]), 3.5))
+        tracks = whole.of(frame).tracks
         assert tracks.status[marker] != MarkerStatus.TRACKED
         others = np.delete(np.arange(len(tracks)), marker)
         assert tracks.tracked[others].mean() > 0.99
