@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from cli_samples import MINI20
+from ruamel.yaml import YAML
 
 from gelslim_cad.checks import RULES
 from gelslim_cad.checks.explain import Node, UnknownNameError, explain
@@ -66,7 +67,7 @@ def test_fields_point_to_their_line_or_to_the_default() -> None:
         assert path == str(MINI20)
         key, _, value = lines[int(line) - 1].strip().partition(":")
         assert key == node.name.rpartition(".")[2]
-        assert float(value.partition("#")[0]) == node.value
+        assert YAML(typ="safe").load(value) == node.value
     assert {n.name for n in fields if n.origin == "default"} <= set(LOADED.defaulted)
 
 
