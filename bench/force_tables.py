@@ -6,7 +6,7 @@ from typing import Any
 
 SHORT = {
     "depth given, 25%": "depth given",
-    "tangential, 25%": "nothing given, normal force unknown",
+    "tangential, 25%": "tangential forces alone (`--indenter none`)",
     "sphere seen, 25%": "only the ball's size given, contact found in the picture",
     "paper's choices": "the paper's choices, with our detector",
 }

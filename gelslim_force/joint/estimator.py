@@ -21,6 +21,7 @@ from scipy import sparse
 
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.model_errors import at_edge, edge_nodes, off_design
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import NormalEquations, huber
@@ -262,21 +263,10 @@ class JointEstimator:
         error = math.hypot(self.settings.light_error, unresolved)
         return bins.sums(self.law, moved_mm[:, 2], gain, error)
 
-    def _off_design(self, force_n: Array) -> Array:
-        """(6, 6) by a gel and a print that are not as specified, for the markers alone.
-
-        Light tells the scale of the heights. Without it such errors change the size of all forces,
-        and a height that is wrong shows as shear, which acts where the pressure does.
-        """
-        wrench = np.einsum("kcd,cd->k", self._rigid, force_n)
-        normal = float(wrench[2])
-        if normal == 0:
-            return np.zeros((6, 6))
-        x, y = -wrench[4] / normal, wrench[3] / normal
-        shear = np.array([[1.0, 0, 0, 0, 0, -y], [0, 1.0, 0, 0, 0, x]])
-        shear *= self.settings.shear_by_markers * normal
-        scale = self.settings.scale_by_markers * wrench
-        return np.asarray(np.outer(scale, scale) + shear.T @ shear)
+    @cached_property
+    def _near_edge(self) -> Mask:
+        """(c,) nodes at the edge of the gel."""
+        return edge_nodes(self.neighbours.sum(axis=1), self.lattice)
 
     def _found(self, seen: Mask, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
@@ -285,8 +275,10 @@ class JointEstimator:
         sums = np.reshape(self._rigid[:, nodes], (6, -1))
         spread = state.equations.spread_of(sums, state.force_n[nodes].ravel())
         covariance = spread @ sums.T
+        covariance += at_edge(state.force_n, self.points_mm, self._near_edge, self.settings)
         if self.light is None:
-            covariance = covariance + self._off_design(state.force_n)
+            wrench = np.einsum("kcd,cd->k", self._rigid, state.force_n)
+            covariance += off_design(wrench, self.settings)
         return JointForces(
             state.force_n,
             state.displacement_mm,

@@ -3,7 +3,8 @@
 Light that changes for another reason than a contact, such as a shadow or dirt, pulls the forces
 away from what the markers show. The markers in the contact then keep residuals. The covariance
 grows by their size, as that of a mean of values that do not agree (R. T. Birge, "The calculation of
-errors by the method of least squares", Phys. Rev. 40, 1932).
+errors by the method of least squares", Phys. Rev. 40, 1932). It grows as well where the forces
+leave much of the change of the light unexplained.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ _INSIDE = 0.3
 _LEAST = 4
 _MOST_SIGMAS = 3.0
 """Of the mean square of the noise, which is no misfit."""
-_USUAL = 0.12
-"""Root mean square of the residuals over their deviations in contacts that the light shows as it
-should. It is far below 1, because the deviations hold errors of print and camera, which most frames
-have in common with the reference."""
+_USUAL_MM, _USUAL_SHARE = 0.0005, 0.0025
+"""Root mean square of the residuals in contacts that the light shows as it should: of small
+motions, and as a share of the motion."""
+_USUAL_UNEXPLAINED = 0.45
+"""Share of the change of light that forces leave unexplained in most frames, up to which it is that
+of noise and mesh. It tells of other causes where forces can follow the markers all the same."""
 
 
 def with_misfit(
@@ -38,14 +41,17 @@ def with_misfit(
         markers_px: (n, 2) markers of the frame; NaN for lost ones.
         noise_px: Standard deviation of their positions.
     """
-    growth = marker_misfit(estimator, found, markers_px, noise_px) / _USUAL
+    growth = max(
+        marker_misfit(estimator, found, markers_px, noise_px),
+        found.unexplained / _USUAL_UNEXPLAINED,
+    )
     return found if growth <= 1 else replace(found, covariance=growth**2 * found.covariance)
 
 
 def marker_misfit(
     estimator: JointEstimator, found: JointForces, markers_px: Array, noise_px: float
 ) -> float:
-    """Root mean square residual of the markers in the contact beyond noise, over their deviation.
+    """Root mean square residual of the markers in the contact beyond noise, over the usual one.
 
     0 where fewer than four are seen. Arguments as in `with_misfit`.
     """
@@ -55,9 +61,9 @@ def marker_misfit(
     inside &= np.isfinite(seen).all(axis=1)
     if inside.sum() < _LEAST:
         return 0.0
-    chosen, seen = estimator.settings, seen[inside]
+    seen = seen[inside]
     noise_mm = noise_px * estimator.markers.usual_mm_per_px
     by_chance = noise_mm**2 * (1 + _MOST_SIGMAS / np.sqrt(len(seen)))
     beyond = float(np.mean(np.square(seen - model[inside, :2]))) - by_chance
-    expected = chosen.marker_mm**2 + float(np.mean(np.square(chosen.marker_share * seen)))
+    expected = _USUAL_MM**2 + _USUAL_SHARE**2 * float(np.mean(np.square(seen)))
     return float(np.sqrt(max(beyond, 0.0) / expected))

@@ -27,6 +27,8 @@ class JointSettings:
             of the light.
         light_share: What the mesh does not resolve of the change of the light, as a share of its
             root mean square over the colours together.
+        edge_share: What the mesh does not resolve of contacts at the edge of the gel, as a share of
+            the force there, in each direction.
         gain_sigma: Standard deviation of the gain of the light.
         gamma: Exponent of the camera's response.
         roughness: Difference of the traction of neighbouring nodes.
@@ -55,8 +57,9 @@ class JointSettings:
     friction: float = 1.2
     marker_mm: float = 0.0015
     marker_share: float = 0.02
-    light_error: float = 0.01
+    light_error: float = 0.02
     light_share: float = 0.3
+    edge_share: float = 0.05
     gain_sigma: float = 0.2
     gamma: float = 1.8
     roughness: float = 0.13

@@ -61,7 +61,7 @@ def untouched(count: int = 3) -> list[Pressed]:
     none = np.zeros(0)
     camera = calibration().camera
     images = [shaded(camera=camera, seed=70 + k, noise=2.5).image for k in range(count)]
-    return [Pressed(image, none, np.zeros(6)) for image in images]
+    return [Pressed(image, none, np.zeros(6), none) for image in images]
 
 
 def stream(

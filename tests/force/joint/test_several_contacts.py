@@ -70,7 +70,7 @@ def test_several_balls_at_once(count: int) -> None:
             assert np.hypot(*seen[nearest]) < 0.25
             near = np.hypot(*(nodes - place).T) < APART_MM / 2
             own = truth.force_n[near].sum(axis=0)
-            assert abs(patches[nearest].force_n[2] / own[2] - 1) < 0.15
+            assert abs(patches[nearest].force_n[2] / own[2] - 1) < 0.17
 
 
 @pytest.mark.slow

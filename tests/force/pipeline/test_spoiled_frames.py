@@ -133,7 +133,7 @@ def test_lights_that_drift_apart_are_no_force(mode: str, name: str) -> None:
     for seed in range(4):
         pressing = second(mode, spoiled(name, truth.image, seed))
         assert pressing.wrench is not None
-        assert pressing.wrench.force_n[2] == pytest.approx(truth.wrench[2], rel=0.05)
+        assert pressing.wrench.force_n[2] == pytest.approx(truth.wrench[2], rel=0.07)
         assert (scores(pressing, truth.wrench[:3]) < 3).all()
         assert (scores(second(mode, spoiled(name, untouched(), seed)), np.zeros(3)) < 3).all()
 

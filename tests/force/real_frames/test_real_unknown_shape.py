@@ -136,7 +136,7 @@ def test_presses_have_their_force_where_they_are(sensor: RealSensor) -> None:
         points, push = sensor.estimator.points_mm[:, :2], -found.force_n[:, 2]
         assert np.hypot(*(push @ points / push.sum() - middle)) < 0.35 * half / PX_PER_MM, name
         away = np.hypot(*(points - middle).T)
-        assert push[away > 1.5 * half / PX_PER_MM].sum() < 0.1 * push.sum(), name
+        assert push[away > 1.5 * half / PX_PER_MM].sum() < 0.12 * push.sum(), name
         depth = -found.displacement_mm[:, 2]
         assert away[np.argmax(depth)] < half / PX_PER_MM, name
         assert 0.2 < depth.max() < 0.6 * THICKNESS_MM, name

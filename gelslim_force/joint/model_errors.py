@@ -1,0 +1,57 @@
+"""What the model leaves out of the forces of an unknown shape, as covariance of their wrench."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_force.joint.settings import JointSettings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_EDGE_STEPS = 2
+
+
+def edge_nodes(neighbour_count: NDArray[np.float64], lattice: NodeLattice) -> Mask:
+    """(c,) nodes within two steps of the edge of the gel, by the number of their neighbours."""
+    return lattice.widened(np.asarray(neighbour_count < 4), _EDGE_STEPS)
+
+
+def at_edge(force_n: Array, points_mm: Array, near: Mask, settings: JointSettings) -> Array:
+    """(6, 6) by what the mesh does not resolve of contacts at the edge of the gel.
+
+    Args:
+        force_n: (c, 3) nodal forces.
+        points_mm: (c, 3) places of the nodes.
+        near: (c,) nodes at the edge.
+        settings: Has the share.
+    """
+    force, places = force_n[near], points_mm[near]
+    push = np.abs(force[:, 2])
+    if not push.any():
+        return np.zeros((6, 6))
+    x, y = push @ places[:, :2] / push.sum()
+    along = np.array([[1.0, 0, 0, 0, 0, -y], [0, 1.0, 0, 0, 0, x], [0, 0, 1.0, y, -x, 0]])
+    size = settings.edge_share * float(np.linalg.norm(force.sum(axis=0)))
+    return np.asarray(size**2 * along.T @ along)
+
+
+def off_design(wrench: Array, settings: JointSettings) -> Array:
+    """(6, 6) by a gel and a print that are not as specified, for the markers alone.
+
+    Light tells the scale of the heights. Without it such errors change the size of all forces,
+    and a height that is wrong shows as shear, which acts where the pressure does.
+
+    Args:
+        wrench: (6,) force and torque about the origin.
+        settings: Has the shares.
+    """
+    normal = float(wrench[2])
+    if normal == 0:
+        return np.zeros((6, 6))
+    x, y = -wrench[4] / normal, wrench[3] / normal
+    shear = np.array([[1.0, 0, 0, 0, 0, -y], [0, 1.0, 0, 0, 0, x]])
+    shear *= settings.shear_by_markers * normal
+    scale = settings.scale_by_markers * wrench
+    return np.asarray(np.outer(scale, scale) + shear.T @ shear)
