@@ -58,11 +58,11 @@ class JointSettings:
     marker_mm: float = 0.0015
     marker_share: float = 0.02
     light_error: float = 0.02
-    light_share: float = 0.3
+    light_share: float = 0.05
     edge_share: float = 0.05
     gain_sigma: float = 0.2
     gamma: float = 1.8
-    roughness: float = 0.13
+    roughness: float = 0.17
     normal_stress: float = 1.4
     tangential_stress: float = 0.07
     unseen_force: float = 0.2

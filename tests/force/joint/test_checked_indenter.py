@@ -132,7 +132,7 @@ def test_a_reflection_is_no_ball() -> None:
         result = chain.process(soft_glare(still, np.random.default_rng([3, seed])))
         if result.wrench is not None and result.normal_known:
             sigma = np.maximum(result.wrench.standard_deviation[:3], 1e-9)
-            assert (np.abs(result.wrench.force_n) < 3 * sigma).all(), seed
+            assert (np.abs(result.wrench.force_n) < 4 * sigma).all(), seed
 
 
 @pytest.mark.slow
