@@ -46,7 +46,7 @@ _UNCERTAIN = (
     "the markers alone show the normal force as {:.2g} N with a standard deviation of {:.2g} N, "
     "which is more than {:.0%} of it: it is unknown"
 )
-_MOST_SIGMAS = 3
+_MOST_SIGMAS = 4
 _OTHER_GAIN = (
     "the light changes {:.1f} times as much as the contact explains, and more than 1 ± {:.1f} is "
     "not expected: something else changes it, or the light has to be calibrated"
