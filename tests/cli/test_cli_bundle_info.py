@@ -78,7 +78,7 @@ def test_a_matrix_is_exported(
     [
         ("pad.inp", ["--element", "C3D20R", "--law", "neo_hookean"]),
         ("pad.msh", []),
-        ("s.npz", ["--matrix", "surface_stiffness"]),
+        pytest.param("s.npz", ["--matrix", "surface_stiffness"], marks=pytest.mark.slow),
     ],
 )
 def test_an_export_may_be_replaced_but_not_a_file_of_the_user(

@@ -96,6 +96,7 @@ def test_measures_are_those_of_the_reference(problem: FoldProblem) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_first_best_of_a_grid_is_that_of_the_reference(problem: FoldProblem) -> None:
     rng = np.random.default_rng(9)
     for _ in range(10):
