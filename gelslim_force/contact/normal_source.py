@@ -58,6 +58,8 @@ class NormalReading:
         by_gel_mm: (p, c) derivative of the motion by ln thickness and by Poisson's ratio of the
             gel; None where it does not depend on them, or is not computed.
         push_n: Normal force of the contact model, positive; NaN without one.
+        hidden_n: Standard deviation of the normal force of a contact that is not seen; 0 where one
+            is seen, or would be.
     """
 
     w_mm: Array
@@ -69,6 +71,7 @@ class NormalReading:
     forces: FoundForces | None = None
     by_gel_mm: Array | None = None
     push_n: float = float("nan")
+    hidden_n: float = 0.0
 
     @classmethod
     def given(cls, count: int, normal_mm: ArrayLike, sigma_mm: ArrayLike) -> NormalReading:

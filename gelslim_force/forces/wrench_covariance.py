@@ -16,6 +16,9 @@ from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 
 Array = NDArray[np.float64]
 
+_HIDDEN_SHEAR = 0.2
+"""Usual tangential force of a contact over its normal force."""
+
 
 class WrenchCovariance:
     """Covariances for one sensor.
@@ -70,7 +73,8 @@ class WrenchCovariance:
         spread = self._motion.covariance_mm2(seen, noise_px)
         if reading is not None and reading.known:
             lateral = self._motion.compensation_change(reading.sigma_mm)
-            return rigid + self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
+            found = self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
+            return rigid + found + self._hidden(reading.hidden_n)
         apparent = self._motion.apparent_motion(motion_mm, self._unknown_normal_mm)
         return rigid + self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
 
@@ -78,6 +82,13 @@ class WrenchCovariance:
         """(6, 6) by the motion of the markers that were not seen."""
         own = gains[:, self._motion.markers[filled.unseen]]
         return np.einsum("ani,nm,bmi->ab", own, filled.covariance_mm2, own, optimize=True)
+
+    def _hidden(self, normal_n: float) -> Array:
+        """(6, 6) by a contact that is not seen, anywhere on the gel, but for its normal force."""
+        x, y = np.sqrt(np.mean(np.square(self._motion.points_mm[:, :2]), axis=0))
+        shear = _HIDDEN_SHEAR * normal_n
+        sigma = np.array([shear, shear, 0.0, y * normal_n, x * normal_n, np.hypot(x, y) * shear])
+        return np.diag(np.square(sigma))
 
     def _gains(self, interpolation: MarkerInterpolation) -> Array:
         """Wrench per motion of each marker; computed anew only where other markers are lost."""

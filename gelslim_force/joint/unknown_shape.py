@@ -77,7 +77,10 @@ class UnknownShape:
     @property
     def unseen_n(self) -> float:
         """Normal force that the light may not show."""
-        return self.estimator.settings.unseen_force * self.estimator.youngs_modulus_mpa
+        chosen = self.estimator.settings
+        bare = self.estimator.light is None
+        least = chosen.unseen_by_markers if bare else chosen.unseen_force
+        return least * self.estimator.youngs_modulus_mpa
 
     @property
     def most_gain(self) -> float:
@@ -117,7 +120,8 @@ class UnknownShape:
             return NormalReading.unknown(count, seen)
         if seen is None:
             unseen = np.full(count, self.unseen_mm)
-            return NormalReading(np.zeros(count), unseen, np.zeros(count, dtype=bool))
+            free = np.zeros(count, dtype=bool)
+            return NormalReading(np.zeros(count), unseen, free, hidden_n=self.unseen_n)
         if seen.unexplained > LARGEST_UNEXPLAINED:
             return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
         normal_n, most = abs(float(seen.force_n[:, 2].sum())), self.estimator.settings.most_sigma

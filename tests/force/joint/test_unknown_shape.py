@@ -100,7 +100,7 @@ def test_no_contact_is_no_force() -> None:
 
 @pytest.mark.slow
 def test_a_press_that_grows_and_fades() -> None:
-    """Each frame starts from the last; a push too faint to see is within its deviation."""
+    """Each frame starts from the last; what is too faint to see is within its deviation."""
     for seed in (13, 21):
         pipeline().reset()
         for number, share in enumerate((0.1, 0.2, 0.4, 0.7, 1.0, 0.7, 0.3, 0.0)):
@@ -109,8 +109,7 @@ def test_a_press_that_grows_and_fades() -> None:
             assert found.wrench is not None
             if found.normal_known:
                 off = found.wrench.force_n - truth.wrench[:3]
-                seen = slice(0 if found.wrench.force_n[2] else 2, 3)
-                assert (np.abs(off) < 4 * found.wrench.standard_deviation[:3])[seen].all(), share
+                assert (np.abs(off) < 3.5 * found.wrench.standard_deviation[:3]).all(), share
             else:
                 assert share <= 0.2
 
