@@ -16,6 +16,8 @@ COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57", "#7a3f8f", "#b59b00", "#30a0b0", "#c
 OURS, PAPER, FRONT = "#d62728", "#000000", "#9aa3ad"
 NEGLIGIBLE = 1e-6
 """Of a ladder's largest error: what is below is drawn there, as an open triangle."""
+NAME_PX = 150.0, 14.0
+"""Width and height in which names would lie on each other."""
 MOST_NAMES = {"ladder": 20, "problems": 8, "omissions": 30}
 KEY = "Ladder"
 """PNG text that says from which record a figure was drawn."""
@@ -91,13 +93,18 @@ def _points(axes: Any, ladder: LadderRecord) -> None:
 
 
 def _names(axes: Any, ladder: LadderRecord) -> None:
-    """Beside the points, on the side where there is room."""
+    """Beside the points, on the side where there is room; lower where a name is just above."""
     low, high = axes.get_xlim()
-    for rung in _named(ladder):
+    places: list[tuple[float, float]] = []
+    for rung in sorted(_named(ladder), key=lambda r: _spot(ladder, r)[1], reverse=True):
         time, error = _spot(ladder, rung)
+        x, y = axes.transData.transform((time, error))
+        crowded = any(abs(x - a) < NAME_PX[0] and b - y < NAME_PX[1] for a, b in places)
+        places.append((x, y))
         on_left = math.log(time / low) > 0.78 * math.log(high / low)
         axes.annotate(
-            _short(ladder, rung), (time, error), xytext=(-7 if on_left else 7, 3), fontsize=7.5,
+            _short(ladder, rung), (time, error),
+            xytext=(-7 if on_left else 7, -10 if crowded else 3), fontsize=7.5,
             textcoords="offset points", color="#333a44", ha="right" if on_left else "left",
         )  # fmt: skip
 

@@ -33,7 +33,7 @@ def ladder(kind: str, data: Data, header: Data) -> LadderRecord:
         paper="takes the motion along z as given.",
         reference="Tractions on a pad of half the pitch with eight layers, drawn by the renderer "
         "of the tests",
-        error_label="error of F_z, RMS",
+        error_label="error of the normal force, RMS",
         error_unit="N",
         time_label="processor time per frame, one thread",
         time_unit="ms",

@@ -46,8 +46,8 @@ class WrenchCovariance:
     def of_forces(self, reading: NormalReading, noise_px: float, drift: FrameDrift) -> Array:
         """(6, 6) in N and N mm for forces that the normal source found itself.
 
-        These forces rest on the markers near the contact, and less than the stiffness of the whole
-        pad takes them do they take a drift of the picture for a load.
+        They rest on the markers near the contact. A drift of the picture therefore changes them
+        less than forces that follow from the motion of all markers.
         """
         assert reading.forces is not None
         besides = self._wrench.response[:, :, 2] @ reading.sigma_mm

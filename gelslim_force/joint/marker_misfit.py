@@ -27,7 +27,7 @@ _USUAL_MM, _USUAL_SHARE = 0.0005, 0.0025
 motions, and as a share of the motion."""
 _USUAL_UNEXPLAINED = 0.45
 """Share of the change of light that forces leave unexplained in most frames, up to which it is that
-of noise and mesh. It tells of other causes where forces can follow the markers all the same."""
+of noise and mesh. A larger one shows another cause, also where the forces explain the markers."""
 
 
 def with_misfit(
