@@ -60,6 +60,8 @@ class NormalReading:
         push_n: Normal force of the contact model, positive; NaN without one.
         hidden_n: Standard deviation of the normal force of a contact that is not seen; 0 where one
             is seen, or would be.
+        shown: (c,) nodes whose motion the source sees where their markers are lost; None where it
+            sees none.
     """
 
     w_mm: Array
@@ -72,6 +74,7 @@ class NormalReading:
     by_gel_mm: Array | None = None
     push_n: float = float("nan")
     hidden_n: float = 0.0
+    shown: NDArray[np.bool_] | None = None
 
     @classmethod
     def given(cls, count: int, normal_mm: ArrayLike, sigma_mm: ArrayLike) -> NormalReading:

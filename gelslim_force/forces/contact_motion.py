@@ -102,8 +102,13 @@ class ContactMotion:
         return frame_problems.COVERED.format(share) if share > _MOST_COVERED else ""
 
     def _with_hidden(self, reading: NormalReading, tracked: NDArray[np.bool_]) -> NormalReading:
-        """The reading with the depth that gaps among the markers may hide, in its deviation."""
+        """The reading with the depth that gaps among the markers may hide, in its deviation.
+
+        Light around a lost marker shows a dent there.
+        """
         if not reading.known or tracked.all():
             return reading
         hidden_mm = self._unseen.hidden_mm(tracked)
+        if reading.shown is not None:
+            hidden_mm = np.where(reading.shown, 0.0, hidden_mm)
         return replace(reading, sigma_mm=np.hypot(reading.sigma_mm, hidden_mm))

@@ -21,6 +21,7 @@ from gelslim_force.joint.estimator import JointForces
 from gelslim_force.joint.unknown_shape import LARGEST_UNEXPLAINED, UnknownShape
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 _SIGMAS = 2.0
 _MODEL_ERROR = 0.15
 """Error of the named indenter's force by outline, mesh and friction, over the larger force."""
@@ -47,11 +48,13 @@ class SeenIndenter:
         patch: The contact patch.
         witness: The forces of an unknown shape, None without contact, or why there are none.
         compared: Whether `witness` was looked for in this frame.
+        shown: (c,) nodes whose slope the light shows; None where no marker is lost.
     """
 
     patch: ContactPatch
     witness: JointForces | str | None
     compared: bool
+    shown: Mask | None
 
 
 class CheckedIndenter:
@@ -85,10 +88,12 @@ class CheckedIndenter:
             return patch
         changed = abs(patch.size_mm - self._size_mm) > _GROWN * self._size_mm
         self._age += 1
+        lost = bool(np.isnan(markers_px).any())
+        shown = self.witness.estimator.shown(image, markers_px) if lost else None
         if not changed and self._age < _FRAMES:
-            return SeenIndenter(patch, None, False)
+            return SeenIndenter(patch, None, False, shown)
         self._size_mm, self._age = patch.size_mm, 0
-        return SeenIndenter(patch, self.witness.look(image, markers_px), True)
+        return SeenIndenter(patch, self.witness.look(image, markers_px), True, shown)
 
     def motion(self, seen: Any, lateral_mm: Array | None = None) -> NormalReading:
         """Motion under the named indenter; unknown where it is not the one that touches."""
@@ -99,7 +104,7 @@ class CheckedIndenter:
             return reading
         if seen.compared:
             self._verdict = self._compared(reading, seen.witness)
-        return replace(reading, problem=self._verdict)
+        return replace(reading, problem=self._verdict, shown=seen.shown)
 
     def _compared(self, reading: NormalReading, found: JointForces | str | None) -> str:
         """Why the reading is that of another indenter; empty if it may be of this one."""

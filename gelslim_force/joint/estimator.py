@@ -21,6 +21,7 @@ from scipy import sparse
 
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
+from gelslim_force.joint.marker_rows import MarkerRows
 from gelslim_force.joint.model_errors import at_edge, edge_nodes, off_design
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
@@ -55,6 +56,7 @@ class JointForces:
         by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
         gain: Gain of the light found in this frame.
         unexplained: Share of the change of light in the region that the forces do not explain.
+        shown: (c,) nodes whose slope the light shows; none without light.
     """
 
     force_n: Array
@@ -65,6 +67,7 @@ class JointForces:
     by_marker: Array
     gain: float
     unexplained: float
+    shown: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +147,15 @@ class JointEstimator:
                 begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
         return self._found(
-            region, *self._rounds(frame, nodes, begun[1], self.settings.following_rounds)
+            frame, region, *self._rounds(frame, nodes, begun[1], self.settings.following_rounds)
         )
+
+    def shown(self, image: NDArray[np.uint8], markers_px: Array) -> Mask:
+        """(c,) nodes whose slope the light of a frame shows, with arguments as in `estimate`.
+
+        Raises LostColourError for a grey picture where the rest has colour.
+        """
+        return self._shown(None if self.light is None else self.light.look(image, markers_px))
 
     def _rounds(
         self, frame: _Frame, nodes: Mask, state: _State, rounds: tuple[int, ...]
@@ -236,7 +246,7 @@ class JointEstimator:
         whole = self.responses.compliance.whole(self.strained.force(state.displacement_mm))
         return np.asarray(state.displacement_mm - whole)
 
-    def _marker_rows(self, frame: _Frame, near: Mask, moved_mm: Array) -> _MarkerRows:
+    def _marker_rows(self, frame: _Frame, near: Mask, moved_mm: Array) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.
 
         What mesh and interpolation do not resolve is a share of the motion of them all.
@@ -251,7 +261,7 @@ class JointEstimator:
         share = self.settings.marker_share * _size(model[used])
         noise = np.repeat(self._noise_mm(frame)[used], 2)
         sigma = np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2)
-        return _MarkerRows(used, rows, residual, huber(residual, sigma, _MARKER_LIMIT))
+        return MarkerRows(used, rows, residual, huber(residual, sigma, _MARKER_LIMIT))
 
     def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums | None:
         """The change of light near the contact, linear about the present motion (c, 3)."""
@@ -268,7 +278,7 @@ class JointEstimator:
         """(c,) nodes at the edge of the gel."""
         return edge_nodes(self.neighbours.sum(axis=1), self.lattice)
 
-    def _found(self, seen: Mask, region: Mask, state: _State) -> JointForces:
+    def _found(self, frame: _Frame, seen: Mask, region: Mask, state: _State) -> JointForces:
         assert state.equations is not None
         assert state.markers is not None
         nodes = np.flatnonzero(region)
@@ -279,6 +289,9 @@ class JointEstimator:
         if self.light is None:
             wrench = np.einsum("kcd,cd->k", self._rigid, state.force_n)
             covariance += off_design(wrench, self.settings)
+        else:
+            # Without light, the weights hold the unknown region, which leaves no residuals.
+            covariance -= state.markers.overstated(spread)
         return JointForces(
             state.force_n,
             state.displacement_mm,
@@ -288,7 +301,14 @@ class JointEstimator:
             state.markers.response(spread, self.markers.mm_per_px),
             state.gain,
             state.unexplained,
+            self._shown(frame.seen),
         )
+
+    def _shown(self, seen: SeenLight | None) -> Mask:
+        count = len(self.points_mm)
+        if self.light is None or seen is None:
+            return np.zeros(count, dtype=bool)
+        return self.light.shown(seen, count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,29 +319,12 @@ class _Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class _MarkerRows:
-    """Data of the markers `used` (m,) of n: rows (2m, 3p), residuals and weights (2m,)."""
-
-    used: Nodes
-    rows: Any
-    residual: Array
-    weight: Array
-
-    def response(self, spread: Array, mm_per_px: Array) -> Array:
-        """Change (6, n, 2) per px of sums with the product (6, 3p) of themselves and H⁻¹."""
-        by_mm = ((spread @ self.rows.T) * self.weight).reshape(len(spread), -1, 2)
-        found = np.zeros((len(spread), len(mm_per_px), 2))
-        found[:, self.used] = np.einsum("ami,mij->amj", by_mm, mm_per_px[self.used])
-        return found
-
-
-@dataclass(frozen=True, eq=False)
 class _State:
     force_n: Array
     displacement_mm: Array
     gain: float
     equations: NormalEquations | None = None
-    markers: _MarkerRows | None = None
+    markers: MarkerRows | None = None
     unexplained: float = 0.0
 
 

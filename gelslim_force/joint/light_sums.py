@@ -38,6 +38,7 @@ class LightSums:
         gain_pull: Of w d r.
         left: Of w r r.
         seen: Of w times the square of the change that was seen.
+        by_noise: Of w times the square of the noise.
         gain: The present gain.
     """
 
@@ -49,6 +50,7 @@ class LightSums:
     gain_pull: float
     left: float
     seen: float
+    by_noise: float
     gain: float
 
     def gain_after(self, height_mm: Array, sigma: float) -> float:
@@ -58,9 +60,13 @@ class LightSums:
         return float(np.clip(self.gain + pull / own, *_GAINS))
 
     def unexplained(self, height_mm: Array) -> float:
-        """Share of the change of light that is left after the heights changed by (m,)."""
+        """Share of the change of light that is left after the heights changed by (m,).
+
+        What noise adds to both is taken off.
+        """
         left = self.left - float((2 * self.pull - self.matrix @ height_mm) @ height_mm)
-        return max(left, 0.0) / self.seen if self.seen > 0 else 0.0
+        change = self.seen - self.by_noise
+        return max(left - self.by_noise, 0.0) / change if change > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +129,7 @@ class PlacedBins:
             _sum(weight, by_gain, residual),
             _sum(weight, residual, residual),
             _sum(weight, self.change, self.change),
+            _sum(weight, self.noise, self.noise),
             gain,
         )
 

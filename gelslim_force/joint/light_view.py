@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _BINS_ACROSS = 160
 _SATURATED = 250
+_SHOWN = 0.25
+"""Share of the bins around a node that show its slope where they are seen."""
 _DISC, _RIM_PX = 1.5, 1.0
 """A marker's pixels, over its radius and beyond it, that are left out."""
 
@@ -130,6 +132,13 @@ class LightView:
         shading = self._light.change(image, markers_px, radius)
         logs, noise = _by_channel(shading, self._light.used, self.channels)
         return SeenLight(shading, logs, noise, self._saturated(as_picture(image)))
+
+    def shown(self, seen: SeenLight, count: int) -> Mask:
+        """(count,) nodes around which enough of the light is seen to show their slope."""
+        near = self.nearest[self._light.on_pad.ravel()]
+        valid = seen.shading.valid[self._light.on_pad]
+        bins, free = (np.bincount(near, weight, count) for weight in (None, valid))
+        return np.asarray((bins > 0) & (free >= _SHOWN * bins))
 
     def _saturated(self, picture: NDArray[np.uint8]) -> Mask:
         from gelslim_force.joint.light_kernel import saturated_bins

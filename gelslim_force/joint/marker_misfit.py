@@ -25,7 +25,7 @@ _MOST_SIGMAS = 3.0
 _USUAL_MM, _USUAL_SHARE = 0.0005, 0.0025
 """Root mean square of the residuals in contacts that the light shows as it should: of small
 motions, and as a share of the motion."""
-_USUAL_UNEXPLAINED = 0.45
+_USUAL_UNEXPLAINED = 0.3
 """Share of the change of light that forces leave unexplained in most frames, up to which it is that
 of noise and mesh. A larger one shows another cause, also where the forces explain the markers."""
 

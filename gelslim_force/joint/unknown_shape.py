@@ -140,7 +140,9 @@ class UnknownShape:
             seen.unexplained,
         )
         depth = max(0.0, -float(height.min()))
-        return NormalReading(height, np.zeros(count), seen.region, depth_mm=depth, forces=forces)
+        return NormalReading(
+            height, np.zeros(count), seen.region, depth_mm=depth, forces=forces, shown=seen.shown
+        )
 
 
 def unknown_shape(

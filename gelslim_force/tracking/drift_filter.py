@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 _JUMP_SIGMAS = 5.0
 _SIGNIFICANT_SIGMAS = 3.0
 _UNKNOWN_PX = 10.0
+_LEAK_SHAPE = np.array([0.8, 0.8, 1.1, 0.7])
+"""Parts of the load's own motion of the free markers: shift x, shift y, scale and rotation. A push
+spreads the markers about itself."""
 _LEAST_TARE_COVERAGE = 0.8
 _MOST_TARE_PX = 2.0
 """Shift beyond which the picture without contact, to which light is compared, does not fit."""
@@ -215,7 +218,7 @@ class DriftFilter:
         After a jump the drift known before has no part in the estimate.
         """
         step = found.similarity.vector - self._drift.vector
-        measured = measured + self._spread(found.leak_px)
+        measured = measured + self._leak(found.leak_px)
         total = self._remaining() + measured
         if step @ np.linalg.solve(total, step) > _JUMP_SIGMAS**2:
             self._covariance = self._covariance + self._spread(_UNKNOWN_PX)
@@ -224,7 +227,7 @@ class DriftFilter:
 
     def _remaining(self) -> Array:
         """(4, 4) covariance of the drift by the frames before and by the load's own motion."""
-        return np.asarray(self._covariance + self._spread(self._bias_px))
+        return np.asarray(self._covariance + self._leak(self._bias_px))
 
     def tare(self, frame: FrameDrift, tracks: Tracks, time_s: float) -> TareRecord:
         """Take the drift of a frame as the new rest.
@@ -329,6 +332,10 @@ class DriftFilter:
     def _spread(self, sigma_px: float) -> Array:
         """(4, 4) covariance of a drift that moves the markers by about `sigma_px`."""
         return np.asarray(self._unit * sigma_px**2)
+
+    def _leak(self, sigma_px: float) -> Array:
+        """(4, 4) covariance by what the load itself moves the free markers."""
+        return np.asarray(self._spread(sigma_px) * _LEAK_SHAPE**2)
 
 
 def _product(gain: Array) -> Array:

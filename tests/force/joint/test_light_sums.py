@@ -65,6 +65,7 @@ def test_sums_are_those_of_rows_by_differences() -> None:
         "gain_pull": weight @ (by_gain * residual),
         "left": weight @ residual**2,
         "seen": weight @ found.change.ravel() ** 2,
+        "by_noise": weight @ found.noise.ravel() ** 2,
     }
     for name, value in expected.items():
         scale = np.abs(value).max()
@@ -89,8 +90,23 @@ def test_what_is_left_after_a_step_is_that_of_the_rows() -> None:
     height[sums.nodes] = step * 1e-3
     weight = (np.hypot(0.05 / np.sqrt(found.area_mm2), found.noise) ** -2).ravel()
     left = found.change.ravel() - change(found, height, 1.0)
-    share = weight @ left**2 / (weight @ found.change.ravel() ** 2)
+    by_noise = weight @ found.noise.ravel() ** 2
+    share = (weight @ left**2 - by_noise) / (weight @ found.change.ravel() ** 2 - by_noise)
     assert sums.unexplained(step * 1e-3) == pytest.approx(share, rel=1e-5)
+
+
+def test_noise_is_nothing_that_forces_have_to_explain() -> None:
+    height = np.random.default_rng(5).normal(0, 0.02, 64)
+    plain = bins(10)
+    noise = np.random.default_rng(11).normal(size=(2, BINS)) * 0.15
+    drawn = change(plain, height, 1.0).reshape(2, -1) + noise
+    known, unknown = (
+        replace(plain, change=drawn, noise=np.full((2, BINS), size)).sums(LAW, height, 1.0, 0.01)
+        for size in (0.15, 0.01)
+    )
+    still = np.zeros(len(known.nodes))
+    assert known.unexplained(still) < 0.15
+    assert unknown.unexplained(still) > 0.4
 
 
 def test_the_gain_of_drawn_changes_is_found() -> None:

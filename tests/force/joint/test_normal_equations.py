@@ -30,6 +30,7 @@ def light_sums(
         float(weight @ (by_gain * residual)),
         float(weight @ residual**2),
         float(weight @ residual**2),
+        0.0,
         gain,
     )
 

@@ -21,7 +21,7 @@ from pressed_samples import (
     reference,
     shaped,
 )
-from sensor_samples import sensor_bundle
+from sensor_samples import sensor_bundle, sensor_grid
 from shaded_frames import shaded
 
 from gelslim_force.built_sensor import built_gel
@@ -76,6 +76,25 @@ def test_six_components_of_an_unknown_object(seed: int) -> None:
     push = -found.field.force_n[:, 2]
     assert (push >= 0).all()
     assert (np.hypot(*found.field.force_n[:, :2].T) <= 1.2 * push + 1e-9).all()
+
+
+def test_lost_markers_hide_no_depth_where_the_light_shows_the_gel() -> None:
+    """Eight small specks cover markers only; under a patch of 2.4 mm a dent could hide."""
+    clean, grid = pressed(13).image, sensor_grid().positions_mm
+    places = calibration().camera.project(np.column_stack([grid, np.zeros(len(grid))]))
+    row, column = np.indices(clean.shape[:2])
+    free = np.flatnonzero((grid < -3).all(axis=1))
+    sigma = []
+    for specks, radius_px in (([], 0), (free[::4][:8], 8), (free[:1], 30)):
+        image = clean.copy()
+        for x, y in places[specks]:
+            image[np.hypot(column - x, row - y) < radius_px] = 20
+        found = processed(image)
+        assert found.wrench is not None
+        assert found.normal_known
+        sigma.append(found.wrench.standard_deviation[2])
+    assert sigma[1] == pytest.approx(sigma[0], rel=0.1)
+    assert sigma[2] > 1.2 * sigma[0]
 
 
 def test_the_next_frame_starts_from_the_last() -> None:

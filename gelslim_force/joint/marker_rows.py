@@ -1,0 +1,53 @@
+"""The markers near a contact as data of its forces, and what they say of their own weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerRows:
+    """Lateral motion of m of n markers by the forces on p nodes.
+
+    Attributes:
+        used: (m,) markers.
+        rows: (2m, 3p) motion in x and y of each by the forces.
+        residual: (2m,) in mm.
+        weight: (2m,) in 1/mm².
+    """
+
+    used: NDArray[np.intp]
+    rows: Any
+    residual: Array
+    weight: Array
+
+    def response(self, spread: Array, mm_per_px: Array) -> Array:
+        """Change (6, n, 2) per px of six sums of the forces where a marker is seen elsewhere.
+
+        Args:
+            spread: (6, 3p) product of the sums with the covariance of the forces.
+            mm_per_px: (n, 2, 2) of the markers.
+        """
+        by_mm = ((spread @ self.rows.T) * self.weight).reshape(len(spread), -1, 2)
+        found = np.zeros((len(spread), len(mm_per_px), 2))
+        found[:, self.used] = np.einsum("ami,mij->amj", by_mm, mm_per_px[self.used])
+        return found
+
+    def overstated(self, spread: Array) -> Array:
+        """Part (6, 6) of the covariance of the sums that the residuals show to be too large.
+
+        The weights hold errors of mesh and print that not every contact has. Where the residuals
+        are smaller than the weights expect, the variance of the markers is that of the residuals:
+        K. R. Koch, "Parameter estimation and hypothesis testing in linear models", 1999, §3.6,
+        on variance components. `spread` is as in `response`.
+        """
+        count = len(self.residual) - int(np.count_nonzero(spread.any(axis=0)))
+        seen = float(self.weight @ np.square(self.residual)) / max(count, 1)
+        gain = (spread @ self.rows.T) * np.sqrt(self.weight)
+        return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
