@@ -41,25 +41,29 @@ def balls(count: int, seed: int) -> tuple[list[Place], list[Array]]:
     ]
 
 
-def within_bounds(found: FrameResult, truth: Pressed, most: float, field: float) -> None:
+def within_bounds(found: FrameResult, truth: Pressed, most: float, field: float) -> Array:
+    """Scores (3,) of the force: its errors over their standard deviations."""
     assert found.normal_known, found.problems
     assert found.wrench is not None
     assert found.field is not None
     off = found.wrench.vector - truth.wrench
     assert abs(off[2]) < most * abs(truth.wrench[2])
-    assert (np.abs(off[:3]) < 3 * found.wrench.standard_deviation[:3]).all()
+    score = off[:3] / found.wrench.standard_deviation[:3]
+    assert (np.abs(score) < 3.5).all()
     size = np.linalg.norm(truth.force_n)
     assert np.linalg.norm(found.field.force_n - truth.force_n) < field * size
+    return np.asarray(score)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 3])
 def test_several_balls_at_once(count: int) -> None:
+    scores = []
     for seed in range(6):
         places, parts = balls(count, seed)
         truth = pressed_by(np.sum(parts, axis=0), seed)
         found = processed(truth.image)
-        within_bounds(found, truth, 0.1, 0.33)
+        scores.append(within_bounds(found, truth, 0.1, 0.33))
         assert found.field is not None
         patches = contact_patches(found.field)
         assert len(patches) == count
@@ -71,6 +75,8 @@ def test_several_balls_at_once(count: int) -> None:
             near = np.hypot(*(nodes - place).T) < APART_MM / 2
             own = truth.force_n[near].sum(axis=0)
             assert abs(patches[nearest].force_n[2] / own[2] - 1) < 0.17
+    # The largest of 18 scores exceeds 3 in one of 20 sets; their size is what σ claims.
+    assert np.sqrt(np.mean(np.square(scores))) < 1.2
 
 
 @pytest.mark.slow
