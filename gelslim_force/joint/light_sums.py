@@ -38,7 +38,7 @@ class LightSums:
         gain_pull: Of w d r.
         left: Of w r r.
         seen: Of w times the square of the change that was seen.
-        by_noise: Of w times the square of the noise.
+        by_noise: Of w times the square of the noise that bins do not have in common.
         gain: The present gain.
     """
 
@@ -62,7 +62,8 @@ class LightSums:
     def unexplained(self, height_mm: Array) -> float:
         """Share of the change of light that is left after the heights changed by (m,).
 
-        What noise adds to both is taken off.
+        What independent noise adds to both is taken off. Noise that neighbours have in common
+        cannot be told from a change.
         """
         left = self.left - float((2 * self.pull - self.matrix @ height_mm) @ height_mm)
         change = self.seen - self.by_noise
@@ -82,6 +83,7 @@ class PlacedBins:
         level: (c, n).
         area_mm2: (n,).
         built: Gain of the light as calibrated, (c, n) or one number.
+        independent: Share of the noise that neighbouring bins do not have in common.
     """
 
     taps: SlopeTaps
@@ -92,6 +94,7 @@ class PlacedBins:
     level: Array
     area_mm2: Array
     built: Array | float = 1.0
+    independent: float = 1.0
 
     def sums(self, law: LightLaw, height_mm: Array, gain: float, light_error: float) -> LightSums:
         """Sums over the data, linear about the present heights.
@@ -129,7 +132,7 @@ class PlacedBins:
             _sum(weight, by_gain, residual),
             _sum(weight, residual, residual),
             _sum(weight, self.change, self.change),
-            _sum(weight, self.noise, self.noise),
+            self.independent * _sum(weight, self.noise, self.noise),
             gain,
         )
 
@@ -162,6 +165,7 @@ def placed_bins(
         of(view.level),
         of(view.area_mm2),
         of(view.gain),
+        seen.independent,
     )
 
 

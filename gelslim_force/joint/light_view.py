@@ -26,6 +26,9 @@ _BINS_ACROSS = 160
 _SATURATED = 250
 _SHOWN = 0.25
 """Share of the bins around a node that show its slope where they are seen."""
+_QUIET, _ROWS = 3.0, 4
+"""Standard deviations up to which a bin's change is noise, and rows of bins for one that is read
+for the correlation of the noise."""
 _DISC, _RIM_PX = 1.5, 1.0
 """A marker's pixels, over its radius and beyond it, that are left out."""
 
@@ -39,12 +42,14 @@ class SeenLight:
         log_change: (c, rows, columns) of the grey values of each channel.
         noise: (c, rows, columns) its standard deviation.
         saturated: (c, rows, columns) whether a pixel may be saturated.
+        independent: Share of the noise that neighbouring bins do not have in common.
     """
 
     shading: ShadingChange
     log_change: Array
     noise: Array
     saturated: Mask
+    independent: float
 
 
 class LightView:
@@ -131,7 +136,8 @@ class LightView:
         radius = self._radius if len(markers_px) == len(self._radius) else None
         shading = self._light.change(image, markers_px, radius)
         logs, noise = _by_channel(shading, self._light.used, self.channels)
-        return SeenLight(shading, logs, noise, self._saturated(as_picture(image)))
+        saturated = self._saturated(as_picture(image))
+        return SeenLight(shading, logs, noise, saturated, independent_noise(shading))
 
     def shown(self, seen: SeenLight, count: int) -> Mask:
         """(count,) nodes around which enough of the light is seen to show their slope."""
@@ -149,6 +155,21 @@ class LightView:
             channels = np.array(self.channels)
             saturated_bins(picture, channels, self._light.bin_px, _SATURATED, found)
         return found
+
+
+def independent_noise(shading: ShadingChange) -> float:
+    """Share of the noise of the brightness that neighbouring bins do not have in common.
+
+    It is 1 for the noise of a sensor, and less where a picture was compressed.
+    """
+    layer = min(1, len(shading.change) - 1)
+    change, noise = (a[layer, ::_ROWS] for a in (shading.change, shading.noise))
+    quiet = shading.valid[::_ROWS] & (np.abs(change) < _QUIET * noise)
+    noisy = np.where(quiet, change, 0.0)
+    both = quiet[:, 1:] & quiet[:, :-1]
+    common = float((noisy[:, 1:] * noisy[:, :-1]).sum()) / max(int(both.sum()), 1)
+    own = float(np.square(noisy).sum()) / max(int(quiet.sum()), 1)
+    return float(np.clip(1.0 - common / own, 0.0, 1.0)) if own > 0 else 1.0
 
 
 def source_channels(light: LightMap) -> list[int]:

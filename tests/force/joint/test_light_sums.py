@@ -106,6 +106,8 @@ def test_noise_is_nothing_that_forces_have_to_explain() -> None:
     )
     still = np.zeros(len(known.nodes))
     assert known.unexplained(still) < 0.15
+    alike = replace(plain, change=drawn, noise=np.full((2, BINS), 0.15), independent=0.2)
+    assert alike.sums(LAW, height, 1.0, 0.01).unexplained(still) > 0.4
     assert unknown.unexplained(still) > 0.4
 
 
