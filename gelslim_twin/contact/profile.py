@@ -131,17 +131,34 @@ def stl_profile(shape: Stl, folder: Path) -> Profile:
     Raises ValueError for a file that is no STL, or a grid of more than four million cells.
     """
     corners = _down(stl_corners(folder / shape.file) * shape.scale, shape.down)
+    return mesh_profile(corners, shape.resolution_mm)[0]
+
+
+def mesh_profile(corners: Array, resolution_mm: float) -> tuple[Profile, Array]:
+    """Lower surface of facets (n, 3, 3) by a height map, and where it lies.
+
+    Args:
+        corners: Corners of the facets in mm; z points up.
+        resolution_mm: Cell size of the height map.
+
+    Returns:
+        The profile about the middle of the extents, its lowest point at 0; and the point (3,) of
+        the mesh's frame that is the profile's origin.
+
+    Raises:
+        ValueError: The height map would have more than four million cells, or one row.
+    """
     points = corners.reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
-    corners = corners - [*((low + high) / 2)[:2], low[2]]
+    origin = np.array([*((low + high) / 2)[:2], low[2]])
     half = (high - low)[:2] / 2
-    count = np.ceil(2 * half / shape.resolution_mm).astype(int) + 1
+    count = np.ceil(2 * half / resolution_mm).astype(int) + 1
     if count.prod() > _MOST_CELLS or count.min() < 2:
         raise ValueError(
             f"a height map of {count[0]} x {count[1]} cells is no good; change resolution_mm"
         )
     x, y = (np.linspace(-h, h, n) for h, n in zip(half, count, strict=True))
-    return _interpolated(x, y, _lowest(corners, x, y))
+    return _interpolated(x, y, _lowest(corners - origin, x, y)), origin
 
 
 def rough_profile(plane: TexturedPlane, seed: int) -> Profile:
@@ -176,19 +193,10 @@ def _down(corners: Array, direction: str) -> Array:
 
 def _lowest(corners: Array, x: Array, y: Array) -> Array:
     """Lowest height (nx, ny) of the facets over the grid's points; infinite where there is none."""
+    from gelslim_twin.contact.height_map_kernel import lower_heights
+
     height = np.full((len(x), len(y)), np.inf)
-    for a, b, c in corners:
-        i0, i1 = np.searchsorted(x, [min(a[0], b[0], c[0]) - 1e-9, max(a[0], b[0], c[0]) + 1e-9])
-        j0, j1 = np.searchsorted(y, [min(a[1], b[1], c[1]) - 1e-9, max(a[1], b[1], c[1]) + 1e-9])
-        double = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-        if i1 <= i0 or j1 <= j0 or abs(double) < 1e-15:
-            continue
-        dx, dy = x[i0:i1, None] - a[0], y[None, j0:j1] - a[1]
-        u = (dx * (c[1] - a[1]) - dy * (c[0] - a[0])) / double
-        v = (dy * (b[0] - a[0]) - dx * (b[1] - a[1])) / double
-        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-        z = np.where(inside, a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2]), np.inf)
-        height[i0:i1, j0:j1] = np.minimum(height[i0:i1, j0:j1], z)
+    lower_heights(np.ascontiguousarray(corners), x, y, height)
     return height
 
 
