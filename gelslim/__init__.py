@@ -23,12 +23,18 @@ if TYPE_CHECKING:
     from gelslim_force.pipeline import ForcePipeline
     from gelslim_force.sensor import open_sensor
     from gelslim_twin.scene.reader import read_scene
+    from gelslim_twin.stepping.body import Body
+    from gelslim_twin.stepping.state import TwinState
+    from gelslim_twin.stepping.twin import Twin
     from ifem_export.bundle.files import load_bundle, write_bundle
 
 __all__ = [
+    "Body",
     "Budget",
     "ForcePipeline",
     "GelslimError",
+    "Twin",
+    "TwinState",
     "__version__",
     "build",
     "calibrate",

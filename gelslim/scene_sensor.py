@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from gelslim_twin.scene.reader import LoadedScene
     from ifem_export.bundle.bundle import Bundle
 
-DEEPEST_SHARE = 0.9
-"""Largest depth of a contact as a part of the thickness of the gel."""
-
 
 def sensor_figures(loaded: LoadedScene) -> SensorFigures:
     """Return the figures of a sensor that planning needs; they need no stiffness.
@@ -60,6 +57,8 @@ def spec_bundle(path: Path, with_light: bool = True) -> Bundle:
 
 def require_within_gel(loaded: LoadedScene, thickness_mm: float) -> None:
     """Raise InputError if the tool goes deeper than `DEEPEST_SHARE` of the gel."""
+    from gelslim_twin.effects.contact_estimate import DEEPEST_SHARE
+
     most = DEEPEST_SHARE * thickness_mm
     lowest = min(indenter.raised_mm for indenter in loaded.scene.indenters)
     depth = max(pose.depth_mm for pose in loaded.poses) - lowest

@@ -25,11 +25,17 @@ if TYPE_CHECKING:
     from gelslim_twin.simulation.scene_task import job_of
     from gelslim_twin.simulation.sensor import TwinSensor, store_sensor, stored_sensor
     from gelslim_twin.simulation.simulate import SimulationJob, simulate
+    from gelslim_twin.stepping.body import Body
+    from gelslim_twin.stepping.state import TwinState
+    from gelslim_twin.stepping.step import Step
+    from gelslim_twin.stepping.step_error import StepError
+    from gelslim_twin.stepping.twin import Twin
     from gelslim_twin.validation.score import Validation
     from gelslim_twin.validation.validate import validate
 
 __all__ = [
     "EFFECTS",
+    "Body",
     "ContactError",
     "Effect",
     "FrameRenderer",
@@ -41,7 +47,11 @@ __all__ = [
     "SensorFigures",
     "SimulationError",
     "SimulationJob",
+    "Step",
+    "StepError",
+    "Twin",
     "TwinSensor",
+    "TwinState",
     "Validation",
     "bundle_figures",
     "job_of",

@@ -52,7 +52,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "built_sensor", "sensor", "run",
     ),
     "gelslim_twin": (
-        "effects", "scene", "planning", "contact", "render", "simulation", "validation",
+        "effects", "scene", "planning", "contact", "render", "simulation", "stepping", "validation",
     ),
     "gelslim_cad": (
         "spec", "markers", "pictures", "geometry", "light", "electronics", "dimensions", "checks",

@@ -62,6 +62,10 @@ class NewtonContact:
         self._tangent: Tangent | None = None
         self._last_step: tuple[SolidState, Pose, SolidState] | None = None
 
+    def forget(self) -> None:
+        """Drop the last tangent stiffness and the last step, so that the next starts without."""
+        self._tangent = self._last_step = None
+
     def released(self) -> SolidState:
         """The undeformed gel without contact."""
         still = np.zeros((self.body.bundle.mesh.n_nodes, 3))

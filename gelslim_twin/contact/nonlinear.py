@@ -78,14 +78,27 @@ class NonlinearContact:
         state: GelState = GelState.at_rest(len(self._zero))
         before: Pose | None = None
         for pose in poses:
-            for middle in self.solver.steps_to(state, before, pose):
-                if before is None or not is_stationary(before, middle):
-                    state = self._advanced(state, before or middle, middle)
-                before = middle
+            state, before = self.advanced(state, before, pose), pose
             yield GelState(state.displacement_mm, state.force_n, state.touch, state.solver)
         self.solver.compliance.store()
 
-    def _advanced(self, last: GelState, before: Pose, pose: Pose) -> GelState:
+    def advanced(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
+        """State at `pose` from the state `last` at `before`, in as many load steps as necessary.
+
+        Raises ContactError.
+        """
+        state = last
+        for middle in self.solver.steps_to(last, before, pose):
+            if before is None or not is_stationary(before, middle):
+                state = self._step_to(state, before or middle, middle)
+            before = middle
+        return state
+
+    def forget(self) -> None:
+        """Drop what the last poses left to start from, on which the last bits of a state depend."""
+        self._newton.forget()
+
+    def _step_to(self, last: GelState, before: Pose, pose: Pose) -> GelState:
         if not isinstance(last, SolidState) or not last.force_n.any():
             try:
                 return self._step(last, before, pose)

@@ -52,6 +52,16 @@ class Candidates:
     nodes: Nodes
     block: NDArray[np.float32]
 
+    @classmethod
+    def none(cls) -> Candidates:
+        """No candidates, as before the first contact."""
+        return cls(np.zeros(0, np.intp), np.zeros((0, 0), np.float32))
+
+    @classmethod
+    def of(cls, nodes: Nodes, compliance: SurfaceCompliance) -> Candidates:
+        """Candidates `nodes` (n,) in this order, with their compliance."""
+        return cls(nodes, compliance.block(nodes))
+
     def including(self, wanted: NDArray[np.bool_], compliance: SurfaceCompliance) -> Candidates:
         """Candidates that include all `wanted` (c,) nodes, and not too many others."""
         count = int(wanted.sum())
@@ -60,7 +70,7 @@ class Candidates:
         new = np.flatnonzero(wanted & ~inside)
         if len(self.nodes) + len(new) > SPARE * count:
             nodes = np.flatnonzero(wanted)
-            return Candidates(nodes, compliance.block(nodes))
+            return Candidates.of(nodes, compliance)
         if len(new) == 0:
             return self
         nodes = np.concatenate([self.nodes, new])
@@ -82,7 +92,11 @@ class ContactSettings:
 
 @dataclass(eq=False)
 class ContactSolver:
-    """Solves the contact along a sequence of poses. It stores only the last candidates."""
+    """Solves the contact along a sequence of poses. It stores only the last candidates.
+
+    The order of the candidates decides the last bits of a solution, so that a solution is repeated
+    exactly with the same `candidates`.
+    """
 
     compliance: SurfaceCompliance
     tool: Tool
@@ -93,7 +107,7 @@ class ContactSolver:
         self.points_mm = np.asarray(mesh.surface_mm)
         self._cell = min(mesh.cell_size_mm[:2])
         self._longest = self.settings.longest_step * self._cell
-        self._reach = Candidates(np.zeros(0, np.intp), np.zeros((0, 0), np.float32))
+        self.candidates = Candidates.none()
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """A state per pose, starting from the undeformed gel. Raises ContactError."""
@@ -157,10 +171,10 @@ class ContactSolver:
             if min(deepest, depth) <= 0:
                 return replace(GelState.at_rest(len(moved)), displacement_mm=offset.copy())
             wanted |= room < CANDIDATE_SHARE * deepest
-            self._reach = self._reach.including(wanted, self.compliance)
-            nodes = self._reach.nodes
+            self.candidates = self.candidates.including(wanted, self.compliance)
+            nodes = self.candidates.nodes
             iteration = PlaneIteration(
-                self.tool, pose, self._reach.block, self.points_mm[nodes], offset[nodes],
+                self.tool, pose, self.candidates.block, self.points_mm[nodes], offset[nodes],
                 target[nodes], wanted[nodes], self.settings.friction, self.settings.tolerance,
                 deepest,
             )  # fmt: skip

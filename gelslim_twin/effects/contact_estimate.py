@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 NONLINEAR_EXCESS = ((0.0, 0.0), (0.05, 0.02), (0.15, 0.08), (0.30, 0.21), (0.50, 0.47))
 """Indentation over thickness, and neo-Hookean over linear force minus one (computed)."""
-
-
+DEEPEST_SHARE = 0.9
+"""Largest depth of a contact as a part of the thickness of the gel."""
 RIDGES = 1.25
 """Factor for rings and bumps, whose force is up to 1.19 times that of the disc of their area."""
 

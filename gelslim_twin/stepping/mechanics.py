@@ -1,0 +1,177 @@
+"""One step of the gel: which law it needs, and the contact by the solver of that law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.solver import Candidates, ContactSettings, ContactSolver
+from gelslim_twin.contact.tool import Tool, clearance_mm
+from gelslim_twin.effects.circumstances import EffectParameters
+from gelslim_twin.effects.contact import NEWTON_RUNGS, RelaxationParameters
+from gelslim_twin.effects.contact_estimate import (
+    DEEPEST_SHARE,
+    ContactEstimate,
+    Footprint,
+    contact_estimate,
+)
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.stepping.request import Request
+from gelslim_twin.stepping.step_error import StepError
+from ifem_export.compliance.columns import SurfaceCompliance
+
+if TYPE_CHECKING:
+    from gelslim_twin.contact.nonlinear import NonlinearContact
+    from gelslim_twin.contact.relaxation import PronySeries
+
+Array = NDArray[np.float64]
+Nodes = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedStep:
+    """The gel after a step.
+
+    Attributes:
+        gel: Its state.
+        candidates: Candidate nodes of the contact, in the solver's order.
+        large_strain: Whether the neo-Hookean law was solved, and not the linear one.
+        excess: Estimated share by which a linear gel underestimates the force, where it was used.
+    """
+
+    gel: GelState
+    candidates: Nodes
+    large_strain: bool = False
+    excess: float = 0.0
+
+
+@dataclass(eq=False)
+class StepMechanics:
+    """Solves single steps on one sensor. Twins of the same sensor share it.
+
+    Between two calls it keeps nothing that a result depends on.
+    """
+
+    compliance: SurfaceCompliance
+    request: Request
+    friction: float
+    effects: Mapping[str, EffectParameters]
+    _solver: ContactSolver = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        settings = ContactSettings(self.request.solver_tolerance, self.friction)
+        self._solver = ContactSolver(self.compliance, Tool(()), settings)
+        mesh = self.compliance.bundle.mesh
+        self.thickness_mm = mesh.layers * mesh.cell_size_mm[2]
+        self._cell_mm2 = mesh.cell_size_mm[0] * mesh.cell_size_mm[1]
+
+    @property
+    def points_mm(self) -> Array:
+        """Surface nodes (c, 3) at rest."""
+        return self._solver.points_mm
+
+    @property
+    def rest(self) -> SolvedStep:
+        """The gel without contact."""
+        return SolvedStep(GelState.at_rest(len(self.points_mm)), Candidates.none().nodes)
+
+    @cached_property
+    def _nonlinear(self) -> NonlinearContact:
+        from gelslim_twin.contact.nonlinear import NonlinearContact
+
+        # Half of the allowed error is left to the law; Newton's method takes a tenth of that.
+        allowed = max(NEWTON_RUNGS[-1][1], 0.1 * self.request.force_share)
+        tolerance = next(t for _, t, _ in NEWTON_RUNGS if t <= allowed)
+        return NonlinearContact(self._solver, tolerance)
+
+    @cached_property
+    def series(self) -> PronySeries | None:
+        """Relaxation of the gel, None for an elastic one."""
+        given = self.effects["relaxation"]
+        assert isinstance(given, RelaxationParameters)
+        if given.use == "off" or not any(term.fraction for term in given.terms):
+            return None
+        from gelslim_twin.contact.relaxation import PronySeries
+
+        return PronySeries(
+            tuple(t.fraction for t in given.terms), tuple(t.time_s for t in given.terms)
+        )
+
+    def advanced(
+        self, tool: Tool, last: SolvedStep, before: Pose | None, pose: Pose, name: str
+    ) -> SolvedStep:
+        """The gel with the tool at `pose`, from the state `last` with the tool at `before`.
+
+        Raises:
+            StepError: The tool goes deeper than the gel allows.
+            ContactError: The contact does not converge.
+        """
+        contact = self._estimate(tool, pose)
+        if contact is None:
+            return self.rest
+        most = DEEPEST_SHARE * self.thickness_mm
+        if contact.depth_mm > most:
+            raise StepError(
+                f"body {name} goes {contact.depth_mm:.3g} mm deep into a gel of "
+                f"{self.thickness_mm:g} mm, the limit is {most:.3g} mm; take shorter time steps, "
+                "or stop the body before"
+            )
+        large_strain = self._needs_large_strain(contact)
+        solver = self._solver
+        solver.tool = tool
+        if solver.candidates.nodes is not last.candidates:
+            solver.candidates = Candidates.of(last.candidates, self.compliance)
+        if large_strain:
+            self._nonlinear.forget()
+        solve = self._nonlinear if large_strain else solver
+        gel = solve.advanced(last.gel, before, pose)
+        if not gel.force_n.any():
+            return self.rest
+        excess = 0.0 if large_strain else contact.nonlinear_excess
+        return SolvedStep(gel, solver.candidates.nodes, large_strain, excess)
+
+    def block(self, nodes: Nodes) -> Array:
+        """Compliance (3n, 3n) in mm/N among surface nodes."""
+        return self.compliance.block(nodes).astype(float)
+
+    def _needs_large_strain(self, contact: ContactEstimate) -> bool:
+        use = self.effects["nonlinearity"].use
+        if use != "auto":
+            return use == "on"
+        if contact.nonlinear_excess <= self.request.force_share / 2:
+            return False
+        from gelslim_twin.contact.nonlinear import unfit
+
+        return unfit(self.compliance.bundle) is None
+
+    def _estimate(self, tool: Tool, pose: Pose) -> ContactEstimate | None:
+        """The contact from what of the tool is below the undeformed surface; None for nothing."""
+        points = self.points_mm
+        below = clearance_mm(tool, pose, points)
+        into = below < 0
+        if not into.any():
+            return None
+        area = self._cell_mm2 * float(into.sum())
+        volume = -self._cell_mm2 * float(below[into].sum())
+        span = np.ptp(points[into, :2], axis=0) + np.sqrt(self._cell_mm2)
+        width = area / float(span.max())
+        material = self.compliance.bundle.material
+        return contact_estimate(
+            Footprint(
+                lambda d: area,
+                lambda d: volume,
+                lambda d: float(span.max()) / 2,
+                lambda d: np.inf,
+                lambda d: width,
+            ),
+            -float(below.min()),
+            self.thickness_mm,
+            material.youngs_modulus_mpa,
+            material.poissons_ratio,
+        )

@@ -1,0 +1,121 @@
+"""Rigid motions: reading them, and the closed form from and to the tool's pose.
+
+A rigid motion is a matrix (4, 4) that takes points of a body to the sensor frame, in mm. A pose of
+the tool has R = Ry Rx Rz with the angles of tilt about y and x and of the twist about z. The third
+column of R is then (cos a sin b, -sin a, cos a cos b) for the tilts a about x and b about y, and
+the second row is (cos a sin c, cos a cos c, -sin a) for the twist c.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gelslim_twin.contact.tool import rotation
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.stepping.step_error import StepError
+
+Array = NDArray[np.float64]
+NOT_RIGID = 1e-6
+"""Largest deviation of R'R from the identity, and of the last row of a matrix."""
+NOT_UNIT = 1e-3
+"""Largest deviation of the length of a quaternion from 1."""
+FORMS = (
+    "give each body a matrix (4, 4), or the seven numbers x, y, z in mm and the unit quaternion "
+    "w, x, y, z"
+)
+
+
+def rigid_motions(poses: ArrayLike, bodies: int) -> Array:
+    """Read the poses of bodies as rigid motions.
+
+    Args:
+        poses: Matrices (k, 4, 4), or positions in mm and unit quaternions (k, 7), as
+            x, y, z, qw, qx, qy, qz; for a single body also (4, 4) or (7,).
+        bodies: The number k of bodies.
+
+    Returns:
+        The motions (k, 4, 4).
+
+    Raises:
+        StepError: The shape is another, a number is not finite, or a motion is not rigid.
+    """
+    given = _numbers(poses)
+    if bodies == 1 and given.shape in ((4, 4), (7,)):
+        given = given[None]
+    if given.shape not in ((bodies, 7), (bodies, 4, 4)):
+        raise StepError(f"poses of shape {given.shape} for {bodies} bodies; {FORMS}")
+    return np.stack([_motion(number, one) for number, one in enumerate(given)])
+
+
+def _motion(number: int, given: Array) -> Array:
+    if not np.isfinite(given).all():
+        raise StepError(f"pose of body {number} holds a number that is not finite: {given}")
+    return _of_quaternion(number, given) if given.ndim == 1 else _of_matrix(number, given)
+
+
+def _numbers(poses: Any) -> Array:
+    try:
+        return np.array(poses, dtype=float)
+    except (TypeError, ValueError):
+        raise StepError(f"poses are not an array of numbers; {FORMS}") from None
+
+
+def _of_matrix(number: int, matrix: Array) -> Array:
+    turn = matrix[:3, :3]
+    bent = float(np.abs(turn.T @ turn - np.eye(3)).max())
+    if bent > NOT_RIGID or np.linalg.det(turn) < 0:
+        raise StepError(
+            f"pose of body {number}: its upper left block is no rotation (R'R differs from the "
+            f"identity by {bent:.2g}, determinant {np.linalg.det(turn):.3g}); scale and reflection "
+            "are not part of a rigid motion"
+        )
+    if np.abs(matrix[3] - [0.0, 0.0, 0.0, 1.0]).max() > NOT_RIGID:
+        raise StepError(f"pose of body {number}: its last row is {matrix[3]}, must be 0, 0, 0, 1")
+    return matrix
+
+
+def _of_quaternion(number: int, row: Array) -> Array:
+    length = float(np.linalg.norm(row[3:]))
+    if abs(length - 1) > NOT_UNIT:
+        raise StepError(
+            f"pose of body {number}: the quaternion w, x, y, z = {row[3:]} has the length "
+            f"{length:.4g}, must be 1"
+        )
+    w, x, y, z = row[3:] / length
+    found = np.eye(4)
+    found[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    found[:3, 3] = row[:3]
+    return found
+
+
+def tool_pose(motion: Array, time_s: float = 0.0) -> Pose:
+    """The pose of a tool whose frame a rigid motion (4, 4) places in the sensor frame.
+
+    At a tilt of 90° about x, where tilt about y and twist turn about the same axis, the tilt about
+    y is 0.
+    """
+    turn = motion[:3, :3]
+    tilt_x = math.asin(min(1.0, max(-1.0, -turn[1, 2])))
+    if math.hypot(turn[1, 0], turn[1, 1]) > 1e-12:
+        tilt_y = math.atan2(turn[0, 2], turn[2, 2])
+        twist = math.atan2(turn[1, 0], turn[1, 1])
+    else:
+        tilt_y, twist = 0.0, math.atan2(-turn[0, 1], turn[0, 0])
+    x, y, z = (float(v) for v in motion[:3, 3])
+    return Pose(time_s, x, y, -z, *(math.degrees(angle) for angle in (twist, tilt_x, tilt_y)))
+
+
+def motion_of(pose: Pose) -> Array:
+    """The rigid motion (4, 4) of a tool's pose."""
+    found = np.eye(4)
+    found[:3, :3] = rotation(pose)
+    found[:3, 3] = [pose.x_mm, pose.y_mm, -pose.depth_mm]
+    return found

@@ -1,0 +1,112 @@
+"""The result of one step: forces at once, pictures and derivatives when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_force.forces.wrench import resultant
+from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.stepping.request import Request
+from gelslim_twin.stepping.step_error import StepError
+
+if TYPE_CHECKING:
+    from gelslim_twin.render.frame_renderer import RenderedFrame
+    from gelslim_twin.simulation.picture import Viewer
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """The gel after one step.
+
+    Attributes:
+        time_s: Time since the start.
+        step_s: Length of the step.
+        number: Steps since the start.
+        points_mm: Surface nodes (c, 3) at rest.
+        gel: State of the gel, with the forces after relaxation.
+        before: State of the gel before the step, for motion blur.
+        origins_mm: Origins (k, 3) of the bodies in the sensor frame.
+        large_strain: Whether the neo-Hookean law was solved, and not the linear one.
+        excess: Estimated share by which a linear gel underestimates the force, where it was used.
+        request: What the twin was asked for.
+        view: Gives camera and renderer.
+    """
+
+    time_s: float
+    step_s: float
+    number: int
+    points_mm: Array
+    gel: GelState
+    before: GelState
+    origins_mm: Array
+    large_strain: bool
+    excess: float
+    request: Request
+    view: Callable[[], Viewer]
+
+    @property
+    def force_n(self) -> Array:
+        """Nodal forces (c, 3) in N on the gel."""
+        return self.gel.force_n
+
+    @property
+    def displacement_mm(self) -> Array:
+        """Displacement (c, 3) of the surface nodes."""
+        return self.gel.displacement_mm
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether a body touches the gel."""
+        return bool(self.gel.touch.any())
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Force in N and torque in N mm (6,) on the gel about the origin of the sensor.
+
+        As everywhere in this project, the nodal forces act at the nodes at rest.
+        """
+        return np.concatenate(resultant(self.points_mm, self.gel.force_n))
+
+    @cached_property
+    def reactions(self) -> Array:
+        """Force in N and torque in N mm (k, 6) on each body about its origin, sensor frame.
+
+        They act where the nodes are now. This is what a physics engine applies to the bodies: its
+        work over a closed path without friction is zero.
+        """
+        places = self.points_mm + self.gel.displacement_mm
+        return np.stack(
+            [-np.concatenate(resultant(places - o, self.gel.force_n)) for o in self.origins_mm]
+        )
+
+    @cached_property
+    def markers_px(self) -> Array:
+        """Images (m, 2) of the dots' centres. Raises StepError unless they are observed."""
+        self._require_seen("markers")
+        return self.view().markers_px(self.gel)
+
+    @cached_property
+    def frame(self) -> RenderedFrame:
+        """The picture with the dots drawn in it. Raises StepError unless images are observed."""
+        self._require_seen("image")
+        return self.view().frame(self.gel, self.before, self.number, self.step_s)
+
+    def image(self) -> NDArray[np.uint8]:
+        """The picture (h, w, 3), or (h, w) of a mono camera, drawn at the first call.
+
+        Raises StepError unless images are observed.
+        """
+        return self.frame.image
+
+    def _require_seen(self, what: str) -> None:
+        if what not in self.request.observe and "image" not in self.request.observe:
+            seen = ", ".join(f'"{name}"' for name in (*self.request.observe, what))
+            raise StepError(f"{what} are not observed by this twin; make it with observe=({seen})")

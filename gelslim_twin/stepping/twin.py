@@ -1,0 +1,263 @@
+"""A sensor that is stepped through time: poses of bodies in, forces and pictures out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gelslim_twin.scene.scene import Scene
+from gelslim_twin.simulation.picture import Viewer
+from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.stepping.body import Body
+from gelslim_twin.stepping.mechanics import SolvedStep, StepMechanics
+from gelslim_twin.stepping.pictures import pad_size_mm, stepped_scene, stepped_viewer
+from gelslim_twin.stepping.request import Request
+from gelslim_twin.stepping.rigid_motion import rigid_motions, tool_pose
+from gelslim_twin.stepping.state import TwinState
+from gelslim_twin.stepping.step import Step
+from gelslim_twin.stepping.step_error import StepError
+from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.operators.single_thread import single_threaded
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sensor:
+    """What twins of one sensor share: nothing in it depends on the steps."""
+
+    sensor: TwinSensor
+    folder: Path
+    request: Request
+    scene: Scene
+    mechanics: StepMechanics
+
+    @cached_property
+    def viewer(self) -> Viewer:
+        """Camera and renderer."""
+        return stepped_viewer(self.sensor, self.folder, self.scene, self.request)
+
+    def view(self) -> Viewer:
+        """The viewer, made at the first call."""
+        return self.viewer
+
+
+class Twin:
+    """A tactile sensor and the bodies that touch it, advanced step by step.
+
+    The contact is quasi-static: a state follows from the last one and from the poses, and time
+    counts for relaxation and motion blur only. Without contact nothing is solved, and a picture is
+    drawn when it is asked for. A step that fails leaves the twin as it was.
+
+    Attributes:
+        bodies: The bodies, in the order in which `step` takes their poses.
+        points_mm: Surface nodes (c, 3) at rest in the sensor frame.
+        state: All that the next step depends on; set it to go back to it exactly.
+    """
+
+    def __init__(
+        self,
+        bundle: str | os.PathLike[str],
+        observe: Iterable[str] = ("force",),
+        tolerance: Mapping[str, str | float] | None = None,
+        *,
+        friction: float = 0.0,
+        effects: Mapping[str, Any] | None = None,
+        keep: str | os.PathLike[str] | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Open a sensor.
+
+        Args:
+            bundle: Folder of the bundle.
+            observe: What is wanted, of `displacement`, `force`, `markers` and `image`.
+            tolerance: Errors allowed: of `force` relative to the resultant, as "2%" or 0.02; of
+                the others in pixels of the camera, as 0.2. By default 2 % and 0.2 px.
+            friction: Coefficient of Coulomb friction between the bodies and the gel.
+            effects: The block `effects` of a scene file, such as {"nonlinearity": "off"}.
+            keep: Folder that keeps the compliance of the pad for the next twin; none by default.
+            seed: Seed of noise, dirt and print faults.
+
+        Raises:
+            StepError: There is no such folder, or a setting cannot be used.
+            IfemError: The bundle is damaged, its pad is too fine, or it has no markers or no
+                camera where these are observed.
+        """
+        folder = Path(bundle)
+        if not folder.is_dir():
+            raise StepError(
+                f"{folder}: no such folder; name a bundle, which `gelslim bundle` writes"
+            )
+        request = Request.read(observe, tolerance)
+        sensor = TwinSensor(load_bundle(folder))
+        scene = stepped_scene(request, friction, effects, seed, pad_size_mm(sensor))
+        compliance = SurfaceCompliance(sensor.bundle, None if keep is None else Path(keep))
+        mechanics = StepMechanics(
+            compliance, request, scene.contact.friction, scene.effects.parameters()
+        )
+        self._shared = _Sensor(sensor, folder, request, scene, mechanics)
+        if request.seen:
+            _ = self._shared.viewer
+        self._bodies: tuple[Body, ...] = ()
+        self._state = self._initial()
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies, in the order in which `step` takes their poses."""
+        return self._bodies
+
+    @property
+    def points_mm(self) -> Array:
+        """Surface nodes (c, 3) at rest in the sensor frame."""
+        return self._shared.mechanics.points_mm
+
+    def add(self, body: Body) -> Body:
+        """Add a body.
+
+        Args:
+            body: The body.
+
+        Returns:
+            The same body.
+
+        Raises:
+            StepError: It is no body, or the twin was stepped already.
+        """
+        if not isinstance(body, Body):
+            raise StepError(
+                f"{type(body).__name__} is no body; make one by Body.from_mesh, Body.sphere, "
+                "Body.box or Body.from_indenters"
+            )
+        if self._state.number:
+            raise StepError("a body is added before the first step; call reset before")
+        self._bodies = (*self._bodies, body)
+        self._state = self._initial()
+        return body
+
+    def prepare(self) -> None:
+        """Compute the compliance of the whole pad, which otherwise happens where it is touched.
+
+        After it no step has to wait for that. The folder `keep` keeps it.
+        """
+        compliance = self._shared.mechanics.compliance
+        compliance.require(np.arange(compliance.nodes))
+        compliance.store()
+
+    def reset(self) -> None:
+        """Return to the undeformed gel at time 0; the bodies stay."""
+        self._state = self._initial()
+
+    def clone(self) -> Twin:
+        """A twin of the same sensor, bodies and state, which then goes its own way.
+
+        The two share what does not depend on the steps. They must not be stepped by two threads
+        at once.
+        """
+        other = object.__new__(Twin)
+        other._shared, other._bodies, other._state = self._shared, self._bodies, self._state
+        return other
+
+    @property
+    def state(self) -> TwinState:
+        """All that the next step depends on; set it to go back to it exactly.
+
+        Setting raises StepError for the state of another sensor or another number of bodies.
+        """
+        return self._state
+
+    @state.setter
+    def state(self, state: TwinState) -> None:
+        if not isinstance(state, TwinState):
+            raise StepError(f"{type(state).__name__} is no state of a twin")
+        if state.key != self._state.key:
+            raise StepError(
+                "the state belongs to another pad, another gel or another number of bodies"
+            )
+        self._state = state
+
+    @single_threaded
+    def step(self, poses: ArrayLike, dt: float) -> Step:
+        """Move the bodies and solve the gel.
+
+        Args:
+            poses: Rigid motions of the k bodies in the sensor frame: matrices (k, 4, 4) in mm, or
+                x, y, z in mm with a unit quaternion w, x, y, z as (k, 7); for a single body also
+                (4, 4) or (7,).
+            dt: Time since the last step in s.
+
+        Returns:
+            The gel after the step.
+
+        Raises:
+            StepError: There is no body, a pose or the time cannot be used, or a body goes deeper
+                than the gel allows.
+            ContactError: The contact does not converge.
+        """
+        if not self._bodies:
+            raise StepError("the twin has no body; add one before the first step")
+        step_s = _duration(dt)
+        motions = rigid_motions(poses, len(self._bodies))
+        last = self._state
+        solved = self._solved(motions, last.time_s + step_s)
+        gel, memory = solved.gel, last.relaxation
+        series = self._shared.mechanics.series
+        if series is not None:
+            from gelslim_twin.contact.relaxation import at_rest, relax
+
+            memory = at_rest(series, len(gel.force_n)) if memory is None else memory
+            force, memory = relax(series, memory, gel.force_n, step_s)
+            gel = replace(gel, force_n=force)
+        self._state = TwinState(
+            last.key, last.time_s + step_s, last.number + 1, motions, solved, memory
+        )
+        return Step(
+            time_s=self._state.time_s,
+            step_s=step_s,
+            number=self._state.number,
+            points_mm=self.points_mm,
+            gel=gel,
+            before=last.solved.gel,
+            origins_mm=motions[:, :3, 3],
+            large_strain=solved.large_strain,
+            excess=solved.excess,
+            request=self._shared.request,
+            view=self._shared.view,
+        )
+
+    def _solved(self, motions: Array, time_s: float) -> SolvedStep:
+        last = self._state
+        if last.motions is not None and np.array_equal(motions, last.motions):
+            return last.solved
+        top = float(self.points_mm[:, 2].max())
+        body, motion = self._bodies[0], motions[0]
+        if motion[2, 3] - body.shape.radius_mm > top:
+            return self._shared.mechanics.rest
+        side = body.side(motion[:3, :3])
+        pose = tool_pose(motion @ side.frame, time_s)
+        before = None
+        if last.motions is not None:
+            before = tool_pose(last.motions[0] @ side.frame, last.time_s)
+        return self._shared.mechanics.advanced(side.tool, last.solved, before, pose, body.name)
+
+    def _initial(self) -> TwinState:
+        compliance = self._shared.mechanics.compliance
+        key = f"{compliance.key}-{len(self._bodies)}"
+        return TwinState(key, 0.0, 0, None, self._shared.mechanics.rest)
+
+
+def _duration(dt: float) -> float:
+    try:
+        found = float(dt)
+    except (TypeError, ValueError):
+        raise StepError(f"dt = {dt!r}: must be a number of seconds above 0") from None
+    if not (np.isfinite(found) and found > 0):
+        raise StepError(f"dt = {found}: must be a number of seconds above 0")
+    return found
