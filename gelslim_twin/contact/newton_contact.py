@@ -23,7 +23,7 @@ from gelslim_twin.contact.gel_body import GelBody, Tangent
 from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState
 from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm
 from gelslim_twin.contact.solver import CANDIDATE_SHARE, ContactSolver
-from gelslim_twin.contact.tool import ToolSurface, clearance_mm, tool_surface
+from gelslim_twin.contact.tool import ToolSurface
 from gelslim_twin.scene.pose import Pose
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 
@@ -177,10 +177,10 @@ class _NewtonSolve:
         self.target, ahead = self.solver.targets(last, before, pose)
         points = self.solver.points_mm
         tool = self.solver.tool
-        self.on_tool = np.isfinite(clearance_mm(tool, pose, points + ahead * [1.0, 1.0, 0.0]))
+        self.on_tool = np.isfinite(tool.clearance_mm(pose, points + ahead * [1.0, 1.0, 0.0]))
         self.wanted = last.touch > 0
         self.surface: ToolSurface | None = None
-        self.deepest_mm = -float(np.min(clearance_mm(tool, pose, points), initial=0.0))
+        self.deepest_mm = -float(np.min(tool.clearance_mm(pose, points), initial=0.0))
         self.rest, self.off_mm, self.stale = 1.0, np.inf, True
         self.size = 1e-300
         self.touch, self.memory = last.touch, Anderson()
@@ -193,7 +193,7 @@ class _NewtonSolve:
         node that moves, and the iteration for their forces would converge slowly.
         """
         points = self.solver.points_mm + self.whole[self.body.surface]
-        normal = tool_surface(self.solver.tool, self.pose, points, self.surface).normal
+        normal = self.solver.tool.surface(self.pose, points, self.surface).normal
         held = normal[:, :, None] * normal[:, None, :]
         held[self.touch == STICK] = np.eye(3)
         held[self.touch == FREE] = 0.0
@@ -206,7 +206,7 @@ class _NewtonSolve:
         outer[np.asarray(self.body.bundle.mesh.bonded)] = 0.0
         free = tangent.motion(-outer)
         offset = u + free[self.body.surface]
-        surface = tool_surface(self.solver.tool, self.pose, points + u, self.surface)
+        surface = self.solver.tool.surface(self.pose, points + u, self.surface)
         self.surface = surface = surface.only(self.on_tool)
         room = allowed_motion_mm(surface, points + u, u - offset)
         self.wanted |= room < CANDIDATE_SHARE * self.deepest_mm
@@ -311,7 +311,7 @@ class _NewtonSolve:
         self.size = float(np.linalg.norm(load)) or self.size
         before, self.rest = self.rest, float(np.linalg.norm(rest)) / self.size
         points = self.solver.points_mm + self.whole[self.body.surface]
-        seen = tool_surface(self.solver.tool, self.pose, points, self.surface)
+        seen = self.solver.tool.surface(self.pose, points, self.surface)
         gap = seen.gap_mm(points)
         pressed = np.zeros(len(points), dtype=bool)
         pressed[nodes] = balance.touch > 0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.contact_forces import ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_state import ContactError
-from gelslim_twin.contact.tool import Tool, ToolSurface, tool_surface
+from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
@@ -122,7 +122,7 @@ class PlaneIteration:
             sweeps += balance.sweeps
             force, known = balance.force_n, balance.motion_mm
             new, used = known + self.offset_mm, shape
-            shape = tool_surface(self.tool, self.pose, self.points_mm + new, shape)
+            shape = self.tool.surface(self.pose, self.points_mm + new, shape)
             gap = shape.gap_mm(self.points_mm + new)
             before, worst = worst, self._worst(gap, balance)
             slack = (
@@ -144,7 +144,7 @@ class PlaneIteration:
                 share = turning(shape.normal - used.normal)
                 mixed = shape.turned(used, share)
                 u = u_before + 0.5 * (u - u_before)
-                shape = tool_surface(self.tool, self.pose, self.points_mm + u, mixed)
+                shape = self.tool.surface(self.pose, self.points_mm + u, mixed)
                 shape = ToolSurface(shape.met_mm, mixed.normal)
         raise ContactError(
             f"nodes keep a gap of {worst:.2g} mm to the tool after {GEOMETRY_STEPS} iterations: "

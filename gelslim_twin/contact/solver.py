@@ -30,7 +30,7 @@ from gelslim_twin.contact.plane_iteration import (
     allowed_motion_mm,
     gap_tolerance_mm,
 )
-from gelslim_twin.contact.tool import Tool, ToolSurface, clearance_mm, tool_surface
+from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
 from ifem_export.compliance.columns import SurfaceCompliance
 
@@ -159,7 +159,7 @@ class ContactSolver:
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
         target, ahead = self.targets(last, before, pose)
-        below = clearance_mm(self.tool, pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
+        below = self.tool.clearance_mm(pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
         moved = (last if start is None else start).displacement_mm
@@ -199,7 +199,7 @@ class ContactSolver:
         if self.settings.friction == 0 or not dragged.any():
             return u + dragged, ahead
         # Other nodes stick for the part of the step in which they are in contact.
-        heights = [clearance_mm(self.tool, p, places) for p in (before, pose)]
+        heights = [self.tool.clearance_mm(p, places) for p in (before, pose)]
         share = np.where(np.isfinite(heights[0]), 0.0, 0.5)
         closing = np.isfinite(heights[0]) & (heights[1] < 0)
         first = np.maximum(heights[0][closing], 0.0)
@@ -213,7 +213,7 @@ class ContactSolver:
         """Tangent planes at all nodes, and the displacement (c,) that forces may cause along n."""
         places = self.points_mm + moved
         # Slopes cost four more evaluations of the tool and matter near the gel only.
-        surface = tool_surface(self.tool, pose, places, reach_mm=self._cell).only(on_tool)
+        surface = self.tool.surface(pose, places, reach_mm=self._cell).only(on_tool)
         return surface, allowed_motion_mm(surface, places, moved - offset)
 
     def _state(
@@ -228,7 +228,7 @@ class ContactSolver:
         """State of the whole surface, and gaps (c,) of all nodes."""
         balance = found.balance
         u = self.compliance.displacement(nodes, balance.force_n, balance.motion_mm) + offset
-        gap = clearance_mm(self.tool, pose, self.points_mm + u)
+        gap = self.tool.clearance_mm(pose, self.points_mm + u)
         gap[nodes] = found.gap_mm
         force, touch = np.zeros_like(u), np.zeros(len(u), dtype=np.int8)
         force[nodes], touch[nodes] = balance.force_n, balance.touch

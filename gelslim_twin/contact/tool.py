@@ -46,6 +46,50 @@ class Tool:
             height = np.minimum(height, shape(x - dx, y - dy) + raised)
         return height
 
+    def clearance_mm(self, pose: Pose, points_mm: Array) -> Array:
+        """Distance (n,) of points (n, 3) below the tool along its axis; infinite outside it."""
+        own = _own(pose, points_mm)
+        return np.asarray(self.local(own[:, 0], own[:, 1]) - own[:, 2])
+
+    def surface(
+        self,
+        pose: Pose,
+        points_mm: Array,
+        before: ToolSurface | None = None,
+        reach_mm: float = np.inf,
+    ) -> ToolSurface:
+        """Tangent planes of the tool at points (n, 3).
+
+        A point outside the tool has no plane, unless `before` has one for it. So a node that slips
+        off an edge within the iteration keeps the plane of the edge, also where another part of the
+        tool stands above it. Slopes are computed for points nearer than `reach_mm` only; the other
+        planes are perpendicular to the tool's axis.
+        """
+        own, turn = _own(pose, points_mm), rotation(pose)
+        height = self.local(own[:, 0], own[:, 1])
+        slopes = np.zeros((len(own), 2))
+        on = np.flatnonzero(height < own[:, 2] + reach_mm)
+        if len(on):
+            around = self.local(own[on, 0] + _SIDES[:, :1], own[on, 1] + _SIDES[:, 1:])
+            for axis in (0, 1):
+                ahead, behind = around[2 * axis], around[2 * axis + 1]
+                slopes[on, axis] = _slope(behind, height[on], ahead)
+        met = np.column_stack([own[:, :2], np.where(np.isfinite(height), height, 0.0)]) @ turn.T
+        met += [pose.x_mm, pose.y_mm, -pose.depth_mm]
+        met[~np.isfinite(height), 2] = np.inf
+        normal = np.column_stack([-slopes, np.ones(len(own))])
+        normal /= np.sqrt(1.0 + (slopes**2).sum(axis=1))[:, None]
+        if pose.tilt_x_deg != 0 or pose.tilt_y_deg != 0 or slopes.any():
+            normal = normal @ turn.T
+        if before is not None:
+            off = before.is_met & ~np.isfinite(height)
+            held = np.flatnonzero(before.is_met & np.isfinite(height))
+            last = _own(pose, before.met_mm[held])
+            facing = before.normal[held] @ turn
+            off[held] = _past_walls(self, last, facing, own[held, :2], height[held])
+            met[off], normal[off] = before.met_mm[off], before.normal[off]
+        return ToolSurface(met, normal)
+
     def carried(self, before: Pose, after: Pose, points_mm: Array) -> Array:
         """Positions at another pose of points (n, 3) that are fixed to the tool."""
         start = np.array([before.x_mm, before.y_mm, -before.depth_mm])
@@ -120,52 +164,6 @@ class ToolSurface:
         frames[:, 1, 1] = normal[:, 2] * a - normal[:, 0] * c
         frames[:, 2, 1] = -normal[:, 1] * a
         return frames
-
-
-def clearance_mm(tool: Tool, pose: Pose, points_mm: Array) -> Array:
-    """Distance (n,) of points (n, 3) below the tool along its axis; infinite outside it."""
-    own = _own(pose, points_mm)
-    return np.asarray(tool.local(own[:, 0], own[:, 1]) - own[:, 2])
-
-
-def tool_surface(
-    tool: Tool,
-    pose: Pose,
-    points_mm: Array,
-    before: ToolSurface | None = None,
-    reach_mm: float = np.inf,
-) -> ToolSurface:
-    """Tangent planes of the tool at points (n, 3).
-
-    A point outside the tool has no plane, unless `before` has one for it. So a node that slips
-    off an edge within the iteration keeps the plane of the edge, also where another part of the
-    tool stands above it. Slopes are computed for points nearer than `reach_mm` only; the other
-    planes are perpendicular to the tool's axis.
-    """
-    own, turn = _own(pose, points_mm), rotation(pose)
-    height = tool.local(own[:, 0], own[:, 1])
-    slopes = np.zeros((len(own), 2))
-    on = np.flatnonzero(height < own[:, 2] + reach_mm)
-    if len(on):
-        around = tool.local(own[on, 0] + _SIDES[:, :1], own[on, 1] + _SIDES[:, 1:])
-        for axis in (0, 1):
-            ahead, behind = around[2 * axis], around[2 * axis + 1]
-            slopes[on, axis] = _slope(behind, height[on], ahead)
-    met = np.column_stack([own[:, :2], np.where(np.isfinite(height), height, 0.0)]) @ turn.T
-    met += [pose.x_mm, pose.y_mm, -pose.depth_mm]
-    met[~np.isfinite(height), 2] = np.inf
-    normal = np.column_stack([-slopes, np.ones(len(own))])
-    normal /= np.sqrt(1.0 + (slopes**2).sum(axis=1))[:, None]
-    if pose.tilt_x_deg != 0 or pose.tilt_y_deg != 0 or slopes.any():
-        normal = normal @ turn.T
-    if before is not None:
-        off = before.is_met & ~np.isfinite(height)
-        held = np.flatnonzero(before.is_met & np.isfinite(height))
-        last = _own(pose, before.met_mm[held])
-        facing = before.normal[held] @ turn
-        off[held] = _past_walls(tool, last, facing, own[held, :2], height[held])
-        met[off], normal[off] = before.met_mm[off], before.normal[off]
-    return ToolSurface(met, normal)
 
 
 def _own(pose: Pose, points_mm: Array) -> Array:

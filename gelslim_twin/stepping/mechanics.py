@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import Candidates, ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool, clearance_mm
+from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import EffectParameters
 from gelslim_twin.effects.contact import NEWTON_RUNGS, RelaxationParameters
 from gelslim_twin.effects.contact_estimate import (
@@ -153,7 +153,7 @@ class StepMechanics:
     def _estimate(self, tool: Tool, pose: Pose) -> ContactEstimate | None:
         """The contact from what of the tool is below the undeformed surface; None for nothing."""
         points = self.points_mm
-        below = clearance_mm(tool, pose, points)
+        below = tool.clearance_mm(pose, points)
         into = below < 0
         if not into.any():
             return None

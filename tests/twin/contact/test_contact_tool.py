@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sampled import quick
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.tool import Tool, ToolSurface, clearance_mm, rotation, tool_surface
+from gelslim_twin.contact.tool import Tool, ToolSurface, rotation
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -101,7 +101,7 @@ def test_tilted_plane_and_its_slope() -> None:
     normal = rotation(pose)[:, 2]
     points = grid(2.0)
     plane = -0.3 - ((points - [1.0, 2.0]) @ normal[:2]) / normal[2]
-    surface = tool_surface(tool, pose, np.column_stack([points, np.zeros(len(points))]))
+    surface = tool.surface(pose, np.column_stack([points, np.zeros(len(points))]))
     np.testing.assert_allclose(surface.normal, np.tile(normal, (len(points), 1)), atol=1e-9)
     np.testing.assert_allclose(surface.gap_mm(np.column_stack([points, plane])), 0.0, atol=1e-9)
     frames = surface.frames
@@ -118,10 +118,10 @@ def test_tilted_plane_and_its_slope() -> None:
 def test_level_faces_have_no_frames_and_rims_no_wild_slopes() -> None:
     tool = Tool.of([FlatPunch(shape="flat_punch", radius_mm=2)], Path())
     points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [-1.99999, 0.0, 0.0], [3.0, 0.0, 0.0]])
-    surface = tool_surface(tool, Pose(depth_mm=0.1), points)
+    surface = tool.surface(Pose(depth_mm=0.1), points)
     assert surface.frames is None
     assert list(surface.is_met) == [True, True, True, False]
-    later = tool_surface(tool, Pose(depth_mm=0.1), points + np.array([0.5, 0, 0]), surface)
+    later = tool.surface(Pose(depth_mm=0.1), points + np.array([0.5, 0, 0]), surface)
     np.testing.assert_allclose(later.gap_mm(points)[:3], -0.1)
     assert later.gap_mm(points)[3] == math.inf
 
@@ -146,16 +146,16 @@ def test_planes_are_those_of_the_tool_along_the_vertical(name: str, tilt: float)
     on = np.isfinite(height) & (height < 0.9)
     assert on.sum() > 50
     met = np.column_stack([points, height])[on]
-    surface = tool_surface(tool, pose, met)
+    surface = tool.surface(pose, met)
     np.testing.assert_allclose(surface.gap_mm(met), 0.0, atol=1e-8)
-    np.testing.assert_allclose(clearance_mm(tool, pose, met), 0.0, atol=1e-8)
+    np.testing.assert_allclose(tool.clearance_mm(pose, met), 0.0, atol=1e-8)
     assert (surface.normal[:, 2] > 0).all()
     # A short step along the plane leaves the tool by no more than its curvature.
     frames = surface.frames
     if frames is None:
         return
     near = met + 1e-3 * frames[:, :, 0]
-    flat = np.abs(clearance_mm(tool, pose, near)) < 3e-5
+    flat = np.abs(tool.clearance_mm(pose, near)) < 3e-5
     assert flat.mean() > 0.9
 
 

@@ -13,7 +13,7 @@ from sampled import quick
 
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool, clearance_mm, tool_surface
+from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cone, Cylinder, FlatPunch, Indenter, Ring
 from gelslim_twin.scene.pose import Pose
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -56,15 +56,15 @@ def test_a_node_past_a_wall_keeps_the_face_it_slipped_from(
     inside, outside = np.array([[1.99, 0.3, 0.0]]), np.array([[2.03, 0.32, 0.0]])
     rest = Pose()
     start, end = (tool.carried(rest, pose, p) for p in (inside, outside))
-    first = tool_surface(tool, pose, start)
-    held = tool_surface(tool, pose, end, first)
+    first = tool.surface(pose, start)
+    held = tool.surface(pose, end, first)
     np.testing.assert_array_equal(held.met_mm, first.met_mm)
     np.testing.assert_array_equal(held.normal, first.normal)
-    back = tool_surface(tool, pose, start - [0.1, 0, 0], held)
-    alone = tool_surface(tool, pose, start - [0.1, 0, 0])
+    back = tool.surface(pose, start - [0.1, 0, 0], held)
+    alone = tool.surface(pose, start - [0.1, 0, 0])
     np.testing.assert_array_equal(back.met_mm, alone.met_mm)
     # The other way, from the higher face under the lower one, nothing is held.
-    entered = tool_surface(tool, pose, start, tool_surface(tool, pose, end))
+    entered = tool.surface(pose, start, tool.surface(pose, end))
     np.testing.assert_array_equal(entered.met_mm, first.met_mm)
 
 
@@ -73,9 +73,9 @@ def test_slopes_are_no_walls() -> None:
     far = np.array([[2.4, 0.7, 0.0]])
     for shape in (CONE, Cone(shape="cone", included_angle_deg=20, tip_radius_mm=0.1)):
         tool = Tool.of([shape], Path())
-        near = tool_surface(tool, Pose(), np.array([[0.2, 0.1, 0.0]]))
+        near = tool.surface(Pose(), np.array([[0.2, 0.1, 0.0]]))
         np.testing.assert_array_equal(
-            tool_surface(tool, Pose(), far, near).met_mm, tool_surface(tool, Pose(), far).met_mm
+            tool.surface(Pose(), far, near).met_mm, tool.surface(Pose(), far).met_mm
         )
 
 
@@ -84,7 +84,7 @@ def test_a_face_is_level_up_to_its_wall(side: float) -> None:
     tool = Tool.of(
         (PUNCH, FlatPunch(shape="flat_punch", length_mm=9, width_mm=9, raised_mm=2.0)), Path()
     )
-    surface = tool_surface(tool, Pose(), np.array([[2.01 + side, 0.0, 0.0]]))
+    surface = tool.surface(Pose(), np.array([[2.01 + side, 0.0, 0.0]]))
     np.testing.assert_array_equal(surface.normal, [[0.0, 0.0, 1.0]])
 
 
@@ -101,12 +101,12 @@ def test_stepped_tools_converge(name: str, friction: float) -> None:
     states = list(ContactSolver(kept, tool, ContactSettings(1e-3, friction)).states(path))
     for pose, state in zip(path[1:-1], states[1:-1], strict=True):
         places = kept.bundle.mesh.surface_mm + state.displacement_mm
-        above = clearance_mm(tool, pose, places)
+        above = tool.clearance_mm(pose, places)
         assert above.min() > -2e-3 * pose.depth_mm
         # A node that slipped past a wall in the step is held by the face beside it.
         for node in np.flatnonzero((state.touch > 0) & (np.abs(above) > 2e-3 * pose.depth_mm)):
             around = places[node] + np.column_stack([AROUND, np.zeros(len(AROUND))])
-            assert clearance_mm(tool, pose, around).min() < 0.03 * pose.depth_mm
+            assert tool.clearance_mm(pose, around).min() < 0.03 * pose.depth_mm
         moved = kept.whole(state.force_n)
         np.testing.assert_allclose(moved, state.displacement_mm, atol=1e-4 * pose.depth_mm)
     assert not states[-1].force_n.any()

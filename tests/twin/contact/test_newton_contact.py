@@ -16,7 +16,7 @@ from gelslim_twin.contact.gel_state import ContactStatus
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
-from gelslim_twin.contact.tool import Tool, clearance_mm
+from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -84,7 +84,7 @@ def test_nodes_in_contact_lie_on_the_tool_and_obey_coulomb(poisson: float, frict
     for pose, state in zip(PATH[:-1], states[:-1], strict=True):
         on, slack = state.touch > 0, 0.1 * TOLERANCE * pose.depth_mm
         places = one.solver.points_mm + state.displacement_mm
-        gap = clearance_mm(BALL, pose, places)
+        gap = BALL.clearance_mm(pose, places)
         assert on.sum() > 8
         assert np.abs(gap[on]).max() < 1.1 * slack
         assert gap.min() > -1.1 * slack
@@ -102,7 +102,7 @@ def test_nodes_in_contact_lie_on_the_tool_and_obey_coulomb(poisson: float, frict
         centre = [pose.x_mm, pose.y_mm, BALL_MM - pose.depth_mm]
         off = np.linalg.norm(places - centre, axis=1)[on] - BALL_MM
         size = np.linalg.norm(state.force_n, axis=1)[on]
-        deepest = -clearance_mm(BALL, pose, one.solver.points_mm).min()
+        deepest = -BALL.clearance_mm(pose, one.solver.points_mm).min()
         across = np.abs(size * off).max() / (size.max() * deepest)
         assert state.solver["complementarity"] == pytest.approx(across, rel=0.02, abs=1e-9)
         into = max(0.0, -off.min())

@@ -18,7 +18,7 @@ from gelslim_twin.contact.plane_iteration import (
     allowed_motion_mm,
     gap_tolerance_mm,
 )
-from gelslim_twin.contact.tool import Tool, tool_surface
+from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.scene.pose import Pose
 
@@ -46,7 +46,7 @@ def problem(friction: float, tolerance: float) -> PlaneIteration:
 def test_nodes_meet_the_ball_with_their_own_displacement(friction: float, tolerance: float) -> None:
     one = problem(friction, tolerance)
     still = np.zeros_like(one.points_mm)
-    start = tool_surface(BALL, POSE, one.points_mm + one.offset_mm)
+    start = BALL.surface(POSE, one.points_mm + one.offset_mm)
     found = one.solve(start, one.offset_mm.copy(), still)
     force, moved = found.balance.force_n, found.balance.motion_mm
     np.testing.assert_allclose(
@@ -87,7 +87,7 @@ def test_a_finer_tolerance_takes_more_sweeps_but_not_many() -> None:
     sweeps = []
     for tolerance in (1e-2, 1e-3, 1e-5):
         one = problem(0.5, tolerance)
-        start = tool_surface(BALL, POSE, one.points_mm + one.offset_mm)
+        start = BALL.surface(POSE, one.points_mm + one.offset_mm)
         sweeps.append(one.solve(start, one.offset_mm, np.zeros_like(one.points_mm)).sweeps)
     assert sweeps == sorted(sweeps)
     assert sweeps[0] < sweeps[2] <= 80
@@ -106,7 +106,7 @@ def test_allowed_motion_leads_to_the_plane() -> None:
     """From the place without the displacement, along the normal."""
     points = np.array([[0.5, 0.1, -0.1], [-0.2, 0.4, -0.3]])
     moved = np.array([[0.02, 0.01, -0.05], [0.0, -0.03, 0.02]])
-    planes = tool_surface(BALL, POSE, points)
+    planes = BALL.surface(POSE, points)
     room = allowed_motion_mm(planes, points, moved)
     ends = points - moved + room[:, None] * planes.normal
     np.testing.assert_allclose(planes.gap_mm(ends), 0.0, atol=1e-12)
@@ -140,6 +140,6 @@ def test_forces_that_never_settle_are_refused(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(plane_iteration, "GEOMETRY_STEPS", 1)
     one = problem(0.3, 1e-5)
-    start = tool_surface(BALL, POSE, one.points_mm)
+    start = BALL.surface(POSE, one.points_mm)
     with pytest.raises(ContactError, match="1 iterations"):
         one.solve(start, np.zeros_like(one.points_mm), np.zeros_like(one.points_mm))

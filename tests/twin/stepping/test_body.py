@@ -9,7 +9,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stepping_rig import Array, ball_facets, box_facets, turned, write_stl
 
-from gelslim_twin.contact.tool import clearance_mm
 from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.stepping.body import Body, turn_down
 from gelslim_twin.stepping.rigid_motion import tool_pose
@@ -19,7 +18,7 @@ from gelslim_twin.stepping.step_error import StepError
 def signed_depth(body: Body, motion: Array, points: Array) -> Array:
     """Distance of points above the body's surface along the axis of its tool."""
     side = body.side(motion[:3, :3])
-    return -clearance_mm(side.tool, tool_pose(motion @ side.frame), points)
+    return -side.tool.clearance_mm(tool_pose(motion @ side.frame), points)
 
 
 def motion_with(turn: Rotation) -> Array:
@@ -55,7 +54,7 @@ def test_the_surface_of_a_turned_box_is_where_its_faces_are() -> None:
         points = motion[:3, 3] + np.column_stack([rng.uniform(-3, 3, (40, 2)), np.full(40, -9.0)])
         side = body.side(motion[:3, :3])
         pose = tool_pose(motion @ side.frame)
-        above = clearance_mm(side.tool, pose, points)
+        above = side.tool.clearance_mm(pose, points)
         axis = (motion @ side.frame)[:3, 2]
         on = np.isfinite(above)
         met = points[on] + above[on, None] * axis
@@ -70,7 +69,7 @@ def test_a_ball_is_the_same_from_every_side() -> None:
     for turn in Rotation.random(40, random_state=3):
         motion = motion_with(turn)
         side = body.side(motion[:3, :3])
-        above = clearance_mm(side.tool, tool_pose(motion @ side.frame), points)
+        above = side.tool.clearance_mm(tool_pose(motion @ side.frame), points)
         met = points + above[:, None] * (motion @ side.frame)[:3, 2]
         np.testing.assert_allclose(np.linalg.norm(met - motion[:3, 3], axis=1), 3.0, atol=1e-12)
 
