@@ -24,6 +24,7 @@ from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState
 from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm
 from gelslim_twin.contact.solver import CANDIDATE_SHARE, ContactSolver
 from gelslim_twin.contact.tool import ToolSurface
+from gelslim_twin.contact.tool_group import members_of
 from gelslim_twin.scene.pose import Pose
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 
@@ -153,9 +154,10 @@ class _Start:
 
 def _way(start: Pose, end: Pose) -> Array:
     """Difference of two poses in mm; angles count with the arm of a typical contact."""
-    way = np.subtract(astuple(end)[1:], astuple(start)[1:])
-    way[3:] = ARM_MM * np.radians(way[3:])
-    return way
+    pairs = zip(members_of(start), members_of(end), strict=True)
+    ways = np.array([np.subtract(astuple(b)[1:], astuple(a)[1:]) for a, b in pairs])
+    ways[:, 3:] = ARM_MM * np.radians(ways[:, 3:])
+    return ways.ravel()
 
 
 class _NewtonSolve:

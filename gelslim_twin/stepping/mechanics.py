@@ -22,6 +22,7 @@ from gelslim_twin.effects.contact_estimate import (
     contact_estimate,
 )
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.step_error import StepError
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -103,34 +104,32 @@ class StepMechanics:
             tuple(t.fraction for t in given.terms), tuple(t.time_s for t in given.terms)
         )
 
-    def advanced(
-        self, tool: Tool, last: SolvedStep, before: Pose | None, pose: Pose, name: str
-    ) -> SolvedStep:
-        """The gel with the tool at `pose`, from the state `last` with the tool at `before`.
+    def advanced(self, placement: Placement, last: SolvedStep) -> SolvedStep:
+        """The gel with the bodies as placed, from the state `last` at the start of the step.
 
         Raises:
             StepError: The tool goes deeper than the gel allows.
             ContactError: The contact does not converge.
         """
-        contact = self._estimate(tool, pose)
+        contact = self._estimate(placement.tool, placement.pose)
         if contact is None:
             return self.rest
         most = DEEPEST_SHARE * self.thickness_mm
         if contact.depth_mm > most:
             raise StepError(
-                f"body {name} goes {contact.depth_mm:.3g} mm deep into a gel of "
+                f"body {placement.name} goes {contact.depth_mm:.3g} mm deep into a gel of "
                 f"{self.thickness_mm:g} mm, the limit is {most:.3g} mm; take shorter time steps, "
                 "or stop the body before"
             )
         large_strain = self._needs_large_strain(contact)
         solver = self._solver
-        solver.tool = tool
+        solver.tool = placement.tool
         if solver.candidates.nodes is not last.candidates:
             solver.candidates = Candidates.of(last.candidates, self.compliance)
         if large_strain:
             self._nonlinear.forget()
         solve = self._nonlinear if large_strain else solver
-        gel = solve.advanced(last.gel, before, pose)
+        gel = solve.advanced(last.gel, placement.before, placement.pose)
         if not gel.force_n.any():
             return self.rest
         excess = 0.0 if large_strain else contact.nonlinear_excess

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.wrench import resultant
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.step_error import StepError
 
@@ -33,7 +34,8 @@ class Step:
         points_mm: Surface nodes (c, 3) at rest.
         gel: State of the gel, with the forces after relaxation.
         before: State of the gel before the step, for motion blur.
-        origins_mm: Origins (k, 3) of the bodies in the sensor frame.
+        motions: Rigid motions (k, 4, 4) of the bodies.
+        placement: The bodies near the gel; None where none is.
         large_strain: Whether the neo-Hookean law was solved, and not the linear one.
         excess: Estimated share by which a linear gel underestimates the force, where it was used.
         request: What the twin was asked for.
@@ -46,7 +48,8 @@ class Step:
     points_mm: Array
     gel: GelState
     before: GelState
-    origins_mm: Array
+    motions: Array
+    placement: Placement | None
     large_strain: bool
     excess: float
     request: Request
@@ -80,12 +83,20 @@ class Step:
         """Force in N and torque in N mm (k, 6) on each body about its origin, sensor frame.
 
         They act where the nodes are now. This is what a physics engine applies to the bodies: its
-        work over a closed path without friction is zero.
+        work over a closed path without friction is zero. The force of a node is that of the body
+        on whose surface it lies.
         """
-        places = self.points_mm + self.gel.displacement_mm
-        return np.stack(
-            [-np.concatenate(resultant(places - o, self.gel.force_n)) for o in self.origins_mm]
-        )
+        found = np.zeros((len(self.motions), 6))
+        if self.placement is None:
+            return found
+        pushed = np.flatnonzero(self.gel.force_n.any(axis=1))
+        places = (self.points_mm + self.gel.displacement_mm)[pushed]
+        owners = self.placement.owners(places)
+        for body in self.placement.bodies:
+            own = owners == body
+            arms = places[own] - self.motions[body, :3, 3]
+            found[body] = -np.concatenate(resultant(arms, self.gel.force_n[pushed[own]]))
+        return found
 
     @cached_property
     def markers_px(self) -> Array:

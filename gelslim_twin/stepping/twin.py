@@ -18,8 +18,9 @@ from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.mechanics import SolvedStep, StepMechanics
 from gelslim_twin.stepping.pictures import pad_size_mm, stepped_scene, stepped_viewer
+from gelslim_twin.stepping.placement import Placement, placed
 from gelslim_twin.stepping.request import Request
-from gelslim_twin.stepping.rigid_motion import rigid_motions, tool_pose
+from gelslim_twin.stepping.rigid_motion import rigid_motions
 from gelslim_twin.stepping.state import TwinState
 from gelslim_twin.stepping.step import Step
 from gelslim_twin.stepping.step_error import StepError
@@ -206,7 +207,10 @@ class Twin:
         step_s = _duration(dt)
         motions = rigid_motions(poses, len(self._bodies))
         last = self._state
-        solved = self._solved(motions, last.time_s + step_s)
+        placement = placed(
+            self._bodies, motions, last.motions, (last.time_s, last.time_s + step_s), self._top_mm
+        )
+        solved = self._solved(motions, placement)
         gel, memory = solved.gel, last.relaxation
         series = self._shared.mechanics.series
         if series is not None:
@@ -225,27 +229,25 @@ class Twin:
             points_mm=self.points_mm,
             gel=gel,
             before=last.solved.gel,
-            origins_mm=motions[:, :3, 3],
+            motions=motions,
+            placement=placement,
             large_strain=solved.large_strain,
             excess=solved.excess,
             request=self._shared.request,
             view=self._shared.view,
         )
 
-    def _solved(self, motions: Array, time_s: float) -> SolvedStep:
-        last = self._state
+    def _solved(self, motions: Array, placement: Placement | None) -> SolvedStep:
+        last, mechanics = self._state, self._shared.mechanics
+        if placement is None:
+            return mechanics.rest
         if last.motions is not None and np.array_equal(motions, last.motions):
             return last.solved
-        top = float(self.points_mm[:, 2].max())
-        body, motion = self._bodies[0], motions[0]
-        if motion[2, 3] - body.shape.radius_mm > top:
-            return self._shared.mechanics.rest
-        side = body.side(motion[:3, :3])
-        pose = tool_pose(motion @ side.frame, time_s)
-        before = None
-        if last.motions is not None:
-            before = tool_pose(last.motions[0] @ side.frame, last.time_s)
-        return self._shared.mechanics.advanced(side.tool, last.solved, before, pose, body.name)
+        return mechanics.advanced(placement, last.solved)
+
+    @property
+    def _top_mm(self) -> float:
+        return float(self.points_mm[:, 2].max())
 
     def _initial(self) -> TwinState:
         compliance = self._shared.mechanics.compliance

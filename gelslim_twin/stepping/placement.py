@@ -1,0 +1,90 @@
+"""The bodies that are near the gel, placed as one tool of the contact."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_twin.contact.tool import Tool
+from gelslim_twin.contact.tool_group import GroupPose, ToolGroup
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.stepping.body import Body, Side
+from gelslim_twin.stepping.rigid_motion import tool_pose
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Bodies near the gel at the end of a step.
+
+    Attributes:
+        bodies: Their numbers among all bodies.
+        sides: The side of each that faces the gel.
+        tool: The sides as one tool.
+        pose: Its pose at the end of the step.
+        before: Its pose at the start; None for the first step.
+        name: Names of the bodies.
+    """
+
+    bodies: tuple[int, ...]
+    sides: tuple[Side, ...]
+    tool: Tool
+    pose: Pose
+    before: Pose | None
+    name: str
+
+    def owners(self, places_mm: Array) -> NDArray[np.intp]:
+        """Numbers (n,) of the bodies that points (n, 3) of the deformed surface belong to."""
+        if isinstance(self.tool, ToolGroup):
+            return np.asarray(self.bodies, dtype=np.intp)[self.tool.owners(self.pose, places_mm)]
+        return np.full(len(places_mm), self.bodies[0], dtype=np.intp)
+
+
+def placed(
+    bodies: Sequence[Body],
+    motions: Array,
+    before: Array | None,
+    times_s: tuple[float, float],
+    top_mm: float,
+) -> Placement | None:
+    """Place bodies over the gel.
+
+    Args:
+        bodies: All bodies.
+        motions: Their rigid motions (k, 4, 4) at the end of the step.
+        before: The same at its start; None for the first step.
+        times_s: Start and end of the step.
+        top_mm: Height of the highest point of the undeformed gel.
+
+    Returns:
+        The bodies that reach below that height by the sphere around them; None where none does.
+
+    Raises:
+        StepError: A body has no side that faces the gel.
+    """
+    near = tuple(
+        number
+        for number, body in enumerate(bodies)
+        if motions[number, 2, 3] - body.shape.radius_mm <= top_mm
+    )
+    if not near:
+        return None
+    sides = tuple(bodies[k].side(motions[k, :3, :3]) for k in near)
+
+    def pose(moved: Array, time_s: float) -> Pose:
+        found = [tool_pose(moved[k] @ s.frame, time_s) for k, s in zip(near, sides, strict=True)]
+        return found[0] if len(found) == 1 else GroupPose.of(time_s, tuple(found))
+
+    tools = tuple(side.tool for side in sides)
+    return Placement(
+        near,
+        sides,
+        tools[0] if len(tools) == 1 else ToolGroup((), tools),
+        pose(motions, times_s[1]),
+        None if before is None else pose(before, times_s[0]),
+        " and ".join(bodies[k].name for k in near),
+    )
