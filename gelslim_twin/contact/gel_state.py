@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
 import numpy as np
@@ -55,6 +55,45 @@ class GelState:
 
 
 @dataclass(frozen=True, eq=False)
+class StickTargets:
+    """Displacements with which n nodes stick to the tool at the end of a load step.
+
+    Attributes:
+        target_mm: Those displacements (n, 3).
+        ahead_mm: Initial guess (n, 3) of the displacement, in which the tool carries nodes that it
+            touched before.
+        dragged_mm: Way (n, 3) of the point of the tool at the node.
+        share: Part (n,) of the step in which the node is in contact.
+        share_rate: Derivative (n,) of that part by the height of the tool over the node, in 1/mm.
+    """
+
+    target_mm: Array
+    ahead_mm: Array
+    dragged_mm: Array
+    share: Array
+    share_rate: Array
+
+    def at(self, nodes: NDArray[np.intp]) -> StickTargets:
+        """Those of some of the nodes."""
+        return StickTargets(*(getattr(self, f.name)[nodes] for f in fields(self)))
+
+
+@dataclass(frozen=True, eq=False)
+class TouchedNodes:
+    """The n nodes in contact with a linear gel, as the last load step solved them.
+
+    Attributes:
+        nodes: Their numbers (n,) among the surface nodes.
+        normal: Unit normals (n, 3) into the tool.
+        targets: Where they would stick to the tool.
+    """
+
+    nodes: NDArray[np.intp]
+    normal: Array
+    targets: StickTargets
+
+
+@dataclass(frozen=True, eq=False)
 class AnchoredState(GelState):
     """A state with the displacement (c, 3) at which its sticking nodes are fixed to the tool.
 
@@ -62,6 +101,8 @@ class AnchoredState(GelState):
     """
 
     anchor_mm: NDArray[np.float64] | None = None
+    touched: TouchedNodes | None = field(default=None, kw_only=True)
+    """The nodes in contact, from which derivatives are taken; None for a gel at large strain."""
 
 
 def anchor_mm(state: GelState) -> NDArray[np.float64]:

@@ -176,7 +176,8 @@ class _NewtonSolve:
         self.whole, self.pressure = start.whole_mm, start.pressure_mpa
         self.force = start.force_n.copy()
         self.inner = self.body.pad.force(self.whole)
-        self.target, ahead = self.solver.targets(last, before, pose)
+        targets = self.solver.targets(last, before, pose)
+        self.target, ahead = targets.target_mm, targets.ahead_mm
         points = self.solver.points_mm
         tool = self.solver.tool
         self.on_tool = np.isfinite(tool.clearance_mm(pose, points + ahead * [1.0, 1.0, 0.0]))

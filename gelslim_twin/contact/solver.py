@@ -23,7 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.contact_forces import STICK
-from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState, anchor_mm
+from gelslim_twin.contact.gel_state import (
+    AnchoredState,
+    ContactError,
+    GelState,
+    StickTargets,
+    TouchedNodes,
+    anchor_mm,
+)
 from gelslim_twin.contact.plane_iteration import (
     PlaneIteration,
     PlaneSolution,
@@ -158,7 +165,8 @@ class ContactSolver:
         differs from C. `start` is an initial guess.
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
-        target, ahead = self.targets(last, before, pose)
+        targets = self.targets(last, before, pose)
+        target, ahead = targets.target_mm, targets.ahead_mm
         below = self.tool.clearance_mm(pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
@@ -179,7 +187,7 @@ class ContactSolver:
                 deepest,
             )  # fmt: skip
             found = iteration.solve(surface.at(nodes), moved[nodes], guess[nodes])
-            state, gap = self._state(nodes, found, pose, offset, target, deepest)
+            state, gap = self._state(nodes, found, pose, offset, targets, deepest)
             into = (gap < -gap_tolerance_mm(self.settings.tolerance, deepest)) & ~wanted
             if not into.any():
                 return state
@@ -187,25 +195,26 @@ class ContactSolver:
             moved, guess = state.displacement_mm, state.force_n
         raise ContactError("the contact region keeps growing: take smaller steps of the motion")
 
-    def targets(self, last: GelState, before: Pose | None, pose: Pose) -> tuple[Array, Array]:
-        """Displacements (c, 3) of nodes that stick from their first contact, and a guess."""
-        u = anchor_mm(last)
+    def targets(self, last: GelState, before: Pose | None, pose: Pose) -> StickTargets:
+        """Where nodes stick from their first contact."""
+        u, none = anchor_mm(last), np.zeros(len(self.points_mm))
         if before is None:
-            return u, u
+            return StickTargets(u, u, np.zeros_like(u), none, none)
         places = self.points_mm + u
         dragged = self.tool.carried(before, pose, places) - places
         touched = last.touch > 0
         ahead = u + np.where(touched[:, None], dragged, 0.0)
         if self.settings.friction == 0 or not dragged.any():
-            return u + dragged, ahead
+            return StickTargets(u + dragged, ahead, dragged, none + 1.0, none)
         # Other nodes stick for the part of the step in which they are in contact.
         heights = [self.tool.clearance_mm(p, places) for p in (before, pose)]
-        share = np.where(np.isfinite(heights[0]), 0.0, 0.5)
-        closing = np.isfinite(heights[0]) & (heights[1] < 0)
+        share, rate = np.where(np.isfinite(heights[0]), 0.0, 0.5), none
+        closing = np.isfinite(heights[0]) & (heights[1] < 0) & ~touched
         first = np.maximum(heights[0][closing], 0.0)
         share[closing] = heights[1][closing] / (heights[1][closing] - first)
         share[touched] = 1.0
-        return u + share[:, None] * dragged, ahead
+        rate[closing] = share[closing] * (1 - share[closing]) / heights[1][closing]
+        return StickTargets(u + share[:, None] * dragged, ahead, dragged, share, rate)
 
     def _room(
         self, pose: Pose, moved: Array, offset: Array, on_tool: NDArray[np.bool_]
@@ -222,7 +231,7 @@ class ContactSolver:
         found: PlaneSolution,
         pose: Pose,
         offset: Array,
-        target: Array,
+        targets: StickTargets,
         deepest: float,
     ) -> tuple[AnchoredState, Array]:
         """State of the whole surface, and gaps (c,) of all nodes."""
@@ -241,8 +250,10 @@ class ContactSolver:
             "complementarity": float(across / (most * deepest)) if most > 0 else 0.0,
             "iterations": float(found.sweeps),
         }
-        held = np.where((touch == STICK)[:, None], target, u)
-        return AnchoredState(u, force, touch, report, held), gap
+        held = np.where((touch == STICK)[:, None], targets.target_mm, u)
+        on = np.flatnonzero(balance.touch)
+        touched = TouchedNodes(nodes[on], found.surface.normal[on], targets.at(nodes[on]))
+        return AnchoredState(u, force, touch, report, held, touched=touched), gap
 
 
 def even_steps(before: Pose, after: Pose, count: int) -> Iterator[Pose]:

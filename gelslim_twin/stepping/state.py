@@ -6,7 +6,7 @@ import io
 import json
 import os
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.files.replaced_file import replace_file
-from gelslim_twin.contact.gel_state import AnchoredState, GelState
+from gelslim_twin.contact.gel_state import AnchoredState, GelState, StickTargets, TouchedNodes
 from gelslim_twin.contact.relaxation import RelaxationState
 from gelslim_twin.stepping.mechanics import SolvedStep
 from gelslim_twin.stepping.step_error import StepError
 
 Array = NDArray[np.float64]
 FORMAT = "gelslim-twin-state/1"
+TARGETS = tuple(field.name for field in fields(StickTargets))
 GEL_KINDS = ("plain", "anchored", "solid")
 
 
@@ -81,6 +82,11 @@ class TwinState:
             "whole_mm": getattr(gel, "whole_mm", None),
             "pressure_mpa": getattr(gel, "pressure_mpa", None),
         }
+        touched = gel.touched if isinstance(gel, AnchoredState) else None
+        if touched is not None:
+            found["touched"] = touched.nodes
+            found["normal"] = touched.normal
+            found |= {name: getattr(touched.targets, name) for name in TARGETS}
         if self.relaxation is not None:
             found["elastic_n"] = self.relaxation.elastic_n
             found["internal_n"] = self.relaxation.internal_n
@@ -129,7 +135,11 @@ def _gel(record: dict[str, Any], held: dict[str, Any]) -> GelState:
     if kind == "plain":
         return GelState(*fields)
     if kind == "anchored":
-        return AnchoredState(*fields, held.get("anchor_mm"))
+        touched = None
+        if "touched" in held:
+            targets = StickTargets(*(held[name] for name in TARGETS))
+            touched = TouchedNodes(held["touched"], held["normal"], targets)
+        return AnchoredState(*fields, held.get("anchor_mm"), touched=touched)
     from gelslim_twin.contact.newton_contact import SolidState
 
     return SolidState(*fields, held.get("anchor_mm"), held["whole_mm"], held.get("pressure_mpa"))

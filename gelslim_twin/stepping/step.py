@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.forces.wrench import resultant
-from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.gel_state import AnchoredState, GelState
+from gelslim_twin.stepping.mechanics import StepMechanics
 from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.step_error import StepError
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Step:
     """The gel after one step.
 
@@ -33,12 +34,14 @@ class Step:
         number: Steps since the start.
         points_mm: Surface nodes (c, 3) at rest.
         gel: State of the gel, with the forces after relaxation.
+        elastic: The same before relaxation.
         before: State of the gel before the step, for motion blur.
         motions: Rigid motions (k, 4, 4) of the bodies.
         placement: The bodies near the gel; None where none is.
         large_strain: Whether the neo-Hookean law was solved, and not the linear one.
         excess: Estimated share by which a linear gel underestimates the force, where it was used.
         request: What the twin was asked for.
+        mechanics: What solved the step.
         view: Gives camera and renderer.
     """
 
@@ -47,12 +50,14 @@ class Step:
     number: int
     points_mm: Array
     gel: GelState
+    elastic: GelState
     before: GelState
     motions: Array
     placement: Placement | None
     large_strain: bool
     excess: float
     request: Request
+    mechanics: StepMechanics
     view: Callable[[], Viewer]
 
     @property
@@ -97,6 +102,37 @@ class Step:
             arms = places[own] - self.motions[body, :3, 3]
             found[body] = -np.concatenate(resultant(arms, self.gel.force_n[pushed[own]]))
         return found
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Derivative (6, 6 k) of the wrench by the poses of the k bodies.
+
+        A row is a component of `wrench`. The columns of each body are its translation in mm and its
+        rotation in rad about its own origin, in the sensor frame. The contact set is that of the
+        step: nodes stay in contact, stick or slip as they do. Where a step took several load steps,
+        it is the derivative of the last of them. The gel does not relax meanwhile.
+
+        Raises StepError for a gel at large strain.
+        """
+        found = np.zeros((6, 6 * len(self.motions)))
+        if self.placement is None or not self.elastic.touch.any():
+            return found
+        elastic = self.elastic
+        if self.large_strain or not isinstance(elastic, AnchoredState) or elastic.touched is None:
+            raise StepError(
+                "the stiffness is that of a linear gel, and this step needed large strain; make "
+                'the twin with effects={"nonlinearity": "off"}'
+            )
+        from gelslim_twin.stepping.derivative import wrench_derivative
+
+        return wrench_derivative(
+            self.points_mm,
+            elastic,
+            self.mechanics.block(elastic.touched.nodes),
+            self.placement,
+            self.motions,
+            self.mechanics.friction,
+        )
 
     @cached_property
     def markers_px(self) -> Array:

@@ -228,12 +228,14 @@ class Twin:
             number=self._state.number,
             points_mm=self.points_mm,
             gel=gel,
+            elastic=solved.gel,
             before=last.solved.gel,
             motions=motions,
             placement=placement,
             large_strain=solved.large_strain,
             excess=solved.excess,
             request=self._shared.request,
+            mechanics=self._shared.mechanics,
             view=self._shared.view,
         )
 

@@ -94,7 +94,8 @@ def test_nodes_stick_from_the_moment_of_their_contact() -> None:
     last = state(one, touched)
     before = Pose(x_mm=-2.6, depth_mm=0.25)
     after = Pose(x_mm=-1.8, y_mm=0.3, depth_mm=0.55)
-    target, ahead = one.targets(last, before, after)
+    found = one.targets(last, before, after)
+    target, ahead = found.target_mm, found.ahead_mm
     drag, kinds = np.array([0.8, 0.3, -0.3]), set()
     for k, (place, u) in enumerate(
         zip(one.points_mm + last.displacement_mm, last.displacement_mm, strict=True)
@@ -125,13 +126,14 @@ def test_targets_start_from_the_anchors_and_turn_with_the_tool() -> None:
     anchors = plain.displacement_mm + 0.01
     held = AnchoredState(plain.displacement_mm, plain.force_n, plain.touch, {}, anchors)
     after = replace(BEFORE, twist_deg=25, tilt_y_deg=4, y_mm=0.4)
-    target, _ = one.targets(held, BEFORE, after)
+    target = one.targets(held, BEFORE, after).target_mm
     expected = carried(BEFORE, after, one.points_mm + anchors) - one.points_mm
     np.testing.assert_allclose(target, expected, atol=1e-12)
-    np.testing.assert_array_equal(one.targets(held, None, after)[0], anchors)
+    np.testing.assert_array_equal(one.targets(held, None, after).target_mm, anchors)
     assert anchor_mm(plain) is plain.displacement_mm
     smooth = solver(0.0)
-    target, ahead = smooth.targets(state(smooth, [5]), BEFORE, after)
+    found = smooth.targets(state(smooth, [5]), BEFORE, after)
+    target, ahead = found.target_mm, found.ahead_mm
     moved = state(smooth, [5]).displacement_mm
     dragged = carried(BEFORE, after, smooth.points_mm + moved) - smooth.points_mm
     np.testing.assert_allclose(target, dragged, atol=1e-12)
@@ -234,7 +236,7 @@ def test_nodes_that_a_level_punch_comes_over_stick_for_half_the_step() -> None:
         ContactSettings(1e-3, 0.5),
     )
     before, after = Pose(x_mm=-0.5, depth_mm=0.2), Pose(x_mm=0.5, depth_mm=0.2)
-    target, _ = one.targets(GelState.at_rest(len(one.points_mm)), before, after)
+    target = one.targets(GelState.at_rest(len(one.points_mm)), before, after).target_mm
     x, inside = one.points_mm[:, 0], np.abs(one.points_mm[:, 1]) <= 1.0
     expected = np.where(inside & (x >= -2) & (x < 2), 1.0, 0.0)
     expected[~(inside & (np.abs(x + 0.5) <= 2))] = 0.5
