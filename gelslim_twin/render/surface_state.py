@@ -47,16 +47,7 @@ class SurfaceState:
         Places of the lattice without a node (beyond a rounded corner) take the nearest node's
         displacement. Raises ValueError for nodes that are no even lattice.
         """
-        from scipy.spatial import cKDTree
-
-        places = np.asarray(nodes_mm, dtype=float)[:, :2]
-        moved = np.asarray(displacement_mm, dtype=float)
-        if moved.shape != (len(places), 3):
-            raise ValueError(f"displacement of nodes {moved.shape}: must be ({len(places)}, 3)")
-        x, y = (np.unique(np.round(places[:, k], 9)) for k in (0, 1))
-        sites = np.column_stack([a.ravel() for a in np.meshgrid(x, y)])
-        _, nearest = cKDTree(places).query(sites)
-        return cls(x, y, moved[nearest].reshape(len(y), len(x), 3))
+        return NodeLattice.of(nodes_mm).state(displacement_mm)
 
     @classmethod
     def at_rest(cls, length_mm: float, width_mm: float) -> SurfaceState:
@@ -96,6 +87,37 @@ class SurfaceState:
         if self.moves:
             displacement(self.padded_mm, self.origin_mm, self.step_mm, points, out)
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class NodeLattice:
+    """The even lattice of surface nodes: axes (nx,), (ny,), and the node (ny nx,) at each place.
+
+    Places without a node (beyond a rounded corner) have the nearest one.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    nearest: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, nodes_mm: ArrayLike) -> NodeLattice:
+        """The lattice of surface nodes (n, 2 or 3) of a regular mesh."""
+        from scipy.spatial import cKDTree
+
+        places = np.asarray(nodes_mm, dtype=float)[:, :2]
+        x, y = (np.unique(np.round(places[:, k], 9)) for k in (0, 1))
+        sites = np.column_stack([a.ravel() for a in np.meshgrid(x, y)])
+        return cls(x, y, cKDTree(places).query(sites)[1])
+
+    def state(self, displacement_mm: ArrayLike) -> SurfaceState:
+        """The state of nodes displaced by (n, 3). Raises ValueError for another shape."""
+        moved = np.asarray(displacement_mm, dtype=float)
+        count = int(self.nearest.max()) + 1
+        if moved.shape != (count, 3):
+            raise ValueError(f"displacement of nodes {moved.shape}: must be ({count}, 3)")
+        shape = (len(self.y_mm), len(self.x_mm), 3)
+        return SurfaceState(self.x_mm, self.y_mm, moved[self.nearest].reshape(shape))
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,12 +63,10 @@ class Viewer:
     @cached_property
     def surface(self) -> Callable[[GelState], SurfaceState]:
         """A state as the renderer takes it. The last two are kept, because a frame needs both."""
-        from gelslim_twin.render.surface_state import SurfaceState
+        from gelslim_twin.render.surface_state import NodeLattice
 
-        points_mm = self.sensor.points_mm
-        return lru_cache(maxsize=2)(
-            lambda state: SurfaceState.from_nodes(points_mm, state.displacement_mm)
-        )
+        lattice = NodeLattice.of(self.sensor.points_mm)
+        return lru_cache(maxsize=2)(lambda state: lattice.state(state.displacement_mm))
 
     def frame(
         self, state: GelState, before: GelState | None, number: int, step_s: float
