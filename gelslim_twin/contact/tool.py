@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -98,15 +99,21 @@ class Tool:
         return np.asarray((points_mm - start) @ turn.T + end)
 
 
+@lru_cache(maxsize=64)
 def rotation(pose: Pose) -> Array:
-    """Rotation matrix (3, 3) of a pose: twist about z first, then tilt about x, then about y."""
+    """Rotation matrix (3, 3) of a pose: twist about z first, then tilt about x, then about y.
+
+    It is read-only, because a contact asks for that of its pose some twenty times.
+    """
     cz, sz = _cos_sin(pose.twist_deg)
     cx, sx = _cos_sin(pose.tilt_x_deg)
     cy, sy = _cos_sin(pose.tilt_y_deg)
     about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
     about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    return np.asarray(about_y @ about_x @ about_z)
+    turn = np.asarray(about_y @ about_x @ about_z)
+    turn.flags.writeable = False
+    return turn
 
 
 def _cos_sin(angle_deg: float) -> tuple[float, float]:
