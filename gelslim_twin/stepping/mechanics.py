@@ -41,13 +41,14 @@ class SolvedStep:
 
     Attributes:
         gel: Its state.
-        candidates: Candidate nodes of the contact, in the solver's order.
+        candidates: Candidate nodes of the contact, in the solver's order. Those that were read
+            from a file have no compliance yet.
         large_strain: Whether the neo-Hookean law was solved, and not the linear one.
         excess: Estimated share by which a linear gel underestimates the force, where it was used.
     """
 
     gel: GelState
-    candidates: Nodes
+    candidates: Candidates
     large_strain: bool = False
     excess: float = 0.0
 
@@ -80,7 +81,7 @@ class StepMechanics:
     @property
     def rest(self) -> SolvedStep:
         """The gel without contact."""
-        return SolvedStep(GelState.at_rest(len(self.points_mm)), Candidates.none().nodes)
+        return SolvedStep(GelState.at_rest(len(self.points_mm)), Candidates.none())
 
     @cached_property
     def _nonlinear(self) -> NonlinearContact:
@@ -124,8 +125,9 @@ class StepMechanics:
         large_strain = self._needs_large_strain(contact)
         solver = self._solver
         solver.tool = placement.tool
-        if solver.candidates.nodes is not last.candidates:
-            solver.candidates = Candidates.of(last.candidates, self.compliance)
+        solver.candidates = last.candidates
+        if len(last.candidates.block) != 3 * len(last.candidates.nodes):
+            solver.candidates = Candidates.of(last.candidates.nodes, self.compliance)
         if large_strain:
             self._nonlinear.forget()
         solve = self._nonlinear if large_strain else solver
@@ -133,7 +135,7 @@ class StepMechanics:
         if not gel.force_n.any():
             return self.rest
         excess = 0.0 if large_strain else contact.nonlinear_excess
-        return SolvedStep(gel, solver.candidates.nodes, large_strain, excess)
+        return SolvedStep(gel, solver.candidates, large_strain, excess)
 
     def block(self, nodes: Nodes) -> Array:
         """Compliance (3n, 3n) in mm/N among surface nodes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,16 +75,35 @@ def placed(
         return None
     sides = tuple(bodies[k].side(motions[k, :3, :3]) for k in near)
 
-    def pose(moved: Array, time_s: float) -> Pose:
-        found = [tool_pose(moved[k] @ s.frame, time_s) for k, s in zip(near, sides, strict=True)]
-        return found[0] if len(found) == 1 else GroupPose.of(time_s, tuple(found))
+    def poses(moved: Array, time_s: float) -> list[Pose]:
+        return [tool_pose(moved[k] @ s.frame, time_s) for k, s in zip(near, sides, strict=True)]
 
+    ends, starts = poses(motions, times_s[1]), None
+    if before is not None:
+        pairs = zip(poses(before, times_s[0]), ends, strict=True)
+        starts = [_turned_to(start, end) for start, end in pairs]
     tools = tuple(side.tool for side in sides)
     return Placement(
         near,
         sides,
         tools[0] if len(tools) == 1 else ToolGroup((), tools),
-        pose(motions, times_s[1]),
-        None if before is None else pose(before, times_s[0]),
+        _joined(ends, times_s[1]),
+        None if starts is None else _joined(starts, times_s[0]),
         " and ".join(bodies[k].name for k in near),
     )
+
+
+def _joined(poses: list[Pose], time_s: float) -> Pose:
+    return poses[0] if len(poses) == 1 else GroupPose.of(time_s, tuple(poses))
+
+
+def _turned_to(start: Pose, end: Pose) -> Pose:
+    """The same pose with its angles within half a turn of those at the end of the step.
+
+    The load steps between the two take the angles in equal parts, which must not lead once round.
+    """
+    nearer = {
+        name: getattr(start, name) + 360 * round((getattr(end, name) - getattr(start, name)) / 360)
+        for name in ("twist_deg", "tilt_y_deg")
+    }
+    return replace(start, **nearer)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gelslim_core.files.replaced_file import replace_file
 from gelslim_twin.contact.gel_state import AnchoredState, GelState, StickTargets, TouchedNodes
 from gelslim_twin.contact.relaxation import RelaxationState
+from gelslim_twin.contact.solver import Candidates
 from gelslim_twin.stepping.mechanics import SolvedStep
 from gelslim_twin.stepping.step_error import StepError
 
@@ -76,7 +77,7 @@ class TwinState:
             "displacement_mm": gel.displacement_mm,
             "force_n": gel.force_n,
             "touch": gel.touch,
-            "candidates": self.solved.candidates,
+            "candidates": self.solved.candidates.nodes,
             "motions": self.motions,
             "anchor_mm": getattr(gel, "anchor_mm", None),
             "whole_mm": getattr(gel, "whole_mm", None),
@@ -121,7 +122,7 @@ class TwinState:
             held.get("motions"),
             SolvedStep(
                 _gel(record, held),
-                held["candidates"],
+                Candidates(held["candidates"], np.zeros((0, 0), np.float32)),
                 bool(record["large_strain"]),
                 float(record["excess"]),
             ),

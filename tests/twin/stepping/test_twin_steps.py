@@ -166,3 +166,16 @@ def test_what_is_not_observed_is_refused(pad: Path, seen_pad: Path) -> None:
     assert step.markers_px.shape == (99, 2)
     with pytest.raises(StepError, match="not observed"):
         step.image()
+
+
+def test_a_turn_through_half_a_turn_is_a_small_one(pad: Path) -> None:
+    """Angles jump from 180° to -180°; the load steps do not lead once round in between."""
+    twin = linear_twin(pad, friction=0.8)
+    twin.add(Body.box(3.0, 3.0, 3.0))
+    twin.step(at(0.0, 0.0, 1.3, turned("z", 165.0)), DT_S)
+    over = twin.step(at(0.0, 0.0, 1.3, turned("z", 195.0)), DT_S)
+    twin.reset()
+    twin.step(at(0.0, 0.0, 1.3, turned("z", 75.0)), DT_S)
+    known = twin.step(at(0.0, 0.0, 1.3, turned("z", 105.0)), DT_S)
+    assert known.wrench[5] > 1e-4
+    np.testing.assert_allclose(over.wrench, known.wrench, atol=1e-4 * np.abs(known.wrench).max())
