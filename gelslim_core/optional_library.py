@@ -40,6 +40,7 @@ EXTRAS = (
     Extra("record", ("pyarrow", "mcap", "mcap_ros2"), "Parquet tables and ROS 2 recordings"),
     Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
+    Extra("sim", ("mujoco",), "examples/mujoco_grasp.py, in which a physics engine steps the twin"),
 )  # fmt: skip
 
 

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
-SLOW = ("frames_to_forces", "data_set")
+SLOW = ("frames_to_forces", "data_set", "mujoco_grasp")
+NEEDS = {"mujoco_grasp": "mujoco"}
+"""Modules of extras without which an example is not tested."""
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 
 def test_there_are_examples() -> None:
-    assert {p.stem for p in EXAMPLES} >= {"own_finger", "frames_to_forces", "data_set"}
+    assert {p.stem for p in EXAMPLES} >= {"own_finger", *SLOW}
 
 
 @pytest.mark.parametrize(
@@ -25,6 +27,9 @@ def test_there_are_examples() -> None:
 def test_an_example_runs(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    if path.stem in NEEDS:
+        module = NEEDS[path.stem]
+        pytest.importorskip(module, reason=f"NOT TESTED: the example {path.stem} needs {module}")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tempfile.mkdtemp", lambda: str(tmp_path))
     runpy.run_path(str(path), run_name="__main__")

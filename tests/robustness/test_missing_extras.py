@@ -32,6 +32,7 @@ MISSING = {
     "record": ("pyarrow", "mcap", "mcap_ros2"),
     "cluster": ("distributed", "dask"),
     "export": ("safetensors",),
+    "sim": ("mujoco",),
 }
 
 
