@@ -80,7 +80,7 @@ class StickTargets:
 
 @dataclass(frozen=True, eq=False)
 class TouchedNodes:
-    """The n nodes in contact with a linear gel, as the last load step solved them.
+    """The n nodes in contact, as the last load step solved them.
 
     Attributes:
         nodes: Their numbers (n,) among the surface nodes.
@@ -102,7 +102,7 @@ class AnchoredState(GelState):
 
     anchor_mm: NDArray[np.float64] | None = None
     touched: TouchedNodes | None = field(default=None, kw_only=True)
-    """The nodes in contact, from which derivatives are taken; None for a gel at large strain."""
+    """The nodes in contact, from which derivatives are taken; None where they are not known."""
 
 
 def anchor_mm(state: GelState) -> NDArray[np.float64]:

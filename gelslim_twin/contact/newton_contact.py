@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gelslim_force.forces.finite_strain import Anderson
 from gelslim_twin.contact.contact_forces import FREE, STICK, ContactForces, solve_contact_forces
 from gelslim_twin.contact.gel_body import GelBody, Tangent
-from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState
+from gelslim_twin.contact.gel_state import AnchoredState, ContactError, GelState, TouchedNodes
 from gelslim_twin.contact.plane_iteration import allowed_motion_mm, gap_tolerance_mm
 from gelslim_twin.contact.solver import CANDIDATE_SHARE, ContactSolver
 from gelslim_twin.contact.tool import ToolSurface
@@ -176,8 +176,8 @@ class _NewtonSolve:
         self.whole, self.pressure = start.whole_mm, start.pressure_mpa
         self.force = start.force_n.copy()
         self.inner = self.body.pad.force(self.whole)
-        targets = self.solver.targets(last, before, pose)
-        self.target, ahead = targets.target_mm, targets.ahead_mm
+        self.targets = self.solver.targets(last, before, pose)
+        self.target, ahead = self.targets.target_mm, self.targets.ahead_mm
         points = self.solver.points_mm
         tool = self.solver.tool
         self.on_tool = np.isfinite(tool.clearance_mm(pose, points + ahead * [1.0, 1.0, 0.0]))
@@ -339,4 +339,7 @@ class _NewtonSolve:
         touch[nodes] = balance.touch
         u = self.whole[self.body.surface]
         held = np.where((touch == STICK)[:, None], self.target, u)
-        return SolidState(u, self.force, touch, report, held, self.whole, self.pressure)
+        on = np.flatnonzero(touch)
+        touched = TouchedNodes(on, seen.normal[on], self.targets.at(on))
+        whole = self.whole, self.pressure
+        return SolidState(u, self.force, touch, report, held, *whole, touched=touched)

@@ -98,6 +98,21 @@ class NonlinearContact:
         """Drop what the last poses left to start from, on which the last bits of a state depend."""
         self._newton.forget()
 
+    def compliance(self, state: GelState, nodes: NDArray[np.intp]) -> Array:
+        """Compliance (3n, 3n) in mm/N among surface nodes (n,) of the gel deformed as in `state`.
+
+        Raises ContactError for a gel that only the tool keeps from buckling.
+        """
+        body = self._newton.body
+        whole = state.whole_mm if isinstance(state, SolidState) else None
+        whole = self._whole(state.displacement_mm) if whole is None else whole
+        unheld = np.zeros((len(body.surface), 3, 3))
+        pressure = body.pad.predicted_pressure_mpa(whole, np.zeros_like(whole))
+        tangent = body.tangent(whole, pressure, unheld)
+        if tangent.stiffened:
+            raise ContactError("the gel would buckle if the tool did not hold it")
+        return tangent.block(nodes)
+
     def _step_to(self, last: GelState, before: Pose, pose: Pose) -> GelState:
         if not isinstance(last, SolidState) or not last.force_n.any():
             try:

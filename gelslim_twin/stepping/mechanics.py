@@ -137,8 +137,13 @@ class StepMechanics:
         excess = 0.0 if large_strain else contact.nonlinear_excess
         return SolvedStep(gel, solver.candidates, large_strain, excess)
 
-    def block(self, nodes: Nodes) -> Array:
-        """Compliance (3n, 3n) in mm/N among surface nodes."""
+    def tangent_compliance(self, solved: SolvedStep, nodes: Nodes) -> Array:
+        """Compliance (3n, 3n) in mm/N among surface nodes of the gel as it is deformed.
+
+        Raises ContactError for a gel that only the tool keeps from buckling.
+        """
+        if solved.large_strain:
+            return self._nonlinear.compliance(solved.gel, nodes)
         return self.compliance.block(nodes).astype(float)
 
     def _needs_large_strain(self, contact: ContactEstimate) -> bool:

@@ -135,12 +135,14 @@ def _gel(record: dict[str, Any], held: dict[str, Any]) -> GelState:
     kind = record["gel"]
     if kind == "plain":
         return GelState(*fields)
+    touched = None
+    if "touched" in held:
+        targets = StickTargets(*(held[name] for name in TARGETS))
+        touched = TouchedNodes(held["touched"], held["normal"], targets)
+    anchors = held.get("anchor_mm")
     if kind == "anchored":
-        touched = None
-        if "touched" in held:
-            targets = StickTargets(*(held[name] for name in TARGETS))
-            touched = TouchedNodes(held["touched"], held["normal"], targets)
-        return AnchoredState(*fields, held.get("anchor_mm"), touched=touched)
+        return AnchoredState(*fields, anchors, touched=touched)
     from gelslim_twin.contact.newton_contact import SolidState
 
-    return SolidState(*fields, held.get("anchor_mm"), held["whole_mm"], held.get("pressure_mpa"))
+    whole = held["whole_mm"], held.get("pressure_mpa")
+    return SolidState(*fields, anchors, *whole, touched=touched)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.wrench import resultant
 from gelslim_twin.contact.gel_state import AnchoredState, GelState
-from gelslim_twin.stepping.mechanics import StepMechanics
+from gelslim_twin.stepping.mechanics import SolvedStep, StepMechanics
 from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.step_error import StepError
@@ -34,12 +34,10 @@ class Step:
         number: Steps since the start.
         points_mm: Surface nodes (c, 3) at rest.
         gel: State of the gel, with the forces after relaxation.
-        elastic: The same before relaxation.
+        solved: The elastic gel, before relaxation, and the law that was solved.
         before: State of the gel before the step, for motion blur.
         motions: Rigid motions (k, 4, 4) of the bodies.
         placement: The bodies near the gel; None where none is.
-        large_strain: Whether the neo-Hookean law was solved, and not the linear one.
-        excess: Estimated share by which a linear gel underestimates the force, where it was used.
         request: What the twin was asked for.
         mechanics: What solved the step.
         view: Gives camera and renderer.
@@ -50,12 +48,10 @@ class Step:
     number: int
     points_mm: Array
     gel: GelState
-    elastic: GelState
+    solved: SolvedStep
     before: GelState
     motions: Array
     placement: Placement | None
-    large_strain: bool
-    excess: float
     request: Request
     mechanics: StepMechanics
     view: Callable[[], Viewer]
@@ -69,6 +65,16 @@ class Step:
     def displacement_mm(self) -> Array:
         """Displacement (c, 3) of the surface nodes."""
         return self.gel.displacement_mm
+
+    @property
+    def large_strain(self) -> bool:
+        """Whether the neo-Hookean law was solved, and not the linear one."""
+        return self.solved.large_strain
+
+    @property
+    def excess(self) -> float:
+        """Estimated share by which a linear gel underestimates the force, where it was used."""
+        return self.solved.excess
 
     @property
     def in_contact(self) -> bool:
@@ -112,23 +118,18 @@ class Step:
         step: nodes stay in contact, stick or slip as they do. Where a step took several load steps,
         it is the derivative of the last of them. The gel does not relax meanwhile.
 
-        Raises StepError for a gel at large strain.
+        Raises ContactError for a gel that only the body keeps from buckling.
         """
         found = np.zeros((6, 6 * len(self.motions)))
-        if self.placement is None or not self.elastic.touch.any():
+        gel = self.solved.gel
+        if self.placement is None or not isinstance(gel, AnchoredState) or gel.touched is None:
             return found
-        elastic = self.elastic
-        if self.large_strain or not isinstance(elastic, AnchoredState) or elastic.touched is None:
-            raise StepError(
-                "the stiffness is that of a linear gel, and this step needed large strain; make "
-                'the twin with effects={"nonlinearity": "off"}'
-            )
         from gelslim_twin.stepping.derivative import wrench_derivative
 
         return wrench_derivative(
             self.points_mm,
-            elastic,
-            self.mechanics.block(elastic.touched.nodes),
+            gel,
+            self.mechanics.tangent_compliance(self.solved, gel.touched.nodes),
             self.placement,
             self.motions,
             self.mechanics.friction,

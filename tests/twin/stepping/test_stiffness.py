@@ -13,7 +13,6 @@ from stepping_rig import DT_S, LINEAR, Array, at, linear_twin, pad_folder
 from gelslim_force.presses.ball_on_layer import BallOnLayer
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.step import Step
-from gelslim_twin.stepping.step_error import StepError
 from gelslim_twin.stepping.twin import Twin
 
 MOVE_MM, TURN_RAD = 5e-5, 5e-5
@@ -136,11 +135,31 @@ def test_without_contact_it_is_zero(pad: Path) -> None:
     np.testing.assert_array_equal(twin.step(at(0, 0, 3.5), DT_S).stiffness, np.zeros((6, 6)))
 
 
-def test_large_strain_has_none(pad: Path) -> None:
-    twin = Twin(pad, effects={"nonlinearity": "on"})
-    twin.add(Body.sphere(3.0))
-    with pytest.raises(StepError, match="linear gel"):
-        _ = twin.step(at(0, 0, 2.95), DT_S).stiffness
+@pytest.mark.slow
+@pytest.mark.parametrize(("depth", "friction"), [(0.15, 0.5), (0.8, 5.0), (1.4, 0.5)])
+def test_it_is_the_difference_quotient_at_large_strain(
+    pad: Path, depth: float, friction: float
+) -> None:
+    """Light: the fixed point over linear contacts. Deep: Newton's method on the whole gel."""
+    large = {"nonlinearity": "on"}
+    twin = Twin(pad, tolerance={"force": EXACT}, friction=friction, effects=large)
+    twin.add(Body.sphere(4.0))
+    for share in (0.4, 0.7, 0.95):
+        twin.step(at(0.1, 0.2, 4.0 - share * depth), DT_S)
+    end = at(0.12, 0.21, 4.0 - depth)
+    state, ends = twin.state, []
+    step = twin.step(end, DT_S)
+    assert step.large_strain
+    size = 0.002
+    for way in (1.0, -1.0):
+        twin.state = state
+        ends.append(twin.step(at(0.12, 0.21, 4.0 - depth + way * size), DT_S))
+        np.testing.assert_array_equal(ends[-1].gel.touch, step.gel.touch)
+    known = (ends[0].wrench - ends[1].wrench) / (2 * size)
+    np.testing.assert_allclose(step.stiffness[:, 2], known, atol=1e-3 * np.abs(known).max())
+    linear = Twin(pad, friction=friction, effects=LINEAR)
+    linear.add(Body.sphere(4.0))
+    assert step.stiffness[2, 2] > 1.02 * linear.step(end, DT_S).stiffness[2, 2]
 
 
 def test_a_relaxing_gel_has_that_of_the_elastic_one(pad: Path) -> None:

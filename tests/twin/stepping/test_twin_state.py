@@ -104,6 +104,7 @@ def test_a_state_at_large_strain_is_restored_exactly(pad: Path, tmp_path: Path) 
     for one, two in zip(carried_out(fresh, poses[4:]), known, strict=True):
         assert one.large_strain
         assert_same(one, two)
+        np.testing.assert_array_equal(one.stiffness, two.stiffness)
 
 
 def random_sequence(pad: Path, steps: int) -> None:
