@@ -21,6 +21,7 @@ import force_sigma
 import force_tables
 import page_tables
 import tolerance_tables
+import twin_steps
 import twin_tables
 from bench_data import DOCS, write_whole
 
@@ -68,6 +69,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-contact": _from("twin_ladders", twin_tables.contact_text),
         "twin-overhead": _from("twin_ladders", twin_tables.overhead_text),
     },
+    "docs/twin_steps.md": {"steps": _from("twin_steps", twin_steps.table)},
     "docs/stiffness.md": {
         "operators": _from("stiffness_ladder", page_tables.operators),
         "contacts": _from("operator_contacts", page_tables.contacts),

@@ -46,6 +46,7 @@ STEPS = (
     Step("normal_sources"),
     Step("force_sigma", quick=None),
     Step("twin_ladders"),
+    Step("twin_steps"),
     Step("rendering"),
     Step("assembly"),
     Step("force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),
