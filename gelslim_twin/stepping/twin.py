@@ -100,7 +100,7 @@ class Twin:
         request = Request.read(observe, tolerance)
         sensor = TwinSensor(load_bundle(folder))
         scene = stepped_scene(request, friction, effects, seed, pad_size_mm(sensor))
-        compliance = SurfaceCompliance(sensor.bundle, None if keep is None else Path(keep))
+        compliance = SurfaceCompliance(sensor.bundle, _made(keep))
         mechanics = StepMechanics(
             compliance, request, scene.contact.friction, scene.effects.parameters()
         )
@@ -253,6 +253,17 @@ class Twin:
         compliance = self._shared.mechanics.compliance
         key = f"{compliance.key}-{len(self._bodies)}"
         return TwinState(key, 0.0, 0, None, self._shared.mechanics.rest)
+
+
+def _made(keep: str | os.PathLike[str] | None) -> Path | None:
+    if keep is None:
+        return None
+    try:
+        Path(keep).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise StepError(f"keep: {keep}: {reason}; choose a folder you can write to") from None
+    return Path(keep)
 
 
 def _duration(dt: float) -> float:

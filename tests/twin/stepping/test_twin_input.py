@@ -61,6 +61,15 @@ def test_a_bundle_must_be_there_and_hold_what_is_observed(pad: Path, tmp_path: P
             Twin(folder, observe)
 
 
+def test_the_compliance_is_kept_for_the_next_twin(pad: Path, tmp_path: Path) -> None:
+    Twin(pad, keep=tmp_path / "kept").prepare()
+    again = Twin(pad, keep=tmp_path / "kept")
+    assert again._shared.mechanics.compliance._made.all()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StepError, match="keep"):
+        Twin(pad, keep=tmp_path / "file")
+
+
 @pytest.mark.parametrize("dt", [0.0, -0.002, float("nan"), float("inf"), "soon", None])
 def test_times_that_are_refused(pad: Path, dt: Any) -> None:
     twin = linear_twin(pad)
