@@ -338,6 +338,7 @@ def pad_light(d: Dimensions) -> LightMap:
         elevation_deg=np.array([_elevation_deg(found) for found in steep]),
         colour=colour,
         smooth_mm=SMOOTHING_MM,
+        fans=traced.fans,
     )
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gelslim_optics.light.light_fans import LightFans
 
 Array = NDArray[np.float64]
 
@@ -23,6 +26,7 @@ class LightMap:
         azimuth_deg: Mean direction (k,) in the plane; 0 is towards +x, 90 towards +y.
         elevation_deg: Mean elevation (k,) at which light rises to the face, within the gel.
         colour: Response (k, 3) of the camera's red, green and blue.
+        fans: Directions of the light as in `LightFans.sums`; None for one direction per source.
 
     Raises:
         ValueError: A shape does not fit, or a value is out of range.
@@ -34,6 +38,7 @@ class LightMap:
     azimuth_deg: Array
     elevation_deg: Array
     colour: Array
+    fans: Array | None = None
 
     def __post_init__(self) -> None:
         for name in ("x_mm", "y_mm", "irradiance", "azimuth_deg", "elevation_deg", "colour"):
@@ -58,6 +63,8 @@ class LightMap:
                 raise ValueError(f"{name} of the light must be two or more increasing values")
         if self.irradiance.min() < 0 or self.colour.min() < 0:
             raise ValueError("irradiance and colour of the light must not be negative")
+        if self.fans is not None and self.light_fans.sums.shape[0] != count:
+            raise ValueError(f"fans of {len(self.fans)} sources of light: must be {count}")
         if np.any((self.elevation_deg <= 0) | (self.elevation_deg > 90)):
             raise ValueError("elevation_deg of the light must be above 0 and at most 90")
 
@@ -72,10 +79,12 @@ class LightMap:
         elevation_deg: Array,
         colour: Array,
         smooth_mm: float = 0.0,
+        fans: Array | None = None,
     ) -> LightMap:
         """Light from the maps (k, nx, ny) of a tracer for one pad, relative to their common mean.
 
-        `smooth_mm` is the standard deviation of a Gaussian filter against the noise of the tracer.
+        `smooth_mm` is the standard deviation of a Gaussian filter against the noise of the tracer,
+        `fans` are its tallies of direction, of which a coarse part is kept.
         Raises ValueError for maps without light.
         """
         maps = np.asarray(bins, dtype=float)
@@ -94,7 +103,9 @@ class LightMap:
             for count, step in zip(maps.shape[1:], steps, strict=True)
         )
         irradiance = np.transpose(maps, (2, 1, 0)) / maps.mean()
-        return cls(x, y, irradiance, azimuth_deg, elevation_deg, colour)
+        if fans is not None:
+            fans = LightFans.of_trace(fans, (length_mm, width_mm)).sums
+        return cls(x, y, irradiance, azimuth_deg, elevation_deg, colour, fans)
 
     @property
     def sources(self) -> int:
@@ -106,6 +117,18 @@ class LightMap:
         """Unit vectors (k, 3) along which the light travels."""
         a, e = np.deg2rad(self.azimuth_deg), np.deg2rad(self.elevation_deg)
         return np.column_stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+    @cached_property
+    def light_fans(self) -> LightFans:
+        """Directions of the light at places; those of one direction each without `fans`."""
+        lower, upper = ((axis[0], axis[-1]) for axis in (self.x_mm, self.y_mm))
+        half = [(axis[1] - axis[0]) / 2 for axis in (self.x_mm, self.y_mm)]
+        corners = (lower[0] - half[0], upper[0] - half[1]), (lower[1] + half[0], upper[1] + half[1])
+        if self.fans is not None:
+            return LightFans(self.fans, *corners)
+        tangent = self.directions[:, :2] / self.directions[:, 2:]
+        sums = np.column_stack([np.ones(len(tangent)), tangent])
+        return LightFans(sums[:, None, None, None, :], *corners)
 
     def at(self, x_mm: Array, y_mm: Array) -> Array:
         """Irradiance (..., k) at points of any shape, bilinear."""
@@ -123,7 +146,10 @@ LIGHT_FIELDS = ("x_mm", "y_mm", "irradiance", "azimuth_deg", "elevation_deg", "c
 
 def light_arrays(light: LightMap) -> dict[str, Array]:
     """Return the arrays of a light map by name, as a bundle stores them."""
-    return {name: np.asarray(getattr(light, name)) for name in LIGHT_FIELDS}
+    found = {name: np.asarray(getattr(light, name)) for name in LIGHT_FIELDS}
+    if light.fans is not None:
+        found["fans"] = light.fans.astype(np.float32)
+    return found
 
 
 def red_green_sides(

@@ -66,6 +66,8 @@ class LightResult:
         tallies: Flux (source, replicate, column); for the columns see `trace_geometry`.
         maps: Flux (source, replicate, nx, ny) that arrives at the face, by bin.
         bin_area_mm2: Area of a bin.
+        fans: Flux (source, nx, ny, azimuth, elevation, 3) that arrives, by place and direction, and
+            its products with the components along x and y of its tangent d / (d·n).
     """
 
     colours: tuple[str, ...]
@@ -76,6 +78,7 @@ class LightResult:
     tallies: Array
     maps: Array
     bin_area_mm2: float
+    fans: Array
 
     def replicates(self, entry: str, colour: str | None = None) -> Array:
         """One value per replicate of an entry of the ledger, as a share of the emitted flux.
@@ -186,6 +189,7 @@ class LightResult:
             rays=self.rays * len(chosen) // len(self.colours),
             tallies=self.tallies[chosen],
             maps=self.maps[chosen],
+            fans=self.fans[chosen],
         )
 
     @property

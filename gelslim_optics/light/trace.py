@@ -47,20 +47,23 @@ class TraceOptions:
         cut: Weight below which a ray ends; its weight is counted as truncated.
         max_faces: Number of faces after which a ray ends in the same way.
         bins: Numbers of bins (nx, ny) of the irradiance map.
+        fans: Numbers of places (nx, ny) at which the directions of the light are told apart, and of
+            bins of azimuth and of the sine of the elevation.
     """
 
     split: float = 5e-2
     cut: float = 1e-6
     max_faces: int = 10_000
     bins: tuple[int, int] = (40, 40)
+    fans: tuple[int, int, int, int] = (4, 8, 12, 12)
 
     def __post_init__(self) -> None:
         if not SMALLEST_SPLIT <= self.split <= 1:
             raise ValueError(f"split = {self.split!r}: must be between {SMALLEST_SPLIT} and 1")
         if not 0 <= self.cut < 1:
             raise ValueError(f"cut = {self.cut!r}: must be at least 0 and less than 1")
-        if self.max_faces < 1 or min(self.bins) < 1:
-            raise ValueError("max_faces and both numbers of bins must be at least 1")
+        if self.max_faces < 1 or min(*self.bins, *self.fans) < 1:
+            raise ValueError("max_faces and all numbers of bins must be at least 1")
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,7 @@ class _Job:
     middle: tuple[float, float]
     limits: Array
     bins: tuple[int, int]
+    fans: tuple[int, int, int, int]
     edges: int
 
 
@@ -123,6 +127,7 @@ def trace_light(
     width = columns(len(faces))
     tallies = np.zeros((len(scene.sources), replicates, width))
     maps = np.zeros((len(scene.sources), replicates, *options.bins))
+    fans = np.zeros((len(scene.sources), *options.fans, 3))
     with nullcontext() if threads == 1 else ThreadPoolExecutor(threads) as pool:
         for s, source in enumerate(scene.sources):
             job = _job(scene, source, options)
@@ -132,9 +137,10 @@ def trace_light(
                 )
                 starts = (_centred(launch(scene, source, p), job.middle) for p in pieces)
                 key = np.random.SeedSequence([seed, r, s, 1]).generate_state(1, np.uint64)[0]
-                for sums, heat in _blocks(pool, job, starts, key):
+                for sums, heat, fan in _blocks(pool, job, starts, key):
                     tallies[s, r] += sums
                     maps[s, r] += heat
+                    fans[s] += fan
     power = sum(source.power for source in scene.sources)
     return LightResult(
         colours=tuple(source.colour for source in scene.sources),
@@ -145,6 +151,7 @@ def trace_light(
         tallies=tallies / each,
         maps=maps / each,
         bin_area_mm2=_bin_area(scene, options.bins),
+        fans=fans / (each * replicates),
     )
 
 
@@ -165,7 +172,7 @@ def trace_paths(
         starts = _centred(launch(scene, source, points), job.middle)
         key = np.random.SeedSequence([seed, 0, s, 1]).generate_state(1, np.uint64)[0]
         trail = np.zeros((each * max_points, 5))
-        _, _, written = _run(job, starts, key, 0, trail)
+        *_, written = _run(job, starts, key, 0, trail)
         trail = trail[:written]
         for number in np.unique(trail[:, 0]):
             line = trail[trail[:, 0] == number, 2:] + np.array([0.0, *job.middle])
@@ -193,6 +200,7 @@ def _job(scene: LightScene, source: Source, options: TraceOptions) -> _Job:
         middle=middle,
         limits=np.array([options.split, options.cut, options.max_faces]),
         bins=options.bins,
+        fans=options.fans,
         edges=len(names),
     )
 
@@ -205,18 +213,18 @@ def _centred(starts: Array, middle: tuple[float, float]) -> Array:
 
 def _blocks(
     pool: ThreadPoolExecutor | None, job: _Job, batches: Iterator[Array], key: Any
-) -> Iterator[tuple[Array, Array]]:
-    """Sums and maps of the blocks of rays, in their order; without a pool in this thread."""
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Sums, maps and fans of the blocks of rays, in order; without a pool in this thread."""
     first = 0
     for starts in batches:
 
-        def trace(i: int, s: Array = starts, f: int = first) -> tuple[Array, Array, int]:
+        def trace(i: int, s: Array = starts, f: int = first) -> tuple[Array, Array, Array, int]:
             return _run(job, s[i : i + BLOCK_RAYS], key, f + i)
 
         offsets = range(0, len(starts), BLOCK_RAYS)
         done = map(trace, offsets) if pool is None else pool.map(trace, offsets)
-        for sums, heat, _ in done:
-            yield sums, heat
+        for sums, heat, fan, _ in done:
+            yield sums, heat, fan
         first += len(starts)
 
 
@@ -231,10 +239,11 @@ def _kernel() -> Any:
 
 def _run(
     job: _Job, starts: Array, key: Any, first_ray: int, trail: Array | None = None
-) -> tuple[Array, Array, int]:
+) -> tuple[Array, Array, Array, int]:
     trace_block = _kernel()
 
     sums, heat = np.zeros(columns(job.edges)), np.zeros(job.bins)
+    fans = np.zeros((*job.fans, 3))
     trail = np.zeros((0, 5)) if trail is None else trail
     # Each branch that waits has at least the split weight, of a total of 1.
     depth = math.ceil(1 / job.limits[0]) + 4
@@ -254,9 +263,10 @@ def _run(
         np.empty(depth, dtype=np.uint64),
         sums,
         heat,
+        fans,
         trail,
     )
-    return sums, heat, int(written)
+    return sums, heat, fans, int(written)
 
 
 def _bin_area(scene: LightScene, bins: tuple[int, int]) -> float:

@@ -63,8 +63,9 @@ def map_arrival(
     nz: float,
     sums: Any,
     heat: Any,
+    fans: Any,
 ) -> None:
-    """Add the flux w that reaches the mapped face at the position of the ray."""
+    """Add the flux w that reaches the mapped face at the position and direction of the ray."""
     x, y, z, dx, dy, dz = ray[0], ray[1], ray[2], ray[3], ray[4], ray[5]
     ay, az, by, bz = shape[e, 0], shape[e, 1], shape[e, 2], shape[e, 3]
     if shape[e, 7] == 0.0:
@@ -87,8 +88,17 @@ def map_arrival(
     # Normal to the right of the face; y grows along (|nz|, -ny sign nz).
     up = -nz if nz < 0 else nz
     ty, tz = up, -ny if nz > 0 else ny
-    sums[SLOPE] -= w * (dy * ty + dz * tz) / max(cosine, 1e-12)
+    across = dy * ty + dz * tz
+    sums[SLOPE] -= w * across / max(cosine, 1e-12)
     sums[SLOPE_ALONG] -= w * dx / max(cosine, 1e-12)
+    px, ps, turns, rises = fans.shape[0], fans.shape[1], fans.shape[2], fans.shape[3]
+    i, j = int(px * (x - box[2]) / (box[3] - box[2])), int(ps * part)
+    turn = int(turns * (0.5 + math.atan2(across, dx) / (2 * math.pi)))
+    rise = int(rises * cosine)
+    cell = fans[min(max(i, 0), px - 1), min(max(j, 0), ps - 1), turn % turns, min(rise, rises - 1)]
+    cell[0] += w
+    cell[1] += w * dx / max(cosine, 1e-12)
+    cell[2] += w * across / max(cosine, 1e-12)
 
 
 @njit(**COMPILED)

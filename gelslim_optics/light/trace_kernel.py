@@ -69,9 +69,10 @@ def trace_block(
     seeds: Any,
     sums: Any,
     heat: Any,
+    fans: Any,
     trail: Any,
 ) -> int:
-    """Trace rays (n, 8) into `sums` and `heat`; returns the number of rows written to `trail`.
+    """Trace rays (n, 8) into `sums`, `heat`, `fans`; returns the rows written to `trail`.
 
     `limits`: smallest weight that is split at a face, weight at which a ray ends, largest number
     of faces. `ray` (7), `stack` (d, 7), `notes` (d, 4) and `seeds` (d) are work space. The rows of
@@ -183,7 +184,9 @@ def trace_block(
                     break
                 if coats[beyond, 0] > 0.0:
                     if e >= 0 and facts[e, OWNER] == face:
-                        map_arrival(shape, box, e, ray, w, cosine, normal[1], normal[2], sums, heat)
+                        map_arrival(
+                            shape, box, e, ray, w, cosine, normal[1], normal[2], sums, heat, fans
+                        )
                     kept = w * turn_back(coats, beyond, ray, path, bounce, normal, cosine)
                     if e in (END, GEL_END):
                         sums[ENDS_STOPPED] += w - kept

@@ -25,10 +25,13 @@ that faces the light."""
 
 
 class ShadingParameters(EffectParameters):
-    """The coat of the gel reflects diffusely, and part of its light comes from all directions."""
+    """The coat of the gel reflects diffusely, in each direction of the traced light."""
 
     ambient_share: float = Field(
-        default=0.3, ge=0, le=1, description="Share of the light that does not depend on the slope"
+        default=0.0,
+        ge=0,
+        le=1,
+        description="Further share of the light that does not depend on the slope",
     )
 
 

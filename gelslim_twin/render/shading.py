@@ -1,8 +1,9 @@
 """Shading of the deformed gel: each source's light changes with the slope towards it.
 
 The coat is a Lambertian reflector. Light in the direction d (unit vector) gives the irradiance d·n
-on a surface with outward normal n, and none where d·n is negative (attached shadow). An ambient
-share of the light, scattered by the coat, does not depend on the slope.
+on a surface with outward normal n, and none where d·n is negative (attached shadow). Traced light
+has its directions at each place, with what the coat has scattered back; see `LightFans`. A further
+ambient share does not depend on the slope.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_optics.light.light_fans import STEEPEST
 from gelslim_twin.render.surroundings import Sight
 
 if TYPE_CHECKING:
@@ -28,12 +30,12 @@ _ROUNDS, _NEAR_MM = 8, 1e-3
 class Shading:
     """Ambient share of the light, and spacing `pixel_step` of the lattice that is computed."""
 
-    ambient_share: float = 0.3
+    ambient_share: float = 0.0
     pixel_step: int = 4
 
     def gain(self, sight: Sight, state: SurfaceState, light: LightMap) -> NDArray[np.float32]:
         """Irradiance (rows, columns, k) over that of a level surface, on the lattice of `sight`."""
-        from gelslim_twin.render.surface_kernel import lambert, seen_slopes
+        from gelslim_twin.render.surface_kernel import fan_light, seen_slopes
 
         rest = sight.rest_mm.reshape(-1, 2)
         slopes = np.zeros((len(rest), 2))
@@ -42,5 +44,9 @@ class Shading:
             rest, sight.slope.reshape(-1, 2), _ROUNDS, _NEAR_MM, slopes,
         )  # fmt: skip
         gain = np.empty((len(rest), light.sources), dtype=np.float32)
-        lambert(slopes, light.directions, self.ambient_share, gain)
+        fans = light.light_fans
+        fan_light(
+            slopes, rest, fans.tables, np.array(fans.lower_mm), np.array(fans.upper_mm), STEEPEST,
+            self.ambient_share, gain,
+        )  # fmt: skip
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)

@@ -111,16 +111,50 @@ def seen_slopes(
 
 
 @njit(**COMPILED)
-def lambert(slopes: Any, directions: Any, ambient: Any, out: Any) -> None:
+def fan_light(
+    slopes: Any,
+    rest: Any,
+    tables: Any,
+    lower: Any,
+    upper: Any,
+    steepest: Any,
+    ambient: Any,
+    out: Any,
+) -> None:
     """Write light (n, k) float32 over that of a level surface, at slopes (n, 2).
 
-    Sources travel along unit `directions` (k, 3); the share `ambient` is blind to the slope.
+    `tables` (k, py, px, m, m) hold it, times the length of the normal (-slope, 1), at places in the
+    middle of equal parts of the pad from `lower` to `upper` (2,), by slope along y and x from
+    -`steepest` to `steepest`; both are interpolated linearly. The share `ambient` is blind to the
+    slope.
     """
+    places_y, places_x, count = tables.shape[1], tables.shape[2], tables.shape[3]
     for n in range(slopes.shape[0]):
-        a, b = slopes[n, 0], slopes[n, 1]
-        size = math.sqrt(1.0 + a * a + b * b)
-        for k in range(directions.shape[0]):
-            up = directions[k, 2]
-            facing = (up - a * directions[k, 0] - b * directions[k, 1]) / (size * up)
-            direct = max(facing, 0.0)
-            out[n, k] = direct + ambient * (1.0 - direct)
+        x = (rest[n, 0] - lower[0]) / (upper[0] - lower[0]) * places_x - 0.5
+        y = (rest[n, 1] - lower[1]) / (upper[1] - lower[1]) * places_y - 0.5
+        i, u = _part(x, places_x)
+        j, v = _part(y, places_y)
+        a, s = _part((slopes[n, 0] / steepest + 1.0) * (count - 1) / 2, count)
+        b, t = _part((slopes[n, 1] / steepest + 1.0) * (count - 1) / 2, count)
+        size = math.sqrt(1.0 + slopes[n, 0] ** 2 + slopes[n, 1] ** 2)
+        for k in range(tables.shape[0]):
+            light = 0.0
+            for q in range(2):
+                for p in range(2):
+                    share = (v if q else 1.0 - v) * (u if p else 1.0 - u)
+                    if share == 0.0:
+                        continue
+                    table = tables[k, j + q, i + p]
+                    low = (1.0 - s) * table[b, a] + s * table[b, a + 1]
+                    high = (1.0 - s) * table[b + 1, a] + s * table[b + 1, a + 1]
+                    light += share * ((1.0 - t) * low + t * high)
+            light /= size
+            out[n, k] = light + ambient * (1.0 - light)
+
+
+@njit(**COMPILED)
+def _part(at: Any, count: Any) -> Any:
+    """Number of the value before a coordinate held to `count` values, and the part beyond it."""
+    held = min(max(at, 0.0), count - 1.0)
+    i = min(math.floor(held), max(count - 2, 0))
+    return i, held - i

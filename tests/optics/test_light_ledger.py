@@ -23,7 +23,17 @@ def result(seed: int = 1, replicates: int = REPLICATES) -> LightResult:
     rng = np.random.default_rng(seed)
     tallies = rng.uniform(0.1, 1.0, (3, replicates, column.columns(len(EDGES))))
     maps = rng.uniform(0.0, 1.0, (3, replicates, 11, 21))
-    return LightResult(COLOURS, SHARES, EDGES, "face", 1000, tallies, maps, 0.25)
+    return LightResult(
+        COLOURS,
+        SHARES,
+        EDGES,
+        "face",
+        1000,
+        tallies,
+        maps,
+        0.25,
+        np.zeros((len(COLOURS), 1, 1, 1, 1, 3)),
+    )
 
 
 def weighted(values: np.ndarray, colour: str | None) -> np.ndarray:

@@ -51,7 +51,7 @@ def tallied(weight: float, cosine: float, split: float, count: int) -> np.ndarra
     found = []
     for block in range(16):
         rows = np.repeat(row[None], count // 16, axis=0)
-        sums, _, _ = _run(job, rows, np.uint64(99), block * count)
+        sums, *_ = _run(job, rows, np.uint64(99), block * count)
         assert sums[[leaked, returned]].sum() == pytest.approx(weight * len(rows), rel=1e-9)
         found.append(sums[leaked] / len(rows))
     return np.array(found)

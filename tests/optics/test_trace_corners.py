@@ -32,7 +32,7 @@ def test_no_ray_is_lost_at_a_corner(mirror: str, crown: float) -> None:
             slope = rng.choice([0.0, rng.uniform(-0.5, 0.5)])
             size = math.sqrt(slope**2 + dy * dy + dz * dz)
             starts.append((0.0, y, floor, slope / size, dy / size, dz / size, 1.0, 0.0))
-    sums, _, _ = _run(job, np.array(starts), np.uint64(3), 0)
+    sums, *_ = _run(job, np.array(starts), np.uint64(3), 0)
     assert sums[LOST] == 0
     booked = sums[: ENDS_STOPPED + 1].sum() + sums[PER_EDGE:].sum()
     assert booked == pytest.approx(len(starts), abs=1e-8)

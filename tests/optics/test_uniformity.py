@@ -18,7 +18,9 @@ X = (np.arange(BINS) + 0.5) / BINS
 def result(maps: NDArray[np.float64]) -> LightResult:
     """One lamp whose replicates are `maps` (replicate, x, y)."""
     tallies = np.zeros((1, len(maps), column.PER_EDGE))
-    return LightResult(("red",), (1.0,), (), "face", maps.size, tallies, maps[None], 1.0)
+    return LightResult(
+        ("red",), (1.0,), (), "face", maps.size, tallies, maps[None], 1.0, np.zeros(0)
+    )
 
 
 def ramp() -> NDArray[np.float64]:
