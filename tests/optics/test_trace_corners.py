@@ -50,7 +50,7 @@ def test_rays_started_on_corners_of_the_foot() -> None:
         for y, z in (shape[:2], shape[2:4])
         for a in angles
     ]
-    sums, _, _ = _run(job, np.array(starts), np.uint64(3), 0)
+    sums, *_ = _run(job, np.array(starts), np.uint64(3), 0)
     assert sums[LOST] == 0
     # Half head out through the neighbouring wall at once; at one of the ends by signs alone.
     assert sums[CORNERS] == 250

@@ -119,7 +119,7 @@ def agree(
     names = column.face_names(scene)
     for number, row in enumerate(rows):
         centred = row - np.array([0, *job.middle, 0, 0, 0, 0, 0])
-        sums, heat, _ = _run(job, centred[None], np.uint64(3), number)
+        sums, heat, *_ = _run(job, centred[None], np.uint64(3), number)
         slow = SlowTracer(scene, source, CUT, BINS)
         if row[6] > 0:
             through = "ends" if isinstance(source, EndRow) else source.edge
@@ -224,7 +224,7 @@ def test_rays_beside_the_foot_have_missed_it_with_what_it_did_not_reflect() -> N
 def test_a_ray_that_starts_outside_of_its_medium_is_lost() -> None:
     scene, source = crowned(), LedRow("foot_right", (1.0,))
     job = _job(scene, source, TraceOptions(split=1e-4))
-    sums, _, _ = _run(job, np.array([[0.0, 0, 30, 0, 0, 1, 0.7, 0]]), np.uint64(3), 0)
+    sums, *_ = _run(job, np.array([[0.0, 0, 30, 0, 0, 1, 0.7, 0]]), np.uint64(3), 0)
     assert sums[column.LOST] == 0.7
     assert sums[column.CROSSINGS] == 1
     assert sums.sum() == pytest.approx(1.7)
