@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,6 +19,7 @@ from gelslim_force.pipeline import ForcePipeline
 Progress = Callable[[str, int, int], None]
 TOTAL = "total"
 """Name of the sum of a frame's stages."""
+_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _TIMED_FRAMES = 4096
 """Frames at the end of a run over which the median times are taken: memory does not grow."""
 
@@ -38,7 +40,10 @@ class RunSummary:
     """Frames of a camera that were dropped for newer ones, as the reader of the frames counts."""
     with_forces: int = 0
     problems: dict[str, int] = field(default_factory=dict)
-    """Number of frames with each problem; problems that differ in numbers only count as one."""
+    """Number of frames with each problem; of those that differ in numbers only, the first stands
+    for all."""
+    first_of_kind: dict[str, str] = field(default_factory=dict)
+    """Those first problems by their words without numbers."""
     least_coverage: float = 1.0
     largest_force_n: float = 0.0
     last: FrameResult | None = None
@@ -54,8 +59,9 @@ class RunSummary:
         if result.stage_ms:
             self._times(TOTAL).append(sum(result.stage_ms.values()))
         for problem in result.problems:
-            kind = "".join("#" if c.isdigit() else c for c in problem)
-            self.problems[kind] = self.problems.get(kind, 0) + 1
+            kind = _NUMBER.sub("", problem)
+            first = self.first_of_kind.setdefault(kind, problem)
+            self.problems[first] = self.problems.get(first, 0) + 1
         if result.tracks is not None:
             self.least_coverage = min(self.least_coverage, result.coverage)
         if result.wrench is not None:

@@ -271,7 +271,8 @@ def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures:
     if wrench is not None:
         say(f"Last frame: {wrench}.")
     for problem, count in sorted(summary.problems.items(), key=lambda item: -item[1])[:5]:
-        say(f"{count} frames: {problem}.", style="yellow")
+        frames = "1 frame" if count == 1 else f"{count} frames, the first"
+        say(f"{frames}: {problem}.", style="yellow")
     times = summary.median_ms()
     if times:
         total = times.pop("total")

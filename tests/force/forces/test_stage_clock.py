@@ -67,3 +67,11 @@ def test_stages_of_one_frame_add_up_to_its_time(monkeypatch: pytest.MonkeyPatch)
     for name in ("track", "force", "track"):
         clock.stage(name)
     assert clock.stages == pytest.approx({"track": 3.0, "force": 3.0})
+
+
+def test_problems_that_differ_in_numbers_count_with_the_first() -> None:
+    made = RunSummary()
+    for force in (0.25, 13.5, 7):
+        made.add(FrameResult(0, 0.0, problems=(f"a force of {force} N is too large",)))
+    made.add(FrameResult(0, 0.0, problems=("nothing is seen",)))
+    assert made.problems == {"a force of 0.25 N is too large": 3, "nothing is seen": 1}
