@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.detection.detection import as_planes
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 
 Array = NDArray[np.float64]
@@ -21,9 +22,7 @@ _LONGEST_RUN = 1.6
 """Equal rows one after the other, over the pitch: so many always meet dots."""
 _SAMPLES = 128
 """Pixels of a row that are looked at."""
-_PARTS = 8
-"""Parts of a row, of which most must be sharp."""
-_SHARPEST = 1.8
+_SHARPEST, _RANK = 1.8, 4
 """Sharpness of one line over that of the fourth sharpest: pictures of gels have lines alike, and
 those compressed in blocks have many sharp ones."""
 _LEAST_SHARP = 15
@@ -74,17 +73,16 @@ class PictureFaults:
     def broken(self, image: NDArray[np.uint8]) -> str:
         """What is wrong with the rows or columns of a picture (h, w) or (h, w, 3).
 
-        Empty if nothing is.
+        Empty if nothing is. Raises ValueError if the array is no picture.
         """
-        (left, top), (right, bottom) = self._box
-        part: Any = image[top:bottom, left:right]
-        for lines, turned in (("rows", part), ("columns", part.swapaxes(0, 1))):
-            some = _grey(turned[:, :: max(1, turned.shape[1] // _SAMPLES)])
-            count = _longest_run(some)
+        from gelslim_force.tracking.line_kernel import longest_run
+
+        for words, lines in self._lines_of(as_planes(image)).items():
+            count = longest_run(lines)
             if count > _LONGEST_RUN * self._pitch_px:
-                return _FROZEN.format(count=count, lines=lines)
-            if _sharpest(some) > _SHARPEST:
-                return _EDGE.format(lines=lines)
+                return _FROZEN.format(count=count, lines=words)
+            if _sharpest(lines) > _SHARPEST:
+                return _EDGE.format(lines=words)
         return ""
 
     def torn(self, displacement_px: Array, growth: Array) -> str:
@@ -94,38 +92,53 @@ class PictureFaults:
             displacement_px: (n, 2) motion of the markers; NaN for those not seen.
             growth: (n,) logarithm of the size of their dots over that at rest; NaN likewise.
         """
-        count = self._strained(displacement_px)
+        from gelslim_force.tracking.median_kernel import line_medians, median
+        from gelslim_force.tracking.tear_kernel import strained
+
+        limit_px = _MOST_STRAIN * self._pitch_px
+        count = strained(displacement_px, self.reference.neighbours, limit_px)
         if count > _FEW_STRAINED:
             return _STRAINED.format(count=count)
-        usual = float(np.nanmedian(growth)) if np.isfinite(growth).any() else 0.0
+        usual = median(growth)
         for lines in self._lines:
-            off = np.abs(_medians(growth, lines) - usual)
-            if (off > _LARGEST_GROWTH).sum() >= _FEW_GROWN:
+            sizes, motion = np.empty((len(lines), 1)), np.empty((len(lines), 2))
+            line_medians(growth[:, None], lines, _LEAST_IN_LINE, sizes)
+            if np.count_nonzero(np.abs(sizes - usual) > _LARGEST_GROWTH) >= _FEW_GROWN:
                 return _OTHER_SIZES
-            x, y = (_medians(displacement_px[:, k], lines) for k in (0, 1))
-            motion = np.column_stack([x, y])
-            jump = _jump_px(motion[np.isfinite(x)])
+            line_medians(displacement_px, lines, _LEAST_IN_LINE, motion)
+            jump = _jump_px(motion[np.isfinite(motion[:, 0])])
             if jump > _LEAST_JUMP * self._pitch_px:
                 return _TORN.format(jump=jump)
         return ""
 
-    def _strained(self, displacement_px: Array) -> int:
-        """Number of pairs of direct neighbours that moved against each other too far."""
-        near = self.reference.neighbours[:, :4]
-        apart = displacement_px[near] - displacement_px[:, None]
-        far = np.square(apart).sum(axis=2) > (_MOST_STRAIN * self._pitch_px) ** 2
-        return int((far & (near >= 0)).sum()) // 2
+    def _lines_of(self, planes: NDArray[np.uint8]) -> dict[str, Any]:
+        """Rows and columns of the part of a picture (h, w, c) that has markers, by their name."""
+        from gelslim_force.tracking import line_kernel as lk
+
+        left, top, right, bottom = self._box(*planes.shape[:2])
+        across, down = right - left, bottom - top
+        steps = max(1, across // _SAMPLES), max(1, down // _SAMPLES)
+        rows = np.empty((-(-across // steps[0]), down), dtype=np.int16)
+        columns = np.empty((-(-down // steps[1]), across), dtype=np.int16)
+        lk.rows(planes, left, top, steps[0], rows)
+        lk.columns(planes, left, top, steps[1], columns)
+        return {"rows": rows, "columns": columns}
+
+    def _box(self, height: int, width: int) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom of the part of the picture that has markers."""
+        (left, top), (right, bottom) = self._corners
+        return max(left, 0), max(top, 0), min(right, width), min(bottom, height)
 
     @cached_property
     def _pitch_px(self) -> float:
         return float(np.median(self.reference.pitch_px))
 
     @cached_property
-    def _box(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Corners of the part of the picture that has markers."""
+    def _corners(self) -> tuple[list[int], list[int]]:
+        """First and last corner of the markers, the latter excluded."""
         places = self.reference.positions_px
         first, last = places.min(axis=0).astype(int), places.max(axis=0).astype(int) + 1
-        return (first[0], first[1]), (last[0], last[1])
+        return first.tolist(), last.tolist()
 
     @cached_property
     def _lines(self) -> tuple[NDArray[np.int64], ...]:
@@ -140,52 +153,23 @@ def _table(sites: NDArray[np.int64], axis: int) -> NDArray[np.int64]:
     return table if axis == 0 else np.ascontiguousarray(table.T)
 
 
-def _medians(values: Array, lines: NDArray[np.int64]) -> Array:
-    """(lines,) lower medians of values (n,); NaN for lines with few values that are not NaN."""
-    ranked = np.sort(np.where(lines >= 0, values[lines], np.nan), axis=1)
-    count = np.isfinite(ranked).sum(axis=1)
-    middle = ranked[np.arange(len(lines)), np.maximum(count - 1, 0) // 2]
-    return np.where(count >= _LEAST_IN_LINE, middle, np.nan)
+def _sharpest(lines: Any) -> float:
+    """How sharp the sharpest line is, over most of its length, against the fourth sharpest."""
+    from gelslim_force.tracking import line_kernel as lk
 
-
-def _grey(part: Any) -> Any:
-    """Sum of the colours of a part (h, w) or (h, w, 3) of a picture."""
-    if part.ndim == 2 or part.shape[2] < 3:
-        return part.reshape(*part.shape[:2], -1)[..., 0].astype(np.int16)
-    return part[..., 0].astype(np.int16) + part[..., 1] + part[..., 2]
-
-
-def _longest_run(rows: Any) -> int:
-    """Number of equal rows one after the other."""
-    same = (rows[1:] == rows[:-1]).all(axis=1)
-    ends = np.flatnonzero(~np.concatenate([[False], same, [False]]))
-    return int(np.diff(ends).max())
-
-
-def _sharpest(rows: Any) -> float:
-    """How sharp the sharpest row is, over most of its length, against the fourth sharpest."""
-    steps = np.diff(rows, axis=0)
-    bends = np.abs(2 * steps[1:-1] - steps[:-2] - steps[2:])
-    length = bends.shape[1] // _PARTS
-    parts = bends[:, : length * _PARTS].reshape(len(bends), _PARTS, length).sum(axis=2)
-    ranked = np.sort(np.sort(parts, axis=1)[:, _PARTS // 3])
-    return float(ranked[-1] / max(ranked[-4], _LEAST_SHARP * length))
+    sharp = np.empty(max(lines.shape[1] - 3, 0), dtype=np.int32)
+    if len(sharp) < _RANK:
+        return 0.0
+    lk.sharpness(lines, sharp)
+    ranked = np.partition(sharp, (-_RANK, -1))
+    return float(ranked[-1] / max(ranked[-_RANK], _LEAST_SHARP * (len(lines) // lk.PARTS)))
 
 
 def _jump_px(motion: Array) -> float:
     """How far two parts of lines (k, 2) are apart that move as one each; 0 if there is one part."""
-    count = len(motion)
-    if count < _LEAST_LINES:
+    from gelslim_force.tracking import tear_kernel as tk
+
+    if len(motion) < _LEAST_LINES:
         return 0.0
-    before = np.arange(1, count)[:, None]
-    sums = np.cumsum(motion, axis=0)
-    first, second = sums[:-1] / before, (sums[-1] - sums[:-1]) / (count - before)
-    between = before[:, 0] * (count - before[:, 0]) / count * np.square(second - first).sum(axis=1)
-    split = int(np.argmax(between))
-    jump = second[split] - first[split]
-    size = float(np.hypot(*jump))
-    spread = float(np.square(motion - sums[-1] / count).sum())
-    steep = float((motion[split + 1] - motion[split]) @ jump) / max(size, 1e-12) ** 2
-    if between[split] < _LEAST_EXPLAINED * spread or steep < _LEAST_STEEP:
-        return 0.0
-    return size
+    explained, steep, size = tk.jump(motion)
+    return size if explained >= _LEAST_EXPLAINED and steep >= _LEAST_STEEP else 0.0
