@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -120,15 +121,19 @@ class FrameCheck:
             return _TOO_FEW.format(tracks.coverage, self.least_coverage)
         if tracked.slipped:
             return _SLIPPED
+        from gelslim_force.tracking.median_kernel import median
+
         growth, _ = self.whole.changes(tracked)
-        if np.nanmedian(growth) > _LARGEST_BLUR:
+        if median(growth) > _LARGEST_BLUR:
             return _BLURRED
         moved_px = np.where(tracks.tracked[:, None], tracks.displacement_px, np.nan)
         return self.faults.torn(moved_px, growth) or self.unseen.problem(tracks.tracked)
 
     def moved(self, tracks: Tracks) -> str:
         """Why markers that no drift explains have moved too far; empty if they have not."""
-        moved_px = tracks.displacement_px[tracks.tracked]
-        usual_mm = self.mm_per_px * float(np.hypot(*np.median(moved_px, axis=0)))
+        from gelslim_force.tracking.median_kernel import median
+
+        moved_px = np.ascontiguousarray(tracks.displacement_px[tracks.tracked].T)
+        usual_mm = self.mm_per_px * math.hypot(*map(median, moved_px))
         share = usual_mm / self.unseen.thickness_mm
         return _ALL_MOVED.format(usual_mm, share, _LARGEST_USUAL) if share > _LARGEST_USUAL else ""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.frames.read_only import read_only
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 
 Array = NDArray[np.float64]
@@ -21,11 +24,11 @@ def noise_px(reference: ReferenceLattice, displacement_px: Array) -> float:
     displacement varies. Unknown displacements (NaN) are ignored. The result is 0 if fewer than
     eight markers have four neighbours.
     """
-    near = reference.neighbours[:, :4]
-    complete = (near >= 0).all(axis=1)
-    around = displacement_px[near[complete]].mean(axis=1)
-    off = displacement_px[complete] - around
-    return robust_sigma(off[np.isfinite(off).all(axis=1)]) / np.sqrt(1.25)
+    from gelslim_force.tracking.noise_kernel import deviations
+
+    off = np.empty((len(reference), 2))
+    count = deviations(read_only(displacement_px), reference.neighbours, off)
+    return robust_sigma(off[:count]) / math.sqrt(1.25)
 
 
 def robust_sigma(values: Array) -> float:

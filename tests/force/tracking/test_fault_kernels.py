@@ -1,14 +1,17 @@
-"""The compiled looks at lines of a picture and of markers against plain NumPy."""
+"""The compiled looks at lines of a picture, at markers and at their dots against plain NumPy."""
 
 from __future__ import annotations
-
-import warnings
 
 import numpy as np
 import pytest
 
 from gelslim_force.detection.detection import as_planes
-from gelslim_force.tracking import line_kernel, median_kernel, tear_kernel
+from gelslim_force.lattice.reference_lattice import ReferenceLattice
+from gelslim_force.tracking import line_kernel, median_kernel, tear_kernel, whole_kernel
+from gelslim_force.tracking.marker_noise import noise_px, robust_sigma
+
+SITES = np.stack(np.mgrid[:14, :16], axis=-1).reshape(-1, 2)
+LATTICE = ReferenceLattice(SITES, SITES[:, ::-1] * 17.0, np.arange(len(SITES)))
 
 
 def sharpness(rows: np.ndarray) -> np.ndarray:
@@ -84,17 +87,12 @@ def test_medians_leave_out_what_is_not_known() -> None:
 
 def test_pairs_that_part() -> None:
     rng = np.random.default_rng(4)
-    side = np.arange(64).reshape(8, 8)
-    padded = np.pad(side, 1, constant_values=-1)
-    near = np.stack(
-        [padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:]], axis=-1
-    ).reshape(64, 4)
-    motion = rng.normal(size=(64, 2))
-    motion[rng.random(64) < 0.1] = np.nan
+    motion = rng.normal(size=(len(SITES), 2))
+    motion[rng.random(len(SITES)) < 0.1] = np.nan
+    near = LATTICE.neighbours[:, :4]
     apart = np.linalg.norm(motion[near] - motion[:, None], axis=2)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert tear_kernel.strained(motion, near, 1.5) == ((apart > 1.5) & (near >= 0)).sum() // 2
+    count = ((apart > 1.5) & (near >= 0)).sum() // 2
+    assert tear_kernel.strained(motion, LATTICE.neighbours, 1.5) == count > 0
 
 
 def test_the_division_of_lines_in_two_parts() -> None:
@@ -104,3 +102,63 @@ def test_the_division_of_lines_in_two_parts() -> None:
         motion[count // 3 :] += [1.0, -2.0]
         np.testing.assert_allclose(tear_kernel.jump(motion), jump(motion), rtol=1e-9)
     assert tear_kernel.jump(np.full((6, 2), 0.25))[2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_size_and_stretch_are_those_of_the_eigenvalues() -> None:
+    rng = np.random.default_rng(6)
+    axes = rng.normal(size=(2, 30, 2, 2)) + 2 * np.eye(2)
+    now, rest = axes @ axes.swapaxes(-1, -2)
+    dots = rng.permutation(30)
+    dots[:4] = -1
+    growth, stretch = np.empty(30), np.empty(30)
+    as_rows = [np.stack([m[:, 0, 0], m[:, 0, 1], m[:, 1, 1]], axis=1) for m in (now, rest)]
+    whole_kernel.changes(dots, *as_rows, growth, stretch)
+    assert np.isnan(growth[:4]).all()
+    assert np.isnan(stretch[:4]).all()
+    for marker in range(4, 30):
+        ratio = np.linalg.eigvals(np.linalg.solve(rest[marker], now[dots[marker]])).real
+        assert growth[marker] == pytest.approx(np.log(ratio.prod()) / 2)
+        assert stretch[marker] == pytest.approx(abs(np.log(ratio[0] / ratio[1])) / 2)
+
+
+def test_dots_that_grow_otherwise_than_those_around() -> None:
+    rng, near = np.random.default_rng(7), LATTICE.neighbours
+    for spread in (0.05, 0.1, 0.3):
+        growth = rng.normal(0, spread, len(SITES))
+        growth[rng.random(len(SITES)) < 0.1] = np.nan
+        around = np.where(near >= 0, growth[near], np.nan)
+        around = np.where(np.isnan(around), growth[:, None], around)
+        expected = np.abs(growth - np.median(around, axis=1)) > 0.15
+        found = np.empty(len(SITES), dtype=bool)
+        whole_kernel.far_from_neighbours(growth, near, 0.15, found)
+        np.testing.assert_array_equal(found, expected)
+        assert 0 < expected.sum() < len(SITES) or spread < 0.1
+
+
+def test_markers_beside_the_inside_of_a_gap() -> None:
+    rng, near = np.random.default_rng(8), LATTICE.neighbours
+    there = near[:, :8] >= 0
+    seen = 0
+    for radius, worn in ((0.0, 0.02), (2.5, 0.02), (4.0, 0.02), (4.0, 0.3)):
+        whole = np.hypot(*(SITES - [6, 5]).T) >= radius
+        whole &= rng.random(len(SITES)) >= worn
+        missing = (there & ~whole[near[:, :8]]).sum(axis=1)
+        inside = ~whole & (missing == there.sum(axis=1)) & (missing >= 5)
+        expected = ((near >= 0) & inside[near]).any(axis=1)
+        if (~whole & (missing < there.sum(axis=1) / 2)).mean() > 0.05:
+            expected[:] = False
+        found = np.empty(len(SITES), dtype=bool)
+        whole_kernel.beside_gap(whole, near, 8, 5, 0.05, found)
+        np.testing.assert_array_equal(found, expected)
+        seen += expected.sum()
+    assert seen > 20
+
+
+def test_noise_is_told_by_the_deviation_from_four_neighbours() -> None:
+    motion = np.random.default_rng(9).normal(size=(len(SITES), 2))
+    motion[[3, 77, 150]] = np.nan
+    inner = LATTICE.neighbours[(LATTICE.neighbours[:, :4] >= 0).all(axis=1), :4]
+    own = motion[(LATTICE.neighbours[:, :4] >= 0).all(axis=1)]
+    off = own - motion[inner].mean(axis=1)
+    expected = robust_sigma(off[np.isfinite(off).all(axis=1)]) / np.sqrt(1.25)
+    assert noise_px(LATTICE, motion) == pytest.approx(expected, rel=1e-12)

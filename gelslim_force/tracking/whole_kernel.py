@@ -1,0 +1,87 @@
+"""Compiled search for dots that are not seen whole. Import it only where it runs (numba).
+
+`growth` (n,) and `stretch` (n,) are the logarithms of the size and stretch of the markers' dots
+over those at rest, NaN for those not seen. `near` (n, k) are the neighbours of each marker on the
+lattice, the nearest first, or -1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gelslim_force.detection.darkness_kernel import COMPILED
+
+_LEAST_PRODUCT = 1e-12
+
+
+@njit(**COMPILED)
+def changes(dots: Any, moments: Any, rest: Any, growth: Any, stretch: Any) -> None:
+    """Write growth and stretch of the `dots` (n,) of the markers, -1 for those not seen.
+
+    `moments` (m, 3) are those of the dots, `rest` (n, 3) those of the markers' dots at rest.
+    """
+    for i in range(len(dots)):
+        growth[i] = stretch[i] = math.nan
+        if dots[i] >= 0:
+            now, before = moments[dots[i]], rest[i]
+            # The eigenvalues of now / before follow from determinants and the mixed product.
+            mixed = now[0] * before[2] + now[2] * before[0] - 2 * now[1] * before[1]
+            start = before[0] * before[2] - before[1] ** 2
+            product = max((now[0] * now[2] - now[1] ** 2) / start, _LEAST_PRODUCT)
+            ratio = mixed / (2 * start) / math.sqrt(product)
+            growth[i], stretch[i] = math.log(product) / 2, math.acosh(max(ratio, 1.0))
+
+
+@njit(**COMPILED)
+def far_from_neighbours(growth: Any, near: Any, limit: Any, far: Any) -> None:
+    """Write which dots (n,) have grown otherwise than the median of the dots around them.
+
+    Neighbours that are not seen, or not there, count as the dot itself.
+    """
+    count = near.shape[1]
+    around = np.empty(count)
+    for i in range(len(growth)):
+        alike = 0
+        for k in range(count):
+            value = growth[near[i, k]] if near[i, k] >= 0 else math.nan
+            around[k] = growth[i] if math.isnan(value) else value
+            alike += abs(growth[i] - around[k]) <= limit
+        # If more than half are alike, so are the two in the middle, and their mean.
+        if 2 * alike > count or math.isnan(growth[i]):
+            far[i] = False
+        else:
+            around.sort()
+            middle = (around[(count - 1) // 2] + around[count // 2]) / 2
+            far[i] = abs(growth[i] - middle) > limit
+
+
+@njit(**COMPILED)
+def beside_gap(whole: Any, near: Any, next_to: Any, fewest: Any, worn: Any, beside: Any) -> None:
+    """Write which markers (n,) are neighbours of the inside of a gap.
+
+    Inside are markers that are not `whole`, with at least `fewest` of the first `next_to`
+    neighbours, none of them whole. Where more than a share `worn` of the markers miss their dot and
+    less than half of those around it, all gaps are wear.
+    """
+    count = len(whole)
+    inside = np.zeros(count, dtype=np.bool_)
+    single = inner = 0
+    for i in range(count):
+        there = missing = 0
+        for k in range(next_to):
+            if near[i, k] >= 0:
+                there += 1
+                missing += not whole[near[i, k]]
+        single += not whole[i] and 2 * missing < there
+        inside[i] = not whole[i] and missing == there and missing >= fewest
+        inner += inside[i]
+    beside[:] = False
+    if inner == 0 or single > worn * count:
+        return
+    for i in range(count):
+        for k in range(near.shape[1]):
+            beside[i] |= near[i, k] >= 0 and inside[near[i, k]]
