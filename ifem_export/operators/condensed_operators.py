@@ -18,7 +18,7 @@ from scipy import sparse
 from ifem_export.assembly.occupancy_table import occupancy_table
 from ifem_export.operators.adjoint_fields import AdjointFields
 from ifem_export.operators.pad_system import PadSystem, checked_field
-from ifem_export.operators.solver import Solver, SparseFactor, pad_solver
+from ifem_export.operators.solver import Solver, SparseFactor, matrix_bytes, pad_solver
 
 Array = NDArray[np.float64]
 COMPLIANCE_RTOL = 1e-8
@@ -66,7 +66,7 @@ class PaperOperator(_WithCompliance):
     def n_bytes(self) -> int:
         """Bytes of the stencil, or of the matrix if cells are scaled."""
         if self.system.mesh.fill is not None:
-            return _matrix_bytes(self.system.stiffness)
+            return matrix_bytes(self.system.stiffness)
         return int(sum(part.nbytes for part in self._stencil))
 
     @cached_property
@@ -111,14 +111,11 @@ class CondensedOperator(_WithCompliance):
 
     @property
     def n_bytes(self) -> int:
-        """Bytes of the blocks that a call reads."""
+        """Bytes that a call with one iteration reads."""
         s = self.system
-        parts = (s.surface, s.inner, s.surface_to_inner, s.inner_to_surface)
-        kept = sum(map(_matrix_bytes, parts))
-        if isinstance(self.inner_solver, SparseFactor):
-            return int(kept + 12 * self.inner_solver.factor.nnz)
+        blocks = (s.surface, s.surface_to_inner, s.inner_to_surface)
         adjoint = 0 if self.adjoint is None else self.adjoint.n_bytes
-        return int(kept + s.inner_preconditioner.blocks.nbytes + adjoint)
+        return int(sum(map(matrix_bytes, blocks)) + self.inner_solver.n_bytes + adjoint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +161,3 @@ def condensed_stiffness(system: PadSystem, dtype: type[np.floating[Any]]) -> NDA
         inner = factor.solve(coupling[:, part].toarray())
         dense[:, part] = system.surface[:, part].toarray() - system.inner_to_surface @ inner
     return np.asarray((dense + dense.T) / 2, dtype=dtype)
-
-
-def _matrix_bytes(matrix: sparse.csr_array) -> int:
-    return int(matrix.data.nbytes + matrix.indices.nbytes + matrix.indptr.nbytes)

@@ -64,10 +64,15 @@ def apply_by_nodes(u: Any, table: Any, nodes: Any, masks: Any, out: Any) -> None
     for n in range(len(nodes)):
         k, j, i = nodes[n]
         blocks = table[masks[n]]
-        for axis in range(3):
-            total = 0.0
-            for slot in range(27):
-                dz, dy, dx = slot // 9, slot // 3 % 3, slot % 3
+        # Three sums at once, because each addition waits for the one before.
+        x = y = z = 0.0
+        for dz in range(3):
+            for dy in range(3):
+                slot = 9 * dz + 3 * dy
                 for other in range(3):
-                    total += blocks[slot, axis, other] * u[other, k + dz, j + dy, i + dx]
-            out[axis, k, j, i] = total
+                    for dx in range(3):
+                        moved = u[other, k + dz, j + dy, i + dx]
+                        x += blocks[slot + dx, 0, other] * moved
+                        y += blocks[slot + dx, 1, other] * moved
+                        z += blocks[slot + dx, 2, other] * moved
+        out[0, k, j, i], out[1, k, j, i], out[2, k, j, i] = x, y, z

@@ -44,7 +44,10 @@ class LatticeProduct:
             raise MeshError("the pad has cut cells: it needs its matrix", field="mesh")
 
     def __call__(self, field: Array) -> Array:
-        """Forces (L, c, 3) in N for displacements (L, c, 3) in mm."""
+        """Forces (m, c, 3) in N for displacements (m, c, 3) in mm of the m lowest free layers.
+
+        Layers above them are held.
+        """
         from ifem_export.operators.lattice_kernel import (
             apply_by_layers,
             apply_by_nodes,
@@ -52,18 +55,25 @@ class LatticeProduct:
             spread,
         )
 
-        u, out = self._lattices
+        layers, (_, rows, columns) = len(field), self.system.mesh.numbering.shape
+        # Arrays of their own, because operators are shared between threads.
+        u = np.zeros((3, layers + 2, rows + 2, columns + 2))
+        out = np.empty((3, layers, rows, columns))
         found = np.empty_like(field)
+        nodes, masks = self._rim
+        count = int(np.searchsorted(nodes[:, 0], layers))
         spread(np.ascontiguousarray(field), *self._columns, u)
         apply_by_layers(u, self._table, self._layer_masks, out)
-        apply_by_nodes(u, self._table, *self._rim, out)
+        apply_by_nodes(u, self._table, nodes[:count], masks[:count], out)
         collect(out, *self._columns, found)
         return found
 
     @property
     def n_bytes(self) -> int:
         """Bytes that a product reads and writes."""
-        return int(sum(part.nbytes for part in (*self._lattices, *self._columns, *self._rim)))
+        layers, (_, rows, columns) = self.system.layers, self.system.mesh.numbering.shape
+        lattices = 24 * ((layers + 2) * (rows + 2) * (columns + 2) + layers * rows * columns)
+        return lattices + int(sum(part.nbytes for part in (*self._columns, *self._rim)))
 
     @cached_property
     def _table(self) -> Array:
@@ -73,13 +83,6 @@ class LatticeProduct:
     def _columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         rows, columns = self.system.lattice_positions.T
         return np.ascontiguousarray(rows), np.ascontiguousarray(columns)
-
-    @cached_property
-    def _lattices(self) -> tuple[Array, Array]:
-        """Displacements with zeros around them, and forces."""
-        layers, (_, rows, columns) = self.system.layers, self.system.mesh.numbering.shape
-        u = np.zeros((3, layers + 2, rows + 2, columns + 2))
-        return u, np.empty((3, layers, rows, columns))
 
     @cached_property
     def _layer_masks(self) -> NDArray[np.int64]:
@@ -118,10 +121,12 @@ class LatticeMatrix:
 
     def __matmul__(self, x: Array) -> Array:
         """Forces (n,) of displacements (n,) in the order of the assembled matrix."""
-        system = self.product.system
-        field = np.zeros((system.layers, system.columns, 3))
-        field[: self.layers] = x.reshape(self.layers, -1, 3)
-        return np.asarray(self.product(field)[: self.layers].ravel())
+        return self.product(x.reshape(self.layers, -1, 3)).ravel()
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes that a product reads and writes."""
+        return self.product.n_bytes
 
     def tocsr(self) -> sparse.csr_array:
         """The assembled matrix."""
@@ -169,9 +174,7 @@ class MatrixFreeOperator:
     @cached_property
     def _inner(self) -> Solver:
         """Solver of the inner nodes, the surface held."""
-        system = self.system
-        matrix = LatticeMatrix(self._product, system.layers - 1, lambda: system.inner)
-        return _solver(matrix, system.inner_preconditioner)
+        return _held_solver(self._product)
 
     @cached_property
     def _free(self) -> Solver:
@@ -179,6 +182,20 @@ class MatrixFreeOperator:
         system = self.system
         matrix = LatticeMatrix(self._product, system.layers, lambda: system.stiffness)
         return _solver(matrix, system.preconditioner)
+
+
+def held_surface_solver(system: PadSystem) -> Solver:
+    """Solver of the inner nodes with the surface held, K_ii u = f, which reads no matrix.
+
+    Raises MeshError for a pad with cut cells.
+    """
+    return _held_solver(LatticeProduct(system))
+
+
+def _held_solver(product: LatticeProduct) -> Solver:
+    system = product.system
+    matrix = LatticeMatrix(product, system.layers - 1, lambda: system.inner)
+    return _solver(matrix, system.inner_preconditioner)
 
 
 def _solver(matrix: LatticeMatrix, preconditioner: Preconditioner) -> Solver:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -57,30 +56,16 @@ class MirroredOperator:
 
     def __call__(self, field: Array) -> Array:
         """Apply to a field (L, c, 3); the result has the same shape."""
-        layers = field.shape[0]
-        lattice = np.zeros((*self.shape, layers, 3))
-        lattice[self.columns[:, 0], self.columns[:, 1]] = field.transpose(1, 0, 2)
-        waves = fft.rfft2(lattice, axes=(0, 1), workers=1)
-        waves[..., 2] *= -1j
-        pairs = np.empty((len(self.blocks), *waves.shape[1:], 2), dtype=complex)
-        pairs[..., 0] = waves[: len(pairs)]
-        pairs[..., 1] = waves[self._opposite]
-        pairs[..., 1, 1] *= -1.0
-        # Two complex columns are four real ones.
-        columns = pairs.view(float).reshape(*self.blocks.shape[:3], 4)
-        mixed = np.matmul(self.blocks, columns).view(complex).reshape(pairs.shape)
-        mixed[..., 2, :] *= 1j
-        waves[: len(pairs)] = mixed[..., 0]
-        mixed[..., 1, 1] *= -1.0
-        waves[self._opposite[1:-1]] = mixed[1:-1, ..., 1]
-        result = fft.irfft2(waves, s=self.shape, axes=(0, 1), workers=1)
-        found = result[self.columns[:, 0], self.columns[:, 1]]
-        return np.ascontiguousarray(found.transpose(1, 0, 2))
+        from ifem_export.operators.mirrored_kernel import collect, multiply, spread
 
-    @cached_property
-    def _opposite(self) -> NDArray[np.int64]:
-        """Row of -ky for each row of ky >= 0."""
-        return -np.arange(len(self.blocks)) % self.shape[0]
+        lattice = np.empty((*self.shape, field.shape[0], 3))
+        spread(np.ascontiguousarray(field), self.columns, lattice)
+        waves = fft.rfft2(lattice, axes=(0, 1), workers=1)
+        multiply(self.blocks, waves.reshape(*waves.shape[:2], -1))
+        result = fft.irfft2(waves, s=self.shape, axes=(0, 1), workers=1)
+        found = np.empty(field.shape)
+        collect(result, self.columns, found)
+        return found
 
 
 def mirrored_operator(

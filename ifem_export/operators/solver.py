@@ -15,6 +15,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from ifem_export.errors import IfemError
 from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.preconditioner import Preconditioner
+from ifem_export.operators.symmetric_matrix import Matrix, matrix_bytes
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "iterative", "pcg", "direct"]
@@ -104,22 +105,12 @@ def factored(matrix: sparse.csr_array) -> SuperLU:
     return factor
 
 
-class Matrix(Protocol):
-    """A symmetric matrix, which need not be stored."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of rows and of columns."""
-
-    def __matmul__(self, x: Array) -> Array:
-        """Its product with a vector."""
-
-    def tocsr(self) -> sparse.csr_array:
-        """The matrix itself, to be factored."""
-
-
 class Solver(Protocol):
     """Solves A x = b for one matrix."""
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes that an iteration or a back-substitution reads."""
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
         """Solve to |b - A x| <= rtol |b|.
@@ -136,6 +127,11 @@ class ConjugateGradients:
     preconditioner: Preconditioner
     layers: int
     most_iterations: int = MOST_ITERATIONS
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes that an iteration reads."""
+        return int(matrix_bytes(self.matrix) + self.preconditioner.blocks.nbytes)
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
         """Solve to a relative residual, starting from the preconditioner's result."""
@@ -174,6 +170,11 @@ class SparseFactor:
     """Sparse factor, computed at the first use and kept."""
 
     matrix: sparse.csr_array
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the factor, and of the matrix, with which the residual is computed."""
+        return int(matrix_bytes(self.matrix) + 12 * self.factor.nnz)
 
     @cached_property
     def factor(self) -> SuperLU:
@@ -216,6 +217,11 @@ class GradientsThenFactor:
     """
 
     first: ConjugateGradients
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes that an iteration of conjugate gradients reads."""
+        return self.first.n_bytes
 
     def solve(self, b: ArrayLike, rtol: float = 1e-8) -> Solution:
         """See `Solver`; raises ConvergenceError if the matrix is too large to factor."""

@@ -28,8 +28,9 @@ from ifem_export.operators.convolved_operator import (
     truncated,
 )
 from ifem_export.operators.crowned_system import pad_system
+from ifem_export.operators.matrix_free import held_surface_solver
 from ifem_export.operators.pad_system import PadSystem
-from ifem_export.operators.solver import Method, inner_solver
+from ifem_export.operators.solver import inner_solver
 
 Array = NDArray[np.float64]
 Rung = Literal["paper", "truncated", "fft", "pcg", "factor", "dense32"]
@@ -162,10 +163,9 @@ def system_operator(
         return ConvolvedOperator("truncated", system, near, missing, fields)
     if rung == "dense32":
         return DenseOperator(system)
-    iterative: Method = "auto" if system.is_cut else "iterative"
-    solver = inner_solver(system, "direct" if rung == "factor" else iterative)
     if rung == "factor":
-        return CondensedOperator(system, rung, solver, FACTOR_RTOL)
+        return CondensedOperator(system, rung, inner_solver(system, "direct"), FACTOR_RTOL)
+    solver = inner_solver(system) if system.is_cut else held_surface_solver(system)
     corrected = adjoint_fields(system) if rtol > EXACT_RTOL else None
     return CondensedOperator(system, rung, solver, rtol, corrected)
 
