@@ -244,7 +244,8 @@ def with_neighbours(touched: NDArray[np.bool_], neighbours: sparse.csr_array) ->
 
 def _above_noise(smoothed: SmoothedForce, normal_known: bool) -> Mask:
     """(c,) nodes whose force is too large to be noise."""
-    parts = slice(0, 3) if normal_known else slice(0, 2)
-    size = np.linalg.norm(smoothed.force_n[:, parts], axis=1)
-    sigma = np.linalg.norm(smoothed.sigma_n[:, : 2 if normal_known else 1], axis=1)
-    return np.asarray(size > _CONTACT_SIGMAS * sigma)
+    force, sigma = smoothed.force_n, smoothed.sigma_n
+    if not normal_known:
+        force, sigma = force[:, :2], sigma[:, :1]
+    size, noise = (np.einsum("ij,ij->i", v, v) for v in (force, sigma))
+    return np.asarray(size > _CONTACT_SIGMAS**2 * noise)

@@ -100,9 +100,10 @@ class LowPass:
         smooth, chosen, least = force_n.copy(), [0, 0], [np.inf, np.inf]
         for k, spread in enumerate(self.spreads):
             tried = spread @ force_n if self.widths_mm[k] else force_n
-            fell = False
+            fell, lost = False, force_n - tried
+            squared = np.einsum("ij,ij->j", lost, lost)
             for part, columns in enumerate(_PARTS):
-                error = ((force_n[:, columns] - tried[:, columns]) ** 2).sum() + noisy[k, part]
+                error = squared[columns].sum() + noisy[k, part]
                 if error < least[part]:
                     fell, least[part], chosen[part] = True, error, k
                     smooth[:, columns] = tried[:, columns]

@@ -62,23 +62,30 @@ class AdjointFields:
             force_n: (c, 3) in N.
             displacement_mm: (c, 3) or (3c,), the motion to which they belong.
         """
+        force = np.asarray(force_n, dtype=float)
         due = self.forces.reshape(6, -1) @ np.ravel(displacement_mm)
-        share = self._spread @ (due - resultants(self.points_mm, force_n))
-        x, y, z = share[3:]
-        turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-        traction = share[:3] + self.points_mm @ turn
-        return np.asarray(force_n + self.area_mm2[:, None] * traction)
+        share = self._spread @ (due - self._motions @ force.ravel())
+        return force + (share @ self._weighted).reshape(force.shape)
 
     @property
     def n_bytes(self) -> int:
         """Bytes that a call of `completed` reads."""
-        return int(self.points_mm.nbytes + self.area_mm2.nbytes + self.forces.nbytes)
+        return int(self.forces.nbytes + self._motions.nbytes + self._weighted.nbytes)
+
+    @cached_property
+    def _motions(self) -> Array:
+        """(6, 3c) the rigid motions; their products with forces are force and torque."""
+        return rigid_motions(self.points_mm).reshape(6, -1)
+
+    @cached_property
+    def _weighted(self) -> Array:
+        """(6, 3c) nodal forces of tractions that are the rigid motions."""
+        return np.asarray(self._motions * np.repeat(self.area_mm2, 3))
 
     @cached_property
     def _spread(self) -> Array:
         """Rigid motion (6, 6) whose forces, weighted by the area, have unit resultants."""
-        motions = rigid_motions(self.points_mm).reshape(6, -1)
-        return np.asarray(np.linalg.inv((motions * np.repeat(self.area_mm2, 3)) @ motions.T))
+        return np.asarray(np.linalg.inv(self._weighted @ self._motions.T))
 
 
 def rigid_motions(points: Array) -> Array:

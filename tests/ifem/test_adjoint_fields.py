@@ -119,9 +119,9 @@ def test_the_correction_is_that_of_least_traction() -> None:
     np.testing.assert_allclose(added.ravel(), expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_memory_is_that_of_points_areas_and_forces() -> None:
+def test_memory_is_that_of_forces_motions_and_tractions() -> None:
     mesh = pad(OUTLINES["disc"])
-    assert adjoint_fields(system(mesh, 0.3)).n_bytes == 8 * (3 + 1 + 18) * len(mesh.surface)
+    assert adjoint_fields(system(mesh, 0.3)).n_bytes == 8 * (18 + 18 + 18) * len(mesh.surface)
 
 
 def test_a_loose_iteration_loses_no_resultant_of_a_nearly_incompressible_gel() -> None:
