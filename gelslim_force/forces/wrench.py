@@ -140,30 +140,29 @@ class WrenchNoise:
     def covariance(
         self,
         gains: Array,
-        marker_covariance_mm2: Array,
+        sigma: Array,
         normal_sigma_mm: Array | None = None,
-        lateral_sigma_mm: Array | None = None,
+        lateral: Array | None = None,
     ) -> Array:
         """Covariance (6, 6) of the wrench in N and N mm.
 
         Args:
-            gains: (6, k, 2) for the interpolation in use.
-            marker_covariance_mm2: (k, 2, 2) of each marker's lateral motion.
+            gains: (6, n, 2) wrench per motion of each marker, in px or mm.
+            sigma: (n,) standard deviation of a coordinate of each marker, in the same unit.
             normal_sigma_mm: (c,) standard deviation of the normal motion. The errors of all nodes
                 are fully correlated: a depth that is too large is too large everywhere.
-            lateral_sigma_mm: (k, 2) change of the markers' lateral motion with the same error:
-                their apparent motion is taken off for a depth that is wrong or unknown.
+            lateral: (n, 2) change of the markers' lateral motion with the same error, in the unit
+                of the gains: their apparent motion is taken off for a depth that is wrong or
+                unknown.
         """
-        count = len(marker_covariance_mm2)
-        spread = gains[:, :, :1] * marker_covariance_mm2[:, 0]
-        spread += gains[:, :, 1:] * marker_covariance_mm2[:, 1]
-        total = spread.reshape(6, 2 * count) @ gains.reshape(6, 2 * count).T
+        flat = gains.reshape(6, -1)
+        noise = flat * np.repeat(sigma, 2)
         common = np.zeros(6)
         if normal_sigma_mm is not None:
             common += self.response[:, :, 2] @ normal_sigma_mm
-        if lateral_sigma_mm is not None:
-            common += gains.reshape(6, 2 * count) @ lateral_sigma_mm.reshape(-1)
-        return np.asarray(total + np.outer(common, common))
+        if lateral is not None:
+            common += flat @ lateral.reshape(-1)
+        return np.asarray(noise @ noise.T + np.outer(common, common))
 
     def wrench(self, force_n: Array, covariance: Array) -> Wrench:
         """Wrench of nodal forces (c, 3); NaN for what an unknown normal motion leaves open."""

@@ -40,8 +40,10 @@ class WrenchCovariance:
         self._wrench, self._motion = wrench, motion
         self._unknown_normal_mm = unknown_normal_mm
         self._field = field
-        self._drift = DriftNoise.of(motion, wrench.gains(motion.interpolation), field)
-        self._kept_gains: tuple[bytes, Array] | None = None
+        self._px_per_mm = np.linalg.inv(motion.view.mm_per_px)
+        self._spread_mm = np.sqrt(np.mean(np.square(motion.points_mm[:, :2]), axis=0))
+        self._kept_gains: tuple[bytes, Array, Array] | None = None
+        self._drift = DriftNoise.of(self._gains(motion.interpolation)[1], field)
 
     def of_forces(self, reading: NormalReading, noise_px: float, drift: FrameDrift) -> Array:
         """(6, 6) in N and N mm for forces that the normal source found itself.
@@ -65,34 +67,47 @@ class WrenchCovariance:
         drift: FrameDrift,
     ) -> Array:
         """(6, 6) in N and N mm for forces that follow from the motion of the markers."""
-        whole = self._gains(interpolation)
-        gains = self._drift.corrected(whole, drift)
-        rigid = self._drift.covariance(drift) + self._unseen(whole, filled)
-        motion_mm, seen = filled.motion_mm, np.ones(len(filled.motion_mm), dtype=bool)
-        seen[filled.unseen] = False
-        spread = self._motion.covariance_mm2(seen, noise_px)
+        per_mm, per_px = self._gains(interpolation)
+        rigid = self._drift.covariance(drift) + self._unseen(per_mm, filled)
+        gains = self._drift.corrected(per_px, drift)
+        sigma = np.full(gains.shape[1], noise_px)
+        sigma[filled.unseen] = 0.0
         if reading is not None and reading.known:
-            lateral = self._motion.compensation_change(reading.sigma_mm)
-            found = self._wrench.covariance(gains, spread, reading.sigma_mm, lateral)
+            lateral = self._in_px(self._motion.compensation_change(reading.sigma_mm))
+            found = self._wrench.covariance(gains, sigma, reading.sigma_mm, lateral)
             return rigid + found + self._hidden(reading.hidden_n)
-        apparent = self._motion.apparent_motion(motion_mm, self._unknown_normal_mm)
-        return rigid + self._wrench.covariance(gains, spread, lateral_sigma_mm=apparent)
+        apparent = self._motion.apparent_motion(filled.motion_mm, self._unknown_normal_mm)
+        return rigid + self._wrench.covariance(gains, sigma, lateral=self._in_px(apparent))
+
+    def _in_px(self, motion_mm: Array) -> Array:
+        """(n, 2) motion in the picture of the followed markers, for motions (k, 2) of all."""
+        return np.einsum("nij,nj->ni", self._px_per_mm, motion_mm[self._motion.markers])
 
     def _unseen(self, gains: Array, filled: FilledMotion) -> Array:
-        """(6, 6) by the motion of the markers that were not seen."""
-        own = gains[:, self._motion.markers[filled.unseen]]
-        return np.einsum("ani,nm,bmi->ab", own, filled.covariance_mm2, own, optimize=True)
+        """(6, 6) by the motion of the markers that were not seen; gains (6, k, 2) per mm."""
+        found = np.zeros((6, 6))
+        if len(filled.unseen):
+            own = gains[:, self._motion.markers[filled.unseen]]
+            for axis in range(2):
+                found += own[..., axis] @ filled.covariance_mm2 @ own[..., axis].T
+        return found
 
     def _hidden(self, normal_n: float) -> Array:
         """(6, 6) by a contact that is not seen, anywhere on the gel, but for its normal force."""
-        x, y = np.sqrt(np.mean(np.square(self._motion.points_mm[:, :2]), axis=0))
+        x, y = self._spread_mm
         shear = _HIDDEN_SHEAR * normal_n
         sigma = np.array([shear, shear, 0.0, y * normal_n, x * normal_n, np.hypot(x, y) * shear])
         return np.diag(np.square(sigma))
 
-    def _gains(self, interpolation: MarkerInterpolation) -> Array:
-        """Wrench per motion of each marker; computed anew only where other markers are lost."""
+    def _gains(self, interpolation: MarkerInterpolation) -> tuple[Array, Array]:
+        """Wrench (6, k, 2) per mm of all markers and (6, n, 2) per px of the followed ones.
+
+        They are computed anew only where other markers are lost.
+        """
         lost = interpolation.lost.tobytes()
         if self._kept_gains is None or self._kept_gains[0] != lost:
-            self._kept_gains = lost, self._wrench.gains(interpolation)
-        return self._kept_gains[1]
+            per_mm = self._wrench.gains(interpolation)
+            scale = self._motion.view.mm_per_px
+            per_px = np.einsum("ani,nij->anj", per_mm[:, self._motion.markers], scale)
+            self._kept_gains = lost, per_mm, per_px
+        return self._kept_gains[1:]

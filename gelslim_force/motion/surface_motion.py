@@ -128,18 +128,6 @@ class SurfaceMotion:
         height = self._of_all(self.nodes_to_markers @ height_mm, 0.0)
         return np.asarray(-height[:, None] * self.apparent_per_mm)
 
-    def covariance_mm2(self, known: NDArray[np.bool_], noise_px: float) -> Array:
-        """(k, 2, 2) of the markers' motion, for noise of their positions; 0 where not seen."""
-        spread = noise_px**2 * self._squared_scale
-        spread[~known] = 0.0
-        return self._of_all(spread, 0.0)
-
-    @cached_property
-    def _squared_scale(self) -> Array:
-        """(n, 2, 2) covariance on the gel in mm² per variance in the picture in px²."""
-        scale = self.view.mm_per_px
-        return np.asarray(scale @ scale.transpose(0, 2, 1))
-
     def of_noise(self, noise_px: Array) -> Array:
         """Motion (c, 3) of the nodes for errors (n, 2) of the positions; no normal motion."""
         motion = np.einsum("kij,kj->ki", self.view.mm_per_px, noise_px)

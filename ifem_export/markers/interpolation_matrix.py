@@ -142,7 +142,7 @@ class MarkerInterpolation:
             )
         where = np.flatnonzero(lost)
         if len(where) == 0:
-            return replace(self, fill=None)
+            return self if self.fill is None else replace(self, fill=None)
         _require_field(self.markers_mm[~lost], self.markers_mm)
         rows = self.roughness[where]
         square = rows[:, where]

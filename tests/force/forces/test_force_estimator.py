@@ -103,9 +103,9 @@ def test_wrench_covariance_is_that_of_many_draws(case) -> None:
     noise = WrenchNoise.of(operator, points)
     to_nodes = bundle.markers.to_surface
     count = to_nodes.shape[1]
-    gains = noise.gains(bundle.markers.sparse)
     spread = np.array([[4e-6, 1e-6], [1e-6, 2e-6]])
-    predicted = noise.covariance(gains, np.broadcast_to(spread, (count, 2, 2)))
+    gains = noise.gains(bundle.markers.sparse) @ np.linalg.cholesky(spread)
+    predicted = noise.covariance(gains, np.ones(count))
     rng = np.random.default_rng(0)
     draws = []
     for _ in range(400):
@@ -125,7 +125,7 @@ def test_uncertain_depth_adds_to_the_normal_force(case) -> None:
     points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
     noise = WrenchNoise.of(operator, points)
     gains = noise.gains(bundle.markers.sparse)
-    nothing = np.zeros((gains.shape[1], 2, 2))
+    nothing = np.zeros(gains.shape[1])
     sigma = np.abs(moved[:, 2]) * 0.1
     found = noise.covariance(gains, nothing, sigma)
     shift = np.zeros_like(moved)

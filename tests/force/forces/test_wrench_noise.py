@@ -63,16 +63,15 @@ def test_covariance_is_the_sum_over_markers_and_correlated_errors() -> None:
             each[:, marker, axis] = wrench_of(motion)
     np.testing.assert_allclose(gains, each, rtol=1e-9)
 
-    half = RNG.normal(size=(MARKERS, 2, 2))
-    spread = half @ half.transpose(0, 2, 1)
-    expected = sum(each[:, k] @ spread[k] @ each[:, k].T for k in range(MARKERS))
-    np.testing.assert_allclose(noise.covariance(gains, spread), expected, rtol=1e-9)
+    sigma = RNG.uniform(0, 1, MARKERS)
+    expected = sum(sigma[k] ** 2 * each[:, k] @ each[:, k].T for k in range(MARKERS))
+    np.testing.assert_allclose(noise.covariance(gains, sigma), expected, rtol=1e-9)
 
     deep, aside = RNG.uniform(0, 1, NODES), RNG.uniform(0, 1, (MARKERS, 2))
     sunk = wrench_of(np.column_stack([np.zeros((NODES, 2)), deep]))
     shifted = sum(each[:, k, i] * aside[k, i] for k in range(MARKERS) for i in range(2))
     np.testing.assert_allclose(
-        noise.covariance(gains, spread, deep, aside),
+        noise.covariance(gains, sigma, deep, aside),
         expected + np.outer(sunk + shifted, sunk + shifted),
         rtol=1e-9,
     )

@@ -65,17 +65,6 @@ def test_small_motion_is_taken_to_sink_by_three_times_itself(surface) -> None:
     assert at_limit == pytest.approx(-0.3 * per_mm[of[10]])
 
 
-def test_covariance_is_that_of_the_positions_in_the_picture(surface) -> None:
-    known = np.ones(len(surface.markers), dtype=bool)
-    known[5] = False
-    found = surface.covariance_mm2(known, 0.2)
-    assert not found[NOT_FOLLOWED].any()
-    assert not found[surface.markers[5]].any()
-    k = 20
-    inverse = np.linalg.inv(CAMERA.jacobian(surface.view.rest_mm[k : k + 1])[0])
-    assert found[surface.markers[k]] == pytest.approx(0.04 * inverse @ inverse.T)
-
-
 def test_apparent_over_seen_of_a_true_and_of_a_false_contact(surface) -> None:
     """Markers show the apparent motion of a depth of 0.4 mm where the gel is pressed in."""
     away = np.hypot(surface.points_mm[:, 0] - 2.0, surface.points_mm[:, 1] + 1.0)
