@@ -20,6 +20,13 @@ import numpy as np
 from numba import njit
 
 from gelslim_core.kernel_cache import drop_stale
+from gelslim_force.detection.ring_kernel import (
+    SUMS,
+    ring_level,
+    ring_light,
+    ring_pixels,
+    ring_sums,
+)
 from gelslim_force.detection.window_kernel import (
     COMPILED,
     LANES,
@@ -33,11 +40,10 @@ from gelslim_force.detection.window_kernel import (
     SVV,
     WEIGHT,
     ellipse,
-    ring_sums,
     window_sums,
 )
 
-drop_stale(["centroid_kernel"], ["window_kernel"], Path(__file__).parent)
+drop_stale(["centroid_kernel"], ["ring_kernel", "window_kernel"], Path(__file__).parent)
 
 CX, CY, AREA, CONTRAST, MXX, MXY, MYY, STEPS, INSIDE, SHIFT = range(10)
 """Columns of a dot; INSIDE is 1 if the window is inside the picture, SHIFT is the last shift of the
@@ -63,29 +69,34 @@ _CONVERGED_SHAPE = 0.04
 
 
 @njit(**COMPILED)
-def _light_plane(picture: Any, width: Any, ring: Any, plane: Any, limits: Any, lanes: Any) -> Any:
+def _light_plane(picture: Any, width: Any, ring: Any, plane: Any, work: Any) -> Any:
     """Fit level and slopes of the light to the ring around a dot (x, y, mxx, mxy, myy).
 
     Returns False if the ring has too few pixels. The level is fitted first, because the dark edge
     of a neighbour would tilt the plane; each further round leaves out pixels far from the last fit,
     such as other dots and glare.
     """
-    x0, y0 = ring[0], ring[1]
-    inner = ellipse(ring[2], ring[3], ring[4], _RING[0], _RING_MARGIN_PX[0])
-    outer = ellipse(ring[2], ring[3], ring[4], _RING[1], _RING_MARGIN_PX[1])
-    plane[:] = 0.0
-    limits[0], limits[1] = -1e30, 1e30
-    for turn in range(3):
+    most, u, v, steps, light, listed, limits, lanes = work
+    if listed[0] != ring[2] or listed[1] != ring[3] or listed[2] != ring[4]:
+        inner = ellipse(ring[2], ring[3], ring[4], _RING[0], _RING_MARGIN_PX[0])
+        outer = ellipse(ring[2], ring[3], ring[4], _RING[1], _RING_MARGIN_PX[1])
+        listed[0], listed[1], listed[2] = ring[2], ring[3], ring[4]
+        listed[3] = ring_pixels(inner, outer, most, picture.shape[1], u, v, steps)
+        listed[4] = max(outer[3], outer[4])
+    count, reach = int(listed[3]), listed[4]
+    count = ring_light(picture, width, ring[0], ring[1], reach, u, v, steps, count, light)
+    n, total, squares = ring_level(light, count)
+    if n < _LEAST_RING:
+        return False
+    plane[0], plane[1], plane[2] = total / n, 0.0, 0.0
+    scatter = math.sqrt(max(squares / n - plane[0] ** 2, 1e-6))
+    limits[0], limits[1] = -0.7 * scatter, 1.5 * scatter
+    for _ in range(2):
         n, su, sv, suu, suv, svv, so, suo, svo, soo = ring_sums(
-            picture, width, x0, y0, inner, outer, plane, limits, lanes
+            u, v, light, count, plane, limits, lanes
         )
         if n < _LEAST_RING:
             return False
-        if turn == 0:
-            plane[0] = so / n
-            scatter = math.sqrt(max(soo / n - (so / n) ** 2, 1e-6))
-            limits[0], limits[1] = -0.7 * scatter, 1.5 * scatter
-            continue
         mu, mv, mo = su / n, sv / n, so / n
         auu, auv, avv = suu / n - mu * mu, suv / n - mu * mv, svv / n - mv * mv
         bu, bv = suo / n - mu * mo, svo / n - mv * mo
@@ -122,8 +133,8 @@ def _contrast(picture: Any, width: Any, ring: Any, work: Any) -> Any:
 
     The contrast is the mean darkness, weighted by darkness.
     """
-    plane, limits, sums, lanes = work
-    if not _light_plane(picture, width, ring, plane, limits, lanes):
+    plane, sums, lanes, of_ring = work
+    if not _light_plane(picture, width, ring, plane, of_ring):
         return 0.0
     window = ellipse(ring[2], ring[3], ring[4], _WINDOW, _WINDOW_MARGIN_PX)
     light = (plane[0], plane[1], plane[2])
@@ -160,7 +171,7 @@ def _measure_one(
     The moments are changed. `limits` holds the largest second moment, the least contrast and the
     number of steps.
     """
-    plane, _, sums, lanes = work
+    plane, sums, lanes, _ = work
     x0, y0, moments = start
     widest, faintest, most = limits
     updates, fits, ring, contrast = 0, 0, (-1.0, -1.0, 0.0, 0.0, 0.0), 0.0
@@ -211,6 +222,24 @@ def _measure_one(
 
 
 @njit(**COMPILED)
+def _ring_work(moments: Any, widest: Any, shape: Any) -> Any:
+    """Work space for the rings of dots with moments up to those given (n, 3) or `widest` px²."""
+    largest = max(widest, 1.0)
+    for i in range(len(moments)):
+        if math.isfinite(moments[i, 0] + moments[i, 1] + moments[i, 2]):
+            largest = max(largest, moments[i, 0], moments[i, 2], abs(moments[i, 1]))
+    # Rounding and a long axis that is oblique make moments along an axis 2.5 times as large.
+    reach = 2 * _RING[1] * math.sqrt(2.5 * largest) + _RING_MARGIN_PX[1]
+    most = int(min(reach, float(max(shape[0], shape[1]))))
+    size = (2 * most + 1) ** 2 + LANES
+    # Zeros, because what follows the last place of a ring is multiplied by a weight of 0.
+    u, v = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32)
+    steps, light = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int32)
+    lanes = np.empty(SUMS * LANES, dtype=np.float32)
+    return most, u, v, steps, light, np.zeros(5), np.empty(2), lanes
+
+
+@njit(**COMPILED)
 def measure(
     picture: Any,
     width: Any,
@@ -233,7 +262,7 @@ def measure(
     dot's darkness between which the weight rises. A dot that is not found has area 0.
     """
     lanes = np.empty(QUANTITIES * LANES, dtype=np.float32)
-    work = np.empty(3), np.empty(2), np.empty(8), lanes
+    work = np.empty(3), np.empty(8), lanes, _ring_work(moments, widest, picture.shape)
     limits, moment = (widest, faintest, most), np.empty(3)
     for i in range(starts.shape[0]):
         out[i] = 0.0

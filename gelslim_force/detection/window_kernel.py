@@ -1,4 +1,4 @@
-"""Compiled sums over elliptic windows and rings of a picture, sixteen pixels of a row at a time.
+"""Compiled sums over elliptic windows of a picture, sixteen pixels of a row at a time.
 
 Import it only where it runs, because it loads numba. Pictures are the sums of the colour channels,
 (h, w + LANES) uint16; the last columns are never used, they only let every load have sixteen
@@ -25,7 +25,7 @@ COMPILED: dict[str, Any] = {
     "fastmath": {"contract", "nsz"},
 }
 LANES = 16
-QUANTITIES = 6
+QUANTITIES = 5
 MASS, SQUARE, WEIGHT, SU, SV, SUU, SUV, SVV = range(8)
 """Sums over a window: darkness, its square, weights, and the weights' first and second moments."""
 
@@ -58,86 +58,6 @@ def box(shape: Any, width: Any, height: Any, x0: Any, y0: Any) -> Any:
         max(0, math.ceil(y0 - shape[4])),
         min(height - 1, math.floor(y0 + shape[4])),
     )
-
-
-@njit(**COMPILED)
-def _ring_lanes(
-    picture: Any,
-    first: Any,
-    last: Any,
-    top: Any,
-    bottom: Any,
-    x0: Any,
-    y0: Any,
-    inner: Any,
-    outer: Any,
-    plane: Any,
-    limits: Any,
-    lanes: Any,
-) -> None:
-    """Write sums over the rows of a ring for the columns from `first` on, up to `last`."""
-    one, zero = np.float32(1), np.float32(0)
-    oa, ia = np.float32(outer[0]), np.float32(inner[0])
-    rise, low, high = np.float32(plane[1]), np.float32(limits[0]), np.float32(limits[1])
-    start, more = np.float32(first - x0), np.int32(last - first)
-    lanes[:] = zero
-    for y in range(top, bottom + 1):
-        height = y - y0
-        v = np.float32(height)
-        ob, oc = np.float32(2 * outer[1] * height), np.float32(outer[2] * height * height - 1)
-        ib, ic = np.float32(2 * inner[1] * height), np.float32(inner[2] * height * height - 1)
-        base = np.float32(plane[0] + plane[2] * height)
-        row = picture[y, first : first + LANES]
-        for i in range(LANES):
-            u = np.float32(i) + start
-            off = np.float32(row[i]) - base - rise * u
-            ring = ((oa * u + ob) * u + oc <= zero) & ((ia * u + ib) * u + ic > zero)
-            kept = ring & (off > low) & (off < high) & (np.int32(i) <= more)
-            keep = one if kept else zero
-            value, side = keep * off, keep * v
-            lanes[i] += keep
-            lanes[LANES + i] += side
-            lanes[2 * LANES + i] += side * v
-            lanes[3 * LANES + i] += value
-            lanes[4 * LANES + i] += value * v
-            lanes[5 * LANES + i] += value * off
-
-
-@njit(**COMPILED)
-def ring_sums(
-    picture: Any,
-    width: Any,
-    x0: Any,
-    y0: Any,
-    inner: Any,
-    outer: Any,
-    plane: Any,
-    limits: Any,
-    lanes: Any,
-) -> Any:
-    """Sums over the pixels between two ellipses that deviate by low ... high from the plane.
-
-    Returns (number, u, v, uu, uv, vv, off, u off, v off, off²), with off the deviation from the
-    plane and (u, v) the place from the centre.
-    """
-    left, right, top, bottom = box(outer, width, picture.shape[0], x0, y0)
-    n = su = sv = suu = suv = svv = so = suo = svo = soo = 0.0
-    for first in range(left, right + 1, LANES):
-        _ring_lanes(picture, first, right, top, bottom, x0, y0, inner, outer, plane, limits, lanes)
-        for i in range(LANES):
-            u = first + i - x0
-            count, side, off = float(lanes[i]), float(lanes[LANES + i]), float(lanes[3 * LANES + i])
-            n += count
-            su += count * u
-            suu += count * u * u
-            sv += side
-            suv += side * u
-            svv += lanes[2 * LANES + i]
-            so += off
-            suo += off * u
-            svo += lanes[4 * LANES + i]
-            soo += lanes[5 * LANES + i]
-    return n, su, sv, suu, suv, svv, so, suo, svo, soo
 
 
 @njit(**COMPILED)

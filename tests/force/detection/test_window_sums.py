@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelslim_force.detection import component_kernel as ck
+from gelslim_force.detection import ring_kernel as rk
 from gelslim_force.detection import window_kernel as wk
 
 Array = NDArray[np.float64]
@@ -79,19 +80,33 @@ def test_sums_over_windows_are_those_of_all_pixels() -> None:
 
 
 def test_sums_over_rings_are_those_of_all_pixels() -> None:
-    rng = np.random.default_rng(3)
-    image, lanes = picture(rng), np.empty(wk.QUANTITIES * wk.LANES, np.float32)
-    limits = np.array([-180.0, 250.0])
+    """Around whole pixels, also at the border; the values beyond a ring's pixels do not count."""
+    rng, most = np.random.default_rng(3), 70
+    image, lanes = picture(rng), np.empty(rk.SUMS * wk.LANES, np.float32)
+    size = (2 * most + 1) ** 2 + wk.LANES
+    ring_u, ring_v = np.zeros(size, np.float32), np.zeros(size, np.float32)
+    steps, level = np.empty(size, np.int64), np.empty(size, np.int32)
+    limits, inside_picture = np.array([-180.0, 250.0]), 0
     for x0, y0, *moments in places(rng, 40):
+        x0, y0 = round(x0), round(y0)
         inner, outer = wk.ellipse(*moments, 1.35, 1.5), wk.ellipse(*moments, 1.7, 3.5)
-        found = wk.ring_sums(image, WIDTH, x0, y0, inner, outer, PLANE, limits, lanes)
+        count = rk.ring_pixels(inner, outer, most, image.shape[1], ring_u, ring_v, steps)
+        reach = max(outer[3:])
+        count = rk.ring_light(image, WIDTH, x0, y0, reach, ring_u, ring_v, steps, count, level)
+        assert count % wk.LANES == 0
         u, v = around(x0, y0)
+        ring = inside(outer, u, v) & ~inside(inner, u, v)
+        values = image[:, :WIDTH][ring].astype(np.int64)
+        assert rk.ring_level(level, count) == (len(values), values.sum(), (values**2).sum())
         off = image[:, :WIDTH] - light(u, v)
-        keep = inside(outer, u, v) & ~inside(inner, u, v) & (off > limits[0]) & (off < limits[1])
+        keep = ring & (off > limits[0]) & (off < limits[1])
         parts = (1 + 0 * u, u, v, u * u, u * v, v * v, off, u * off, v * off, off**2)
         truth = [part[keep].sum() for part in parts]
+        found = rk.ring_sums(ring_u, ring_v, level, count, PLANE, limits, lanes)
         assert found[0] == truth[0]
         assert found == pytest.approx(truth, rel=2e-5, abs=2e-6 * np.abs(truth).max())
+        inside_picture += min(x0, y0, WIDTH - 1 - x0, HEIGHT - 1 - y0) >= reach
+    assert 0 < inside_picture < 40
 
 
 @pytest.mark.parametrize("share", [0.1, 0.4, 0.6])
