@@ -29,7 +29,8 @@ def ring_pixels(inner: Any, outer: Any, most: Any, stride: Any, u: Any, v: Any, 
     those of `window_kernel`; what is further away than `most` px along an axis is left out, and
     the arrays have room for (2 most + 1)² values. Returns the number of pixels.
     """
-    zero, count = np.float32(0), 0
+    zero = np.float32(0)
+    count: Any = 0
     right, bottom = min(math.floor(outer[3]), most), min(math.floor(outer[4]), most)
     oa, ia = np.float32(outer[0]), np.float32(inner[0])
     for y in range(-bottom, bottom + 1):

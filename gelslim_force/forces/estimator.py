@@ -12,7 +12,7 @@ because in a wide pad the tangential forces of a normal motion have no resultant
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, Protocol, get_args
 
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from gelslim_core.immutable import frozen
 from gelslim_force.forces.frame_result import ForceField
 from gelslim_force.forces.low_pass import (
     ForceNoise,
@@ -108,8 +109,8 @@ class ForceEstimator:
 
     @cached_property
     def points_mm(self) -> Array:
-        """(c, 3) at rest."""
-        return np.asarray(self.mesh.surface_mm)
+        """(c, 3) at rest, read-only, so that no result copies them."""
+        return frozen(np.asarray(self.mesh.surface_mm))
 
     @cached_property
     def area_mm2(self) -> Array:
@@ -175,11 +176,17 @@ class ForceEstimator:
             touched = _above_noise(smoothed, normal_known)
         if not normal_known:
             force[:, 2] = np.nan
-        found = self.field_of(force, displacement_mm, touched)
         width = None if smoothed is None else smoothed.width_mm
-        return replace(found, misfit=misfit, low_pass_mm=width)
+        return self.field_of(force, displacement_mm, touched, misfit, width)
 
-    def field_of(self, force_n: Array, displacement_mm: Array, touched: Mask | None) -> ForceField:
+    def field_of(
+        self,
+        force_n: Array,
+        displacement_mm: Array,
+        touched: Mask | None,
+        misfit: float = 0.0,
+        low_pass_mm: Array | None = None,
+    ) -> ForceField:
         """Field of forces (c, 3) at a motion (c, 3); without `touched` all that press touch."""
         contact = np.asarray(force_n[:, 2] < 0) if touched is None else touched
         return ForceField(
@@ -190,6 +197,8 @@ class ForceEstimator:
             contact=contact,
             centre_of_pressure_mm=self._centre(force_n),
             slip_margin=self._slip_margin(force_n),
+            misfit=misfit,
+            low_pass_mm=low_pass_mm,
         )
 
     def _masked(self, touched: Mask | None) -> bool:
@@ -217,7 +226,7 @@ class ForceEstimator:
         return np.asarray(push @ self.points_mm[:, :2] / total)
 
     def _slip_margin(self, force: Array) -> float:
-        total = force.sum(axis=0)
+        total = np.ones(len(force)) @ force
         if not total[2] < 0 or self.settings.friction == 0:
             return float("nan")
         return float(1 - np.hypot(total[0], total[1]) / (self.settings.friction * -total[2]))

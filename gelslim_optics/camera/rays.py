@@ -126,7 +126,8 @@ def points_along(pinhole_mm: Array, stack: LayerStack, slopes: Array, z_mm: Arra
     """Points (n, 3) in mm at heights `z_mm` (n,) on the rays with `slopes` (n, 2) in air."""
     size = np.hypot(slopes[:, 0], slopes[:, 1])
     reach = reach_per_slope(size, stack.crossed_mm(z_mm), stack.indices)
-    return np.column_stack([pinhole_mm[:2] + slopes * reach[:, None], z_mm])
+    x, y = (pinhole_mm[k] + slopes[:, k] * reach for k in (0, 1))
+    return np.column_stack([x, y, z_mm])
 
 
 def check_above(pinhole_mm: Array, z_mm: Array) -> None:

@@ -192,15 +192,15 @@ class VirtualCamera:
         xy = (uv - self.principal_px) / self.focal_px
         if self.lens is not None:
             xy = self.lens.undistort(xy)
-        ray = xy[:, :1] * self.right + xy[:, 1:] * self.down + self.forward
-        missed = ray[:, 2] <= 0
+        x, y, z = self.axes[:2].T @ xy.T + self.forward[:, None]
+        missed = z <= 0
         if missed.any():
             first = uv[np.argmax(missed)]
             raise ValueError(
                 f"{int(missed.sum())} of {len(uv)} pixels, such as ({first[0]:g}, {first[1]:g}), "
                 "look away from the window and see no point of it"
             )
-        return np.asarray(ray[:, :2] / ray[:, 2:])
+        return np.column_stack([x / z, y / z])
 
     def project(self, points_mm: ArrayLike) -> Vector:
         """Positions in the image of points in or on the gel, with exact refraction.
