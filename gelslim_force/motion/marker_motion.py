@@ -15,6 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_optics.camera.height_points import points_at_heights
 from gelslim_optics.camera.projection_error import projection_error_mm
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -91,7 +92,7 @@ class MarkerView:
         if compensation not in COMPENSATIONS:
             raise ValueError(f"compensation {compensation!r}: one of {', '.join(COMPENSATIONS)}")
         w = np.broadcast_to(np.asarray(normal_mm, dtype=float), len(positions))
-        known = np.isfinite(positions).all(axis=1) & np.isfinite(w)
+        known = np.isfinite(positions[:, 0] + positions[:, 1] + w)
         if known.all():
             return self._lateral(positions, self.rest_mm, w, compensation)
         motion = np.full(positions.shape, np.nan)
@@ -111,4 +112,4 @@ class MarkerView:
         return np.asarray(motion)
 
     def _at(self, positions_px: Array, height_mm: Array) -> Array:
-        return self.camera.points_along(self.camera.pixel_slopes(positions_px), height_mm)
+        return points_at_heights(self.camera, positions_px, height_mm)

@@ -165,7 +165,7 @@ class FarField:
         from gelslim_force.tracking import drift_kernel as dk
 
         motion, arms = np.asarray(displacement_px), self._arms
-        seen = np.asarray(tracked & np.isfinite(motion).all(axis=1))
+        seen = np.asarray(tracked & np.isfinite(motion[:, 0] + motion[:, 1]))
         if seen.sum() < _LEAST_FREE:
             return None
         width = _CUT_SIGMAS * max(noise_px, LEAST_NOISE_PX)

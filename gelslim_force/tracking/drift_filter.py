@@ -219,11 +219,13 @@ class DriftFilter:
         """
         step = found.similarity.vector - self._drift.vector
         measured = measured + self._leak(found.leak_px)
-        total = self._remaining() + measured
-        if step @ np.linalg.solve(total, step) > _JUMP_SIGMAS**2:
-            self._covariance = self._covariance + self._spread(_UNKNOWN_PX)
         prior = self._remaining()
-        return np.asarray(np.linalg.solve(prior + measured, prior).T)
+        solved = np.linalg.solve(prior + measured, np.column_stack([prior, step]))
+        if step @ solved[:, 4] > _JUMP_SIGMAS**2:
+            self._covariance = self._covariance + self._spread(_UNKNOWN_PX)
+            prior = self._remaining()
+            solved = np.linalg.solve(prior + measured, prior)
+        return np.asarray(solved[:, :4].T)
 
     def _remaining(self) -> Array:
         """(4, 4) covariance of the drift by the frames before and by the load's own motion."""

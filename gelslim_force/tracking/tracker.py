@@ -213,20 +213,21 @@ class Tracker:
             return False
         change = _area_change(dots.area_px[tracks.dots[seen]], self._area[seen])
         shrunk = change[self._large[seen]] < -_AREA_STEP
-        if len(shrunk) >= 2 and shrunk.mean() > 0.5:
+        if len(shrunk) >= 2 and 2 * np.count_nonzero(shrunk) > len(shrunk):
             # Most of the large anchors lie on regular dots.
             return True
         moved = np.abs(tracks.displacement_px[seen]) >= self._little_px
         if 2 * np.count_nonzero(moved) < moved.size:
             return False
         # In another part of a tilted view dots are larger or smaller.
-        return bool((np.abs(change) > _AREA_STEP).mean() > _MOST_CHANGED)
+        changed = np.count_nonzero(np.abs(change) > _AREA_STEP)
+        return bool(changed > _MOST_CHANGED * len(change))
 
     def _remember(self, result: TrackedFrame) -> None:
         tracks = result.tracks
         step = tracks.positions_px - self._positions
-        moved = np.isfinite(step).all(axis=1, keepdims=True)
-        self._velocity = np.where(moved, step, 0.0)
+        moved = np.isfinite(step[:, 0] + step[:, 1])
+        self._velocity = np.where(moved[:, None], step, 0.0)
         # A lost marker is searched in the next frame where it was last seen.
         self._positions = np.where(tracks.known[:, None], tracks.positions_px, self._positions)
         seen = tracks.tracked

@@ -12,7 +12,7 @@ from functools import cache, wraps
 from typing import Any, TypeVar
 
 import scipy.linalg  # noqa: F401  (loads its own BLAS, which must be there to be limited)
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import LibController, ThreadpoolController
 
 Wrapped = TypeVar("Wrapped", bound=Callable[..., Any])
 
@@ -22,11 +22,19 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+@cache
+def _libraries() -> tuple[LibController, ...]:
+    """The BLAS libraries that are loaded."""
+    return tuple(lib for lib in _controller().lib_controllers if lib.user_api == "blas")
+
+
 def single_threaded(function: Wrapped) -> Wrapped:
     """Run `function` with one BLAS thread, and restore the number of threads after it."""
 
     @wraps(function)
     def limited(*args: Any, **kwargs: Any) -> Any:
+        if all(library.num_threads == 1 for library in _libraries()):
+            return function(*args, **kwargs)
         with _controller().limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 

@@ -11,6 +11,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from gelslim_optics.camera import back_projection
 from gelslim_optics.camera.back_projection import HeightGrid
+from gelslim_optics.camera.height_points import points_at_heights
 from gelslim_optics.camera.lens_distortion import LensDistortion
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -36,6 +37,25 @@ def test_plane_round_trip(lens: LensDistortion | None, seed: int) -> None:
         assert np.abs(camera.project(points) - pixels).max() < 1e-9
         again = camera.backproject(camera.project(points), z)
         assert np.abs(again - points).max() < 1e-9
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_points_at_heights_are_those_on_the_rays(lens: LensDistortion | None) -> None:
+    """Heights in all layers; a pixel that looks away is named."""
+    rng = np.random.default_rng(9)
+    for _ in range(5):
+        camera = VirtualCamera.from_fold(**random_pose(rng), lens=lens)
+        pixels = rng.uniform((0, 0), (WIDTH - 1, HEIGHT - 1), (80, 2))
+        z = rng.uniform(camera.window_bottom_z_mm - 1, 0.5, 80)
+        found = points_at_heights(camera, pixels, z)
+        expected = camera.points_along(camera.pixel_slopes(pixels), z)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+        flat = np.column_stack([found[:, :2], z])
+        assert np.abs(camera.project(flat) - pixels).max() < 1e-9
+    away = dict(random_pose(rng), pitch_rad=math.pi)
+    turned = VirtualCamera.from_fold(**away)
+    with pytest.raises(ValueError, match="look away from the window"):
+        points_at_heights(turned, pixels, z)
 
 
 def test_finds_where_light_traced_from_the_real_camera_ends() -> None:
