@@ -11,6 +11,8 @@ known drift and, if that explains few markers, from the least squares of all.
 
 from __future__ import annotations
 
+import cmath
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -70,7 +72,7 @@ class Similarity:
     @property
     def rotation_deg(self) -> float:
         """Rotation from x to y."""
-        return float(np.degrees(np.angle(1 + self.growth)))
+        return math.degrees(cmath.phase(1 + self.growth))
 
     @property
     def scale(self) -> float:
@@ -200,7 +202,7 @@ class FarField:
             free=free,
             weights=weights,
             touched=touched,
-            leak_px=float(np.hypot(_LEAK * width * rim / (rim + count), _UNEVEN_PX)),
+            leak_px=math.hypot(_LEAK * width * rim / (rim + count), _UNEVEN_PX),
             residual_px=float(np.sqrt((off[free] ** 2).mean() / 2)),
         )
 

@@ -75,8 +75,8 @@ def _matched(
     sure = mk.verify(rest, near, pitch, points, dots, trusted, _AGREEMENT, 1)
     if sure == len(reference) and _one_patch(reference, points, dots, trusted):
         # All markers are verified by all their neighbours: nothing below would change a match.
-        status = np.full(len(reference), MarkerStatus.TRACKED, dtype=np.int64)
-        return _tracks(reference, points, dots, status, np.empty((len(reference), 2)))
+        status = np.full(len(reference), int(MarkerStatus.TRACKED), dtype=np.int64)
+        return _tracks(reference, dots, status, points[dots])
     sure = mk.verify(rest, near, pitch, points, dots, trusted, _AGREEMENT, _ROUNDS - 1)
     dots, trusted = _grown(reference, points, dots, trusted)
     if sure < _NEARLY_ALL * min(len(reference), len(points)):
@@ -96,7 +96,9 @@ def _matched(
                 status[i] = MarkerStatus.REJECTED
         elif offered[i]:
             status[i] = MarkerStatus.REJECTED
-    return _tracks(reference, points, dots, status, guess)
+    seen = dots >= 0
+    guess[seen] = points[dots[seen]]
+    return _tracks(reference, dots, status, guess)
 
 
 def _one_patch(
@@ -178,13 +180,10 @@ def _shifted(
 
 def _tracks(
     reference: ReferenceLattice,
-    points: NDArray[np.float64],
     dots: NDArray[np.int64],
     status: NDArray[np.int64],
     positions: NDArray[np.float64],
 ) -> Tracks:
-    seen = dots >= 0
-    positions[seen] = points[dots[seen]]
     return Tracks(
         positions_px=positions,
         displacement_px=positions - reference.positions_px,
