@@ -67,7 +67,7 @@ class LightSums:
         """
         left = self.left - float((2 * self.pull - self.matrix @ height_mm) @ height_mm)
         change = self.seen - self.by_noise
-        return max(left - self.by_noise, 0.0) / change if change > 0 else 0.0
+        return min(max(left - self.by_noise, 0.0) / change, 1.0) if change > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

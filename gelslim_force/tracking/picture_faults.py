@@ -39,6 +39,9 @@ _LEAST_LINES, _LEAST_IN_LINE = 5, 4
 _LARGEST_GROWTH, _FEW_GROWN = 0.08, 2
 """Change of the logarithm of the dots' size in most of a line, against that of all, and lines with
 such a change: contacts change single dots by more and lines by a quarter of this."""
+_STRAIN_SHOWN = 2.0
+"""Largest growth of dots over the strain between the lines beside them, which is a mean over two
+pitches: contacts strain the gel at their rim within one."""
 _FROZEN = (
     "{count} {lines} of the picture are the same: the camera, its cable or its driver has a fault"
 )
@@ -103,13 +106,23 @@ class PictureFaults:
         for lines in self._lines:
             sizes, motion = np.empty((len(lines), 1)), np.empty((len(lines), 2))
             line_medians(growth[:, None], lines, _LEAST_IN_LINE, sizes)
-            if np.count_nonzero(np.abs(sizes - usual) > _LARGEST_GROWTH) >= _FEW_GROWN:
-                return _OTHER_SIZES
             line_medians(displacement_px, lines, _LEAST_IN_LINE, motion)
+            other = sizes[:, 0] - usual
+            if _many_grown(other) and _many_grown(_unstrained(other, motion, self._apart(lines))):
+                return _OTHER_SIZES
             jump = _jump_px(motion[np.isfinite(motion[:, 0])])
             if jump > _LEAST_JUMP * self._pitch_px:
                 return _TORN.format(jump=jump)
         return ""
+
+    def _apart(self, lines: NDArray[np.int64]) -> Array:
+        """(2,) from a line of markers to the next, perpendicular to both, in px."""
+        places = self.reference.positions_px
+        ends = [places[line[line >= 0]] for line in lines if (line >= 0).sum() > 1]
+        along = np.sum([end[-1] - end[0] for end in ends], axis=0)
+        across = np.array([-along[1], along[0]]) / np.hypot(*along)
+        step = (ends[-1].mean(axis=0) - ends[0].mean(axis=0)) @ across / max(len(ends) - 1, 1)
+        return np.asarray(step * across)
 
     def _lines_of(self, planes: NDArray[np.uint8]) -> dict[str, Any]:
         """Rows and columns of the part of a picture (h, w, c) that has markers, by their name."""
@@ -163,6 +176,26 @@ def _sharpest(lines: Any) -> float:
     lk.sharpness(lines, sharp)
     ranked = np.partition(sharp, (-_RANK, -1))
     return float(ranked[-1] / max(ranked[-_RANK], _LEAST_SHARP * (len(lines) // lk.PARTS)))
+
+
+def _many_grown(growth: Array) -> bool:
+    return bool(np.count_nonzero(np.abs(growth) > _LARGEST_GROWTH) >= _FEW_GROWN)
+
+
+def _unstrained(growth: Array, motion: Array, apart: Array) -> Array:
+    """Growth (k,) of the dots of lines beyond what their motion (k, 2) apart explains.
+
+    Where neighbouring lines move away from each other by a share of their distance `apart` (2,),
+    dots between them grow by about that share; NaN where it is not known.
+    """
+    if len(motion) < _LEAST_LINES:
+        return growth
+    share = motion @ apart / (apart @ apart)
+    known = np.flatnonzero(np.isfinite(share))
+    if len(known) < 2:
+        return growth
+    strain = _STRAIN_SHOWN * np.gradient(np.interp(np.arange(len(share)), known, share[known]))
+    return growth - np.clip(growth, np.minimum(strain, 0.0), np.maximum(strain, 0.0))
 
 
 def _jump_px(motion: Array) -> float:

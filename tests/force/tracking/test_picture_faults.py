@@ -66,6 +66,18 @@ def test_lines_of_dots_of_another_size_belong_elsewhere(faults: PictureFaults) -
     assert faults.torn(motion, level + 0.2) == ""
 
 
+def test_lines_of_dots_that_a_strain_makes_larger_are_those_of_a_gel(faults: PictureFaults) -> None:
+    """A rod across the gel, sheared along it: dots grow on one side and shrink on the other."""
+    line = np.arange(ROWS) - 5.4
+    motion = 7.0 / (1 + line**4 / 16)
+    strain = np.gradient(motion) / PITCH_PX
+    assert np.count_nonzero(np.abs(strain) > 0.08) > 2
+    assert faults.torn(moved(faults, motion), 1.3 * strain[rows(faults)]) == ""
+    assert "other sizes" in faults.torn(moved(faults, motion), -1.3 * strain[rows(faults)])
+    still = moved(faults, np.zeros(ROWS))
+    assert "other sizes" in faults.torn(still, 1.3 * strain[rows(faults)])
+
+
 def test_neighbours_that_part_are_none_of_a_gel(faults: PictureFaults) -> None:
     level, motion = np.zeros(len(faults.reference)), moved(faults, np.zeros(ROWS))
     motion[40:46, 0] += 0.7 * PITCH_PX
