@@ -18,6 +18,7 @@ from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.indenter import Indenter, parse_indenter
 from gelslim_force.contact.normal_motion import IndenterSource, NormalModel
 from gelslim_force.contact.patch_finder import PatchFinder
+from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.light_calibration import LightCalibration
@@ -26,6 +27,7 @@ from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.settings import PipelineSettings
 from gelslim_optics.camera.record import is_mono
+from gelslim_optics.light.light_map import LightMap
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.bundle.files import load_bundle
 
@@ -235,6 +237,7 @@ def indenter_source(
         marker_radius_px=radius_px[np.searchsorted(calibration.markers, followed.markers)],
         surface_mm=points_mm,
         indenter=shape,
+        opposed=bool(bundle.light) and colours_oppose(LightMap.from_arrays(bundle.light)),
     )
     chosen = settings or PipelineSettings()
     model = NormalModel(chosen.compliance(bundle), points_mm, chosen.edge(bundle))

@@ -66,6 +66,7 @@ class PatchFinder:
             are left out.
         surface_mm: (c, 2 or 3) surface nodes of the pad; only bins near one of them count.
         indenter: Determines the shape of the patch, which is a disc if None.
+        opposed: Whether each tilt of the gel takes light from some colour; see `colours_oppose`.
 
     Raises:
         ValueError: The reference cannot be used.
@@ -80,6 +81,7 @@ class PatchFinder:
         marker_radius_px: ArrayLike = 6.0,
         surface_mm: ArrayLike | None = None,
         indenter: Indenter | None = None,
+        opposed: bool = False,
     ) -> None:
         self.indenter = indenter
         self._last: Followed | None = None
@@ -89,7 +91,7 @@ class PatchFinder:
         picture = np.asarray(reference)
         bin_px = max(2, round(picture.shape[1] / 160)) if picture.ndim >= 2 else 2
         self._radius = np.ascontiguousarray(radius * 1.5 + 1.0)
-        self._light = ShadingReference(picture, markers, self._radius, bin_px)
+        self._light = ShadingReference(picture, markers, self._radius, bin_px, opposed)
         bins = bin_positions(self._light, camera)
         self._x, self._y, self._parallax, self._growth = bins
         self._bin_mm = bin_sizes(self._x, self._y)

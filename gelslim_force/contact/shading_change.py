@@ -17,6 +17,8 @@ from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 
 from gelslim_core.errors import GelslimError
+from gelslim_force.contact.light_baseline import without_baseline
+from gelslim_force.contact.reflections import reflecting
 from gelslim_force.frames.read_only import read_only
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
@@ -27,7 +29,6 @@ LEAST_LEVEL = 8.0
 FLOOR = 5.0
 LEAST_FREE = 0.34
 """Smallest share of a bin's pixels that must be free of ink and glare."""
-MEDIAN_OF = 1500
 _SAMPLE_PX = 8
 _GREY, _LEAST_GREY = 2, 0.95
 """Difference of the channels, in grey values, up to which a pixel has no colour, and the share of
@@ -37,8 +38,6 @@ _BLACK, _WHITE, _LEAST_LIT = 5, 250, 0.05
 _OPAQUE = 0.75
 """Share of its light that every colour keeps at a tilt of the gel: light from two sides loses less
 than this in the brighter of the two. Darker is dirt on the gel or on the window."""
-ROBUST = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 
 class LostColourError(GelslimError, ValueError):
@@ -50,28 +49,37 @@ class ShadingChange:
     """Change of log R/G and of log brightness in the used channels, one layer per combination."""
 
     change: NDArray[np.floating]
-    """(c, rows, columns) about the median over the pad; 0 where not valid."""
+    """(c, rows, columns) about the median and the trend over the pad; 0 where not valid."""
     valid: Mask
     """(rows, columns) bins on the pad with enough free pixels."""
     noise: NDArray[np.floating]
     """(c, rows, columns) standard deviation of each bin, from the spread outside the patch; it is
     larger where there is little light, or few free pixels."""
+    hidden: Mask | None = None
+    """(rows, columns) bins on the pad that a reflection hides; None without one."""
 
 
 class ShadingReference:
     """Reference frame (h, w, 3) or (h, w) uint8 with its markers, and the bins' layout.
 
     The owner sets `on_pad` (rows, columns) once the positions of the bins on the gel are known.
+    With `opposed`, each tilt of the gel takes light from some colour, and reflections are left out.
     """
 
     def __init__(
-        self, image: NDArray[np.uint8], markers_px: Array, radius_px: Array, bin_px: int
+        self,
+        image: NDArray[np.uint8],
+        markers_px: Array,
+        radius_px: Array,
+        bin_px: int,
+        opposed: bool = False,
     ) -> None:
         self.image = as_picture(image)
         self.bin_px = bin_px
         height, width, channels = self.image.shape
         self.shape = (height // bin_px, width // bin_px)
         self.on_pad = np.ones(self.shape, dtype=bool)
+        self._opposed = opposed
         self._radius = radius_px
         self._coloured = not is_grey(self.image)
         from gelslim_force.contact.shading_kernel import bin_sums, block_discs
@@ -153,9 +161,13 @@ class ShadingReference:
         free = (self._counts >= LEAST_FREE * self.bin_px**2) & ~self._soiled()
         share = np.sqrt(np.float32(self.bin_px**2) / np.maximum(self._counts, 1))
         noise_level = self._noise_level * share.astype(np.float32)
-        return _relative_to_median(
-            _combined(np.log(self._ratios[self.used])), free & self.on_pad, noise_level
-        )
+        change, valid = _combined(np.log(self._ratios[self.used])), free & self.on_pad
+        noise = without_baseline(change, valid, noise_level)
+        hidden = reflecting(change, noise, valid) if self._opposed and len(change) > 1 else None
+        if hidden is None or not hidden.any():
+            return ShadingChange(change, valid, noise)
+        change *= ~hidden
+        return ShadingChange(change, valid & ~hidden, noise, hidden & self.on_pad)
 
     def _soiled(self) -> Mask:
         """(rows, columns) bins that something opaque covers, and those beside them.
@@ -220,28 +232,6 @@ def _noise_level(levels: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.sqrt(square)
     both = square[:1] + square[1:2]
     return np.sqrt(np.concatenate([both, both / 4, square[2:] + both / 4]))
-
-
-def _relative_to_median(
-    change: NDArray[np.floating], valid: Mask, noise_level: NDArray[np.floating]
-) -> ShadingChange:
-    layers = len(change)
-    used = np.flatnonzero(valid)
-    if not len(used):
-        return ShadingChange(np.zeros_like(change), valid, np.full_like(change, np.inf))
-    some = used[:: max(1, len(used) // MEDIAN_OF)]
-    seen, scale = (a.reshape(layers, -1)[:, some] for a in (change, noise_level))
-    middle = _middles(seen)
-    spread = ROBUST * _middles(np.abs(seen - middle) / scale)
-    change -= middle[:, :, None]
-    change *= valid
-    return ShadingChange(change, valid, np.maximum(spread[:, :, None] * noise_level, 1e-4))
-
-
-def _middles(rows: NDArray[np.floating]) -> NDArray[np.floating]:
-    """(c, 1) upper medians."""
-    half = rows.shape[1] // 2
-    return np.partition(rows, half, axis=1)[:, half : half + 1]
 
 
 def bin_positions(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.contact.shading_change import (
     FLOOR,
     ShadingChange,
@@ -91,7 +92,9 @@ class LightView:
         picture = as_picture(reference)
         self._radius = np.ascontiguousarray(radius_px * _DISC + _RIM_PX)
         bin_px = max(2, round(picture.shape[1] / _BINS_ACROSS))
-        self._light = ShadingReference(picture, markers_px, self._radius, bin_px)
+        self._light = ShadingReference(
+            picture, markers_px, self._radius, bin_px, colours_oppose(light)
+        )
         x, y, self.lean, _ = bin_positions(self._light, camera)
         self.rest_mm = np.stack([x, y], axis=-1)
         self.area_mm2 = bin_sizes(x, y) ** 2

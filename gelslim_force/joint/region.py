@@ -43,12 +43,24 @@ def contact_nodes(
     """
     changed = changed_bins(shading)
     region = lattice.nearest(places_mm[changed])
-    if rise is None or not region.any():
+    if not region.any():
+        return region
+    if shading.hidden is not None:
+        region = _continued(region, lattice.nearest(places_mm[shading.hidden]), lattice)
+    if rise is None:
         return region
     seen = changed & shading.valid
     dent = _dent(lattice, places_mm[seen], rise[seen])
     filled = ndimage.binary_fill_holes(closed(lattice.picture(region) | dent, 1))
     return np.asarray(filled[lattice.place[:, 0], lattice.place[:, 1]])
+
+
+def _continued(region: Mask, hidden: Mask, lattice: NodeLattice) -> Mask:
+    """(c,) the region with what is hidden next to it, where the contact may go on."""
+    parts, _ = ndimage.label(lattice.picture(hidden), np.ones((3, 3)))
+    part = parts[lattice.place[:, 0], lattice.place[:, 1]]
+    beside = np.unique(part[lattice.widened(region, 1)])
+    return np.asarray(region | (np.isin(part, beside) & hidden))
 
 
 def pressing_nodes(

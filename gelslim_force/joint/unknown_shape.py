@@ -209,7 +209,7 @@ def unknown_shape(
 
 
 def _traced(bundle: Bundle) -> LightMap:
-    return LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
+    return LightMap.from_arrays(bundle.light)
 
 
 def _moved_region(estimator: JointEstimator) -> MovedRegion:

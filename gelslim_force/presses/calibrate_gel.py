@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_force.calibration.sensor_calibration import Calibration
-from gelslim_force.contact.shading_change import ROBUST
+from gelslim_force.contact.light_baseline import ROBUST
 from gelslim_force.presses.ball_check import require_ball
 from gelslim_force.presses.gel_calibration import GelCalibration, designed_thickness_mm
 from gelslim_force.presses.gel_fit import (

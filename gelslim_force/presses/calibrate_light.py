@@ -97,7 +97,7 @@ def calibrate_light(
     else:
         require_ball(*found)
     fitted = fit_gel(*found, GelPrior(_ratio_sigma(bundle)))
-    traced = LightMap(**{name: np.asarray(value) for name, value in bundle.light.items()})
+    traced = LightMap.from_arrays(bundle.light)
     lights, channels = _lights(view, reference, traced, pictures, fitted)
     law = LightLaw.of(traced, JointSettings().gamma)
     points = np.asarray(bundle.mesh.surface_mm)[:, :2]

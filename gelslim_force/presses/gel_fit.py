@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.contact.shading_change import ROBUST
+from gelslim_force.contact.light_baseline import ROBUST
 from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
 from gelslim_force.presses.press_model import LOCAL, PressModel

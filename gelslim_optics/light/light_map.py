@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gelslim_optics.light.light_fans import LightFans
 
@@ -106,6 +107,11 @@ class LightMap:
         if fans is not None:
             fans = LightFans.of_trace(fans, (length_mm, width_mm)).sums
         return cls(x, y, irradiance, azimuth_deg, elevation_deg, colour, fans)
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, ArrayLike]) -> LightMap:
+        """Light from the arrays that a bundle stores; see `light_arrays`."""
+        return cls(**{name: np.asarray(arrays[name], dtype=float) for name in LIGHT_FIELDS})
 
     @property
     def sources(self) -> int:

@@ -78,7 +78,7 @@ class TwinSensor:
         from gelslim_optics.light.light_map import LightMap, red_green_sides
 
         if self.bundle.light:
-            return LightMap(**{n: np.asarray(v) for n, v in self.bundle.light.items()})
+            return LightMap.from_arrays(self.bundle.light)
         length, width = self.size_mm
         light = red_green_sides(length, width, decay_mm=0.8 * width)
         return replace(light, colour=np.ones((2, 3))) if self.mono else light

@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter, zoom
 
 Picture = NDArray[np.uint8]
 Rng = np.random.Generator
+Pair = tuple[float, float]
 Fault = Callable[[Picture, Rng], Picture]
 SKIN = np.array([205.0, 150.0, 120.0])
 
@@ -67,14 +68,19 @@ def glare(image: Picture, rng: Rng) -> Picture:
     return found
 
 
+def reflection(image: Picture, at: Pair, size: Pair, brightness: float) -> Picture:
+    """White light without sharp edges, at a place and of a size in rows and columns."""
+    y, x = np.mgrid[: image.shape[0], : image.shape[1]]
+    bump = np.exp(-(((y - at[0]) / size[0]) ** 2) - ((x - at[1]) / size[1]) ** 2)
+    return _picture(image + brightness * bump[..., None])
+
+
 def soft_glare(image: Picture, rng: Rng) -> Picture:
-    """A reflection without sharp edges."""
+    """A reflection of random place, size and brightness."""
     height, width = image.shape[:2]
-    y, x = np.mgrid[:height, :width]
     at = rng.uniform(0.15, 0.85, 2) * (height, width)
     size = rng.uniform(15, 60, 2)
-    bump = np.exp(-(((y - at[0]) / size[0]) ** 2) - ((x - at[1]) / size[1]) ** 2)
-    return _picture(image + rng.uniform(40, 250) * bump[..., None])
+    return reflection(image, (at[0], at[1]), (size[0], size[1]), rng.uniform(40, 250))
 
 
 def torn(image: Picture, rng: Rng) -> Picture:
@@ -132,12 +138,16 @@ def colours_apart(image: Picture, rng: Rng, change: float | None = None) -> Pict
     return _picture(image * np.exp(np.array([size, -size, 0.0]) / 2))
 
 
-def light_uneven(image: Picture, rng: Rng) -> Picture:
-    """The two lights change by amounts that differ from side to side."""
+def tilted_lights(image: Picture, size: float, tilt: float) -> Picture:
+    """One light changes by the exponent `size` ± `tilt` from side to side, the other against it."""
     across = np.linspace(-1, 1, image.shape[1])[None, :, None]
-    size = rng.uniform(0.02, 0.15) * rng.choice([-1, 1])
-    tilt = rng.uniform(0.0, 0.1) * rng.choice([-1, 1])
     return _picture(image * np.exp(np.array([1.0, -1.0, 0.0]) * (size + tilt * across)))
+
+
+def light_uneven(image: Picture, rng: Rng) -> Picture:
+    """The two lights change by random amounts that differ from side to side."""
+    size = rng.uniform(0.02, 0.15) * rng.choice([-1, 1])
+    return tilted_lights(image, size, rng.uniform(0.0, 0.1) * rng.choice([-1, 1]))
 
 
 def lamp_out(image: Picture, rng: Rng) -> Picture:
