@@ -76,7 +76,10 @@ class WrenchCovariance:
             lateral = self._in_px(self._motion.compensation_change(reading.sigma_mm))
             found = self._wrench.covariance(gains, sigma, reading.sigma_mm, lateral)
             return rigid + found + self._hidden(reading.hidden_n)
-        apparent = self._motion.apparent_motion(filled.motion_mm, self._unknown_normal_mm)
+        noise_mm = noise_px * self._motion.view.usual_mm_per_px
+        apparent = self._motion.apparent_motion(
+            filled.motion_mm, self._unknown_normal_mm, noise_mm
+        )
         return rigid + self._wrench.covariance(gains, sigma, lateral=self._in_px(apparent))
 
     def _in_px(self, motion_mm: Array) -> Array:

@@ -17,6 +17,7 @@ from ifem_export.markers.interpolation_matrix import MarkerInterpolation
 
 Array = NDArray[np.float64]
 _STEP_MM = 1e-3
+_NOISE_SIGMAS = 3.0
 _MOVED_MM = 0.03
 """Lateral motion beyond what noise and thermal drift cause."""
 _UNCERTAIN_MM = 0.01
@@ -110,13 +111,15 @@ class SurfaceMotion:
         large = np.partition(size, -_FEWEST)[-_FEWEST] if len(size) > _FEWEST else size.max()
         return bool(large > _MOVED_MM)
 
-    def apparent_motion(self, motion_mm: Array, normal_mm: float) -> Array:
+    def apparent_motion(self, motion_mm: Array, normal_mm: float, noise_mm: float = 0.0) -> Array:
         """(k, 2) apparent motion of the markers if the gel sinks by `normal_mm` unseen.
 
         The gel is taken to sink in proportion to its lateral motion, and by no more than three
-        times that motion: a press moves the gel around it by about a third of its depth.
+        times that motion: a press moves the gel around it by about a third of its depth. Motion
+        within three standard deviations `noise_mm` of a coordinate is none.
         """
-        size = np.nan_to_num(np.hypot(motion_mm[:, 0], motion_mm[:, 1]))
+        squared = np.square(np.nan_to_num(motion_mm[:, :2])).sum(axis=1)
+        size = np.sqrt(np.maximum(squared - np.square(_NOISE_SIGMAS * noise_mm), 0.0))
         largest = max(float(size.max()), normal_mm / _DEPTH_PER_LATERAL, 1e-9)
         share = self._of_all(size / largest, 0.0)
         return np.asarray(-normal_mm * share[:, None] * self.apparent_per_mm)

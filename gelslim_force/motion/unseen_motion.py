@@ -70,9 +70,17 @@ class UnseenMotion:
         return _HIDDEN.format(2 * widest) if widest > _WIDEST * self.thickness_mm else ""
 
     def hidden_mm(self, seen: Mask) -> Array:
-        """(c,) depth that markers seen (n,) do not show at the nodes; 0 where they do."""
-        unseen = self.nodes(~seen)
-        return np.where(unseen, _UNSEEN * self.thickness_mm, 0.0)
+        """(c,) depth that markers seen (n,) do not show at the nodes; 0 where they do.
+
+        It counts as common to all nodes. The depth in a gap is correlated as the motion is, so that
+        far parts of a gap, and other gaps, are independent: the common depth is that whose sum has
+        the same deviation.
+        """
+        if seen.all():
+            return np.zeros(len(self.points_mm))
+        hidden = np.flatnonzero(~seen)
+        common = np.sqrt(float(self._correlation(hidden, hidden).mean()))
+        return np.where(self.nodes(~seen), common * _UNSEEN * self.thickness_mm, 0.0)
 
     def nodes(self, markers: Mask) -> Mask:
         """(c,) nodes to which one of the chosen markers (n,) is the nearest."""

@@ -26,6 +26,10 @@ by 0.05."""
 _NEXT, _LEAST_MISSING = 8, 5
 """Neighbours of a marker one site away, and how many are missing, with all others, inside a gap.
 Gaps of single dots are wear of the print, which leaves the dots beside them whole."""
+_CUT, _CUT_OVER_USUAL, _LEAST_LOST = 0.08, 4.0, 2
+"""Change of size or shape by which something out of focus cuts a dot beside others that it hides,
+which moves its centre by a pixel, also over that of most dots, and how many of the eight neighbours
+it has to hide."""
 _WORN = 0.05
 """Share of such single dots from which wide gaps are taken for wear too."""
 
@@ -52,11 +56,15 @@ class WholeDots:
             return tracked
         growth, stretch = self.changes(tracked)
         # Comparisons with the NaN of a dot that is not seen are false: it is not whole.
-        whole = (np.abs(growth - median(growth)) < _LARGEST_CHANGE) & (stretch < _LARGEST_CHANGE)
-        covered, beside = np.empty_like(whole), np.empty_like(whole)
+        change = np.maximum(np.abs(growth - median(growth)), stretch)
+        whole = change < _LARGEST_CHANGE
+        covered, beside, lost = (np.empty_like(whole) for _ in range(3))
         wk.far_from_neighbours(growth, near, _COVERED, covered)
+        whole &= ~covered
         wk.beside_gap(whole, near, _NEXT, _LEAST_MISSING, _WORN, beside)
-        cut = seen & (~whole | beside | covered)
+        wk.beside_lost(whole, near, _NEXT, _LEAST_LOST, lost)
+        changed = change > max(_CUT, _CUT_OVER_USUAL * median(change))
+        cut = seen & (~whole | beside | (changed & lost))
         return replace(tracked, tracks=tracked.tracks.without(cut)) if cut.any() else tracked
 
     def changes(self, tracked: TrackedFrame) -> tuple[Array, Array]:

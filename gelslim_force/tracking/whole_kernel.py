@@ -60,6 +60,16 @@ def far_from_neighbours(growth: Any, near: Any, limit: Any, far: Any) -> None:
 
 
 @njit(**COMPILED)
+def beside_lost(whole: Any, near: Any, next_to: Any, fewest: Any, beside: Any) -> None:
+    """Write which markers (n,) have `fewest` of the first `next_to` neighbours or more not whole."""
+    for i in range(len(whole)):
+        lost = 0
+        for k in range(next_to):
+            lost += near[i, k] >= 0 and not whole[near[i, k]]
+        beside[i] = lost >= fewest
+
+
+@njit(**COMPILED)
 def beside_gap(whole: Any, near: Any, next_to: Any, fewest: Any, worn: Any, beside: Any) -> None:
     """Write which markers (n,) are neighbours of the inside of a gap.
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from fault_frames import FAULTS
 from numpy.typing import NDArray
-from pressed_samples import Pressed, calibration
+from pressed_samples import Pressed, calibration, lit_bundle
 from shaded_frames import shaded
 
+from gelslim_force.joint.settings import JointSettings
 from gelslim_force.pipeline import ForcePipeline
 
 Picture = NDArray[np.uint8]
@@ -47,6 +48,8 @@ class Soak:
             score, and error in N.
         late: Frames without a fault, the second after one or later, without the forces that the
             stream gives otherwise.
+        largest_n: Largest component of the forces on the untouched gel, in any frame.
+        widest_n: Largest standard deviation of them.
     """
 
     frames: int = 0
@@ -54,6 +57,18 @@ class Soak:
     answered: Counter[str] = field(default_factory=Counter)
     false: list[tuple[int, str, float, list[float]]] = field(default_factory=list)
     late: list[int] = field(default_factory=list)
+    largest_n: float = 0.0
+    widest_n: float = 0.0
+
+
+def least_press_n() -> float:
+    """The least press that the light shows, 29 mN: no fault on an untouched gel may read as one."""
+    return JointSettings().unseen_force * lit_bundle().material.youngs_modulus_mpa
+
+
+def widest_sigma_n() -> float:
+    """A sixth of the force of a 6 mm ball at 30 % of the thickness: wider, there is no answer."""
+    return 4 * least_press_n()
 
 
 def untouched(count: int = 3) -> list[Pressed]:
@@ -119,6 +134,9 @@ def soak(chain: ForcePipeline, frames: Iterator[StreamFrame]) -> Soak:
         off = result.wrench.force_n - frame.force_n
         known = np.isfinite(off)
         sigma = np.maximum(result.wrench.standard_deviation[:3][known], 1e-9)
+        if not frame.force_n.any():
+            found.largest_n = max(found.largest_n, float(np.abs(off[known]).max()))
+            found.widest_n = max(found.widest_n, float(sigma.max()))
         worst = float(np.abs(off[known] / sigma).max(initial=0.0))
         if worst > MOST_SIGMAS:
             found.false.append((index, frame.fault, worst, off.round(4).tolist()))

@@ -65,6 +65,16 @@ def test_small_motion_is_taken_to_sink_by_three_times_itself(surface) -> None:
     assert at_limit == pytest.approx(-0.3 * per_mm[of[10]])
 
 
+def test_noise_is_not_taken_to_sink(surface) -> None:
+    """Three standard deviations of a coordinate are taken off in quadrature."""
+    motion = moved(surface, 0.02)
+    of, per_mm = surface.markers, surface.apparent_per_mm
+    found = surface.apparent_motion(motion, 0.3, noise_mm=0.004)
+    left = np.sqrt(0.02**2 - 0.012**2)
+    assert found[of[10]] == pytest.approx(-3 * left * per_mm[of[10]])
+    assert not np.delete(found, of[10], axis=0).any()
+
+
 def test_apparent_over_seen_of_a_true_and_of_a_false_contact(surface) -> None:
     """Markers show the apparent motion of a depth of 0.4 mm where the gel is pressed in."""
     away = np.hypot(surface.points_mm[:, 0] - 2.0, surface.points_mm[:, 1] + 1.0)

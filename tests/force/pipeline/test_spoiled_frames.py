@@ -10,12 +10,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fault_frames import FAULTS, black_side, grey
+from fault_frames import FAULTS, SKIN, black_side, grey
 from lit_pipelines import opened
 from numpy.typing import NDArray
 from pressed_samples import calibration, pressed
 from pressed_shapes import ball, pressed_shape
+from scipy.ndimage import gaussian_filter
 from shaded_frames import shaded
+from spoiled_stream import least_press_n, widest_sigma_n
 
 from gelslim_force.contact.shading_change import LostColourError, ShadingReference
 from gelslim_force.forces.frame_result import FrameResult
@@ -25,6 +27,7 @@ pytest.importorskip("PIL")
 MODES = ("unknown", "none", "sphere:6", "depth")
 """An object of unknown shape, tangential forces alone, a named ball, and the depth given."""
 COVERING = ("black_side", "hand", "glare", "torn", "frozen_rows")
+SPOILING = (*COVERING, "compressed", "other_scene", "even", "dirt", "noisy", "soft_glare")
 BALL = (ball(6.0), 0.5, (1.0, -1.0), 0.0, 3)
 Picture = NDArray[np.uint8]
 
@@ -52,6 +55,14 @@ def scores(result: FrameResult, force_n: NDArray[np.float64]) -> NDArray[np.floa
     return np.abs(off[known] / np.maximum(result.wrench.standard_deviation[:3][known], 1e-9))
 
 
+def require_no_force(result: FrameResult) -> None:
+    """Of an untouched gel: none, or one that is small and whose deviation is."""
+    assert (scores(result, np.zeros(3)) < 3).all()
+    if result.wrench is not None:
+        assert np.nanmax(np.abs(result.wrench.force_n), initial=0) < least_press_n()
+        assert np.nanmax(result.wrench.standard_deviation[:3], initial=0) < widest_sigma_n()
+
+
 def spoiled(name: str, image: Picture, seed: int) -> Picture:
     return FAULTS[name](image, np.random.default_rng([list(FAULTS).index(name), seed]))
 
@@ -69,20 +80,31 @@ def test_a_black_third_gives_no_force() -> None:
 @pytest.mark.parametrize("name", COVERING)
 def test_an_untouched_gel_behind_a_fault_is_no_force(mode: str, name: str) -> None:
     for seed in range(3):
-        assert (scores(second(mode, spoiled(name, untouched(), seed)), np.zeros(3)) < 3).all()
+        require_no_force(second(mode, spoiled(name, untouched(), seed)))
+
+
+def test_dots_that_a_soft_rim_cuts_are_not_used() -> None:
+    """Two fingers over every other row of dots: the rows beside them read as 97 mN."""
+    cover = np.zeros(untouched().shape[:2])
+    for top, bottom in ((52, 102), (124, 176)):
+        cover[top:bottom, 387:] = 1
+    for blur_px in (4, 6, 8):
+        soft = gaussian_filter(cover, blur_px)[..., None]
+        seen = np.clip(untouched() * (1 - soft) + 1.15 * SKIN * soft, 0, 255)
+        require_no_force(second("none", np.rint(seen).astype(np.uint8)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", [*COVERING, "compressed", "other_scene", "even", "dirt", "noisy"])
+@pytest.mark.parametrize("name", SPOILING)
 def test_no_fault_of_the_picture_is_a_force(mode: str, name: str) -> None:
     for seed in range(12):
-        assert (scores(second(mode, spoiled(name, untouched(), seed)), np.zeros(3)) < 3).all(), seed
+        require_no_force(second(mode, spoiled(name, untouched(), seed)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["unknown", "none"])
-@pytest.mark.parametrize("name", [*COVERING, "compressed", "other_scene", "even", "dirt", "noisy"])
+@pytest.mark.parametrize("name", SPOILING)
 def test_a_press_behind_a_fault_is_right_or_not_told(mode: str, name: str) -> None:
     truth = pressed(32)
     for seed in range(8):
@@ -135,7 +157,7 @@ def test_lights_that_drift_apart_are_no_force(mode: str, name: str) -> None:
         assert pressing.wrench is not None
         assert pressing.wrench.force_n[2] == pytest.approx(truth.wrench[2], rel=0.07)
         assert (scores(pressing, truth.wrench[:3]) < 3).all()
-        assert (scores(second(mode, spoiled(name, untouched(), seed)), np.zeros(3)) < 3).all()
+        require_no_force(second(mode, spoiled(name, untouched(), seed)))
 
 
 def gap(count: int) -> tuple[UnseenMotion, NDArray[np.bool_]]:
@@ -182,3 +204,26 @@ def test_a_wide_gap_gives_no_force_and_a_narrow_one_does() -> None:
         unseen, seen = gap(count)
         assert bool(unseen.problem(seen)) == refused
         assert (unseen.hidden_mm(seen) > 0).sum() == count**2
+
+
+def test_gaps_far_apart_hide_depths_that_are_independent() -> None:
+    """The sum of the depths is that of the formula, from the correlation of all pairs of nodes."""
+    unseen, all_seen = gap(0)
+    places, thickness_mm = unseen.places_mm, unseen.thickness_mm
+
+    def hidden(*gaps: tuple[float, float]) -> float:
+        lost = np.zeros(len(places), dtype=bool)
+        for middle in gaps:
+            lost |= np.abs(places - middle).max(axis=1) < 1.5
+        ratio = np.sqrt(3) * np.hypot(*(places[lost, None] - places[lost]).transpose(2, 0, 1))
+        ratio /= thickness_mm
+        expected = 0.02 * thickness_mm * np.sqrt(((1 + ratio) * np.exp(-ratio)).sum())
+        found = float(unseen.hidden_mm(~lost).sum())
+        assert found == pytest.approx(expected)
+        return found
+
+    assert all_seen.all()
+    assert not unseen.hidden_mm(all_seen).any()
+    one = hidden((3, 3))
+    assert hidden((3, 3), (11, 11)) == pytest.approx(np.sqrt(2) * one, rel=0.02)
+    assert one > 0.5 * 9 * 0.02 * thickness_mm

@@ -11,7 +11,7 @@ import pytest
 from lit_pipelines import checked, opened
 from pressed_samples import Pressed, pressed
 from pressed_shapes import ball, pressed_shape
-from spoiled_stream import soak, stream, untouched
+from spoiled_stream import least_press_n, soak, stream, untouched, widest_sigma_n
 
 pytest.importorskip("PIL")
 FRAMES = int(os.environ.get("GELSLIM_SOAK_FRAMES", "300"))
@@ -41,3 +41,5 @@ def test_no_fault_is_a_force_and_the_next_frames_are_right(mode: str) -> None:
     assert found.spoiled.total() > 0.09 * FRAMES
     assert len(found.false) <= FRAMES // 10_000, found.false
     assert not found.late
+    assert found.largest_n < least_press_n()
+    assert found.widest_n < widest_sigma_n()

@@ -151,6 +151,8 @@ def test_markers_beside_the_inside_of_a_gap() -> None:
         whole_kernel.beside_gap(whole, near, 8, 5, 0.05, found)
         np.testing.assert_array_equal(found, expected)
         seen += expected.sum()
+        whole_kernel.beside_lost(whole, near, 8, 2, found)
+        np.testing.assert_array_equal(found, missing >= 2)
     assert seen > 20
 
 
