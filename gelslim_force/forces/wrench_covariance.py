@@ -77,9 +77,7 @@ class WrenchCovariance:
             found = self._wrench.covariance(gains, sigma, reading.sigma_mm, lateral)
             return rigid + found + self._hidden(reading.hidden_n)
         noise_mm = noise_px * self._motion.view.usual_mm_per_px
-        apparent = self._motion.apparent_motion(
-            filled.motion_mm, self._unknown_normal_mm, noise_mm
-        )
+        apparent = self._motion.apparent_motion(filled.motion_mm, self._unknown_normal_mm, noise_mm)
         return rigid + self._wrench.covariance(gains, sigma, lateral=self._in_px(apparent))
 
     def _in_px(self, motion_mm: Array) -> Array:

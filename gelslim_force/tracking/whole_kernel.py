@@ -61,7 +61,7 @@ def far_from_neighbours(growth: Any, near: Any, limit: Any, far: Any) -> None:
 
 @njit(**COMPILED)
 def beside_lost(whole: Any, near: Any, next_to: Any, fewest: Any, beside: Any) -> None:
-    """Write which markers (n,) have `fewest` of the first `next_to` neighbours or more not whole."""
+    """Write which markers (n,) have `fewest` or more of their `next_to` neighbours not whole."""
     for i in range(len(whole)):
         lost = 0
         for k in range(next_to):
