@@ -22,6 +22,9 @@ def new_figure(
 
 def as_png(figure: Any, title: str | None = None) -> bytes:
     """The figure as PNG; a `title` is stored in its metadata."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", metadata={"Software": None, "Title": title})
+    # `savefig` would lay the figure out in a first pass of its own and then draw it.
+    FigureCanvasAgg(figure).print_png(stream, metadata={"Software": None, "Title": title})
     return stream.getvalue()

@@ -75,8 +75,12 @@ class _Test:
     force_n: Array
 
     def errors(self, operator: SurfaceOperator) -> ContactError:
-        found, expected = operator.force(self.motion_mm), self.force_n
-        return ContactError(_relative_error(found, expected), _resultant_error(found, expected))
+        return self.errors_of(operator.force(self.motion_mm))
+
+    def errors_of(self, found_n: Array) -> ContactError:
+        """Errors of forces (c, 3) in N for the motion."""
+        expected = self.force_n
+        return ContactError(_relative_error(found_n, expected), _resultant_error(found_n, expected))
 
 
 @single_threaded
@@ -128,15 +132,14 @@ def measure_ladder(
         else:
             operator = system_operator(system, rung, **parameters)
         noise = noise_forces(operator, system.columns)
-        errors = [test.errors(operator) for test in smooth]
+        forces = [operator.force(u) for u in fields]
+        errors = [test.errors_of(found) for test, found in zip(smooth, forces, strict=True)]
         rungs.append(
             MeasuredRung(
                 rung=rung,
                 parameters=parameters,
                 error_field=max(error.field for error in errors),
-                error_operator=max(
-                    map(_relative_error, (operator.force(u) for u in fields), condensed)
-                ),
+                error_operator=max(map(_relative_error, forces, condensed)),
                 error_resultant=max(error.resultant for error in errors),
                 noise_node_n_per_mm=float(np.std(noise)),
                 noise_resultant_n_per_mm=float(np.sqrt(np.mean(noise.sum(axis=1) ** 2))),
