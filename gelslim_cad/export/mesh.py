@@ -194,6 +194,7 @@ def _patches(
 ) -> list[Patch]:
     """As `face_patches`; without normals, which take as long as the nodes, those are empty."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.IMeshTools import IMeshTools_MeshAlgoType, IMeshTools_Parameters
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp
     from OCP.TopTools import TopTools_IndexedMapOfShape
@@ -203,7 +204,12 @@ def _patches(
             f"tessellation: linear {linear_mm} mm and angular {angular_deg} deg must both be > 0"
         )
     bare = bare_copy(shape)
-    BRepMesh_IncrementalMesh(bare.wrapped, linear_mm, False, float(np.radians(angular_deg)), False)
+    wanted = IMeshTools_Parameters()
+    wanted.Deflection = linear_mm
+    wanted.Angle = float(np.radians(angular_deg))
+    # Watson's algorithm, the default, takes a time that grows with the square of the nodes.
+    wanted.MeshAlgo = IMeshTools_MeshAlgoType.IMeshTools_MeshAlgoType_Delabella
+    BRepMesh_IncrementalMesh(bare.wrapped, wanted)
     maps = []
     for kind in (TopAbs_ShapeEnum.TopAbs_VERTEX, TopAbs_ShapeEnum.TopAbs_EDGE):
         found = TopTools_IndexedMapOfShape()
