@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import cadquery as cq
 
@@ -13,6 +14,7 @@ from gelslim_cad.geometry.thread import (
     NUT_PLAY_MM,
     NUT_SEAT_MM,
     NUTS_MM,
+    Insert,
     half_width_mm,
     hole_diameter_mm,
     insert_depth_mm,
@@ -22,6 +24,8 @@ from gelslim_cad.solids.materials import BRASS, STEEL
 from gelslim_cad.solids.shapes import Point2, box, pair, rod, single
 
 PLAY_MM = 0.01
+KINDS_KEPT = 8
+"""Kinds of inserts that are kept: all of one kind are copies of one solid."""
 HEAD_PLAY_MM = 0.1
 BOSS_FLOOR_MM = 1.0
 OVERLAP_MM = 0.05
@@ -136,14 +140,26 @@ def _note(d: Dimensions, hole: Hole) -> str:
 
 
 def _insert(at: Layout, hole: Hole) -> cq.Shape:
-    """Sleeve with a head, as wide as its hole: the knurls sink into the plastic."""
-    d, insert = at.d, INSERTS[at.screw_name]
-    wide = hole_diameter_mm(hole.thread, at.screw_name, d["manufacturing.print_process"])
-    x, y = hole.x_mm, hole.y_mm
-    sleeve = rod(x, y, _between(hole, PLAY_MM, insert.length), wide - 2 * PLAY_MM)
-    head = rod(x, y, _between(hole, PLAY_MM, insert.head_height - PLAY_MM), insert.head)
-    bore = rod(x, y, _between(hole, -1.0, insert.length + 1.0), at.screw.pilot_mm)
-    return sleeve.fuse(head).cut(bore)
+    wide = hole_diameter_mm(hole.thread, at.screw_name, at.d["manufacturing.print_process"])
+    face = hole.surface_z_mm + hole.inward * hole.plate_mm
+    made = _sleeve(INSERTS[at.screw_name], wide, at.screw.pilot_mm, hole.inward)
+    return made.translate((hole.x_mm, hole.y_mm, face))
+
+
+@lru_cache(maxsize=KINDS_KEPT)
+def _sleeve(insert: Insert, wide: float, bore: float, inward: int) -> cq.Shape:
+    """Sleeve with a head, as wide as its hole: the knurls sink into the plastic.
+
+    The mouth of its hole is in the origin; `inward` is the sign of z into the material.
+    """
+
+    def between(start: float, end: float) -> Point2:
+        return min(inward * start, inward * end), max(inward * start, inward * end)
+
+    sleeve = rod(0.0, 0.0, between(PLAY_MM, insert.length), wide - 2 * PLAY_MM)
+    head = rod(0.0, 0.0, between(PLAY_MM, insert.head_height - PLAY_MM), insert.head)
+    drilled = rod(0.0, 0.0, between(-1.0, insert.length + 1.0), bore)
+    return sleeve.fuse(head).cut(drilled)
 
 
 def _nut(at: Layout, hole: Hole) -> cq.Shape:
