@@ -192,14 +192,15 @@ def flat_face(solid: Any) -> Any:
     if not planar:
         raise ExportError("outline: the solid has no planar face; give a flat part or a face")
     volume = solid.Volume()
+    corners = np.array([v.toTuple() for v in solid.Vertices()])
     sheets = [
         (thickness, face)
-        for thickness, face in ((_thickness(solid, f), f) for f in planar)
+        for thickness, face in ((_thickness(corners, f), f) for f in planar)
         if abs(face.Area() * thickness / volume - 1) < 1e-6 and thickness**2 <= face.Area()
     ]
     if not sheets:
         face = max(planar, key=lambda f: float(f.Area()))
-        ratio = volume / (face.Area() * _thickness(solid, face))
+        ratio = volume / (face.Area() * _thickness(corners, face))
         raise ExportError(
             f"outline: volume is {ratio:.6f} x largest face x thickness, must be 1; the solid is "
             "not a flat plate: give the face of its flat blank instead"
@@ -208,10 +209,9 @@ def flat_face(solid: Any) -> Any:
     return min(sheets, key=lambda s: (round(s[0], 6), -_side(s[1])))[1]
 
 
-def _thickness(solid: Any, face: Any) -> float:
-    normal = _normal(face)
-    heights = [float(normal @ v.toTuple()) for v in solid.Vertices()]
-    return max(heights) - min(heights)
+def _thickness(corners: NDArray[np.float64], face: Any) -> float:
+    """Extent of the corners (n, 3) across a plane face."""
+    return float(np.ptp(corners @ _normal(face)))
 
 
 def _side(face: Any) -> float:
