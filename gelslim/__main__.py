@@ -8,6 +8,7 @@ Python.
 try:
     import sys
     from collections.abc import Callable
+    from typing import NoReturn
 
     from gelslim.ending import Ending, number_of, say
 
@@ -27,14 +28,17 @@ OBJECTS_PER_COLLECTION = 100_000
 with Python's own 700 a build spends a twentieth of its time on looking through them."""
 
 
-def main() -> int:
-    """Run `gelslim` with the process's arguments and return its exit status."""
+def main() -> NoReturn:
+    """Run `gelslim` with the process's arguments and end the process with the exit status."""
     import gc
 
     from gelslim.cli.main import main as command
 
     gc.set_threshold(OBJECTS_PER_COLLECTION, 50, 50)
-    return run(command)
+    status = run(command)
+    _ending.wait_for_threads()
+    # The interpreter would take apart the CAD and graphics libraries, which takes up to a second.
+    _ending.leave(status)
 
 
 def run(command: Callable[..., int]) -> int:
@@ -62,4 +66,4 @@ def _tidy() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -4,8 +4,9 @@ While the command line itself loads, there is nothing to clean up: the program p
 ends. Later a KeyboardInterrupt is raised, so that open files are closed and temporary files are
 removed. It is not raised during the import of a library, which could crash or report that it is
 missing, nor during a call of llvmlite, which would free memory twice, but directly after them. A
-further signal waits for that, at most PATIENCE_S. An interrupted process ends without the teardown
-of the interpreter, because threads of compiled code may still run and would use freed memory.
+further signal waits for that, at most PATIENCE_S. The process ends without the teardown of the
+interpreter: threads of compiled code that an interrupt left running would use freed memory, and
+after a build the teardown would take a second.
 """
 
 from __future__ import annotations
@@ -79,8 +80,14 @@ class Ending:
         self._status = status
         return status
 
+    def wait_for_threads(self) -> None:
+        """Wait for all threads but daemons, as the interpreter does before it ends."""
+        for thread in threading.enumerate():
+            if thread is not threading.main_thread() and not thread.daemon:
+                thread.join()
+
     def leave(self, status: int) -> NoReturn:
-        """End after an interrupt: run the exit functions and flush, without further teardown."""
+        """End the process: run the exit functions and flush, without further teardown."""
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError, AttributeError):

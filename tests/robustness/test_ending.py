@@ -259,6 +259,31 @@ def test_an_ignored_signal_stays_ignored(tmp_path: Path) -> None:
     assert done.stdout == "True\n"
 
 
+@pytest.mark.parametrize(("words", "status"), [("--version", 0), ("check nowhere.yaml", 2)])
+def test_the_end_without_teardown_waits_and_flushes(
+    words: str, status: int, tmp_path: Path
+) -> None:
+    """Threads end, exit functions run, all that was printed arrives; nothing is taken apart."""
+    text = f"""
+import atexit, sys, threading, time
+import gelslim.__main__ as program
+class Kept:
+    def __del__(self):
+        print("taken apart")
+kept = Kept()
+atexit.register(print, "exit function")
+threading.Thread(target=lambda: (time.sleep(1.0), print("thread"))).start()
+sys.argv = {["gelslim", *words.split()]!r}
+program.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", text], env=environment(tmp_path / "tmp"), text=True,
+        capture_output=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == status
+    assert done.stdout.endswith("thread\nexit function\n")
+
+
 @pytest.mark.parametrize("number", BOTH)
 def test_early_and_late_answers_in_json_are_the_same(
     number: signal.Signals, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
