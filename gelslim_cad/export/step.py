@@ -24,7 +24,9 @@ DECIMALS = 10
 
 TIME_STAMP = "1970-01-01T00:00:00"
 
-_TOKEN = re.compile(r"'(?:[^']|'')*'|-?\d+\.\d*(?:E[+-]?\d+)?")
+_REAL = re.compile(r"-?\d+\.\d*(?:E[+-]?\d+)?")
+_MARK, _CUT = "\0", "\1"
+"""Characters that no STEP file holds: the place of a string, and the end of a value."""
 _CONTINUATION = re.compile(r"(?<!;)\n *")
 
 
@@ -197,22 +199,32 @@ def _set_header(model: Any, title: str) -> None:
 def _normalised(text: str) -> str:
     """Put each entity on one line, as line breaks depend on the unrounded digits; round reals."""
     head, mark, data = text.partition("DATA;\n")
-    return head + mark + _TOKEN.sub(_Rounded(), _CONTINUATION.sub("", data))
+    # Every second piece lies between quotation marks; a doubled mark only adds an empty piece.
+    pieces = _CONTINUATION.sub("", data).split("'")
+    pieces[::2] = _with_rounded_reals(_MARK.join(pieces[::2])).split(_MARK)
+    return head + mark + "'".join(pieces)
 
 
-class _Rounded:
-    """Rounds the reals among matched tokens. Most reals of a file occur in it many times."""
+def _with_rounded_reals(text: str) -> str:
+    """Round the reals of a text without strings, value by value.
 
-    def __init__(self) -> None:
-        self._known: dict[str, str] = {}
+    Most values occur in it many times, so that a table is faster than a search.
+    """
+    for delimiter in ",)":
+        text = text.replace(delimiter, _CUT + delimiter)
+    values = text.replace("(", "(" + _CUT).split(_CUT)
+    known = _Rounded()
+    return "".join([known[value] if "." in value else value for value in values])
 
-    def __call__(self, match: re.Match[str]) -> str:
-        token = match[0]
-        if token not in self._known:
-            self._known[token] = token if token[0] == "'" else _rounded(token)
-        return self._known[token]
+
+class _Rounded(dict[str, str]):
+    """Values with their reals rounded, worked out when they are first looked up."""
+
+    def __missing__(self, value: str) -> str:
+        found = self[value] = _REAL.sub(_rounded, value)
+        return found
 
 
-def _rounded(real: str) -> str:
-    digits = f"{float(real):.{DECIMALS}f}".rstrip("0")
+def _rounded(real: re.Match[str]) -> str:
+    digits = f"{float(real[0]):.{DECIMALS}f}".rstrip("0")
     return "0." if digits == "-0." else digits

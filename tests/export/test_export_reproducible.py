@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import re
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -70,6 +71,17 @@ def test_step_ignores_and_keeps_settings_others_left_behind():
     finally:
         Interface_Static.SetCVal_s("write.step.unit", old_unit)
         Interface_Static.SetIVal_s("write.surfacecurve.mode", old_mode)
+
+
+def test_reals_are_rounded_and_names_that_look_like_reals_are_not():
+    name = "it's (1.234567890123, -0.) in 2.5E-13"
+    third = samples.box(1 / 3, 2 / 3, 1.0, at=(1e-13, 0.0, 0.0))
+    text = step_bytes(samples.part(name, third)).decode("ascii")
+    assert text.count(name.replace("'", "''")) >= 2
+    values = re.findall(r"-?\d+\.\d*(?:E[+-]?\d+)?", re.sub(r"'(?:[^']|'')*'", "", text))
+    assert {"0.1666666667", "0.3333333333", "0."} <= set(values)
+    assert not any(v == "-0." or "E" in v for v in values)
+    assert max(len(v.partition(".")[2]) for v in values) == 10
 
 
 @pytest.mark.parametrize("name", sorted(samples.SHAPES))
