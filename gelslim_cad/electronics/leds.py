@@ -22,7 +22,7 @@ from gelslim_cad.spec.led_library import (
     LedVariant,
     PadPlace,
     Pads,
-    library_leds,
+    library_led,
 )
 
 SIZE_TOLERANCE_MM = 0.16
@@ -111,7 +111,7 @@ def board_led(d: Lookup, side: Side) -> BoardLed | None:
         where no LED of that model has the colour. `fits` tells whether its size is right too.
     """
     colour, wavelength = list(strip_wavelengths_nm(d).items())[SIDES.index(side)]
-    led = library_leds().get(d["design.leds.model"])
+    led = library_led(d["design.leds.model"])
     if led is None:
         return _own(d, side, colour, wavelength) if d["electronics.own_forward_v"] else None
     white = is_white(d)

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from gelslim_cad.build.manifest import FileEntry
 
 
+_NAME = re.compile(r"(?<![\w.])\w[\w.]*(?<!\.)(?![\w(]|\.\w)")
+"""A dotted name or a number in a formula, but no function."""
+
+
 @dataclass(frozen=True)
 class Note:
     """A short remark under a heading of its own, e.g. on the light guide."""
@@ -80,7 +84,7 @@ def _input(name: str, value: Scalar, known: Mapping[str, Any]) -> str:
 
 
 def substituted(formula: str, inputs: Mapping[str, Scalar]) -> str:
-    """Put the inputs' numbers in place of their names, whole names only, longest name first.
+    """Put the inputs' numbers in place of their names, whole names only.
 
     An input called `camera.focal_length_mm` is also found as `focal_length_mm` where that last
     part is not shared by another input.
@@ -93,11 +97,7 @@ def substituted(formula: str, inputs: Mapping[str, Scalar]) -> str:
         values[name] = number(value)
         if short.count(last) == 1:
             values.setdefault(last, number(value))
-    if not values:
-        return formula
-    names = "|".join(re.escape(name) for name in sorted(values, key=lambda n: (-len(n), n)))
-    pattern = re.compile(rf"(?<![\w.])(?:{names})(?![\w(]|\.\w)")
-    return pattern.sub(lambda found: values[found.group()], formula)
+    return _NAME.sub(lambda found: values.get(found.group(), found.group()), formula)
 
 
 def files(entries: Mapping[str, FileEntry]) -> str:

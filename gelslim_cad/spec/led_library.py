@@ -152,8 +152,21 @@ class LibraryLed(Block):
 @cache
 def library_leds() -> Mapping[str, LibraryLed]:
     """The types of LED by the name that a spec gives as `design.leds.model`."""
-    found = (read_model(path, LibraryLed).model for path in sorted(LIBRARY.glob("*.yaml")))
-    return {led.name: led for led in found}
+    return {led.name: led for led in map(_read, sorted(LIBRARY.glob("*.yaml")))}
+
+
+@cache
+def library_led(name: str) -> LibraryLed | None:
+    """The type of LED of this name, None if there is none; no other file is parsed."""
+    for path in sorted(LIBRARY.glob("*.yaml")):
+        if name in path.read_text(encoding="utf-8") and _read(path).name == name:
+            return _read(path)
+    return None
+
+
+@cache
+def _read(path: Path) -> LibraryLed:
+    return read_model(path, LibraryLed).model
 
 
 def completed_leds(given: Any) -> Any:
@@ -166,7 +179,7 @@ def completed_leds(given: Any) -> Any:
         return given
     own = {n: tuple(v) if n in TABLES and isinstance(v, list) else v for n, v in given.items()}
     model = given.get("model")
-    led = library_leds().get(model) if isinstance(model, str) else None
+    led = library_led(model) if isinstance(model, str) else None
     return own if led is None else {**led.fields(), **own}
 
 
