@@ -23,6 +23,11 @@ from gelslim_cad.geometry.led_strips import is_white, shared_light, strip_wavele
 from gelslim_cad.ordering.line import BomLine
 from ifem_export.markers.grid import MarkerGrid
 
+MOULD = "mould_"
+"""Begins the names of the mould's parts and of what closes it."""
+MILLED = "mould_block"
+"""The part of the mould that is milled to order, unless it is printed."""
+
 
 def build_guide(
     d: Dimensions,
@@ -61,7 +66,7 @@ def before_assembly(
         _shopping(bom, finger_boards(d)),
         _print(d, bom, told),
         _laser(d),
-        _cast(d, Casting.of(d).weighable()),
+        _cast(d, Casting.of(d).weighable(), bom),
         _mark(d, grid),
     ]
     return "\n\n".join(sections)
@@ -123,8 +128,15 @@ def _print(d: Dimensions, bom: tuple[BomLine, ...], told: Sequence[ToldStep]) ->
         "slides and build again.\n\n"
         + "\n".join(f"- `print/{n}.stl` (or `.3mf`), in the orientation of the file" for n in names)
         + "\n\nUse black material or paint the inside matt black: stray light lowers the contrast. "
-        f"{threads}{bezel_blank_step(d)}"
+        f"{threads}{bezel_blank_step(d)}{_printed_tools(bom)}"
     )
+
+
+def _printed_tools(bom: tuple[BomLine, ...]) -> str:
+    """The tools to print, with what to heed; those of the mould belong to the casting."""
+    tools = [b for b in bom if b.tooling and b.process == "print" and not b.name.startswith(MOULD)]
+    lines = [f"- `print/{b.name}.stl`: {b.note}" for b in tools]
+    return "\n\nThe tools that are printed:\n\n" + "\n".join(lines) if lines else ""
 
 
 def _laser(d: Dimensions) -> str:
@@ -135,9 +147,30 @@ def _laser(d: Dimensions) -> str:
     )
 
 
-def _cast(d: Dimensions, batch: Casting) -> str:
+def _mould(bom: tuple[BomLine, ...]) -> str:
+    """The parts of the mould from below, with their files and what to heed."""
+    lines = [
+        f"- {b.quantity} × `{_mould_file(b)}`: {b.note}\n"
+        for b in bom
+        if b.tooling and b.name.startswith(MOULD) and b.note
+    ]
+    return "The mould, from below:\n\n" + "".join(lines) + "\n" if lines else ""
+
+
+def _mould_file(line: BomLine) -> str:
+    """File that a part of the mould is made from; the name of what closes the mould."""
+    if line.process == "buy" and line.name != MILLED:
+        return line.name
+    folder, suffix = {"laser": ("laser", "dxf"), "print": ("mould", "stl")}.get(
+        line.process, ("mould", "step")
+    )
+    return f"{folder}/{line.name}.{suffix}"
+
+
+def _cast(d: Dimensions, batch: Casting, bom: tuple[BomLine, ...]) -> str:
     return (
         "## 4. Cast the gel\n\n"
+        f"{_mould(bom)}"
         f"- Mix **{batch.mass_a_g:.2f} g A + {batch.mass_b_g:.2f} g B** "
         f"({d['material.gel.mix_ratio_a']:g}:{d['material.gel.mix_ratio_b']:g} by mass).\n\n"
         "| quantity | how | value |\n|---|---|---|\n"

@@ -125,6 +125,13 @@ def test_documents_name_files_that_are_there(built: Path) -> None:
     assert set((built / "markers/markers.csv").read_text().splitlines()[0].split(",")) <= named
 
 
+def test_the_instructions_name_all_that_is_printed_and_the_mould(built: Path) -> None:
+    text = (built / "BUILD.md").read_text(encoding="utf-8")
+    made = [*(built / "print").glob("*.stl"), *(built / "mould").glob("*.step")]
+    assert len(made) > 8
+    assert not [path.stem for path in made if f"/{path.stem}." not in text]
+
+
 def test_every_proof_holds_and_all_file_kinds_are_proved(built: Path) -> None:
     proofs = json.loads((built / "manifest.json").read_text())["proofs"]
     assert all(p["ok"] for p in proofs)
