@@ -42,6 +42,8 @@ such a change: contacts change single dots by more and lines by a quarter of thi
 _STRAIN_SHOWN = 2.0
 """Largest growth of dots over the strain between the lines beside them, which is a mean over two
 pitches: contacts strain the gel at their rim within one."""
+_MOST_OUTSIDE = 0.1
+"""Motion of the outer lines of markers over their distance where strain explains sizes."""
 _FROZEN = (
     "{count} {lines} of the picture are the same: the camera, its cable or its driver has a fault"
 )
@@ -186,13 +188,14 @@ def _unstrained(growth: Array, motion: Array, apart: Array) -> Array:
     """Growth (k,) of the dots of lines beyond what their motion (k, 2) apart explains.
 
     Where neighbouring lines move away from each other by a share of their distance `apart` (2,),
-    dots between them grow by about that share; NaN where it is not known.
+    dots between them grow by about that share; NaN where it is not known. A gel is bonded: its
+    outer lines stay, where those of a picture in two parts do not.
     """
     if len(motion) < _LEAST_LINES:
         return growth
     share = motion @ apart / (apart @ apart)
     known = np.flatnonzero(np.isfinite(share))
-    if len(known) < 2:
+    if len(known) < 2 or np.abs(share[known[[0, -1]]]).max() > _MOST_OUTSIDE:
         return growth
     strain = _STRAIN_SHOWN * np.gradient(np.interp(np.arange(len(share)), known, share[known]))
     return growth - np.clip(growth, np.minimum(strain, 0.0), np.maximum(strain, 0.0))

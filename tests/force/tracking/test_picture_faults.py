@@ -76,6 +76,9 @@ def test_lines_of_dots_that_a_strain_makes_larger_are_those_of_a_gel(faults: Pic
     assert "other sizes" in faults.torn(moved(faults, motion), -1.3 * strain[rows(faults)])
     still = moved(faults, np.zeros(ROWS))
     assert "other sizes" in faults.torn(still, 1.3 * strain[rows(faults)])
+    # A part of the picture that lies some rows lower: its rows are farther apart to the last one.
+    lower = 3.2 * np.maximum(np.arange(ROWS) - 7.0, 0.0)
+    assert "other sizes" in faults.torn(moved(faults, lower), 0.25 * (rows(faults) > 7))
 
 
 def test_neighbours_that_part_are_none_of_a_gel(faults: PictureFaults) -> None:
