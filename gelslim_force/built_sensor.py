@@ -42,7 +42,11 @@ class BuiltGel:
         """The source with the derivatives of its motion by the parameters of the gel."""
         chosen = settings or PipelineSettings()
         points_mm = np.asarray(self.bundle.mesh.surface_mm)
-        models = [(NormalModel(chosen.compliance(b), points_mm), step) for b, step in self.more]
+        # The same operators as of the source itself: a difference of two kinds is no derivative.
+        models = [
+            (NormalModel(chosen.compliance(b), points_mm, chosen.edge(b)), step)
+            for b, step in self.more
+        ]
         return replace(source, varied=tuple(models))
 
 

@@ -27,6 +27,9 @@ _MOST_STEPS = 40
 _DISCRETE = 0.1
 """Relative error of the depth for a patch as large as the node spacing; it falls with the square
 of the size."""
+_MESH = 0.004
+"""Relative error of the depth by the mesh of the pad, for patches of any size: 1 % at most of balls
+on an elastic layer, at Poisson's ratios up to 0.48."""
 
 
 class NormalModel:
@@ -160,7 +163,8 @@ class NormalModel:
         patch = patch.at_height(self._rim_height(patch, indenter, depth))
         # The patch moves by less than a node: the depth changes with its size only.
         depth *= (patch.size_mm / seen) ** 2
-        return patch, depth, _DISCRETE * (self.pitch_mm / patch.size_mm) ** 2 * depth
+        share = np.hypot(_DISCRETE * (self.pitch_mm / patch.size_mm) ** 2, _MESH)
+        return patch, depth, float(share) * depth
 
     def _rim_profile(self, patch: ContactPatch, indenter: Indenter) -> float:
         if isinstance(indenter, Flat):

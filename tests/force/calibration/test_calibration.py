@@ -58,7 +58,9 @@ def test_print_errors_noise_and_missing_dots(seed):
     assert np.abs(pulls).max() < 3.5
     # The rest places hold the print's own errors: that is what motions are measured from.
     rest = found.rest_mm - (GRID.positions_mm + jitter)[found.markers]
-    assert np.sqrt((rest**2).mean()) < 0.003
+    # Dirt that touches a few dots shifts them by up to 0.05 mm.
+    assert np.sqrt((rest**2).mean()) < 0.0035
+    assert np.quantile(np.hypot(*rest.T), 0.98) < 0.006
     drawn = np.flatnonzero(frame.drawn)
     assert np.isin(found.markers, drawn).all()
     places = frame.centres_px[drawn]

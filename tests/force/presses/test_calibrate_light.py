@@ -118,7 +118,7 @@ def test_a_hidden_light_is_found_and_explains_other_presses() -> None:
     left = {n: np.mean([r.extra["normal"]["unexplained"] for r in rs]) for n, rs in seen.items()}
     assert left["built"] < 0.75 * left["traced"]
     gains = np.array([r.extra["normal"]["gain"] for r in seen["built"]])
-    assert np.abs(gains - 1).max() < 0.04
+    assert np.abs(gains - 1).max() < 0.045
 
 
 @pytest.mark.slow
