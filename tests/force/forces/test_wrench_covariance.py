@@ -91,7 +91,8 @@ def test_the_covariance_is_the_sum_of_its_causes(sensor: Sensor, deep: bool) -> 
     nodes = len(sensor.motion.points_mm)
     reading = NormalReading.given(nodes, rng.normal(0, 0.1, nodes), 0.01) if deep else None
     if reading is None:
-        lateral = sensor.motion.apparent_motion(filled.motion_mm, UNNOTICED_MM)
+        noise_mm = NOISE_PX * sensor.motion.view.usual_mm_per_px
+        lateral = sensor.motion.apparent_motion(filled.motion_mm, UNNOTICED_MM, noise_mm)
         sunk = np.zeros(6)
     else:
         lateral = sensor.motion.compensation_change(reading.sigma_mm)
