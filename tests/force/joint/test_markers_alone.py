@@ -51,6 +51,7 @@ def test_grey_pictures_are_explained_by_the_markers_alone() -> None:
     assert given.normal is None
 
 
+@pytest.mark.slow
 def test_six_components_from_a_grey_picture() -> None:
     truth = pressed(13)
     found = processed(grey(truth.image))

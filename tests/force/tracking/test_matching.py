@@ -45,6 +45,7 @@ def score():
     return kept
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_in_a_thousand_wrong_at_most_up_to_one_and_a_half_pitches(score, kind):
     """5 % of the markers missing, 1 % spurious dots, no prediction: the reference only."""
@@ -56,6 +57,7 @@ def test_one_in_a_thousand_wrong_at_most_up_to_one_and_a_half_pitches(score, kin
         assert right >= 0.998 * there, (peak, right / there)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_nearest_neighbour_fails_from_half_a_pitch_on(score, kind):
     for peak in (0.8, 1.2, 1.5):
