@@ -26,7 +26,7 @@ by 0.05."""
 _NEXT, _LEAST_MISSING = 8, 5
 """Neighbours of a marker one site away, and how many are missing, with all others, inside a gap.
 Gaps of single dots are wear of the print, which leaves the dots beside them whole."""
-_CUT, _CUT_OVER_USUAL, _LEAST_LOST = 0.08, 4.0, 2
+_CUT, _CUT_OVER_USUAL, _LEAST_LOST = 0.08, 4.0, 3
 """Change of size or shape by which something out of focus cuts a dot beside others that it hides,
 which moves its centre by a pixel, also over that of most dots, and how many of the eight neighbours
 it has to hide."""
