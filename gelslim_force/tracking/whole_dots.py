@@ -26,10 +26,11 @@ by 0.05."""
 _NEXT, _LEAST_MISSING = 8, 5
 """Neighbours of a marker one site away, and how many are missing, with all others, inside a gap.
 Gaps of single dots are wear of the print, which leaves the dots beside them whole."""
-_CUT, _CUT_OVER_USUAL, _LEAST_LOST = 0.08, 4.0, 3
+_CUT, _CUT_OVER_USUAL, _LEAST_LOST = 0.08, 4.0, 2
 """Change of size or shape by which something out of focus cuts a dot beside others that it hides,
 which moves its centre by a pixel, also over that of most dots, and how many of the eight neighbours
-it has to hide."""
+it has to hide. Dirt that covers a part of single dots does not count: beside it are dots that
+strain has changed as much."""
 _WORN = 0.05
 """Share of such single dots from which wide gaps are taken for wear too."""
 
@@ -62,7 +63,7 @@ class WholeDots:
         wk.far_from_neighbours(growth, near, _COVERED, covered)
         whole &= ~covered
         wk.beside_gap(whole, near, _NEXT, _LEAST_MISSING, _WORN, beside)
-        wk.beside_lost(whole, near, _NEXT, _LEAST_LOST, lost)
+        wk.beside_lost(seen, near, _NEXT, _LEAST_LOST, lost)
         changed = change > max(_CUT, _CUT_OVER_USUAL * median(change))
         cut = seen & (~whole | beside | (changed & lost))
         return replace(tracked, tracks=tracked.tracks.without(cut)) if cut.any() else tracked

@@ -60,12 +60,12 @@ def far_from_neighbours(growth: Any, near: Any, limit: Any, far: Any) -> None:
 
 
 @njit(**COMPILED)
-def beside_lost(whole: Any, near: Any, next_to: Any, fewest: Any, beside: Any) -> None:
-    """Write which markers (n,) have `fewest` or more of their `next_to` neighbours not whole."""
-    for i in range(len(whole)):
+def beside_lost(seen: Any, near: Any, next_to: Any, fewest: Any, beside: Any) -> None:
+    """Write which markers (n,) have `fewest` or more of their `next_to` neighbours not seen."""
+    for i in range(len(seen)):
         lost = 0
         for k in range(next_to):
-            lost += near[i, k] >= 0 and not whole[near[i, k]]
+            lost += near[i, k] >= 0 and not seen[near[i, k]]
         beside[i] = lost >= fewest
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from pressed_samples import calibration, lit_bundle, reference
 from shaded_frames import shaded
@@ -45,3 +47,22 @@ def test_an_opaque_speck_is_no_contact() -> None:
     clean = shaded(camera=calibration().camera, seed=43).image
     for radius in (4.0, 9.0):
         assert source.look(soiled(clean, middle, radius), markers) is None
+
+
+def test_strained_dots_beside_soiled_ones_are_kept() -> None:
+    """Dirt on parts of dots cut the strained ones beside them, and forces were off by 11 mN."""
+    found = calibration()
+    dots = np.searchsorted(found.markers, found.reference.markers)
+    whole = WholeDots(found.reference, found.dots.moments_px2[dots])
+    frame = found.tracker().update(shaded(camera=calibration().camera, seed=47).image)
+    marker = len(found.reference) // 2
+    beside = found.reference.neighbours[marker, :3]
+    moments = frame.detections.moments_px2.copy()
+    moments[frame.tracks.dots[marker]] *= np.exp(0.1)
+    moments[frame.tracks.dots[beside]] *= np.exp(-0.3)
+    strained = replace(frame, detections=replace(frame.detections, moments_px2=moments))
+    tracked = whole.of(strained).tracks.tracked
+    assert tracked[marker]
+    assert not tracked[beside].any()
+    hidden = strained.tracks.without(np.isin(np.arange(len(strained.tracks)), beside))
+    assert not whole.of(replace(strained, tracks=hidden)).tracks.tracked[marker]
