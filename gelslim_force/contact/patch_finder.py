@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
-from scipy.spatial import cKDTree
 
+from gelslim_force.contact.gel_bins import GelBins
 from gelslim_force.contact.indenter import Flat, Indenter
 from gelslim_force.contact.patch import ContactPatch, rim_share, strip_covariance, strip_patch
 from gelslim_force.contact.patch_region import LARGEST_CHANGE, changed_region
@@ -21,21 +20,17 @@ from gelslim_force.contact.patch_shading import (
     ShadingFit,
     SlopeLaw,
     Window,
-    best_shading_fit,
-    continued_start,
+    continued_starts,
     first_starts,
+    fit_shading,
     fits_better,
+    nearest_start,
     settled,
+    settled_start,
     start_values,
 )
 from gelslim_force.contact.region_outline import region_patch
-from gelslim_force.contact.shading_change import (
-    ShadingChange,
-    ShadingReference,
-    bin_positions,
-    bin_sizes,
-    near_surface,
-)
+from gelslim_force.contact.shading_change import ShadingChange, ShadingReference
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
@@ -47,6 +42,8 @@ _WINDOW, _MOST_BINS = 2.2, 1200
 """Radius of the fit to the shading, over the size of the patch, and its largest number of bins."""
 _BLUR_PX = 2.0
 """Approximate blur of the picture."""
+_MORE_MISSED = 0.03
+"""Share of the change, beyond the noise, that a followed patch may leave more than before."""
 _LEAST_EXPLAINED = 0.5
 """Share of the change that a fit to the shading must explain; otherwise the outline is kept."""
 _SHADING_ERROR = 0.01
@@ -85,29 +82,13 @@ class PatchFinder:
     ) -> None:
         self.indenter = indenter
         self._last: Followed | None = None
-        self._found_bin: tuple[Array, tuple[int, int]] | None = None
         markers = np.asarray(markers_px, dtype=float).reshape(-1, 2)
         radius = np.broadcast_to(np.asarray(marker_radius_px, dtype=float), (len(markers),))
         picture = np.asarray(reference)
         bin_px = max(2, round(picture.shape[1] / 160)) if picture.ndim >= 2 else 2
         self._radius = np.ascontiguousarray(radius * 1.5 + 1.0)
         self._light = ShadingReference(picture, markers, self._radius, bin_px, opposed)
-        bins = bin_positions(self._light, camera)
-        self._x, self._y, self._parallax, self._growth = bins
-        self._bin_mm = bin_sizes(self._x, self._y)
-        self._light.on_pad &= np.isfinite(self._x)
-        if surface_mm is not None:
-            self._light.on_pad &= near_surface(
-                self._x, self._y, np.asarray(surface_mm, dtype=float)
-            )
-
-    @cached_property
-    def _pad(self) -> cKDTree:
-        return cKDTree(np.column_stack([self._x.ravel()[self._on], self._y.ravel()[self._on]]))
-
-    @cached_property
-    def _on(self) -> NDArray[np.intp]:
-        return np.flatnonzero(self._light.on_pad)
+        self._bins = GelBins(self._light, camera, surface_mm)
 
     def change(
         self, image: NDArray[np.uint8], markers_px: ArrayLike | None = None
@@ -143,15 +124,17 @@ class PatchFinder:
         if patch is None:
             return None
         share = 0.0
-        if not self._well_inside(patch):
-            share = rim_share(patch, self._pad, 2 * self._local_bin(patch))
+        if not self._bins.holds(patch):
+            share = rim_share(patch, self._bins.tree, 2 * self._bins.size_at(patch))
         return _finished(patch, share, contrast)
 
     def _outline(self, region: Mask) -> ContactPatch | None:
-        found = region_patch(region, self._light.on_pad, self._x, self._y, self.indenter)
+        found = region_patch(
+            region, self._bins.on_pad, self._bins.x_mm, self._bins.y_mm, self.indenter
+        )
         if found is None:
             return None
-        parallax, growth = self._sight(found.centre_mm)
+        parallax, growth = self._bins.sight(found.centre_mm)
         # The size of a flat punch is known, not seen: it does not depend on the assumed height.
         flat = isinstance(self.indenter, Flat)
         return replace(found, parallax=parallax, growth_per_mm=0.0 if flat else growth)
@@ -164,7 +147,7 @@ class PatchFinder:
         frames, and whenever the changed region grows or shrinks.
         """
         last, self._last = self._last, None
-        now = self._measured(region)
+        now = self._bins.region(region)
         followed = None
         if last is not None:
             followed = self._followed(last, now, light)
@@ -172,18 +155,34 @@ class PatchFinder:
             if followed is not None and steady and last.age < REFRESH_FRAMES:
                 self._last = Followed(*followed, now, last.age + 1)
                 return followed[0]
-        start = self._outline(region)
+        start = self._start(region, now, known=followed is not None)
         if start is None or isinstance(self.indenter, Flat):
             return start if followed is None else followed[0]
-        new = self._refined(start, light)
-        best = new or followed
-        if new is not None and followed is not None:
-            law = self._law(new[1].window.bin_mm)
-            best = followed if fits_better(followed[1], new[1], law) else new
+        if followed is None:
+            best = self._refined(start, light)
+        else:
+            best = self._better(followed, start, light)
         if best is None:
             return start
         self._last = Followed(*best, now, 0)
         return best[0]
+
+    def _start(self, region: Mask, now: Region, *, known: bool) -> ContactPatch | None:
+        """Where a search begins; beside a `known` patch a disc of the region's size will do."""
+        disc = ContactPatch("disc", now.middle_mm, now.radius_mm)
+        return (
+            disc if known and not self._strip and self._bins.holds(disc) else self._outline(region)
+        )
+
+    def _better(
+        self, followed: tuple[ContactPatch, ShadingFit], start: ContactPatch, light: ShadingChange
+    ) -> tuple[ContactPatch, ShadingFit]:
+        """The followed patch, or one fit from the outline if it explains the shading better."""
+        new = self._shading(start, first_starts(start), light, nearest_start)
+        if new is None or new[1].explained < _LEAST_EXPLAINED:
+            return followed
+        law = self._law(new[1].window.bin_mm)
+        return followed if fits_better(followed[1], new[1], law) else new
 
     def _followed(
         self, last: Followed, now: Region, light: ShadingChange
@@ -193,32 +192,32 @@ class PatchFinder:
         outside = last.patch.outside_mm(*now.middle_mm) > -0.3 * size
         if outside or not 0.6 < now.radius_mm / size < 2.5:
             return None
-        found = self._shading(last.patch, [last.fit.values], light, (last.region, now))
-        if found is None or found[1].explained < last.fit.explained - 0.03:
+        shift = now.middle_mm - last.region.middle_mm
+        starts = continued_starts(
+            last.fit.values, shift, now.radius_mm / last.region.radius_mm, strip=self._strip
+        )
+        found = self._shading(last.patch, starts, light, nearest_start)
+        if found is None or found[1].missed > last.fit.missed + _MORE_MISSED:
             return None
         return found if settled(last.patch, found[0]) else None
-
-    def _measured(self, region: Mask) -> Region:
-        middle = np.array([self._x[region].mean(), self._y[region].mean()])
-        return Region(middle, float(np.sqrt((self._bin_mm[region] ** 2).sum() / np.pi)))
 
     def _refined(
         self, start: ContactPatch, light: ShadingChange
     ) -> tuple[ContactPatch, ShadingFit] | None:
         """The patch of the outline with its rim moved to where the shading has it, if possible."""
-        patch, found = start, None
-        starts = first_starts(start)
+        patch, found = start, self._shading(start, first_starts(start), light)
         for number in range(_MOST_PASSES):
-            found = self._shading(patch, starts, light)
             if found is None:
                 return None
             before, patch = patch, found[0]
+            whole = self._bins.holds(patch, _EDGE_MARGIN)
+            if settled(before, patch) and (number > 0 or whole):
+                break
             # A patch that the edge cuts may look too small with a steep decay around it: larger
             # ones are tried too.
-            if settled(before, patch) and (number > 0 or self._well_inside(patch, _EDGE_MARGIN)):
-                break
-            larger = [start_values(patch, scale, 1.5) for scale in (1.0, 1.3)]
-            starts = [found[1].values, *larger]
+            larger = [] if whole else [start_values(patch, scale, 1.5) for scale in (1.0, 1.3)]
+            choose = nearest_start if whole else settled_start
+            found = self._shading(patch, [found[1].values, *larger], light, choose)
         if found is None or found[1].explained < _LEAST_EXPLAINED:
             return None
         return found
@@ -228,21 +227,14 @@ class PatchFinder:
         patch: ContactPatch,
         starts: list[Array],
         light: ShadingChange,
-        change: tuple[Region, Region] | None = None,
+        choose: Callable[[Window, list[Array], SlopeLaw], Array] = settled_start,
     ) -> tuple[ContactPatch, ShadingFit] | None:
-        """The fit to the shading around a patch, if the size remains similar.
-
-        With `change`, the regions of the last frame and of this one, it continues the last fit.
-        """
+        """The fit to the shading around a patch from one of the starts, if the size is similar."""
         window = self._window(patch, light)
         if window is None:
             return None
         law = self._law(window.bin_mm)
-        if change is not None:
-            shift = change[1].middle_mm - change[0].middle_mm
-            growth = change[1].radius_mm / change[0].radius_mm
-            starts = [continued_start(window, starts[0], shift, growth, law)]
-        fit = best_shading_fit(window, starts, law)
+        fit = fit_shading(window, choose(window, starts, law), law)
         if fit is None or not 0.4 < fit.values[2] / patch.size_mm < 2.0:
             return None
         return self._from_fit(fit, patch, law.curvature_per_mm, window.bin_mm), fit
@@ -264,7 +256,7 @@ class PatchFinder:
             covariance = np.zeros((4, 4))
             covariance[:3, :3] = fit.covariance[:3, :3]
             covariance += extra
-        parallax, growth = self._sight(patch.centre_mm)
+        parallax, growth = self._bins.sight(patch.centre_mm)
         height = -0.1 * size * size * curvature
         return replace(
             patch, covariance=covariance, method="shading", parallax=parallax,
@@ -273,7 +265,8 @@ class PatchFinder:
 
     def _window(self, start: ContactPatch, light: ShadingChange) -> Window | None:
         valid = np.flatnonzero(light.valid)
-        apart = start.outside_mm(self._x.ravel()[valid], self._y.ravel()[valid])
+        bins = self._bins
+        apart = start.outside_mm(bins.x_mm.ravel()[valid], bins.y_mm.ravel()[valid])
         near = valid[apart < (_WINDOW - 1) * start.size_mm]
         rows, columns = np.divmod(near, light.valid.shape[1])
         skip = 1 + len(rows) // _MOST_BINS
@@ -286,15 +279,15 @@ class PatchFinder:
         partner = number[rows + 1, columns - 1]
         have = partner >= 0
         return Window(
-            self._x[rows, columns],
-            self._y[rows, columns],
-            self._parallax[rows, columns],
+            bins.x_mm[rows, columns],
+            bins.y_mm[rows, columns],
+            bins.parallax[rows, columns],
             (
                 LARGEST_CHANGE
                 * np.tanh(light.change[:, rows, columns].astype(float) / LARGEST_CHANGE)
                 / np.median(light.noise[:, rows, columns], axis=1)[:, None]
             ).T,
-            self._local_bin(start),
+            self._bins.size_at(start),
             (np.flatnonzero(have), partner[have]),
         )
 
@@ -311,33 +304,6 @@ class PatchFinder:
     @property
     def _strip(self) -> bool:
         return self.indenter is not None and self.indenter.patch_kind == "strip"
-
-    def _well_inside(self, patch: ContactPatch, scale: float = 1.0) -> bool:
-        """Whether a disc, with its size times `scale`, is on the pad as a whole."""
-        return patch.kind == "disc" and bool(
-            self._inside_mm[self._nearest(patch.centre_mm)] > scale * patch.size_mm
-        )
-
-    @cached_property
-    def _inside_mm(self) -> Array:
-        """Lower bound of the distance of each bin from the nearest one that is not on the pad."""
-        on = np.pad(self._light.on_pad, 1)
-        steps = ndimage.distance_transform_edt(on)[1:-1, 1:-1]
-        return np.asarray((steps - 1) * self._bin_mm[self._light.on_pad].min() / np.sqrt(2))
-
-    def _nearest(self, point_mm: Array) -> tuple[int, int]:
-        if self._found_bin is None or not np.array_equal(self._found_bin[0], point_mm):
-            _, at = self._pad.query(point_mm)
-            row, column = divmod(int(self._on[at]), self._x.shape[1])
-            self._found_bin = point_mm.copy(), (row, column)
-        return self._found_bin[1]
-
-    def _sight(self, point_mm: Array) -> tuple[Array, float]:
-        at = self._nearest(point_mm)
-        return self._parallax[at].copy(), float(self._growth[at])
-
-    def _local_bin(self, patch: ContactPatch) -> float:
-        return float(self._bin_mm[self._nearest(patch.centre_mm)])
 
 
 def _finished(patch: ContactPatch, share: float, contrast: float) -> ContactPatch:

@@ -31,7 +31,7 @@ _TRIED_SIZES = (1.0, 0.87, 1.14)
 _TRIED_DECAY = 1.5
 """Decay that is tried then, in addition to that of the last frame."""
 _SMALL_MOVE = 0.03
-"""Change, over the size of the patch, up to which a continued fit keeps its derivative."""
+"""Change, over the size of the patch, up to which a fit updates its derivative."""
 _START_BINS = 300
 _CONTINUE_BINS = 150
 
@@ -84,6 +84,13 @@ class ShadingFit:
     window: Window
     """The bins of the fit."""
 
+    @property
+    def missed(self) -> float:
+        """Share of the change that the fit leaves beyond the noise."""
+        change = self.window.change
+        total = float(np.square(change - change.mean(axis=0)).sum())
+        return max(1 - self.explained - change.size / max(total, 1e-12), 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Region:
@@ -123,43 +130,40 @@ def first_starts(patch: ContactPatch) -> list[Array]:
     return [start_values(patch, scale, decay) for scale, decay in _STARTS]
 
 
-def continued_start(
-    window: Window, last: Array, shift_mm: Array, growth: float, law: SlopeLaw
-) -> Array:
-    """The start (4,) that fits best, among those near the values of the last frame.
+def continued_starts(last: Array, shift_mm: Array, growth: float, *, strip: bool) -> list[Array]:
+    """Starts (4,) near the values of the last frame.
 
     `shift_mm` (2,) is the motion of the region that changed, `growth` the factor of its size. A rim
     that moved by a tenth of the size is not found from its last position: the fit would take the
     crease for a steep decay.
     """
-    part = window.thinned(_CONTINUE_BINS)
-    residual = np.empty(part.change.shape)
     here, moved = last.copy(), last.copy()
-    if law.strip:
+    if strip:
         moved[0] += shift_mm @ [-np.sin(last[1]), np.cos(last[1])]
     else:
         moved[:2] += shift_mm
     scales = [s * g for g in {1.0, growth} for s in _TRIED_SIZES]
     starts = [place * [1, 1, scale, 1] for place in (here, moved) for scale in scales]
-    starts += [np.array([*s[:3], _TRIED_DECAY]) for s in starts]
+    return starts + [np.array([*s[:3], _TRIED_DECAY]) for s in starts]
+
+
+def nearest_start(window: Window, starts: list[Array], law: SlopeLaw) -> Array:
+    """The start (4,) with the smallest residual on a part of the bins."""
+    part = window.thinned(_CONTINUE_BINS)
+    residual = np.empty(part.change.shape)
     return min(starts, key=lambda s: _squares(part, s, law, residual))
 
 
-def best_shading_fit(window: Window, starts: list[Array], law: SlopeLaw) -> ShadingFit | None:
-    """The fit from the start with the smallest residual after a few steps on a part of the bins."""
-    if len(starts) == 1:
-        return fit_shading(window, starts[0], law, _SMALL_MOVE)
+def settled_start(window: Window, starts: list[Array], law: SlopeLaw) -> Array:
+    """The start (4,) with the smallest residual after a few steps on a part of the bins, moved."""
     part = window.thinned(_START_BINS)
     tried = [_optimised(part, start, law, _FIRST_STEPS)[:2] for start in starts]
-    best, _ = min(tried, key=lambda pair: pair[1])
-    return fit_shading(window, best, law)
+    return min(tried, key=lambda pair: pair[1])[0]
 
 
-def fit_shading(
-    window: Window, start: Array, law: SlopeLaw, small_move: float = 0.0
-) -> ShadingFit | None:
+def fit_shading(window: Window, start: Array, law: SlopeLaw) -> ShadingFit | None:
     """Fit by Gauss-Newton steps with the gains projected out; None where it does not converge."""
-    values, cost, residual, jacobian = _optimised(window, start, law, _MOST_STEPS, small_move)
+    values, cost, residual, jacobian = _optimised(window, start, law, _MOST_STEPS, _SMALL_MOVE)
     total = window.change - window.change.mean(axis=0)
     explained = 1 - cost / max(float((total**2).sum()), 1e-12)
     if not np.isfinite(values).all() or values[2] < 1.5 * window.bin_mm:

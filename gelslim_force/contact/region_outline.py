@@ -104,8 +104,14 @@ def fit_circle(points_mm: Array) -> tuple[Array, Array]:
     def distance(p: Array) -> Array:
         return np.asarray(np.hypot(points_mm[:, 0] - p[0], points_mm[:, 1] - p[1]) - p[2])
 
+    def slope(p: Array) -> Array:
+        away = p[:2] - points_mm
+        return np.column_stack([away / np.hypot(*away.T)[:, None], -np.ones(len(away))])
+
     scale = max(float(1.4826 * np.median(np.abs(distance(start)))), 1e-6)
-    found = least_squares(distance, start, loss="soft_l1", f_scale=2 * scale, max_nfev=50)
+    found = least_squares(
+        distance, start, jac=slope, loss="soft_l1", f_scale=2 * scale, max_nfev=50
+    )
     return found.x, _covariance(found.jac, distance(found.x), 3)
 
 

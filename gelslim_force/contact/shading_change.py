@@ -14,13 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
-from scipy.spatial import cKDTree
 
 from gelslim_core.errors import GelslimError
 from gelslim_force.contact.light_baseline import without_baseline
 from gelslim_force.contact.reflections import reflecting
 from gelslim_force.frames.read_only import read_only
-from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -232,48 +230,3 @@ def _noise_level(levels: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.sqrt(square)
     both = square[:1] + square[1:2]
     return np.sqrt(np.concatenate([both, both / 4, square[2:] + both / 4]))
-
-
-def bin_positions(
-    light: ShadingReference, camera: VirtualCamera
-) -> tuple[Array, Array, Array, Array]:
-    """Where the bins are on the gel.
-
-    Returns x and y (rows, columns) on the rest surface, the parallax (rows, columns, 2) of the line
-    of sight per mm of height, and the relative change of lengths per mm of height.
-    """
-    pixels = light.centres_px()
-    expected = (camera.image_height_px, camera.image_width_px)
-    if light.image.shape[:2] != expected:
-        raise ValueError(
-            f"the reference is {light.image.shape[1]} x {light.image.shape[0]} px, the "
-            f"camera's pictures are {expected[1]} x {expected[0]} px: use frames of this camera"
-        )
-    depth = 0.2
-    at_rest = camera.backproject(pixels, 0.0)[:, :2]
-    below = camera.backproject(pixels, -depth)[:, :2]
-    parallax = ((at_rest - below) / depth).reshape(*light.shape, 2)
-    x, y = (at_rest[:, k].reshape(light.shape) for k in (0, 1))
-    sunk = below.reshape(*light.shape, 2)
-    before = bin_sizes(sunk[..., 0], sunk[..., 1])
-    growth = (1 - before / bin_sizes(x, y)) / depth
-    return x, y, parallax, growth
-
-
-def bin_sizes(x: Array, y: Array) -> Array:
-    """Side (rows, columns) of a square with the area of the bin on the gel."""
-    xi, xj = np.gradient(x)
-    yi, yj = np.gradient(y)
-    return np.sqrt(np.abs(xi * yj - xj * yi))
-
-
-def near_surface(x: Array, y: Array, surface_mm: Array) -> Mask:
-    """Bins (rows, columns) within half a node spacing, along both axes, of a surface node."""
-    nodes = surface_mm[:, :2]
-    steps = [np.diff(np.unique(np.round(v, 9))).min() for v in nodes.T]
-    points = np.column_stack([x.ravel(), y.ravel()]) / steps
-    finite = np.isfinite(points).all(axis=1)
-    near = np.zeros(len(points), dtype=bool)
-    distance, _ = cKDTree(nodes / steps).query(points[finite], p=np.inf)
-    near[finite] = distance <= 0.5
-    return near.reshape(x.shape)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.contact.gel_bins import bin_positions, bin_sizes
 from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.contact.shading_change import (
     FLOOR,
     ShadingChange,
     ShadingReference,
     as_picture,
-    bin_positions,
-    bin_sizes,
 )
 from gelslim_force.joint.light_calibration import LightCalibration
 from gelslim_force.joint.node_lattice import NodeLattice

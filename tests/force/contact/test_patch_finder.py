@@ -221,6 +221,19 @@ def test_a_patch_is_followed_from_frame_to_frame():
     assert abs(leapt.size_mm - 3.2) < 4 * leapt.sigma_mm
 
 
+def test_a_press_that_fades_is_followed():
+    """Noise then leaves more unexplained; a search in each frame doubled the time."""
+    follow, centre = finder(), np.array([1.0, -1.0])
+    sx, sy, _ = pressed_heights(centre, 2.4, BALL_MM)
+    left = []
+    for k, share in enumerate((0.5, 0.44, 0.38, 0.33)):
+        patch = follow.find(shaded((share * sx, share * sy), seed=70 + k).image)
+        assert abs(patch.size_mm - 2.4) < 0.1
+        assert follow._last.age == k
+        left.append(1 - follow._last.fit.explained)
+    assert left[-1] > left[0] + 0.06
+
+
 def test_strip_of_a_cylinder():
     """Slopes of a line contact on a half-space, laid at an angle."""
     half, offset, angle = 1.6, 0.8, np.deg2rad(20.0)
