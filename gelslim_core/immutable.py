@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -32,12 +31,12 @@ class Immutable:
 
     def __post_init__(self) -> None:
         """Replace arrays by read-only ones, and mappings by views of a copy."""
-        for item in dataclasses.fields(self):  # type: ignore[arg-type]
-            value = getattr(self, item.name)
+        values = vars(self)
+        for name, value in values.items():
             if isinstance(value, np.ndarray):
-                object.__setattr__(self, item.name, frozen(value))
-            elif isinstance(value, Mapping):
-                object.__setattr__(self, item.name, MappingProxyType(dict(value)))
+                values[name] = frozen(value)
+            elif isinstance(value, dict | Mapping):
+                values[name] = MappingProxyType(dict(value))
 
     def __getstate__(self) -> dict[str, Any]:
         """Values by name, with mappings as dictionaries, which can be pickled."""

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -79,7 +78,7 @@ class UnseenMotion:
         if seen.all():
             return np.zeros(len(self.points_mm))
         hidden = np.flatnonzero(~seen)
-        common = np.sqrt(float(self._correlation(hidden, hidden).mean()))
+        common = np.sqrt(float(self._alike[np.ix_(hidden, hidden)].mean()))
         return np.where(self.nodes(~seen), common * _UNSEEN * self.thickness_mm, 0.0)
 
     def nodes(self, markers: Mask) -> Mask:
@@ -102,16 +101,18 @@ class UnseenMotion:
         known = motion_mm[near, :2]
         unseen_mm = _UNSEEN * self.thickness_mm
         size = float(np.mean(np.square(known))) + unseen_mm**2 if len(near) else unseen_mm**2
-        own = size * self._correlation(near, near) + noise_mm**2 * np.eye(len(near))
-        cross = size * self._correlation(unseen, near)
-        prior = size * self._correlation(unseen, unseen)
+        alike = self._alike[unseen]
+        prior = size * alike[:, unseen]
         found = motion_mm.copy()
         if not len(near):
             found[unseen, :2] = 0.0
             return FilledMotion(found, unseen, prior)
-        factor = cho_factor(own + 1e-9 * size * np.eye(len(near)))
-        found[unseen, :2] = cross @ cho_solve(factor, known)
-        left = prior - cross @ cho_solve(factor, cross.T)
+        own = size * self._alike[np.ix_(near, near)]
+        own.flat[:: len(near) + 1] += noise_mm**2 + 1e-9 * size
+        cross = size * alike[:, near]
+        solved = np.linalg.solve(own, np.column_stack([known, cross.T]))
+        found[unseen, :2] = cross @ solved[:, :2]
+        left = prior - cross @ solved[:, 2:]
         return FilledMotion(found, unseen, (left + left.T) / 2)
 
     @cached_property
@@ -126,6 +127,8 @@ class UnseenMotion:
         gap = self.points_mm[:, None] - self.places_mm[None]
         return np.asarray(np.argmin(np.square(gap).sum(axis=2), axis=1))
 
-    def _correlation(self, some: NDArray[np.intp], others: NDArray[np.intp]) -> Array:
-        ratio = np.sqrt(3) * self._apart[np.ix_(some, others)] / self.thickness_mm
+    @cached_property
+    def _alike(self) -> Array:
+        """(n, n) correlation of the motion of the markers."""
+        ratio = np.sqrt(3) * self._apart / self.thickness_mm
         return np.asarray((1 + ratio) * np.exp(-ratio))

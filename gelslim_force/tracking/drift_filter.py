@@ -156,7 +156,7 @@ class DriftFilter:
     def __init__(self, reference: ReferenceLattice, settings: DriftSettings) -> None:
         self._reference, self._settings = reference, settings
         self.field = FarField(reference)
-        self._unit = np.diag([1.0, 1.0, *(1 / self.field.arm_px**2,) * 2])
+        self._unit = np.array([1.0, 1.0, *(1 / self.field.arm_px**2,) * 2])
         self.log: tuple[TareRecord, ...] = ()
         self._rest, self._told = Similarity(), 0
         self.reset()
@@ -164,7 +164,7 @@ class DriftFilter:
     def reset(self) -> None:
         """Forget the motion since the last rest; the rests are kept."""
         self._drift = self._rest
-        self._covariance = self._spread(self._settings.unseen_px)
+        self._covariance = np.diag(self._spread(self._settings.unseen_px))
         self._bias_px = 0.0
         self._still: list[Similarity] = []
         self.loaded = None
@@ -194,42 +194,35 @@ class DriftFilter:
         noise = max(noise_px, LEAST_NOISE_PX)
         seen = tracks.tracked if self.loaded is None else tracks.tracked & ~self.loaded
         found = self.field.fitted(tracks.displacement_px, seen, noise, self._drift)
-        self._covariance = self._covariance + self._spread(self._settings.walk_px)
+        self._covariance = self._covariance + np.diag(self._spread(self._settings.walk_px))
         if found is None:
             self._still = []
             return self._found(tracks, None, np.zeros((4, len(tracks), 2)), self._remaining())
-        solution = self.field.solution(found)
-        share = self._share(found, noise**2 * _product(solution))
-        step = found.similarity.vector - self._drift.vector
-        self._drift = Similarity.of(self._drift.vector + share @ step)
-        left = np.eye(4) - share
-        gain = (share @ solution.reshape(4, -1)).reshape(solution.shape)
+        from gelslim_force.tracking.drift_filter_kernel import combined, left_over
+
+        solution = self.field.solution(found).reshape(4, -1)
+        share, vector = combined(
+            self._drift.vector,
+            self._covariance,
+            self._leak(self._bias_px),
+            found.similarity.vector,
+            solution,
+            (noise**2, self._leak(found.leak_px)),
+            (_JUMP_SIGMAS**2, self._spread(_UNKNOWN_PX)),
+        )
+        self._drift = Similarity.of(vector)
+        gain = share @ solution
         # The load moves the free markers in the same way in every frame: no mean takes it off.
-        weight = float(np.trace(share[:2, :2])) / 2
+        weight = (share[0, 0] + share[1, 1]) / 2
         self._bias_px = weight * found.leak_px + (1 - weight) * self._bias_px
-        self._covariance = left @ self._covariance @ left.T
+        self._covariance = left_over(self._covariance, share)
         remaining = self._remaining()
-        self._covariance = self._covariance + noise**2 * _product(gain)
-        return self._found(tracks, found, gain, remaining)
-
-    def _share(self, found: Drift, measured: Array) -> Array:
-        """(4, 4) share of a frame's fit in the estimate, for the covariance (4, 4) of the fit.
-
-        After a jump the drift known before has no part in the estimate.
-        """
-        step = found.similarity.vector - self._drift.vector
-        measured = measured + self._leak(found.leak_px)
-        prior = self._remaining()
-        solved = np.linalg.solve(prior + measured, np.column_stack([prior, step]))
-        if step @ solved[:, 4] > _JUMP_SIGMAS**2:
-            self._covariance = self._covariance + self._spread(_UNKNOWN_PX)
-            prior = self._remaining()
-            solved = np.linalg.solve(prior + measured, prior)
-        return np.asarray(solved[:, :4].T)
+        self._covariance = self._covariance + noise**2 * (gain @ gain.T)
+        return self._found(tracks, found, gain.reshape(4, -1, 2), remaining)
 
     def _remaining(self) -> Array:
         """(4, 4) covariance of the drift by the frames before and by the load's own motion."""
-        return np.asarray(self._covariance + self._leak(self._bias_px))
+        return np.asarray(self._covariance + np.diag(self._leak(self._bias_px)))
 
     def tare(self, frame: FrameDrift, tracks: Tracks, time_s: float) -> TareRecord:
         """Take the drift of a frame as the new rest.
@@ -310,7 +303,9 @@ class DriftFilter:
         """
         if not self._settings.correct:
             return 0.0
-        squared = float(since @ np.linalg.solve(self._remaining(), since))
+        from gelslim_force.tracking.drift_filter_kernel import squared_sigmas
+
+        squared = squared_sigmas(self._remaining(), since)
         return max(0.0, 1 - _SIGNIFICANT_SIGMAS**2 / squared) if squared > 0 else 0.0
 
     def _excess(self) -> str:
@@ -332,15 +327,9 @@ class DriftFilter:
         return ""
 
     def _spread(self, sigma_px: float) -> Array:
-        """(4, 4) covariance of a drift that moves the markers by about `sigma_px`."""
+        """(4,) variances of a drift that moves the markers by about `sigma_px`."""
         return np.asarray(self._unit * sigma_px**2)
 
     def _leak(self, sigma_px: float) -> Array:
-        """(4, 4) covariance by what the load itself moves the free markers."""
+        """(4,) variances by what the load itself moves the free markers."""
         return np.asarray(self._spread(sigma_px) * _LEAK_SHAPE**2)
-
-
-def _product(gain: Array) -> Array:
-    """(4, 4) sum over all markers and coordinates of gains (4, n, 2) with themselves."""
-    flat = gain.reshape(len(gain), -1)
-    return np.asarray(flat @ flat.T)

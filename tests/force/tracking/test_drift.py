@@ -9,6 +9,7 @@ from sensor_samples import press, sensor_grid
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.drift import FarField, Similarity
 from gelslim_force.tracking.drift_filter import DriftFilter, DriftSettings, TareError
+from gelslim_force.tracking.drift_filter_kernel import combined, left_over, squared_sigmas
 from gelslim_force.tracking.tracks import MarkerStatus, Tracks
 
 PX_PER_MM = 20.0
@@ -193,3 +194,31 @@ def test_without_correction_the_drift_is_an_error_of_the_motion() -> None:
 def test_impossible_settings_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=next(iter(bad))):
         DriftSettings(**bad)
+
+
+def test_the_compiled_step_is_that_of_a_kalman_filter() -> None:
+    rng = np.random.default_rng(5)
+    unknown, most = np.array([100.0, 100.0, 1e-2, 1e-2]), 0.025
+    both = set()
+    for far in (0.1, 3.0):
+        known, fit = rng.normal(size=4), rng.normal(size=(4, 60))
+        root = rng.normal(size=(4, 4))
+        covariance, load, own = root @ root.T, rng.uniform(size=4), rng.uniform(size=4)
+        found = known + far * rng.normal(size=4)
+        step, noise = found - known, 0.3
+        before = covariance + np.diag(load)
+        measured = noise * fit @ fit.T + np.diag(own)
+        jumps = step @ np.linalg.inv(before + measured) @ step > most
+        before = before + np.diag(unknown) * jumps
+        gain = before @ np.linalg.inv(before + measured)
+        left = (np.eye(4) - gain) @ (covariance + np.diag(unknown) * jumps)
+        both.add(bool(jumps))
+        share, estimate = combined(
+            known, covariance, load, found, fit, (noise, own), (most, unknown)
+        )
+        assert share == pytest.approx(gain, rel=1e-9)
+        assert estimate == pytest.approx(known + gain @ step, rel=1e-9)
+        expected = left @ (np.eye(4) - gain).T
+        assert left_over(covariance, share) == pytest.approx(expected, rel=1e-9)
+        assert squared_sigmas(before, step) == pytest.approx(step @ np.linalg.solve(before, step))
+    assert both == {False, True}
