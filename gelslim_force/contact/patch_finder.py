@@ -143,46 +143,45 @@ class PatchFinder:
         """The followed patch of the last frame, a new one, or the better of both.
 
         A fit that starts from the last position may miss a rim that moved far, and would then miss
-        it in all frames that follow. Therefore the patch is also searched for anew after some
-        frames, and whenever the changed region grows or shrinks.
+        it in all frames that follow. Therefore the patch is also searched for anew whenever the
+        changed region grows or shrinks, and after some frames, then with less effort.
         """
         last, self._last = self._last, None
         now = self._bins.region(region)
-        followed = None
+        followed, steady = None, False
         if last is not None:
             followed = self._followed(last, now, light)
             steady = abs(now.radius_mm / last.region.radius_mm - 1) < STEADY_CHANGE
             if followed is not None and steady and last.age < REFRESH_FRAMES:
                 self._last = Followed(*followed, now, last.age + 1)
                 return followed[0]
-        start = self._start(region, now, known=followed is not None)
-        if start is None or isinstance(self.indenter, Flat):
-            return start if followed is None else followed[0]
-        if followed is None:
-            best = self._refined(start, light)
+        if followed is not None and steady:
+            new = self._renewed(region, now, light)
         else:
-            best = self._better(followed, start, light)
-        if best is None:
-            return start
+            start = self._outline(region)
+            if start is None or isinstance(self.indenter, Flat):
+                return start if followed is None else followed[0]
+            new = self._refined(start, light)
+            if new is None and followed is None:
+                return start
+        best = new or followed
+        if new is not None and followed is not None:
+            law = self._law(new[1].window.bin_mm)
+            best = followed if fits_better(followed[1], new[1], law) else new
+        assert best is not None
         self._last = Followed(*best, now, 0)
         return best[0]
 
-    def _start(self, region: Mask, now: Region, *, known: bool) -> ContactPatch | None:
-        """Where a search begins; beside a `known` patch a disc of the region's size will do."""
+    def _renewed(
+        self, region: Mask, now: Region, light: ShadingChange
+    ) -> tuple[ContactPatch, ShadingFit] | None:
+        """A single fit from the region, or from its outline where the pad's edge may cut it."""
         disc = ContactPatch("disc", now.middle_mm, now.radius_mm)
-        return (
-            disc if known and not self._strip and self._bins.holds(disc) else self._outline(region)
-        )
-
-    def _better(
-        self, followed: tuple[ContactPatch, ShadingFit], start: ContactPatch, light: ShadingChange
-    ) -> tuple[ContactPatch, ShadingFit]:
-        """The followed patch, or one fit from the outline if it explains the shading better."""
-        new = self._shading(start, first_starts(start), light, nearest_start)
-        if new is None or new[1].explained < _LEAST_EXPLAINED:
-            return followed
-        law = self._law(new[1].window.bin_mm)
-        return followed if fits_better(followed[1], new[1], law) else new
+        start = disc if self._bins.holds(disc) and not self._strip else self._outline(region)
+        if start is None:
+            return None
+        found = self._shading(start, first_starts(start), light, nearest_start)
+        return None if found is None or found[1].explained < _LEAST_EXPLAINED else found
 
     def _followed(
         self, last: Followed, now: Region, light: ShadingChange
