@@ -1,8 +1,8 @@
 """Which of the tracked dots are seen whole.
 
 Something that covers a part of the picture cuts the dots at its rim, and the centre of what is left
-of a dot is another one. Such a dot has another size or shape than at rest, or it stands beside dots
-that are not seen at all.
+of a dot is another one. Such a dot has another size or shape than the gel gives it, or it stands
+beside dots that are not seen at all. The gel strains the dots as it moves the markers around them.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_force.frames.read_only import read_only
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
 from gelslim_force.tracking.tracker import TrackedFrame
 
 Array = NDArray[np.float64]
 _LARGEST_CHANGE = 0.4
-"""Of the logarithm of a dot's size against most others, and of its longer over its shorter axis:
-strain and tilt of the gel seldom change them by more."""
+"""Of the logarithm of a dot's size against most others, and of its longer over its shorter axis,
+beyond those of the strain: where small balls shear the gel until they slip it is 0.25."""
 _COVERED = 0.15
 """Of the logarithm of a dot's size against the dots around it: dirt over a part of it, whose centre
-is then off by up to half a pixel. A press to 30 % of the thickness changes it by up to 0.08, noise
-by 0.05."""
+is then off by up to half a pixel. In presses to 30 % of the thickness it is up to 0.08, by noise
+0.05."""
 _NEXT, _LEAST_MISSING = 8, 5
 """Neighbours of a marker one site away, and how many are missing, with all others, inside a gap.
 Gaps of single dots are wear of the print, which leaves the dots beside them whole."""
 _CUT, _CUT_OVER_USUAL, _LEAST_LOST = 0.08, 4.0, 2
 """Change of size or shape by which something out of focus cuts a dot beside others that it hides,
 which moves its centre by a pixel, also over that of most dots, and how many of the eight neighbours
-it has to hide. Dirt that covers a part of single dots does not count: beside it are dots that
-strain has changed as much."""
+it has to hide. Dirt that covers a part of single dots does not count."""
 _WORN = 0.05
 """Share of such single dots from which wide gaps are taken for wear too."""
 
@@ -55,7 +55,7 @@ class WholeDots:
         seen, near = tracked.tracks.tracked, self.reference.neighbours
         if not seen.any():
             return tracked
-        growth, stretch = self.changes(tracked)
+        growth, stretch = self.beyond_strain(tracked)
         # Comparisons with the NaN of a dot that is not seen are false: it is not whole.
         change = np.maximum(np.abs(growth - median(growth)), stretch)
         whole = change < _LARGEST_CHANGE
@@ -70,9 +70,22 @@ class WholeDots:
 
     def changes(self, tracked: TrackedFrame) -> tuple[Array, Array]:
         """Logarithms (n,) of size and stretch of the dots over those at rest; NaN if not seen."""
+        return self._changes(tracked, self.rest_px2)
+
+    def beyond_strain(self, tracked: TrackedFrame) -> tuple[Array, Array]:
+        """The same over the dots at rest with the strain that the markers around them show."""
+        from gelslim_force.tracking.whole_kernel import strained
+
+        expected = np.empty_like(self.rest_px2)
+        places, near = self.reference.positions_px, self.reference.neighbours
+        motion = read_only(tracked.tracks.displacement_px)
+        strained(places, motion, near, _NEXT, self.rest_px2, expected)
+        return self._changes(tracked, expected)
+
+    def _changes(self, tracked: TrackedFrame, moments_px2: Array) -> tuple[Array, Array]:
         from gelslim_force.tracking.whole_kernel import changes
 
         growth, stretch = np.empty(len(self.reference)), np.empty(len(self.reference))
         moments = tracked.detections.moments_px2
-        changes(tracked.tracks.dots, moments, self.rest_px2, growth, stretch)
+        changes(tracked.tracks.dots, moments, moments_px2, growth, stretch)
         return growth, stretch

@@ -16,13 +16,15 @@ from numba import njit
 from gelslim_force.detection.darkness_kernel import COMPILED
 
 _LEAST_PRODUCT = 1e-12
+_LEAST_AREA = 0.01
+"""Determinant, over the squared trace, of the places from which a gradient is taken."""
 
 
 @njit(**COMPILED)
 def changes(dots: Any, moments: Any, rest: Any, growth: Any, stretch: Any) -> None:
     """Write growth and stretch of the `dots` (n,) of the markers, -1 for those not seen.
 
-    `moments` (m, 3) are those of the dots, `rest` (n, 3) those of the markers' dots at rest.
+    `moments` (m, 3) are those of the dots, `rest` (n, 3) those to which they are compared.
     """
     for i in range(len(dots)):
         growth[i] = stretch[i] = math.nan
@@ -34,6 +36,42 @@ def changes(dots: Any, moments: Any, rest: Any, growth: Any, stretch: Any) -> No
             product = max((now[0] * now[2] - now[1] ** 2) / start, _LEAST_PRODUCT)
             ratio = mixed / (2 * start) / math.sqrt(product)
             growth[i], stretch[i] = math.log(product) / 2, math.acosh(max(ratio, 1.0))
+
+
+@njit(**COMPILED)
+def strained(places: Any, motion: Any, near: Any, next_to: Any, rest: Any, found: Any) -> None:
+    """Write the second moments (n, 3) that the strain of the gel gives to the dots at rest.
+
+    The gradient of the `motion` (n, 2) about each of the `places` (n, 2) is the least squares of
+    those of its `next_to` neighbours that are seen. Where they do not determine it, there is none.
+    """
+    for i in range(len(places)):
+        count = px = py = ux = uy = 0.0
+        for k in range(next_to):
+            j = near[i, k]
+            if j >= 0 and not math.isnan(motion[j, 0]):
+                count += 1
+                px += places[j, 0]
+                py += places[j, 1]
+                ux += motion[j, 0]
+                uy += motion[j, 1]
+        xx = xy = yy = ax = ay = bx = by = 0.0
+        for k in range(next_to):
+            j = near[i, k]
+            if j >= 0 and not math.isnan(motion[j, 0]):
+                x, y = places[j, 0] - px / count, places[j, 1] - py / count
+                u, v = motion[j, 0] - ux / count, motion[j, 1] - uy / count
+                xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
+                ax, ay, bx, by = ax + x * u, ay + y * u, bx + x * v, by + y * v
+        a, b, c, d = 1.0, 0.0, 0.0, 1.0
+        area = xx * yy - xy * xy
+        if area > _LEAST_AREA * (xx + yy) ** 2:
+            a, b = 1 + (yy * ax - xy * ay) / area, (xx * ay - xy * ax) / area
+            c, d = (yy * bx - xy * by) / area, 1 + (xx * by - xy * bx) / area
+        mxx, mxy, myy = rest[i]
+        found[i, 0] = a * a * mxx + 2 * a * b * mxy + b * b * myy
+        found[i, 1] = a * c * mxx + (a * d + b * c) * mxy + b * d * myy
+        found[i, 2] = c * c * mxx + 2 * c * d * mxy + d * d * myy
 
 
 @njit(**COMPILED)

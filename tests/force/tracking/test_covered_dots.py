@@ -66,3 +66,30 @@ def test_strained_dots_beside_soiled_ones_are_kept() -> None:
     assert not tracked[beside].any()
     hidden = strained.tracks.without(np.isin(np.arange(len(strained.tracks)), beside))
     assert not whole.of(replace(strained, tracks=hidden)).tracks.tracked[marker]
+
+
+def test_dots_that_the_gel_strains_are_whole() -> None:
+    """Balls that shear the gel until they slip had a third of the markers below them left out."""
+    found = calibration()
+    dots = np.searchsorted(found.markers, found.reference.markers)
+    whole = WholeDots(found.reference, found.dots.moments_px2[dots])
+    frame = found.tracker().update(shaded(camera=calibration().camera, seed=47).image)
+    places = found.reference.positions_px - found.reference.positions_px.mean(axis=0)
+    gradient = np.array([[0.2, 0.2], [-0.1, -0.25]])
+    turned = np.eye(2) + gradient
+    xx, xy, yy = frame.detections.moments_px2.T
+    moments = turned @ np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1) @ turned.T
+    moments = moments.reshape(-1, 4)[:, [0, 1, 3]]
+    motion = frame.tracks.displacement_px + places @ gradient.T
+    tracks = replace(frame.tracks, displacement_px=motion)
+    detections = replace(frame.detections, moments_px2=moments)
+    strained = replace(frame, tracks=tracks, detections=detections)
+    _, stretch = whole.changes(strained)
+    assert np.nanmin(stretch) > 0.4
+    growth, stretch = whole.beyond_strain(strained)
+    before = whole.changes(frame)
+    assert np.nanmax(np.abs(growth - before[0])) < 0.01
+    assert np.nanmax(stretch) < 0.1
+    assert whole.of(strained).tracks.tracked.all()
+    # Without the motion of the markers the dots are not those of the gel.
+    assert not whole.of(replace(frame, detections=detections)).tracks.tracked.any()
