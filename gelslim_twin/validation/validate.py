@@ -54,11 +54,12 @@ FRAMES_APART = 100
 """Distance of the frame numbers of two contacts, so that each has its own noise."""
 
 
-Knows = Literal["contact", "depth", "shape", "cap", "nothing"]
+Knows = Literal["contact", "depth", "shape", "cap", "light", "nothing"]
+"""What the chain is given: the true heights (`depth`), with the true contact region (`contact`), or
+the shape of the indenter (`shape`; `cap` with the paper's model of it), or the light in the bundle,
+by which it finds the normal motion under an object of unknown shape (`light`)."""
 FOUND_BY_COLOUR = ("shape", "cap")
 """Knowledge that needs a contact patch, which pictures of a mono camera do not show."""
-"""What the chain is given: the true heights (`depth`), with the true contact region (`contact`), or
-the shape of the indenter (`shape`; `cap` with the paper's model of it)."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,8 @@ CHAINS: tuple[Chain, ...] = (
     Chain("ours, depth, neo-Hookean", PipelineSettings(gel="neo_hookean"), "depth", True),
     Chain("ours, shape known", PipelineSettings(), "shape"),
     Chain("ours, shape, neo-Hookean", PipelineSettings(gel="neo_hookean"), "shape", True),
+    Chain("ours, nothing known", PipelineSettings(), "light"),
+    Chain("ours, nothing, neo-Hookean", PipelineSettings(gel="neo_hookean"), "light", True),
     Chain("ours, tangential", PipelineSettings(), "nothing"),
     Chain("paper, depth known", _PAPER, "depth", True),
     Chain("paper, shape known", _PAPER, "cap", True),
@@ -90,12 +93,13 @@ CHAINS: tuple[Chain, ...] = (
 def chains_for(bundle: Bundle, budget: Budget | None = None) -> tuple[Chain, ...]:
     """The chains for a bundle's pad and camera; those that name no operator get the budget."""
     fit, mono = unfit(bundle) is None, is_mono(bundle.camera)
+    blind = (*FOUND_BY_COLOUR, "light") if mono else () if bundle.light else ("light",)
     return tuple(
         chain
         if chain.settings.rung is not None
         else replace(chain, settings=replace(chain.settings, budget=budget))
         for chain in CHAINS
-        if (fit or not chain.needs_even_layers) and not (mono and chain.knows in FOUND_BY_COLOUR)
+        if (fit or not chain.needs_even_layers) and chain.knows not in blind
     )
 
 
@@ -127,9 +131,7 @@ class Bench:
         self.reference: Image = self.renderer.frame(number=0).image
         self.calibration: Calibration = calibrate(sensor.bundle, self.reference)
         self.chains = chains_for(sensor.bundle, budget)
-        self._pipelines = {
-            c.name: ForcePipeline(sensor.bundle, self.calibration, c.settings) for c in self.chains
-        }
+        self._pipelines = {c.name: self._pipeline(c) for c in self.chains}
         places = sensor.grid.positions_mm[self.calibration.reference.markers]
         self._to_markers: Any = marker_to_node(sensor.points_mm, places)
 
@@ -178,6 +180,20 @@ class Bench:
         """The score of one result."""
         error = self.marker_error_mm(truth, result)
         return score(test, frame, chain.name, self.sensor.points_mm, truth, result, error)
+
+    def _pipeline(self, chain: Chain) -> ForcePipeline:
+        """The chain's pipeline, without the shape of an indenter."""
+        if chain.knows != "light":
+            return ForcePipeline(self.sensor.bundle, self.calibration, chain.settings)
+        from gelslim_force.sensor import UNKNOWN, open_sensor
+
+        return open_sensor(
+            self.sensor.bundle,
+            reference=self.reference,
+            calibration=self.calibration,
+            indenter=UNKNOWN,
+            settings=chain.settings,
+        )
 
     def _source(self, chain: Chain, known: str) -> IndenterSource:
         from gelslim_force.sensor import indenter_source
