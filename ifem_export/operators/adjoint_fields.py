@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 ADJOINT_RTOL = 1e-10
 LARGEST_RESIDUAL = 1e-6
 """Where rounding keeps the residual above `ADJOINT_RTOL`, up to this one is accepted."""
+MOST_ASSEMBLED = 500_000
+"""Number of inner unknowns above which the matrix is not assembled: about 1.5 GB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +141,22 @@ def _computed(system: PadSystem) -> Array:
     if system.layers == 1:
         forces = [system.surface @ motion.ravel() for motion in motions]
         return np.reshape(forces, motions.shape)
+    if not system.is_cut and 3 * (system.layers - 1) * system.columns > MOST_ASSEMBLED:
+        return np.stack([_without_matrix(system, motion) for motion in motions])
     solver = inner_solver(system)
     return np.stack([_held(system, solver, motion.ravel()) for motion in motions])
+
+
+def _without_matrix(system: PadSystem, motion: Array) -> Array:
+    """Forces (c, 3) of a motion (c, 3) of a pad whose matrix would take gigabytes."""
+    from ifem_export.operators.matrix_free import MatrixFreeOperator
+
+    try:
+        return MatrixFreeOperator(system, ADJOINT_RTOL).force(motion)
+    except ConvergenceError as error:
+        if not error.residual <= LARGEST_RESIDUAL:
+            raise
+        return MatrixFreeOperator(system, 2 * error.residual).force(motion)
 
 
 def _held(system: PadSystem, solver: Solver, u: Array) -> Array:

@@ -45,7 +45,7 @@ def multiply(blocks: Any, waves: Any) -> None:
     for ky in range(len(blocks)):
         opposite = (count - ky) % count
         for kx in range(waves.shape[1]):
-            _load(waves[ky, kx], waves[opposite, kx], before)
+            load_pair(waves[ky, kx], waves[opposite, kx], before)
             block = blocks[ky, kx]
             for i in range(size):
                 a = b = c = d = 0.0
@@ -56,11 +56,11 @@ def multiply(blocks: Any, waves: Any) -> None:
                     c += share * before[j, 2]
                     d += share * before[j, 3]
                 after[i, 0], after[i, 1], after[i, 2], after[i, 3] = a, b, c, d
-            _store(after, waves[ky, kx], waves[opposite, kx])
+            store_pair(after, waves[ky, kx], waves[opposite, kx])
 
 
 @njit(cache=True, nogil=True)
-def _load(first: Any, second: Any, found: Any) -> None:
+def load_pair(first: Any, second: Any, found: Any) -> None:
     """Write P* of the wave of ky and P* Y of that of -ky as real columns (3L, 4)."""
     for i in range(0, len(first), 3):
         for pair in range(2):
@@ -72,8 +72,8 @@ def _load(first: Any, second: Any, found: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _store(columns: Any, first: Any, second: Any) -> None:
-    """The inverse of `_load`; where both waves are one, the first counts."""
+def store_pair(columns: Any, first: Any, second: Any) -> None:
+    """The inverse of `load_pair`; where both waves are one, the first counts."""
     for i in range(0, len(first), 3):
         for pair in (1, 0):
             wave = first if pair == 0 else second

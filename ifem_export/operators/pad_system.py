@@ -17,6 +17,7 @@ from scipy import sparse
 from ifem_export.assembly.assembly import corner_fill, mesh_stiffness
 from ifem_export.errors import IfemError, MeshError
 from ifem_export.mesh.pad_mesh import PadMesh
+from ifem_export.operators.layer_elimination import LayerElimination, layer_elimination
 from ifem_export.operators.layered_operator import (
     Blocks,
     LayeredOperator,
@@ -34,6 +35,8 @@ from ifem_export.operators.preconditioner import (
 )
 
 Array = NDArray[np.float64]
+MOST_BLOCK_BYTES = 100_000_000
+"""Size of a preconditioner's blocks above which the layers are eliminated one by one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +159,16 @@ class PadSystem:
         """Surface compliance of the infinite pad."""
         return self._operator(surface_compliance)
 
+    @cached_property
+    def elimination(self) -> LayerElimination:
+        """Inverse of the infinite pad's stiffness in little memory."""
+        return layer_elimination(*self._infinite)
+
     def _scaled(self, transform: Callable[[Array], Array]) -> Preconditioner:
+        if self.mesh.fill is None and 18 * self.layers**2 * self.columns > MOST_BLOCK_BYTES:
+            if transform is inverse:
+                return self.elimination
+            return layer_elimination(*self._infinite, surface_held=True)
         uniform = mirrored_operator(*self._infinite, transform)
         if self.mesh.fill is None:
             return uniform
