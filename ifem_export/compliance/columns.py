@@ -20,7 +20,7 @@ from scipy.sparse.linalg import SuperLU
 from gelslim_core.files.replaced_file import replacement
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.row_factor import RowFactor
-from ifem_export.errors import MeshError
+from ifem_export.compliance.table_size import require_room
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.solver import factored
@@ -30,8 +30,6 @@ Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
 BATCH = 64
 FORMAT = "gelslim-compliance/3"
-MOST_BYTES = 4_000_000_000
-"""Largest table, for about 10 000 surface nodes."""
 MOST_ROW = 1500
 """Unknowns per row of the lattice up to which dense blocks are faster than a sparse factor."""
 
@@ -223,17 +221,6 @@ class SurfaceCompliance:
         loads[first + own, np.arange(3 * n)] = 1.0
         moved = np.asarray(self._factor.solve(loads))[first:, : 3 * n]
         return np.asarray(moved.T.reshape(n, 3, self.nodes, 3))
-
-
-def require_room(nodes: int) -> None:
-    """Raise MeshError for a pad whose table of columns would not fit."""
-    if 36 * nodes**2 > MOST_BYTES:
-        raise MeshError(
-            f"{nodes} surface nodes: the compliance would take {36 * nodes**2 / 1e9:.0f} GB, the "
-            f"limit is {MOST_BYTES / 1e9:.0f} GB; mesh the pad with larger cells",
-            field="mesh",
-            value=nodes,
-        )
 
 
 GRID = 1e-6

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.bundle.bundle import Bundle
-from ifem_export.compliance.columns import SurfaceCompliance, require_room
+from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.compliance.table_size import require_room, table_bytes
 from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.mesh.surface_lattice import edge_distance_mm
 from ifem_export.operators.pad_system import PadSystem
@@ -113,7 +114,7 @@ class ContactCompliance:
     @property
     def n_bytes(self) -> int:
         """Bytes of all columns."""
-        return 36 * self.compliance.nodes**2
+        return table_bytes(self.compliance.nodes)
 
 
 def near_edge(mesh: PadMesh, thicknesses: float = EDGE_THICKNESSES) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.compliance import columns as module
+from ifem_export.compliance import table_size
 from ifem_export.compliance.columns import SurfaceCompliance, symmetries
 from ifem_export.compliance.row_factor import LinAlgError, RowFactor
 from ifem_export.elements.material import Material
@@ -157,7 +158,7 @@ def test_a_folder_that_cannot_be_written_does_not_matter(tmp_path: Path) -> None
 
 
 def test_too_large_a_pad_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_BYTES", 1000)
+    monkeypatch.setattr(table_size, "MOST_BYTES", 1000)
     with pytest.raises(MeshError, match="larger cells"):
         SurfaceCompliance(small_pad(0.49, 6, 2, 6.0))
 

@@ -115,7 +115,7 @@ def test_a_compliance_is_shared_by_those_that_use_a_bundle() -> None:
 
 
 def test_a_pad_of_too_many_nodes_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from ifem_export.compliance import columns as table
+    from ifem_export.compliance import table_size as table
 
     monkeypatch.setattr(table, "MOST_BYTES", 1000)
     with pytest.raises(MeshError) as caught:
