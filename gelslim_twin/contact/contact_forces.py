@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from gelslim_twin.contact.gel_state import ContactError
+from ifem_export.compliance.node_convolution import NodeConvolution
 
 Array = NDArray[np.float64]
 Touches = NDArray[np.int8]
@@ -37,7 +38,7 @@ class ContactForces:
 
 
 def solve_contact_forces(
-    compliance: Array | NDArray[np.float32],
+    compliance: Array | NDArray[np.float32] | NodeConvolution,
     height_mm: Array,
     target_mm: Array,
     friction: float,
@@ -50,14 +51,15 @@ def solve_contact_forces(
 
     Args:
         compliance: C (3n, 3n) in mm/N among the nodes, symmetric positive definite; single
-            precision halves the time of a large one.
+            precision halves the time of a large one. For very many nodes, a convolution.
         height_mm: (n,) largest displacement of each node along its normal (the gap at rest);
             inf for a node that is never in contact.
         target_mm: (n, 2) displacement along its tangents of a node that sticks.
         friction: coefficient μ >= 0.
         start_n: (n, 3) forces to start from.
         tolerance: on `ContactForces.residual`, and on the error of the forces that follows from
-            the rate of convergence; frictionless contact is solved to rounding.
+            the rate of convergence; frictionless contact is solved to rounding, or to 1e-8 with
+            a convolution.
         frames: (n, 3, 3), in the columns each node's tangents and the normal into the tool;
             None for x, y, z.
         start_mm: (n, 3) displacement C f under `start_n`, if it is known.
@@ -74,6 +76,12 @@ def solve_contact_forces(
     if not (height_mm < 0).any():
         nothing = np.zeros((n, 3))
         return ContactForces(nothing, nothing, np.zeros(n, dtype=np.int8), 0.0, 0)
+    if not isinstance(compliance, np.ndarray):
+        from gelslim_twin.contact.convolved_forces import ConvolvedContact
+
+        axes = np.tile(np.eye(3), (n, 1, 1)) if frames is None else frames
+        convolved = ConvolvedContact(compliance, height_mm, target_mm, friction, axes)
+        return convolved.balance(start, tolerance)
     if friction == 0:
         return _frictionless(compliance, height_mm, start, frames)
     from gelslim_twin.contact.coulomb_contact import FrictionalContact

@@ -25,6 +25,7 @@ from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver, is_stationary, with_halved_steps
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.table_size import has_room
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 from ifem_export.operators.solver import ConvergenceError
 
@@ -34,9 +35,16 @@ Array = NDArray[np.float64]
 def unfit(bundle: Bundle) -> tuple[str, str] | None:
     """Why the neo-Hookean law does not apply to a pad, and the remedy; None where it applies.
 
-    The law is implemented for flat pads of whole cells.
+    The law is implemented for flat pads of whole cells whose table of columns fits in memory.
     """
     mesh = bundle.mesh
+    if not has_room(len(mesh.surface)):
+        return (
+            f"the sensor's pad has {len(mesh.surface)} surface nodes, more than large deformation "
+            "takes",
+            "switch it off for the linear gel (effects: {nonlinearity: off}) or lower the "
+            "sensor's mesh.nodes_per_marker_pitch",
+        )
     if mesh.surface_shift is None and mesh.fill is None:
         return None
     crowned = mesh.surface_shift is not None

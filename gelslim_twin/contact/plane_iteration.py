@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from gelslim_twin.contact.contact_forces import ContactForces, solve_contact_for
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
+from ifem_export.compliance.pad_compliance import NodeCompliance
 
 Array = NDArray[np.float64]
 FIRST, GROWTH = 0.5, 1.25
@@ -75,13 +77,27 @@ LOOSE, AHEAD = 0.1, 0.1
 """Inexact solves: tolerance of the first one, and then the share of the last relative gap."""
 
 
+class Correction(Protocol):
+    """Motion that the compliance among the nodes lacks, found along with the planes."""
+
+    def first_mm(self, force_n: Array) -> Array:
+        """The first displacement (n, 3) without contact forces, from initial forces (n, 3)."""
+
+    def corrected(self, force_n: Array, motion_mm: Array, offset_mm: Array) -> tuple[Array, float]:
+        """The next displacement without contact forces, and the largest error of the present one.
+
+        `motion_mm` (n, 3) is C f under the forces (n, 3), `offset_mm` (n, 3) the present
+        displacement without contact forces.
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class PlaneIteration:
     """The contact problem of the n candidate nodes at one pose."""
 
     tool: Tool
     pose: Pose
-    block: NDArray[np.float32]
+    block: NodeCompliance
     """Compliance (3n, 3n) in mm/N."""
     points_mm: Array
     """Nodes (n, 3) at rest."""
@@ -94,6 +110,8 @@ class PlaneIteration:
     friction: float
     tolerance: float
     deepest_mm: float
+    correction: Correction | None = None
+    """What the compliance lacks; None where it is exact."""
 
     @property
     def gap_tolerance_mm(self) -> float:
@@ -115,16 +133,20 @@ class PlaneIteration:
         self, surface: ToolSurface, motion_mm: Array, force_n: Array, turning: NormalDamping
     ) -> PlaneSolution:
         shape, u, force, known = surface, motion_mm, force_n, None
-        goal, fine = self.target_mm - self.offset_mm, BALANCE * self.tolerance
+        offset, missing, fine = self.offset_mm, 0.0, BALANCE * self.tolerance
+        if self.correction is not None:
+            offset = self.correction.first_mm(force_n)
         sweeps, worst, inner_tolerance = 0, np.inf, max(fine, LOOSE)
         for turn in range(GEOMETRY_STEPS):
-            balance = self._balance(shape, u, goal, force, inner_tolerance, known)
+            balance = self._balance(shape, u, offset, force, inner_tolerance, known)
             sweeps += balance.sweeps
             force, known = balance.force_n, balance.motion_mm
-            new, used = known + self.offset_mm, shape
+            if self.correction is not None:
+                offset, missing = self.correction.corrected(force, known, offset)
+            new, used = known + offset, shape
             shape = self.tool.surface(self.pose, self.points_mm + new, shape)
             gap = shape.gap_mm(self.points_mm + new)
-            before, worst = worst, self._worst(gap, balance)
+            before, worst = worst, max(self._worst(gap, balance), missing)
             slack = (
                 self.gap_tolerance_mm
                 if turn < EDGES_FROM
@@ -155,13 +177,14 @@ class PlaneIteration:
         self,
         shape: ToolSurface,
         u: Array,
-        goal: Array,
+        offset: Array,
         force: Array,
         inner_tolerance: float,
         known: Array | None,
     ) -> ContactForces:
         frames = shape.frames
-        room = allowed_motion_mm(shape, self.points_mm + u, u - self.offset_mm)
+        room = allowed_motion_mm(shape, self.points_mm + u, u - offset)
+        goal = self.target_mm - offset
         sticking = goal if frames is None else np.einsum("kab,ka->kb", frames, goal)
         return solve_contact_forces(
             self.block,

@@ -22,7 +22,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.contact_forces import STICK
+from gelslim_twin.contact.contact_forces import STICK, ContactForces
 from gelslim_twin.contact.gel_state import (
     AnchoredState,
     ContactError,
@@ -32,6 +32,7 @@ from gelslim_twin.contact.gel_state import (
     anchor_mm,
 )
 from gelslim_twin.contact.plane_iteration import (
+    Correction,
     PlaneIteration,
     PlaneSolution,
     allowed_motion_mm,
@@ -39,7 +40,7 @@ from gelslim_twin.contact.plane_iteration import (
 )
 from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
-from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.compliance.pad_compliance import NodeCompliance, PadCompliance
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -57,7 +58,7 @@ class Candidates:
     """Candidate nodes (n,) of the contact, in order of their addition, and their compliance."""
 
     nodes: Nodes
-    block: NDArray[np.float32]
+    block: NodeCompliance
 
     @classmethod
     def none(cls) -> Candidates:
@@ -65,11 +66,11 @@ class Candidates:
         return cls(np.zeros(0, np.intp), np.zeros((0, 0), np.float32))
 
     @classmethod
-    def of(cls, nodes: Nodes, compliance: SurfaceCompliance) -> Candidates:
+    def of(cls, nodes: Nodes, compliance: PadCompliance) -> Candidates:
         """Candidates `nodes` (n,) in this order, with their compliance."""
         return cls(nodes, compliance.block(nodes))
 
-    def including(self, wanted: NDArray[np.bool_], compliance: SurfaceCompliance) -> Candidates:
+    def including(self, wanted: NDArray[np.bool_], compliance: PadCompliance) -> Candidates:
         """Candidates that include all `wanted` (c,) nodes, and not too many others."""
         count = int(wanted.sum())
         inside = np.zeros(len(wanted), dtype=bool)
@@ -105,7 +106,7 @@ class ContactSolver:
     exactly with the same `candidates`.
     """
 
-    compliance: SurfaceCompliance
+    compliance: PadCompliance
     tool: Tool
     settings: ContactSettings
 
@@ -184,7 +185,7 @@ class ContactSolver:
             iteration = PlaneIteration(
                 self.tool, pose, self.candidates.block, self.points_mm[nodes], offset[nodes],
                 target[nodes], wanted[nodes], self.settings.friction, self.settings.tolerance,
-                deepest,
+                deepest, self._correction(nodes),
             )  # fmt: skip
             found = iteration.solve(surface.at(nodes), moved[nodes], guess[nodes])
             state, gap = self._state(nodes, found, pose, offset, targets, deepest)
@@ -225,6 +226,14 @@ class ContactSolver:
         surface = self.tool.surface(pose, places, reach_mm=self._cell).only(on_tool)
         return surface, allowed_motion_mm(surface, places, moved - offset)
 
+    def _correction(self, nodes: Nodes) -> Correction | None:
+        """What the compliance of the candidates lacks."""
+        return None
+
+    def _displacement(self, nodes: Nodes, balance: ContactForces) -> Array:
+        """Displacement (c, 3) under the forces on `nodes` (n,)."""
+        return self.compliance.displacement(nodes, balance.force_n, balance.motion_mm)
+
     def _state(
         self,
         nodes: Nodes,
@@ -236,7 +245,7 @@ class ContactSolver:
     ) -> tuple[AnchoredState, Array]:
         """State of the whole surface, and gaps (c,) of all nodes."""
         balance = found.balance
-        u = self.compliance.displacement(nodes, balance.force_n, balance.motion_mm) + offset
+        u = self._displacement(nodes, balance) + offset
         gap = self.tool.clearance_mm(pose, self.points_mm + u)
         gap[nodes] = found.gap_mm
         force, touch = np.zeros_like(u), np.zeros(len(u), dtype=np.int8)

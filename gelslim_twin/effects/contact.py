@@ -12,6 +12,7 @@ from gelslim_core.yaml.errors import FieldError
 from gelslim_twin.effects.circumstances import Circumstances, EffectParameters
 from gelslim_twin.effects.contact_estimate import RIDGES
 from gelslim_twin.effects.effect import Bound, Effect, Rung, geometry
+from ifem_export.compliance.table_size import has_room
 
 # The tolerance applies to the field of forces. Displacements err by more, because a node at the
 # border of the contact or under a ridge may change its contact status within the tolerance. In
@@ -28,6 +29,9 @@ NARROW = 3.5
 """Nodes across a tool below which it counts as a tip: 3 nodes across a cone show the full error."""
 FEW = 50.0
 """Nodes in contact above which the error of a tip decreases: many tips support each other."""
+
+FINE_MS = 15.0
+"""Time of a pose on a fine pad over that of its nodes relative to 43 x 43 x 4."""
 
 
 def solver_error(c: Circumstances, tolerance: float) -> Bound:
@@ -50,12 +54,14 @@ def normal_contact_bound(c: Circumstances) -> Bound:
 def normal_contact_ladder(c: Circumstances) -> tuple[Rung, ...]:
     """Relative tolerance of the field of forces.
 
-    The time grows with the square of the nodes in contact, whose compliance is dense.
+    The time grows with the square of the nodes in contact, whose compliance is dense. On pads too
+    fine for that it grows with the nodes of the whole pad.
     """
     nodes = c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
-    dense_ms = c.contact_nodes**2 / 1e4
+    is_dense = has_room(c.sensor.surface_nodes)
+    more_ms = c.contact_nodes**2 / 1e4 if is_dense else FINE_MS * nodes
     return tuple(
-        Rung(name, solver_error(c, tolerance), ms * nodes + dense_ms, {"tolerance": tolerance})
+        Rung(name, solver_error(c, tolerance), ms * nodes + more_ms, {"tolerance": tolerance})
         for (name, tolerance), ms in zip(RUNGS, (1.2, 1.3, 1.5, 1.8, 2.1), strict=True)
     )
 

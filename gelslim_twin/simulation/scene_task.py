@@ -86,7 +86,6 @@ def mechanics_of(
     chosen = {choice.effect: choice for choice in plan.included}
     solver = import_module(chosen["normal_contact"].implementation)
     from gelslim_twin.contact.tool import Tool
-    from ifem_export.compliance.columns import SurfaceCompliance
 
     tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:
@@ -94,7 +93,7 @@ def mechanics_of(
         friction = loaded.scene.contact.friction
     settings = solver.ContactSettings(tolerance, friction)
     tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
-    contact: Any = solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder), tool, settings)
+    contact: Any = _linear_contact(solver, sensor, folder, tool, settings)
     if "nonlinearity" in chosen:
         nonlinear = import_module(chosen["nonlinearity"].implementation)
         contact = nonlinear.NonlinearContact(
@@ -106,6 +105,22 @@ def mechanics_of(
         fractions, times_s = (tuple(t[n] for t in given) for n in ("fraction", "time_s"))
         contact = relaxation.RelaxingContact(contact, relaxation.PronySeries(fractions, times_s))
     return contact
+
+
+def _linear_contact(
+    solver: Any, sensor: TwinSensor, folder: Path | None, tool: Any, settings: Any
+) -> Any:
+    """The contact of a linear gel: by a table of columns where that fits, else by convolution."""
+    from ifem_export.compliance.table_size import has_room
+
+    if has_room(len(sensor.bundle.mesh.surface)):
+        from ifem_export.compliance.columns import SurfaceCompliance
+
+        return solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder), tool, settings)
+    from gelslim_twin.contact.fine_contact import FineContact
+    from ifem_export.compliance.convolved import ConvolvedCompliance
+
+    return FineContact(ConvolvedCompliance(sensor.bundle), tool, settings)
 
 
 def _tolerance(choice: Choice) -> float:
