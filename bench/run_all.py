@@ -47,6 +47,7 @@ STEPS = (
     Step("force_sigma", quick=None),
     Step("twin_ladders"),
     Step("twin_steps"),
+    Step("twin_fine"),
     Step("rendering"),
     Step("assembly"),
     Step("force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),
