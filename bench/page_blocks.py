@@ -22,6 +22,7 @@ import force_tables
 import page_tables
 import tolerance_tables
 import twin_fine
+import twin_skin
 import twin_steps
 import twin_tables
 from bench_data import DOCS, write_whole
@@ -69,6 +70,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-effects": _from("twin_ladders", twin_tables.scenes_text),
         "twin-contact": _from("twin_ladders", twin_tables.contact_text),
         "twin-fine": _from("twin_fine", twin_fine.table),
+        "twin-skin": _from("twin_skin", twin_skin.table),
         "twin-overhead": _from("twin_ladders", twin_tables.overhead_text),
     },
     "docs/twin_steps.md": {"steps": _from("twin_steps", twin_steps.table)},

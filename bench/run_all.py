@@ -48,6 +48,7 @@ STEPS = (
     Step("twin_ladders"),
     Step("twin_steps"),
     Step("twin_fine"),
+    Step("twin_skin"),
     Step("rendering"),
     Step("assembly"),
     Step("force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),

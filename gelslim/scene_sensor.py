@@ -96,6 +96,7 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     import numpy as np
 
     from gelslim_cad.dimensions import derive
+    from gelslim_cad.gel import gel_skin
     from gelslim_cad.geometry.optics import camera_record
     from gelslim_cad.sensor import marker_grid, pad_mesh
     from gelslim_cad.tolerance.asked import read_spec
@@ -107,7 +108,7 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
     mesh, _ = pad_mesh(d, grid)
     cells = mesh.occupancy.shape
     size = tuple(n * h for n, h in zip(cells, mesh.cell_size_mm, strict=True))
-    gel = spec.material.gel
+    gel, skin = spec.material.gel, gel_skin(spec)
     return figures(
         camera_record(d),
         size_mm=(float(size[0]), float(size[1]), float(size[2])),
@@ -117,4 +118,6 @@ def _spec_figures(loaded: LoadedScene) -> SensorFigures:
         markers=len(grid),
         marker_pitch_mm=float(d["design.markers.pitch_mm"]),
         marker_diameter_mm=float(np.median(grid.diameter_mm)),
+        skin_n_per_mm=0.0 if skin is None else skin.stiffness_n_per_mm,
+        skin_friction=None if skin is None else skin.friction,
     )

@@ -11,6 +11,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from gelslim_cad.dimensions import Dimensions
+from gelslim_cad.gel import bare, gel_material, gel_skin, tolerances
 from gelslim_cad.geometry.gel_shape import GelShape, has_markers
 from gelslim_cad.geometry.led_strips import camera_responses
 from gelslim_cad.geometry.lookup import Lookup
@@ -75,7 +76,9 @@ LADDER_NAMES: tuple[Name, ...] = (
 
 def spec_hash(spec: Spec) -> str:
     """SHA-256 of the spec's content: comments, order and spelt-out defaults do not change it."""
-    content = json.dumps(spec.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+    # A layer that is absent leaves the hash as it was before specs had layers.
+    values = spec.model_dump(mode="json", exclude={"material": bare(spec)})
+    content = json.dumps(values, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(content.encode()).hexdigest()
 
 
@@ -201,12 +204,6 @@ def print_outline(d: Lookup) -> Outline:
     return Outline.rounded_rectangle(gel.length_mm, gel.width_mm, gel.corner_radius_mm)
 
 
-def gel_material(spec: Spec) -> Material:
-    """The gel as the stiffness needs it."""
-    gel = spec.material.gel
-    return Material(gel.youngs_modulus_mpa, gel.poissons_ratio, gel.density_kg_m3)
-
-
 def make_bundle(
     spec: Spec,
     d: Dimensions,
@@ -253,17 +250,8 @@ def make_bundle(
         outline=pad_outline(d),
         tolerances=tolerances(spec),
         light=light,
+        skin=gel_skin(spec),
     )
-
-
-def tolerances(spec: Spec) -> dict[str, float]:
-    """Standard deviations of what the spec states of the gel, by name of the bundle."""
-    gel = spec.material.gel
-    return {
-        "youngs_modulus_mpa": gel.youngs_modulus_tolerance_ratio * gel.youngs_modulus_mpa,
-        "poissons_ratio": gel.poissons_ratio_tolerance,
-        "thickness_mm": spec.manufacturing.gel_thickness_tolerance_mm,
-    }
 
 
 def marker_inputs(d: Lookup) -> dict[str, Any]:

@@ -55,8 +55,9 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "effects", "scene", "planning", "contact", "render", "simulation", "stepping", "validation",
     ),
     "gelslim_cad": (
-        "spec", "markers", "pictures", "geometry", "light", "electronics", "dimensions", "checks",
-        "export", "proof", "printability", "solids", "assembly", "ordering", "report", "sensor",
+        "spec", "gel", "markers", "pictures", "geometry", "light", "electronics", "dimensions",
+        "checks", "export", "proof", "printability", "solids", "assembly", "ordering", "report",
+        "sensor",
         "tolerance", "robot", "build", "live", "compare", "explore", "family",
     ),
     "gelslim": (
@@ -81,7 +82,7 @@ FORBIDDEN = {
     },
 }
 CAD_FREE = (
-    "spec", "geometry", "dimensions", "markers", "light", "electronics", "checks", "sensor",
+    "spec", "gel", "geometry", "dimensions", "markers", "light", "electronics", "checks", "sensor",
     "tolerance", "explore",
 )  # fmt: skip
 

@@ -52,10 +52,36 @@ class AcrylicMaterial(Block):
     absorption_per_m: float = between(0, 200, "Absorption coefficient per metre", default=2.0)
 
 
+class SkinLayer(Block):
+    """A membrane on the gel that resists stretching: the coat of paint, or a fabric over it."""
+
+    stiffness_n_per_mm: float | None = Field(
+        default=None,
+        gt=0,
+        le=100,
+        description="Membrane stiffness: Young's modulus times thickness, force per width and "
+        "strain; none where it is left out",
+    )
+    poissons_ratio: float = Field(
+        default=0.3, ge=0, lt=0.5, description="Contraction across over stretch along"
+    )
+    friction: float | None = Field(
+        default=None,
+        ge=0,
+        le=10,
+        description="Coefficient of friction against objects, for scenes that give none; that of "
+        "the fabric counts before that of the coat",
+    )
+
+
 class Material(Block):
-    """Gel and acrylic."""
+    """Gel, what covers it, and acrylic."""
 
     gel: GelMaterial = Field(default=GelMaterial(), description="The gel")
+    coat: SkinLayer = Field(default=SkinLayer(), description="The coat of paint as a membrane")
+    fabric: SkinLayer = Field(
+        default=SkinLayer(), description="A fabric over the gel as a membrane"
+    )
     acrylic: AcrylicMaterial = Field(default=AcrylicMaterial(), description="The light guide")
     allow_stiff_gel: bool = Field(
         default=False, description="Accept a gel stiffer than 5 MPa (no tactile gel is)"

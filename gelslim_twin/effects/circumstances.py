@@ -60,6 +60,8 @@ class SensorFigures:
         focus_mm: Distance of best focus, 0 for a pinhole.
         lens_distortion: Names and values of the distortion coefficients.
         wide_lens: Whether they are of Kannala and Brandt's model.
+        skin_n_per_mm: Membrane stiffness of coat and fabric together, 0 for a bare gel.
+        skin_friction: Their friction against objects, where it is known.
     """
 
     length_mm: float
@@ -85,6 +87,8 @@ class SensorFigures:
     focus_mm: float = 0.0
     lens_distortion: tuple[tuple[str, float], ...] = ()
     wide_lens: bool = False
+    skin_n_per_mm: float = 0.0
+    skin_friction: float | None = None
 
     @property
     def px_per_mm(self) -> float:

@@ -17,6 +17,7 @@ from gelslim_twin.planning.planner import PlanError, Question, make_plan
 from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
+from gelslim_twin.scene.scene import Contact
 from ifem_export.errors import IfemError
 
 JUST_TOUCHING_MM = 1e-9
@@ -60,10 +61,17 @@ def question(loaded: LoadedScene, sensor: SensorFigures) -> Question:
             sensor,
             motion_figures(loaded.poses, footprint),
             footprint,
-            scene.contact.friction,
+            contact_friction(scene.contact, sensor.skin_friction),
             scene.effects.parameters(),
         ),
     )
+
+
+def contact_friction(contact: Contact, of_skin: float | None) -> float:
+    """Coefficient of friction of a scene: its own, else that of the gel's skin, else 0."""
+    if of_skin is None or "friction" in contact.model_fields_set:
+        return contact.friction
+    return of_skin
 
 
 def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures:
@@ -146,7 +154,18 @@ def bundle_figures(path: str | os.PathLike[str]) -> SensorFigures:
         markers=len(positions),
         marker_pitch_mm=_pitch(positions),
         marker_diameter_mm=float(np.median(diameters)),
+        **_skin_figures(manifest.get("skin")),
     )
+
+
+def _skin_figures(record: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The figures of coat and fabric in a manifest."""
+    if record is None:
+        return {}
+    from ifem_export.elements.skin import Skin
+
+    skin = Skin.from_record(record)
+    return {"skin_n_per_mm": skin.stiffness_n_per_mm, "skin_friction": skin.friction}
 
 
 def _pitch(positions: Any) -> float:
@@ -169,6 +188,8 @@ def figures(
     markers: int,
     marker_pitch_mm: float,
     marker_diameter_mm: float,
+    skin_n_per_mm: float = 0.0,
+    skin_friction: float | None = None,
 ) -> SensorFigures:
     """Figures of a sensor.
 
@@ -181,6 +202,8 @@ def figures(
         markers: dots printed.
         marker_pitch_mm: distance between neighbours.
         marker_diameter_mm: of a usual dot.
+        skin_n_per_mm: membrane stiffness of coat and fabric together.
+        skin_friction: their friction against objects.
 
     Raises:
         KeyError: the record lacks a value.
@@ -215,6 +238,8 @@ def figures(
         focus_mm=float(camera.get("focus_mm") or 0.0),
         lens_distortion=tuple(sorted((k, v) for k, v in lens.items() if k != "model")),
         wide_lens=lens.get("model") == "kannala_brandt",
+        skin_n_per_mm=skin_n_per_mm,
+        skin_friction=skin_friction,
     )
 
 

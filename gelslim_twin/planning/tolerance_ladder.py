@@ -109,7 +109,7 @@ def pace_group(effect: str) -> str:
     """Which part of a simulation an effect's time is measured with."""
     if effect == "nonlinearity":
         return LARGE_STRAIN
-    return GEL if effect in ("normal_contact", "friction", "relaxation") else PICTURE
+    return GEL if effect in ("normal_contact", "friction", "skin", "relaxation") else PICTURE
 
 
 def _switched_off(question: Question, effect: str) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gelslim_twin.planning.plan import Choice, Plan
-from gelslim_twin.planning.question import bundle_figures, plan_scene
+from gelslim_twin.planning.question import bundle_figures, contact_friction, plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
 from gelslim_twin.simulation.simulate import Mechanics, SimulationJob, simulate
@@ -61,6 +61,13 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         InputError: The plan needs an effect that the sensor's pad does not allow.
     """
     plan = plan_scene(loaded, bundle_figures(folder / BUNDLE))
+    if {"skin", "nonlinearity"} <= set(plan.order):
+        raise loaded.problem(
+            "effects.nonlinearity",
+            None,
+            "the sensor's gel has a coat or a fabric, large deformation takes a bare gel",
+            "switch one of them off (effects: {nonlinearity: off} or {skin: off})",
+        )
     for choice in plan.included:
         if choice.effect == "nonlinearity":
             problem = import_module(choice.implementation).unfit(sensor.bundle)
@@ -90,10 +97,12 @@ def mechanics_of(
     tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:
         tolerance = min(tolerance, _tolerance(chosen["friction"]))
-        friction = loaded.scene.contact.friction
+        skin = sensor.bundle.skin
+        friction = contact_friction(loaded.scene.contact, None if skin is None else skin.friction)
     settings = solver.ContactSettings(tolerance, friction)
     tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
-    contact: Any = _linear_contact(solver, sensor, folder, tool, settings)
+    membranes = sensor.bundle.skin.membranes if "skin" in chosen and sensor.bundle.skin else ()
+    contact: Any = _linear_contact(solver, sensor, folder, membranes, tool, settings)
     if "nonlinearity" in chosen:
         nonlinear = import_module(chosen["nonlinearity"].implementation)
         contact = nonlinear.NonlinearContact(
@@ -108,7 +117,12 @@ def mechanics_of(
 
 
 def _linear_contact(
-    solver: Any, sensor: TwinSensor, folder: Path | None, tool: Any, settings: Any
+    solver: Any,
+    sensor: TwinSensor,
+    folder: Path | None,
+    skin: tuple[Any, ...],
+    tool: Any,
+    settings: Any,
 ) -> Any:
     """The contact of a linear gel: by a table of columns where that fits, else by convolution."""
     from ifem_export.compliance.table_size import has_room
@@ -116,11 +130,11 @@ def _linear_contact(
     if has_room(len(sensor.bundle.mesh.surface)):
         from ifem_export.compliance.columns import SurfaceCompliance
 
-        return solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder), tool, settings)
+        return solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder, skin), tool, settings)
     from gelslim_twin.contact.fine_contact import FineContact
     from ifem_export.compliance.convolved import ConvolvedCompliance
 
-    return FineContact(ConvolvedCompliance(sensor.bundle), tool, settings)
+    return FineContact(ConvolvedCompliance(sensor.bundle, skin), tool, settings)
 
 
 def _tolerance(choice: Choice) -> float:

@@ -176,6 +176,7 @@ def sensor_key(sensor: TwinSensor) -> str:
         json.dumps(dict(bundle.camera), sort_keys=True),
         repr((sensor.size_mm, sensor.corner_radius_mm)),
         bundle.spec_hash,
+        *(() if bundle.skin is None else (repr(bundle.skin),)),
     )
     return hashlib.sha256("|".join(parts).encode()).hexdigest()
 

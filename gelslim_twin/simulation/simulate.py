@@ -69,6 +69,8 @@ class SimulationJob:
         """Hash of all input of the simulation."""
         bundle = self.sensor.bundle
         material = f"{bundle.material} {bundle.formulation}"
+        if bundle.skin is not None:
+            material += f" {bundle.skin}"
         scene = self.scene.model_dump_json() + repr(self.poses)
         return simulation_key(scene, self.plan.to_json(), bundle.geometry_hash, material)
 

@@ -150,7 +150,7 @@ class StepMechanics:
         use = self.effects["nonlinearity"].use
         if use != "auto":
             return use == "on"
-        if contact.nonlinear_excess <= self.request.force_share / 2:
+        if self.compliance.skin or contact.nonlinear_excess <= self.request.force_share / 2:
             return False
         from gelslim_twin.contact.nonlinear import unfit
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,10 @@ from gelslim_twin.stepping.step_error import StepError
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.operators.single_thread import single_threaded
+
+if TYPE_CHECKING:
+    from gelslim_twin.effects.circumstances import EffectParameters
+    from ifem_export.elements.skin import Membrane
 
 Array = NDArray[np.float64]
 
@@ -100,7 +104,8 @@ class Twin:
         request = Request.read(observe, tolerance)
         sensor = TwinSensor(load_bundle(folder))
         scene = stepped_scene(request, friction, effects, seed, pad_size_mm(sensor))
-        compliance = SurfaceCompliance(sensor.bundle, _made(keep))
+        skin = _membranes(sensor, scene.effects.parameters())
+        compliance = SurfaceCompliance(sensor.bundle, _made(keep), skin)
         mechanics = StepMechanics(
             compliance, request, scene.contact.friction, scene.effects.parameters()
         )
@@ -253,6 +258,19 @@ class Twin:
         compliance = self._shared.mechanics.compliance
         key = f"{compliance.key}-{len(self._bodies)}"
         return TwinState(key, 0.0, 0, None, self._shared.mechanics.rest)
+
+
+def _membranes(sensor: TwinSensor, effects: Mapping[str, EffectParameters]) -> tuple[Membrane, ...]:
+    """Coat and fabric of the sensor, unless they are switched off."""
+    skin = sensor.bundle.skin
+    if skin is None or effects["skin"].use == "off":
+        return ()
+    if effects["nonlinearity"].use == "on":
+        raise StepError(
+            "the sensor's gel has a coat or a fabric, large strain takes a bare gel: switch one "
+            "of the effects nonlinearity and skin off"
+        )
+    return skin.membranes
 
 
 def _made(keep: str | os.PathLike[str] | None) -> Path | None:

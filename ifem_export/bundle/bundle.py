@@ -20,6 +20,7 @@ from gelslim_core.budget.budget import Budget
 from ifem_export.assembly.assembly import mesh_stiffness
 from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
+from ifem_export.elements.skin import Skin
 from ifem_export.errors import IfemError
 from ifem_export.markers.field import MarkerField, marker_field
 from ifem_export.mesh.outline import RoundedRectangle
@@ -72,6 +73,8 @@ class Bundle:
             `gelslim_optics.light.light_map.LightMap` has them; empty where it was not traced.
         stored_adjoint: Adjoint fields (6, c, 3) as stored with the bundle, in N/mm and N/rad, or
             None; see `adjoint`.
+        skin: Coat and fabric on the gel; None where the gel counts as bare. The operators of the
+            surface are those of the bare gel.
     """
 
     mesh: PadMesh
@@ -89,6 +92,7 @@ class Bundle:
     tolerances: Mapping[str, float] = field(default_factory=dict)
     light: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     stored_adjoint: NDArray[np.float64] | None = None
+    skin: Skin | None = None
 
     def surface_operator(
         self,
@@ -200,6 +204,7 @@ def build_bundle(
     outline: RoundedRectangle | None = None,
     tolerances: Mapping[str, float] | None = None,
     light: Mapping[str, ArrayLike] | None = None,
+    skin: Skin | None = None,
 ) -> Bundle:
     """Make the bundle of one sensor.
 
@@ -217,6 +222,7 @@ def build_bundle(
         outline: The gel seen from above.
         tolerances: Standard deviations of material and thickness by name.
         light: Arrays of the light on the untouched gel by name.
+        skin: Coat and fabric on the gel.
 
     Returns:
         The bundle.
@@ -243,6 +249,7 @@ def build_bundle(
         outline=outline,
         tolerances=_plain_json(tolerances or {}),
         light={name: np.asarray(values) for name, values in (light or {}).items()},
+        skin=skin,
     )
 
 

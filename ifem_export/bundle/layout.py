@@ -11,6 +11,7 @@ from scipy import sparse
 from ifem_export.bundle.bundle import Bundle, SelfTest
 from ifem_export.bundle.manifest import ADJOINT_VERSION, MANIFEST, REBUILD
 from ifem_export.elements.material import Material
+from ifem_export.elements.skin import Skin
 from ifem_export.errors import BundleError, IfemError
 from ifem_export.markers.field import MarkerField
 from ifem_export.markers.thin_plate import ThinPlate
@@ -120,7 +121,19 @@ def bundle_from(
         tolerances=dict(manifest.get("tolerances") or {}),
         light={name: take(f"light_{name}") for name in manifest.get("light") or ()},
         stored_adjoint=_adjoint_from(manifest, take, len(mesh.surface)),
+        skin=_skin_from(manifest),
     )
+
+
+def _skin_from(manifest: dict[str, Any]) -> Skin | None:
+    """Coat and fabric; None for bundles without."""
+    record = manifest.get("skin")
+    if record is None:
+        return None
+    try:
+        return Skin.from_record(record)
+    except (KeyError, TypeError, IfemError) as error:
+        raise BundleError(MANIFEST, f"section 'skin' is malformed ({error})", REBUILD) from error
 
 
 def _adjoint_from(

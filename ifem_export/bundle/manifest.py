@@ -112,6 +112,8 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
         "ladder": _ladder_section(bundle),
         "arrays": arrays,
     }
+    if bundle.skin is not None:
+        manifest["skin"] = bundle.skin.to_record()
     return {**manifest, _SEAL: _seal(manifest)}
 
 

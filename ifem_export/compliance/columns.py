@@ -12,9 +12,11 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.sparse.linalg import SuperLU
 
 from gelslim_core.files.replaced_file import replacement
@@ -25,6 +27,9 @@ from ifem_export.mesh.pad_mesh import PadMesh
 from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.solver import factored
 from ifem_export.operators.surface_operator import SurfaceOperator
+
+if TYPE_CHECKING:
+    from ifem_export.elements.skin import Membrane
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -41,11 +46,16 @@ class SurfaceCompliance:
     not computed yet. The file is memory-mapped, so that only the rows used are read. Without a
     folder nothing is stored. An instance must not be used by two threads at once.
 
+    `skin` are membranes on the surface, whose stiffness adds to that of the pad.
+
     Raises MeshError for a pad whose table would not fit.
     """
 
-    def __init__(self, bundle: Bundle, folder: Path | None = None) -> None:
+    def __init__(
+        self, bundle: Bundle, folder: Path | None = None, skin: tuple[Membrane, ...] = ()
+    ) -> None:
         self.bundle = bundle
+        self.skin = skin
         self.nodes = len(bundle.mesh.surface)
         require_room(self.nodes)
         self._folder = folder
@@ -68,15 +78,25 @@ class SurfaceCompliance:
         return system
 
     @cached_property
+    def _stiffness(self) -> sparse.csr_array:
+        """Stiffness of the free nodes, with the skin."""
+        bare = self.system.stiffness
+        if not self.skin:
+            return bare
+        from ifem_export.elements.membrane import membrane_stiffness, with_skin
+
+        return with_skin(bare, membrane_stiffness(self.bundle.mesh, self.skin))
+
+    @cached_property
     def _factor(self) -> SuperLU | RowFactor:
         system = self.system
         if type(system) is not PadSystem:
-            return factored(system.stiffness)
+            return factored(self._stiffness)
         places = np.asarray(system.lattice_positions)
         row = places[:, int(np.ptp(places[:, 1]) > np.ptp(places[:, 0]))]
         if 3 * system.layers * np.bincount(row - row.min()).max() > MOST_ROW:
-            return factored(system.stiffness)
-        return RowFactor.of(system.stiffness, np.repeat(np.tile(row, system.layers), 3))
+            return factored(self._stiffness)
+        return RowFactor.of(self._stiffness, np.repeat(np.tile(row, system.layers), 3))
 
     @cached_property
     def _symmetries(self) -> tuple[Symmetry, ...]:
@@ -97,7 +117,7 @@ class SurfaceCompliance:
     def key(self) -> str:
         """Hash of everything that the compliance depends on."""
         parts = (FORMAT, self.bundle.geometry_hash, repr(self.bundle.material),
-                 self.bundle.formulation)  # fmt: skip
+                 self.bundle.formulation, *map(repr, self.skin))  # fmt: skip
         return hashlib.sha256("|".join(parts).encode()).hexdigest()[:16]
 
     def require(self, nodes: Nodes) -> None:
@@ -182,6 +202,10 @@ class SurfaceCompliance:
 
     def whole(self, force_n: Array) -> Array:
         """Displacement (c, 3) under forces (c, 3) on all nodes, by a solve."""
+        if self.skin:
+            load = np.zeros(self._stiffness.shape[0])
+            load[-3 * self.nodes :] = np.ravel(force_n)
+            return np.array(self._factor.solve(load)[-3 * self.nodes :]).reshape(-1, 3)
         return self.operator.displacement(force_n)
 
     def store(self) -> None:

@@ -7,10 +7,13 @@ rim its first result is the solution. Memory grows with the number of nodes, and
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.node_convolution import LatticeKernel, NodeConvolution
@@ -19,6 +22,10 @@ from ifem_export.operators.layer_elimination import LayerElimination
 from ifem_export.operators.matrix_free import LatticeMatrix, LatticeProduct
 from ifem_export.operators.pad_system import PadSystem
 from ifem_export.operators.solver import ConjugateGradients
+from ifem_export.operators.symmetric_matrix import Matrix, matrix_bytes
+
+if TYPE_CHECKING:
+    from ifem_export.elements.skin import Membrane
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -29,9 +36,11 @@ class ConvolvedCompliance:
 
     Args:
         bundle: The sensor.
+        skin: Membranes on the surface, whose stiffness adds to that of the pad.
 
     Attributes:
         bundle: As given.
+        skin: As given.
         nodes: Surface nodes c.
         iterations: Conjugate-gradient iterations taken so far.
 
@@ -39,7 +48,7 @@ class ConvolvedCompliance:
         MeshError: The pad is crowned or has cut cells.
     """
 
-    def __init__(self, bundle: Bundle) -> None:
+    def __init__(self, bundle: Bundle, skin: tuple[Membrane, ...] = ()) -> None:
         mesh = bundle.mesh
         if mesh.surface_shift is not None or mesh.fill is not None:
             raise MeshError(
@@ -51,6 +60,7 @@ class ConvolvedCompliance:
                 value=len(mesh.surface),
             )
         self.bundle = bundle
+        self.skin = skin
         self.nodes = len(mesh.surface)
         self.iterations = 0
 
@@ -62,12 +72,23 @@ class ConvolvedCompliance:
     @cached_property
     def infinite(self) -> LayerElimination:
         """The infinite pad."""
-        return self.system.elimination
+        if not self.skin:
+            return self.system.elimination
+        from ifem_export.elements.membrane import membrane_symbol
+
+        size = self.bundle.mesh.cell_size_mm[:2]
+        return self.system.eliminated(lambda shape: membrane_symbol(size, self.skin, shape))
 
     @cached_property
     def _gradients(self) -> ConjugateGradients:
         system = self.system
-        matrix = LatticeMatrix(LatticeProduct(system), system.layers, lambda: system.stiffness)
+        matrix: Matrix = LatticeMatrix(
+            LatticeProduct(system), system.layers, lambda: system.stiffness
+        )
+        if self.skin:
+            from ifem_export.elements.membrane import membrane_stiffness
+
+            matrix = SkinnedMatrix(matrix, membrane_stiffness(self.bundle.mesh, self.skin))
         return ConjugateGradients(matrix, self.infinite, system.layers)
 
     @cached_property
@@ -117,3 +138,39 @@ class ConvolvedCompliance:
 
     def store(self) -> None:
         """Nothing is worth storing: the blocks take less time to make than to read."""
+
+
+@dataclass(frozen=True, eq=False)
+class SkinnedMatrix:
+    """The stiffness of a pad's free nodes with membranes on its surface, as a product.
+
+    Attributes:
+        pad: That of the pad; the surface comes last.
+        skin: That of the membranes, among the surface nodes.
+    """
+
+    pad: Matrix
+    skin: sparse.csr_array
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of rows and of columns."""
+        return self.pad.shape
+
+    def __matmul__(self, x: Array) -> Array:
+        """Forces (n,) of displacements (n,)."""
+        found = np.asarray(self.pad @ x)
+        size = self.skin.shape[0]
+        found[-size:] += self.skin @ x[-size:]
+        return found
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes that a product reads and writes."""
+        return matrix_bytes(self.pad) + matrix_bytes(self.skin)
+
+    def tocsr(self) -> sparse.csr_array:
+        """The assembled matrix."""
+        from ifem_export.elements.membrane import with_skin
+
+        return with_skin(self.pad.tocsr(), self.skin)

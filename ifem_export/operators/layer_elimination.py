@@ -12,6 +12,7 @@ The blocks are those of `preconditioner`: real, for ky >= 0 and kx >= 0.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +78,7 @@ def layer_elimination(
     columns: NDArray[np.int64],
     padding: tuple[int, int],
     surface_held: bool = False,
+    on_surface: Callable[[tuple[int, int]], Array] | None = None,
 ) -> LayerElimination:
     """The elimination of a pad's free layers.
 
@@ -87,6 +89,8 @@ def layer_elimination(
         padding: Columns of zeros beyond the lattice along (y, x).
         surface_held: Whether the outer surface does not move, so that the layers below it are the
             free ones.
+        on_surface: Function from the shape of the lattice to stiffness blocks (ky >= 0, kx, 3, 3)
+            in N/mm that are added to those of the surface.
 
     Returns:
         The operator.
@@ -97,6 +101,8 @@ def layer_elimination(
     # An inner layer and the surface have all different blocks.
     pair = mirrored_operator(element_matrix, min(layers, 2), columns, padding, lambda k: k)
     inner, top = pair.blocks[..., :3, :3], pair.blocks[..., -3:, -3:]
+    if on_surface is not None:
+        top = top + on_surface(pair.shape)
     up = np.ascontiguousarray(pair.blocks[..., :3, -3:]) if layers > 1 else np.zeros_like(top)
     count = layers - 1 if surface_held else layers
     inverses = np.empty((*top.shape[:2], count, 3, 3))

@@ -162,7 +162,13 @@ class PadSystem:
     @cached_property
     def elimination(self) -> LayerElimination:
         """Inverse of the infinite pad's stiffness in little memory."""
-        return layer_elimination(*self._infinite)
+        return self.eliminated()
+
+    def eliminated(
+        self, on_surface: Callable[[tuple[int, int]], Array] | None = None
+    ) -> LayerElimination:
+        """The same with blocks added on the surface; see `layer_elimination`."""
+        return layer_elimination(*self._infinite, on_surface=on_surface)
 
     def _scaled(self, transform: Callable[[Array], Array]) -> Preconditioner:
         if self.mesh.fill is None and 18 * self.layers**2 * self.columns > MOST_BLOCK_BYTES:

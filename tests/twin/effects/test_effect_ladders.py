@@ -31,6 +31,7 @@ TIMES_MS = {
     "normal_contact": (1.2, 1.3, 1.5, 1.8, 2.1),
     "friction": (0.4,),
     "nonlinearity": (250.0, 350.0, 450.0),
+    "skin": (0.0,),
     "relaxation": (0.01 + 8e-5 * 1849,),
     "perspective": (0.05,),
     "refraction": (0.02, 0.1),

@@ -1,0 +1,139 @@
+"""Membranes on the gel: strain energy, waves on a bonded layer, both ways to a compliance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from contact_pads import YOUNGS_MPA, dense_compliance, small_pad
+from numpy.typing import NDArray
+
+from ifem_export.bundle.bundle import Bundle, build_bundle
+from ifem_export.bundle.files import load_bundle, write_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.compliance.convolved import ConvolvedCompliance
+from ifem_export.elements.material import Material
+from ifem_export.elements.membrane import membrane_stiffness
+from ifem_export.elements.skin import Membrane, Skin
+from ifem_export.errors import IfemError, MeshError
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import PadMesh, build_pad_mesh
+
+Array = NDArray[np.float64]
+COAT, FABRIC = Membrane(0.04, 0.45), Membrane(0.3, 0.2)
+N, NU = FABRIC.stiffness_n_per_mm, FABRIC.poissons_ratio
+
+
+def bundle_of(mesh: PadMesh) -> Bundle:
+    return build_bundle(mesh, Material(YOUNGS_MPA, 0.45, 1000.0), "bbar", with_stiffness=False)
+
+
+def wave_stiffness(cells: int, layers: int, waves: int) -> Array:
+    """Force per area over displacement (3, 3) of a wave along x on an endless gel in fabric.
+
+    The lattice of a pad of 12 x 12 x 2 mm is periodic with its padding, so that the wave fits.
+    """
+    fine = ConvolvedCompliance(small_pad(0.45, cells, layers), (FABRIC,))
+    made = fine.infinite
+    return np.asarray(made.stiffness[0, waves]) / (12.0 / cells) ** 2
+
+
+def wave_number(cells: int, waves: int) -> float:
+    made = ConvolvedCompliance(small_pad(0.45, cells, 2)).infinite
+    return 2 * np.pi * waves / (made.shape[1] * 12.0 / cells)
+
+
+@pytest.mark.parametrize(("axis", "of_skin"), [(0, N / (1 - NU**2)), (1, N / (2 * (1 + NU)))])
+def test_energy_of_stretch_and_shear(axis: int, of_skin: float) -> None:
+    """A pad of 9 x 7 mm with rounded corners, stretched or sheared by 1 % along x."""
+    mesh, _ = build_pad_mesh(RoundedRectangle(9.0, 7.0, 2.0), 2.0, cells=(12, 9, 2))
+    area = np.asarray(mesh.occupancy)[:, :, -1].sum() * np.prod(mesh.cell_size_mm[:2])
+    u = np.zeros((len(mesh.surface), 3))
+    u[:, axis] = 0.01 * np.asarray(mesh.surface_mm)[:, 0]
+    energy = 0.5 * u.ravel() @ membrane_stiffness(mesh, (FABRIC,)) @ u.ravel()
+    assert energy == pytest.approx(0.5 * of_skin * 0.01**2 * area, rel=1e-12)
+
+
+def test_turning_and_lifting_cost_nothing() -> None:
+    mesh = small_pad(0.45, 6, 2, 6.0).mesh
+    x, y, _ = np.asarray(mesh.surface_mm).T
+    turned = np.column_stack([-y, x, np.sin(x) + y**2])
+    stiffness = membrane_stiffness(mesh, (COAT, FABRIC))
+    np.testing.assert_allclose(stiffness @ turned.ravel(), 0.0, atol=1e-14)
+
+
+def test_a_shear_wave_on_a_layer_in_fabric() -> None:
+    """Motion along y that varies along x: G k coth(k h) of the layer and N k²/(2 (1 + ν))."""
+    cells, waves, thick = 96, 6, 2.0
+    k, shear = wave_number(cells, waves), YOUNGS_MPA / (2 * 1.45)
+    layer = shear * k / np.tanh(k * thick)
+    skin = N / (2 * (1 + NU)) * k**2
+    # The skin has a share that the test can see.
+    assert skin > 2 * layer
+    found = wave_stiffness(cells, 8, waves)[1, 1]
+    assert found == pytest.approx(layer + skin, rel=1e-2)
+
+
+def test_a_stretching_wave_adds_to_the_layer() -> None:
+    """Motion along x that varies along x: N k²/(1 - ν²) more than the bare gel."""
+    cells, waves = 96, 6
+    k = wave_number(cells, waves)
+    bare = ConvolvedCompliance(small_pad(0.45, cells, 3)).infinite.stiffness[0, waves]
+    added = wave_stiffness(cells, 3, waves) - bare / (12.0 / cells) ** 2
+    expected = np.zeros((3, 3))
+    expected[0, 0] = N / (1 - NU**2) * k**2
+    expected[1, 1] = N / (2 * (1 + NU)) * k**2
+    np.testing.assert_allclose(added, expected, atol=0.01 * expected.max())
+
+
+@pytest.mark.parametrize("rounded", [False, True])
+def test_both_compliances_are_the_inverse_of_the_sum(rounded: bool) -> None:
+    mesh, _ = build_pad_mesh(RoundedRectangle(9.0, 7.0, 2.0), 2.0, cells=(12, 9, 2))
+    pad, skin = bundle_of(mesh) if rounded else small_pad(0.45, 10, 2, 8.0), (COAT, FABRIC)
+    whole = np.linalg.inv(dense_compliance(pad)) + membrane_stiffness(pad.mesh, skin).toarray()
+    expected = np.linalg.inv(whole)
+    force = np.random.default_rng(2).standard_normal((len(pad.mesh.surface), 3))
+    moved = (expected @ force.ravel()).reshape(-1, 3)
+    table = SurfaceCompliance(pad, None, skin)
+    nodes = np.arange(len(force))
+    close = {"atol": 2e-6 * np.abs(moved).max()}
+    np.testing.assert_allclose(table.displacement(nodes, force), moved, **close)
+    np.testing.assert_allclose(table.whole(force), moved, **close)
+    np.testing.assert_allclose(ConvolvedCompliance(pad, skin).whole(force, 1e-9), moved, **close)
+
+
+def test_a_skin_has_columns_of_its_own() -> None:
+    pad = small_pad(0.45, 6, 2, 6.0)
+    keys = {SurfaceCompliance(pad, None, skin).key for skin in ((), (COAT,), (FABRIC,))}
+    assert len(keys) == 3
+
+
+def test_a_bundle_keeps_its_skin(tmp_path) -> None:
+    bare = small_pad(0.45, 6, 2, 6.0)
+    for name, skin in (("coat", Skin(COAT, friction=0.7)), ("both", Skin(COAT, FABRIC))):
+        made = build_bundle(bare.mesh, bare.material, "bbar", with_stiffness=False, skin=skin)
+        write_bundle(tmp_path / name, made)
+        assert load_bundle(tmp_path / name).skin == skin
+    write_bundle(tmp_path / "bare", bare)
+    assert load_bundle(tmp_path / "bare").skin is None
+    assert '"skin"' not in (tmp_path / "bare" / "manifest.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("values", "field"),
+    [((0.0, 0.3), "stiffness_n_per_mm"), ((np.nan, 0.3), "stiffness_n_per_mm"),
+     ((1.0, 0.5), "poissons_ratio"), ((1.0, -0.1), "poissons_ratio")],
+)  # fmt: skip
+def test_what_is_no_membrane(values: tuple[float, float], field: str) -> None:
+    with pytest.raises(IfemError) as caught:
+        Membrane(*values)
+    assert caught.value.field == field
+
+
+def test_no_skin_on_a_crown() -> None:
+    mesh, _ = build_pad_mesh(
+        RoundedRectangle(8.0, 8.0, 1.0), 2.0, cells=(8, 8, 2), crown=Paraboloid(0.4, 9.0)
+    )
+    with pytest.raises(MeshError) as caught:
+        membrane_stiffness(mesh, (FABRIC,))
+    assert caught.value.field == "mesh"
