@@ -272,7 +272,14 @@ class Kept:
         print("taken apart")
 kept = Kept()
 atexit.register(print, "exit function")
-threading.Thread(target=lambda: (time.sleep(1.0), print("thread"))).start()
+work_done = threading.Event()
+wait = program._ending.wait_for_threads
+program._ending.wait_for_threads = lambda: (work_done.set(), wait())
+def last():
+    work_done.wait()
+    time.sleep(0.1)
+    print("thread")
+threading.Thread(target=last).start()
 sys.argv = {["gelslim", *words.split()]!r}
 program.main()
 """
