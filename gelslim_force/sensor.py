@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -167,7 +168,7 @@ def normal_source(
                 "the pictures of this sensor are grey, and the markers alone are used: leave the "
                 "calibration of the light out",
             )
-        return unknown_source(bundle, calibration, None, settings)
+        return unknown_source(bundle, calibration, None, settings, more=sensor.more)
     if picture is None:
         raise SensorError(
             "reference",
@@ -250,6 +251,7 @@ def unknown_source(
     reference: Picture | None,
     settings: PipelineSettings | None = None,
     light: LightCalibration | None = None,
+    more: Sequence[tuple[Bundle, float]] = (),
 ) -> UnknownShape:
     """Make a normal source for objects of unknown shape, from light and markers.
 
@@ -259,6 +261,7 @@ def unknown_source(
         reference: (h, w, 3) uint8 picture without contact; None for forces from the markers alone.
         settings: Choose the law of the gel; the defaults if None.
         light: The light as built; None takes it as traced.
+        more: As of `unknown_shape`.
 
     Returns:
         The source, for the constructor of `ForcePipeline`.
@@ -279,7 +282,7 @@ def unknown_source(
         )
     calibration.require_bundle(bundle)
     gel = "linear" if settings is None else settings.gel
-    return unknown_shape(bundle, calibration, reference, gel=gel, light=light)
+    return unknown_shape(bundle, calibration, reference, gel=gel, light=light, more=more)
 
 
 def require_colour(bundle: Bundle) -> None:

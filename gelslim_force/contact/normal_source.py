@@ -33,6 +33,8 @@ class FoundForces:
         by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
         gain: Gain of the light over the light as traced.
         unexplained: Share of the change of the light that the forces do not explain.
+        by_gel: (p, 6) change of force and torque by ln thickness and by Poisson's ratio of the gel;
+            None where it is that of forces that follow from the motion.
     """
 
     force_n: Array
@@ -41,6 +43,7 @@ class FoundForces:
     by_marker: Array
     gain: float
     unexplained: float
+    by_gel: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

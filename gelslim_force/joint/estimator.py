@@ -11,7 +11,7 @@ and the forces follow from the markers alone.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,13 +22,15 @@ from scipy import sparse
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
 from gelslim_force.joint.marker_rows import MarkerRows
-from gelslim_force.joint.model_errors import at_edge, edge_nodes, off_design
+from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import NormalEquations, huber
+from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.region import contact_nodes, pressing_nodes
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.variance_components import scaled_covariance
 from gelslim_force.motion.marker_motion import MarkerView
 from gelslim_optics.light.light_law import LightLaw
 from ifem_export.operators.adjoint_fields import rigid_motions
@@ -54,6 +56,8 @@ class JointForces:
         seen: (c,) nodes that the picture showed as possibly in contact.
         covariance: (6, 6) of force and torque about the origin; the gel is taken as specified.
         by_marker: (6, n, 2) their change in N/px and N mm/px where a marker is seen elsewhere.
+        by_gel: (p, 6) their change by ln thickness and by Poisson's ratio of the gel; None where it
+            is not computed.
         gain: Gain of the light found in this frame.
         unexplained: Share of the change of light in the region that the forces do not explain.
         shown: (c,) nodes whose slope the light shows; none without light.
@@ -65,6 +69,7 @@ class JointForces:
     seen: Mask
     covariance: Array
     by_marker: Array
+    by_gel: Array | None
     gain: float
     unexplained: float
     shown: Mask
@@ -89,6 +94,7 @@ class JointEstimator:
         youngs_modulus_mpa: Of the gel.
         settings: What is assumed.
         moved: Finds the region where there is no light.
+        off_design: What gel and camera that are not as specified do where there is no light.
         strained: Another law of the gel, from motion (c, 3) to forces (c, 3), and None for the
             linear one.
         strained_from_mm: Depth from which it is used.
@@ -108,6 +114,7 @@ class JointEstimator:
     youngs_modulus_mpa: float
     settings: JointSettings
     moved: MovedRegion | None = None
+    off_design: OffDesign | None = None
     strained: Any = None
     strained_from_mm: float = 0.0
 
@@ -160,14 +167,16 @@ class JointEstimator:
     def _rounds(
         self, frame: _Frame, nodes: Mask, state: _State, rounds: tuple[int, ...]
     ) -> tuple[Mask, _State]:
+        wider = None
         for number, count in enumerate(rounds):
             if number > 0:
+                wider = state.force_n
                 pressure = -state.force_n[:, 2] / self.area_mm2
                 least = self.settings.least_pressure
                 nodes = pressing_nodes(nodes, pressure, self.neighbours, least)
             for _ in range(count):
                 state = self._round(frame, np.flatnonzero(nodes), state)
-        return nodes, state
+        return nodes, replace(state, wider_n=wider)
 
     @cached_property
     def _mm_per_px(self) -> Array:
@@ -187,8 +196,7 @@ class JointEstimator:
         if self.moved is None:
             return np.zeros(len(self.points_mm), dtype=bool)
         lateral = self.markers.lateral_motion(frame.markers_px)
-        sigma = np.hypot(self.settings.marker_mm, self._noise_mm(frame))
-        return self.moved.nodes(lateral, sigma)
+        return self.moved.nodes(lateral, self._noise_mm(frame), self.settings.marker_mm)
 
     def _rise(self, light: LightView, seen: SeenLight) -> Array | None:
         """(rows, columns) change that grows with a rise along y; None where no light tells it."""
@@ -284,21 +292,26 @@ class JointEstimator:
         nodes = np.flatnonzero(region)
         sums = np.reshape(self._rigid[:, nodes], (6, -1))
         spread = state.equations.spread_of(sums, state.force_n[nodes].ravel())
-        covariance = spread @ sums.T
-        covariance += at_edge(state.force_n, self.points_mm, self._near_edge, self.settings)
-        if self.light is None:
-            wrench = np.einsum("kcd,cd->k", self._rigid, state.force_n)
-            covariance += off_design(wrench, self.settings)
+        covariance = at_edge(state.force_n, self.points_mm, self._near_edge, self.settings)
+        by_gel, markers = None, state.markers
+        if self.off_design is None:
+            covariance += spread @ sums.T - markers.overstated(spread)
         else:
-            # Without light, the weights hold the unknown region, which leaves no residuals.
-            covariance -= state.markers.overstated(spread)
+            force = state.force_n[nodes]
+            covariance += scaled_covariance(
+                state.equations.hessian, markers, sums, spread, force.ravel()
+            )
+            covariance += by_region(self._rigid, state.force_n, state.wider_n)
+            covariance += self.off_design.by_camera(markers, spread, state.displacement_mm[:, 2])
+            by_gel = self.off_design.by_parameter(markers, spread, nodes, force)
         return JointForces(
             state.force_n,
             state.displacement_mm,
             region,
             seen,
             covariance,
-            state.markers.response(spread, self.markers.mm_per_px),
+            markers.response(spread, self.markers.mm_per_px),
+            by_gel,
             state.gain,
             state.unexplained,
             self._shown(frame.seen),
@@ -326,6 +339,7 @@ class _State:
     equations: NormalEquations | None = None
     markers: MarkerRows | None = None
     unexplained: float = 0.0
+    wider_n: Array | None = None
 
 
 def _size(rows: Array) -> float:

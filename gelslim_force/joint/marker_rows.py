@@ -27,15 +27,24 @@ class MarkerRows:
     residual: Array
     weight: Array
 
+    def by_motion(self, spread: Array) -> Array:
+        """Change (6, m, 2) per mm of six sums of the forces where a used marker moves further.
+
+        Args:
+            spread: (6, 3p) product of the sums with the covariance of the forces.
+        """
+        by_mm = (spread @ self.rows.T) * self.weight
+        return np.asarray(by_mm.reshape(len(spread), -1, 2))
+
     def response(self, spread: Array, mm_per_px: Array) -> Array:
         """Change (6, n, 2) per px of six sums of the forces where a marker is seen elsewhere.
 
         Args:
-            spread: (6, 3p) product of the sums with the covariance of the forces.
+            spread: As in `by_motion`.
             mm_per_px: (n, 2, 2) of the markers.
         """
-        by_mm = ((spread @ self.rows.T) * self.weight).reshape(len(spread), -1, 2)
         found = np.zeros((len(spread), len(mm_per_px), 2))
+        by_mm = self.by_motion(spread)
         found[:, self.used] = np.einsum("ami,mij->amj", by_mm, mm_per_px[self.used])
         return found
 

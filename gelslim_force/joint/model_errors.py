@@ -37,21 +37,16 @@ def at_edge(force_n: Array, points_mm: Array, near: Mask, settings: JointSetting
     return np.asarray(size**2 * along.T @ along)
 
 
-def off_design(wrench: Array, settings: JointSettings) -> Array:
-    """(6, 6) by a gel and a print that are not as specified, for the markers alone.
-
-    Light tells the scale of the heights. Without it such errors change the size of all forces,
-    and a height that is wrong shows as shear, which acts where the pressure does.
+def by_region(rigid: Array, force_n: Array, wider_n: Array | None) -> Array:
+    """(6, 6) by a region that is not known better than its last change.
 
     Args:
-        wrench: (6,) force and torque about the origin.
-        settings: Has the shares.
+        rigid: (6, c, 3) whose products with forces are force and torque.
+        force_n: (c, 3) nodal forces.
+        wider_n: The same before nodes that hardly press were removed the last time; None where
+            none were.
     """
-    normal = float(wrench[2])
-    if normal == 0:
+    if wider_n is None:
         return np.zeros((6, 6))
-    x, y = -wrench[4] / normal, wrench[3] / normal
-    shear = np.array([[1.0, 0, 0, 0, 0, -y], [0, 1.0, 0, 0, 0, x]])
-    shear *= settings.shear_by_markers * normal
-    scale = settings.scale_by_markers * wrench
-    return np.asarray(np.outer(scale, scale) + shear.T @ shear)
+    change = np.einsum("kcd,cd->k", rigid, force_n - wider_n)
+    return np.outer(change, change)

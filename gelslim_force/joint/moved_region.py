@@ -2,8 +2,10 @@
 
 The traction of least size and roughness that explains the motion of all markers is a linear
 function of it. Where this traction is large, the gel is touched. Pressure and tangential traction
-are hard to tell apart without the limits of a friction cone, so their sum of squares counts. The
-region is an upper estimate: the fit then removes nodes that hardly press.
+are hard to tell apart without the limits of a friction cone, so their sum of squares counts. A node
+must also have more traction than the errors of the markers cause: forces that may only push would
+turn the noise of a wide region into a force. The region is an upper estimate: the fit then removes
+nodes that hardly press.
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ TRACTION, ROUGHNESS = 0.3, 0.2
 nodes, over Young's modulus."""
 _SHARE = 0.35
 """Share of the mean traction, weighted by itself, from which a node may be touched."""
+_NOISE_SIGMAS = 2.0
+"""A touched node has more traction than what the model leaves open of the markers, together with
+this many standard deviations of their noise, causes over all components."""
 _MOVED_SIGMAS, _LEAST_MOVED = 4.0, 4
 """Standard deviations beyond which a coordinate of a marker has moved, and how many must have."""
 _NOISE_STEP = 1.2
@@ -63,15 +68,21 @@ class MovedRegion:
         spread = [factor.solve(np.ascontiguousarray(seen[:, :, axis].T)) for axis in range(3)]
         self._traction = np.stack(spread, axis=1).astype(np.float32)
         self._covariance = sum(seen[:, :, axis] @ spread[axis] for axis in range(3))
+        # In these modes the errors of the markers are independent for any size that all share.
+        self._variance, modes = np.linalg.eigh(self._covariance)
+        by_mode = self._traction.reshape(-1, 2 * markers) @ modes.astype(np.float32)
+        self._square = np.square(by_mode).reshape(nodes, 3, -1).sum(axis=1)
         self._kept: tuple[bytes, tuple[Array, bool]] | None = None
 
-    def nodes(self, lateral_mm: Array, sigma_mm: Array) -> Mask:
+    def nodes(self, lateral_mm: Array, noise_mm: Array, unresolved_mm: float) -> Mask:
         """(c,) nodes that may be in contact; none where the markers do not move.
 
         Args:
             lateral_mm: (n, 2) motion of the markers as a picture shows it; NaN for lost ones.
-            sigma_mm: (n,) its standard deviation per coordinate.
+            noise_mm: (n,) standard deviation of each coordinate by the noise of the image.
+            unresolved_mm: The same by what the model leaves open.
         """
+        sigma_mm = np.hypot(noise_mm, unresolved_mm)
         lost = np.asarray(np.isnan(lateral_mm).any(axis=1))
         motion = np.where(lost[:, None], 0.0, lateral_mm)
         moved = np.abs(motion) > _MOVED_SIGMAS * sigma_mm[:, None]
@@ -81,7 +92,15 @@ class MovedRegion:
         traction = self._traction @ weights.astype(np.float32)
         size = np.sqrt((traction**2).sum(axis=1))
         mean = float(size @ size) / float(size.sum())
-        return self._lattice.widened(size > _SHARE * mean, 1)
+        by_errors = self._by_errors(float(np.median(noise_mm[~lost])), unresolved_mm)
+        return self._lattice.widened((size > _SHARE * mean) & (size > by_errors), 1)
+
+    def _by_errors(self, noise_mm: float, unresolved_mm: float) -> Array:
+        """(c,) size of the traction that errors of the markers cause, all of them seen."""
+        error_mm = float(np.hypot(unresolved_mm, _NOISE_SIGMAS * noise_mm))
+        expected = self._variance + noise_mm**2 + unresolved_mm**2
+        weight = np.square(error_mm / expected).astype(np.float32)
+        return np.asarray(np.sqrt(self._square @ weight))
 
     def _factor(self, lost: Mask, sigma_mm: Array) -> tuple[Array, bool]:
         """Of the covariance of the motion; of lost markers it is all but unknown."""

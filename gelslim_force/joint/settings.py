@@ -40,9 +40,6 @@ class JointSettings:
         unseen_by_markers: The same where there is no light.
         most_sigma: Standard deviation of the normal force by the markers alone, over the force,
             beyond which it is unknown.
-        scale_by_markers: Relative standard deviation of the forces by the markers alone through gel
-            and print that are not as specified.
-        shear_by_markers: The same of the tangential force, over the normal force.
         least_pressure: Share of the mean pressure below which a node is taken to be free.
         light_reach: Steps along the lattice around the region whose light is used.
         marker_reach: The same for the markers.
@@ -68,8 +65,6 @@ class JointSettings:
     unseen_force: float = 0.2
     unseen_by_markers: float = 0.5
     most_sigma: float = 0.4
-    scale_by_markers: float = 0.15
-    shear_by_markers: float = 0.02
     least_pressure: float = 0.15
     light_reach: int = 4
     marker_reach: int = 8

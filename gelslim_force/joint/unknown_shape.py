@@ -6,6 +6,7 @@ they show height.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ from gelslim_force.joint.light_view import LightView
 from gelslim_force.joint.marker_misfit import with_misfit
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
+from gelslim_force.joint.off_design import OffDesign
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import MARKERS_ALONE, JointSettings
 from gelslim_force.lattice.reference_lattice import ReferenceLattice
@@ -138,6 +140,7 @@ class UnknownShape:
             seen.by_marker,
             seen.gain,
             seen.unexplained,
+            seen.by_gel,
         )
         depth = max(0.0, -float(height.min()))
         return NormalReading(
@@ -153,6 +156,7 @@ def unknown_shape(
     gel: str = "linear",
     settings: JointSettings | None = None,
     light: LightCalibration | None = None,
+    more: Sequence[tuple[Bundle, float]] = (),
 ) -> UnknownShape:
     """Make the source for one calibrated sensor.
 
@@ -163,6 +167,8 @@ def unknown_shape(
         gel: Law of the gel as in `PipelineSettings`.
         settings: What is assumed; the defaults if None.
         light: The light as built; see `JointSettings.with_light`.
+        more: The sensor with more of each uncertain parameter of its gel, and how much more, as
+            `BuiltGel` has them. Only forces from the markers alone use them.
 
     Returns:
         The source.
@@ -202,7 +208,11 @@ def unknown_shape(
         strained_from_mm=deep_mm(bundle) if gel == "auto" else 0.0,
     )
     if seen is None:
-        estimator = replace(estimator, moved=_moved_region(estimator))
+        estimator = replace(
+            estimator,
+            moved=_moved_region(estimator),
+            off_design=_off_design(estimator, calibration, more),
+        )
     least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
     unseen_n = least * bundle.material.youngs_modulus_mpa
     return UnknownShape(estimator, followed, unseen_n / _stiffness_n_mm(bundle, estimator))
@@ -220,6 +230,19 @@ def _moved_region(estimator: JointEstimator) -> MovedRegion:
         estimator.neighbours,
         estimator.lattice,
         estimator.youngs_modulus_mpa,
+    )
+
+
+def _off_design(
+    estimator: JointEstimator, calibration: Calibration, more: Sequence[tuple[Bundle, float]]
+) -> OffDesign:
+    deviation = calibration.deviation
+    return OffDesign.of(
+        estimator.responses.compliance,
+        more,
+        estimator.nodes_to_markers,
+        estimator.by_height,
+        0.0 if deviation is None else deviation.lean_sigma_mm_per_mm,
     )
 
 

@@ -3,7 +3,8 @@
 The wrench is W = G S u. It is proportional to Young's modulus, so that its derivative by the
 logarithm of the modulus is W. The derivatives of G S by thickness and by Poisson's ratio are
 differences of the adjoint fields of two pads, computed once; where the normal motion follows from
-the size of a patch, it depends on the gel too, and its derivative adds G S du/dh. A linear law
+the size of a patch, it depends on the gel too, and its derivative adds G S du/dh. Where the forces
+follow from the markers alone, the source gives their derivatives (`joint.off_design`). A linear law
 leaves out a part of the force that grows with the depth (docs/physics.md, "Modulus").
 """
 
@@ -92,17 +93,24 @@ class GelShare:
             wrench: With the covariance of everything else.
             displacement_mm: (c, 3) motion of the surface nodes; z is NaN where it is unknown.
             reading: The normal motion, with its derivative by thickness and ratio where it
-                depends on the gel.
+                depends on the gel, or that of its forces.
         """
-        motion = np.nan_to_num(displacement_mm)
-        parts = np.einsum("pwci,ci->pw", self.derivative, motion)
-        if reading is not None and reading.by_gel_mm is not None:
-            parts = parts + reading.by_gel_mm @ self.by_normal.T
+        parts = self._by_gel(displacement_mm, reading)
         by_gel = np.vstack([np.nan_to_num(wrench.vector), parts])
         share = by_gel.T @ self.covariance @ by_gel
         left_out = self._left_out(displacement_mm) * by_gel[0]
         total = wrench.covariance + share + np.outer(left_out, left_out)
         return replace(wrench, covariance=total)
+
+    def _by_gel(self, displacement_mm: Array, reading: NormalReading | None) -> Array:
+        """(p, 6) change of the wrench by thickness and ratio."""
+        if reading is not None and reading.forces is not None and reading.forces.by_gel is not None:
+            return reading.forces.by_gel
+        motion = np.nan_to_num(displacement_mm)
+        parts = np.einsum("pwci,ci->pw", self.derivative, motion)
+        if reading is not None and reading.by_gel_mm is not None:
+            parts = parts + reading.by_gel_mm @ self.by_normal.T
+        return np.asarray(parts)
 
     def _left_out(self, displacement_mm: Array) -> float:
         """Share of the force that the linear law leaves out; 0 where the depth is unknown."""

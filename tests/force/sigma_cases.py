@@ -103,13 +103,33 @@ def spread_normal(seed: int) -> float:
     return float(norm.ppf((0.5 + _GOLDEN * seed) % 1.0))
 
 
-def press(seed: int) -> Contact:
-    """Random tractions."""
+@dataclass(frozen=True, eq=False)
+class _Load:
+    """Gel, gain of the light, and forces (n, 3) on the nodes of the finer pad."""
+
+    gel: MadeGel
+    light_gain: float
+    force_n: Array
+
+
+def _load(seed: int) -> _Load:
     rng = np.random.default_rng([31, seed])
     gel, gain = MadeGel.drawn(rng), float(np.exp(rng.normal(0, LIGHT_GAIN)))
     pad = fine_pad(gel.thickness, gel.poissons_ratio)
     size = np.exp(rng.uniform(np.log(0.4), np.log(1.3)))
-    force = tractions(pad.points_mm, rng) * pad.cell_mm2 * size
+    return _Load(gel, gain, tractions(pad.points_mm, rng) * pad.cell_mm2 * size)
+
+
+def press_force_n(seed: int) -> Array:
+    """(3,) force of `press`, without drawing its picture."""
+    return np.asarray(_load(seed).force_n.sum(axis=0))
+
+
+def press(seed: int) -> Contact:
+    """Random tractions."""
+    load = _load(seed)
+    gel, gain, force = load.gel, load.light_gain, load.force_n
+    pad = fine_pad(gel.thickness, gel.poissons_ratio)
     moved = pad.operator.displacement(force / gel.young)
     splines = surface_splines(pad.points_mm, moved)
 

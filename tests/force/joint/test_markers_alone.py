@@ -69,12 +69,24 @@ def test_six_components_from_a_grey_picture() -> None:
 
 def test_a_force_that_the_markers_hardly_show_is_unknown() -> None:
     """A deviation of the normal force above its share is no answer; the tangential ones are."""
-    found = processed(grey(pressed(0).image))
+    source = mono().normal
+    assert isinstance(source, UnknownShape)
+    strict = replace(source.estimator, settings=replace(source.estimator.settings, most_sigma=0.01))
+    pipeline = mono().with_normal(UnknownShape(strict, source.reference, source.unseen_mm))
+    found = pipeline.process(grey(pressed(0).image))
     assert not found.normal_known
     assert found.wrench is not None
     assert np.isnan(found.wrench.force_n[2])
     assert np.isfinite(found.wrench.force_n[:2]).all()
     assert "standard deviation" in found.problems[-1]
+
+
+def test_a_gel_without_tolerances_changes_no_deviation() -> None:
+    source = mono().normal
+    assert mono().gel is None
+    assert isinstance(source, UnknownShape)
+    assert source.estimator.off_design is not None
+    assert source.estimator.off_design.by_gel.size == 0
 
 
 def test_rest_is_no_force() -> None:
@@ -99,7 +111,7 @@ def test_rest_is_no_force_in_any_noise() -> None:
 
 @pytest.mark.slow
 def test_random_tractions() -> None:
-    """Errors where the normal force is known, which it is for nearly all.
+    """Errors where the normal force is known.
 
     Two contacts of less than 0.08 N are not seen; the place of these, and so their torque, is not
     known.
@@ -123,13 +135,14 @@ def test_random_tractions() -> None:
         shear.append(np.hypot(*off[:2]))
         if large:
             errors.append(off[2] / truth.wrench[2])
-    assert unknown <= 0.05 * len(errors)
+    assert unknown == 0
     assert len(unseen) <= 2
     assert (np.abs(unseen) < 2).all()
     assert np.median(np.abs(errors)) < 0.04
-    assert np.percentile(np.abs(errors), 95) < 0.15
+    assert np.percentile(np.abs(errors), 95) < 0.08
     assert np.median(shear) < 0.002
     spread = np.sqrt(np.mean(np.square(scores), axis=0))
+    assert (spread > 0.5).all()
     assert (spread < 1.3).all()
 
 
@@ -143,38 +156,3 @@ def test_a_contact_elsewhere_is_seen_at_once() -> None:
         assert found.wrench is not None
         off = found.wrench.force_n - truth.wrench[:3]
         assert (np.abs(off) < 3 * found.wrench.standard_deviation[:3]).all()
-
-
-def test_deviations_hold_a_gel_that_is_not_as_specified() -> None:
-    """15 % of force and torque, and shear of 2 % of the normal force at the centre of pressure."""
-    source = mono().normal
-    assert isinstance(source, UnknownShape)
-    estimator = source.estimator
-    bare = replace(
-        estimator, settings=replace(estimator.settings, scale_by_markers=0.0, shear_by_markers=0.0)
-    )
-    positions = pushed_positions()
-    found, without = (e.estimate(reference().image, positions, 0.02) for e in (estimator, bare))
-    assert found is not None
-    assert without is not None
-    added = found.covariance - without.covariance
-    force, points = found.force_n, estimator.points_mm
-    wrench = np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])
-    x, y = -wrench[4] / wrench[2], wrench[3] / wrench[2]
-    expected = (0.15 * wrench) ** 2
-    shear = (0.02 * wrench[2]) ** 2
-    expected += shear * np.array([1, 1, 0, 0, 0, x * x + y * y])
-    np.testing.assert_allclose(np.diag(added), expected, rtol=1e-6)
-
-
-def pushed_positions() -> NDArray[np.float64]:
-    """(n, 2) markers in the picture, of which those near a place move as under a press."""
-    source = mono().normal
-    assert isinstance(source, UnknownShape)
-    view, estimator = source.estimator.markers, source.estimator
-    force = np.zeros_like(estimator.points_mm)
-    near = np.hypot(*(estimator.points_mm[:, :2] - [1.0, 2.0]).T) < 2.0
-    force[near, 2] = -0.01
-    moved = estimator.responses.displacement(np.flatnonzero(near), force[near])
-    now = view.rest_mm + estimator.nodes_to_markers @ moved
-    return np.asarray(view.camera.project(now))
