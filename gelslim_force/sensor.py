@@ -23,7 +23,8 @@ from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.light_calibration import LightCalibration
-from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
+from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.unknown_shape import UnknownShape, layer_stiffness_n_mm, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import GelCalibration
 from gelslim_force.settings import PipelineSettings
@@ -242,7 +243,9 @@ def indenter_source(
     )
     chosen = settings or PipelineSettings()
     model = NormalModel(chosen.compliance(bundle), points_mm, chosen.edge(bundle))
-    return IndenterSource(finder, model, shape, depth_mm)
+    hidden_n = JointSettings().unseen_force * bundle.material.youngs_modulus_mpa
+    hidden_mm = hidden_n / layer_stiffness_n_mm(bundle)
+    return IndenterSource(finder, model, shape, depth_mm, hidden_n=hidden_n, hidden_mm=hidden_mm)
 
 
 def unknown_source(

@@ -245,6 +245,8 @@ class IndenterSource:
         cap_only: Use the paper's model: the indenter's cap below the rim, and no motion outside.
         varied: Models of a gel with more of a parameter, such as its thickness, and how much more;
             `motion` then gives the derivatives by these parameters.
+        hidden_n: Standard deviation of the normal force of a contact that is not seen.
+        hidden_mm: That of the height of the whole surface that causes it.
     """
 
     finder: PatchFinder
@@ -253,6 +255,8 @@ class IndenterSource:
     depth_mm: float | None = None
     cap_only: bool = False
     varied: tuple[tuple[NormalModel, float], ...] = ()
+    hidden_n: float = 0.0
+    hidden_mm: float = 0.0
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> ContactPatch | str | None:
         """The patch of a frame whose markers are at (n, 2), or why none can be seen."""
@@ -272,8 +276,7 @@ class IndenterSource:
         if isinstance(seen, str):
             return NormalReading.unknown(count, seen)
         if seen is None:
-            zero = np.zeros(count)
-            return NormalReading(zero, zero, np.zeros(count, dtype=bool))
+            return NormalReading.unseen(count, self.hidden_n, self.hidden_mm)
         at_rest = seen
         if lateral_mm is not None:
             at_rest = replace(seen, centre_mm=seen.centre_mm - lateral_mm)

@@ -103,6 +103,18 @@ class NormalReading:
         return cls(w, sigma if sigma.ndim else pressed_sigma_mm(w, sigma), None)
 
     @classmethod
+    def unseen(cls, count: int, hidden_n: float, hidden_mm: float) -> NormalReading:
+        """Reading of `count` nodes where no contact is seen.
+
+        Args:
+            count: c.
+            hidden_n: Standard deviation of the normal force of a contact that is not seen.
+            hidden_mm: Standard deviation of the height of all nodes together that causes it.
+        """
+        free = np.zeros(count, dtype=bool)
+        return cls(np.zeros(count), np.full(count, hidden_mm), free, hidden_n=hidden_n)
+
+    @classmethod
     def unknown(cls, count: int, problem: str) -> NormalReading:
         """Reading of `count` nodes whose motion is not known, with the reason."""
         nan = np.full(count, np.nan)

@@ -3,7 +3,8 @@
 The contact patch of a ball of half the radius looks like that of the ball, and the force that
 follows from it is twice as large. The estimate for objects of unknown shape uses no name: where
 both forces differ by more than their errors, something else than the named indenter touches the
-gel.
+gel. A patch where light and markers show no contact, and whose force is so small that they may not
+show it, is none: the blocks of a compressed picture look like that.
 """
 
 from __future__ import annotations
@@ -57,6 +58,14 @@ class SeenIndenter:
     shown: Mask | None
 
 
+@dataclass(frozen=True)
+class _Verdict:
+    """Why the indenter is not the one named, empty if it may be; whether no contact is seen."""
+
+    problem: str = ""
+    untouched: bool = False
+
+
 class CheckedIndenter:
     """`NormalSource` of a named indenter that another one confirms.
 
@@ -75,7 +84,7 @@ class CheckedIndenter:
     def reset(self) -> None:
         """Forget the last frame."""
         self.witness.reset()
-        self._size_mm, self._age, self._verdict = 0.0, 0, ""
+        self._size_mm, self._age, self._verdict = 0.0, 0, _Verdict()
 
     def look(self, image: NDArray[np.uint8], markers_px: Array) -> SeenIndenter | str | None:
         """The patch of a frame whose markers are at (n, 2), and what is compared with it.
@@ -104,21 +113,23 @@ class CheckedIndenter:
             return reading
         if seen.compared:
             self._verdict = self._compared(reading, seen.witness)
-        return replace(reading, problem=self._verdict, shown=seen.shown)
+        if self._verdict.untouched:
+            return replace(self.witness.motion(None), shown=seen.shown)
+        return replace(reading, problem=self._verdict.problem, shown=seen.shown)
 
-    def _compared(self, reading: NormalReading, found: JointForces | str | None) -> str:
-        """Why the reading is that of another indenter; empty if it may be of this one."""
+    def _compared(self, reading: NormalReading, found: JointForces | str | None) -> _Verdict:
+        """Whether the reading is that of this indenter."""
         if isinstance(found, str):
-            return ""
+            return _Verdict()
         named = -reading.push_n
         if found is None or found.unexplained > LARGEST_UNEXPLAINED:
-            return (
-                _NO_CONTACT.format(named=named) if -named > _SIGMAS * self.witness.unseen_n else ""
-            )
+            if -named > _SIGMAS * self.witness.unseen_n:
+                return _Verdict(_NO_CONTACT.format(named=named))
+            return _Verdict(untouched=True)
         if abs(found.gain - 1) > self.witness.most_gain:
-            return ""  # The light itself is not the traced one, and is no witness.
+            return _Verdict()  # The light itself is not the traced one, and is no witness.
         seen, sigma = float(found.force_n[:, 2].sum()), float(np.sqrt(found.covariance[2, 2]))
         allowed = _SIGMAS * sigma + _MODEL_ERROR * max(abs(seen), abs(named))
         if abs(named - seen) <= allowed:
-            return ""
-        return _ANOTHER.format(seen=seen, sigma=sigma, named=named)
+            return _Verdict()
+        return _Verdict(_ANOTHER.format(seen=seen, sigma=sigma, named=named))

@@ -121,9 +121,7 @@ class UnknownShape:
         if isinstance(seen, str):
             return NormalReading.unknown(count, seen)
         if seen is None:
-            unseen = np.full(count, self.unseen_mm)
-            free = np.zeros(count, dtype=bool)
-            return NormalReading(np.zeros(count), unseen, free, hidden_n=self.unseen_n)
+            return NormalReading.unseen(count, self.unseen_n, self.unseen_mm)
         if seen.unexplained > LARGEST_UNEXPLAINED:
             return NormalReading.unknown(count, _UNEXPLAINED.format(seen.unexplained))
         normal_n, most = abs(float(seen.force_n[:, 2].sum())), self.estimator.settings.most_sigma
@@ -215,7 +213,7 @@ def unknown_shape(
         )
     least = chosen.unseen_by_markers if seen is None else chosen.unseen_force
     unseen_n = least * bundle.material.youngs_modulus_mpa
-    return UnknownShape(estimator, followed, unseen_n / _stiffness_n_mm(bundle, estimator))
+    return UnknownShape(estimator, followed, unseen_n / layer_stiffness_n_mm(bundle))
 
 
 def _traced(bundle: Bundle) -> LightMap:
@@ -266,10 +264,10 @@ def _light_view(
     )
 
 
-def _stiffness_n_mm(bundle: Bundle, estimator: JointEstimator) -> float:
+def layer_stiffness_n_mm(bundle: Bundle) -> float:
     """Normal force of a wide bonded layer per mm by which its whole surface sinks."""
     mesh, gel = bundle.mesh, bundle.material
     ratio = gel.poissons_ratio
     modulus = gel.youngs_modulus_mpa * (1 - ratio) / ((1 + ratio) * (1 - 2 * ratio))
     thickness_mm = mesh.layers * mesh.cell_size_mm[2]
-    return float(modulus * estimator.area_mm2.sum() / thickness_mm)
+    return float(modulus * surface_share_mm2(mesh).sum() / thickness_mm)

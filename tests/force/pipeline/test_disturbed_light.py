@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fault_frames import reflection, tilted_lights
+from fault_frames import compressed, reflection, tilted_lights
 from lit_pipelines import checked, opened
 from pressed_samples import Pressed, calibration, pressed
 from pressed_shapes import ball, pressed_shape
-from spoiled_stream import Picture, untouched
+from spoiled_stream import Picture, least_press_n, untouched
 
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.pipeline import ForcePipeline
 
 pytest.importorskip("PIL")
 pytestmark = pytest.mark.slow
+BALL_MM = 6.0
 FOUND = (
     ("unknown", ((291, 425), (20, 41), 177.0)),
     ("unknown", ((306, 400), (23, 49), 181.0)),
@@ -88,3 +89,43 @@ def test_a_press_under_a_reflection_is_right_or_not_told(
         assert largest_score(result, truth) < 3
         told += result.normal_known
     assert told >= {20: 4, 40: 2, 60: 0 if brightness == 250 else 2}[radius_px]
+
+
+def test_compressed_pictures_of_an_untouched_gel_are_no_press_of_a_named_ball() -> None:
+    """Blocks of JPEG near the rim of the gel have the light of a ball of up to 58 mN."""
+    still = untouched()
+    deceived = 0
+    for seed in range(60):
+        rng = np.random.default_rng([78, seed])
+        noisy = still[seed % 3].image + rng.normal(0, 1.5, still[0].image.shape)
+        image = compressed(np.clip(np.rint(noisy), 0, 255).astype(np.uint8), rng)
+        alone, found = (c(f"sphere:{BALL_MM:g}") for c in (opened, checked))
+        results = []
+        for chain in (alone, found):
+            chain.reset()
+            results.append(chain.process(image))
+        if results[0].wrench is not None and results[1].wrench is not None:
+            deceived += abs(results[0].wrench.force_n[2]) > least_press_n()
+            assert np.nanmax(np.abs(results[1].wrench.force_n)) < least_press_n()
+    assert deceived >= 1
+
+
+def test_a_named_ball_that_is_not_seen_may_press_with_the_least_force_that_is() -> None:
+    """Balls of 1 to 2 mN leave no patch; the gel is untouched within the deviation."""
+    for chain in (opened(f"sphere:{BALL_MM:g}"), checked(f"sphere:{BALL_MM:g}")):
+        for image, force_n in faint():
+            chain.reset()
+            found = chain.process(image)
+            assert found.wrench is not None
+            assert found.normal_known
+            assert found.wrench.force_n[2] == pytest.approx(0, abs=1e-3)
+            sigma = found.wrench.standard_deviation
+            assert sigma[2] == pytest.approx(least_press_n(), rel=0.1)
+            assert (sigma > 0.19 * least_press_n()).all()
+            assert abs(force_n) < sigma[2]
+
+
+def faint() -> list[tuple[Picture, float]]:
+    """The untouched gel, and a ball that hardly touches it."""
+    truth = pressed_shape(ball(BALL_MM), 0.02, (1.3, -2.1), 0.0, 20)
+    return [(untouched()[0].image, 0.0), (truth.image, float(truth.wrench[2]))]
