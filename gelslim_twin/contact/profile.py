@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from gelslim_twin.contact.profile_kernel import arc_heights
 from gelslim_twin.scene.footprint import stl_corners
 from gelslim_twin.scene.indenter import (
     Cone,
@@ -99,11 +100,9 @@ def _turned(angle_deg: float, shape: Profile) -> Profile:
 
 
 def _arc(radius: float, reach: Array) -> Array:
-    inside = reach <= radius
-    # r² / (R + √(R² - r²)) keeps its digits near the pole, R - √(R² - r²) does not.
-    square = np.minimum(reach, radius) ** 2
-    height = square / (radius + np.sqrt(np.maximum(radius * radius - square, 0.0)))
-    return _within(inside, height)
+    height = np.empty(reach.shape)
+    arc_heights(radius, reach.reshape(-1), height.reshape(-1))
+    return height
 
 
 def _tipped(tip: float, half: float, reach: Array) -> Array:

@@ -171,9 +171,9 @@ class ContactSolver:
         below = self.tool.clearance_mm(pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
-        moved = (last if start is None else start).displacement_mm
+        moved = self._carried_mm(last, ahead) if start is None else start.displacement_mm
         guess = (last if start is None else start).force_n
-        wanted = np.zeros(len(moved), dtype=bool)
+        wanted = last.touch > 0
         for _ in range(GROWTH_STEPS):
             surface, room = self._room(pose, moved, offset, on_tool)
             deepest = -float(np.min(room, initial=0.0))
@@ -195,6 +195,10 @@ class ContactSolver:
             wanted, on_tool = wanted | into, on_tool | into
             moved, guess = state.displacement_mm, state.force_n
         raise ContactError("the contact region keeps growing: take smaller steps of the motion")
+
+    def _carried_mm(self, last: GelState, ahead_mm: Array) -> Array:
+        """Initial guess of the displacement (c, 3): the tool carries the nodes that stick to it."""
+        return np.where((last.touch == STICK)[:, None], ahead_mm, last.displacement_mm)
 
     def targets(self, last: GelState, before: Pose | None, pose: Pose) -> StickTargets:
         """Where nodes stick from their first contact."""

@@ -11,16 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.profile import Profile, profile
+from gelslim_twin.contact.tool_kernel import (
+    DIFFERENCE_MM,
+    MOST_SLOPE,
+    ROUNDING_MM,
+    node_frames,
+    own_coordinates,
+    paths_to_walls,
+    tangent_planes,
+)
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
-DIFFERENCE_MM = 1e-4
-MOST_SLOPE = 10.0
-"""Largest slope; steeper flanks and walls are given this one."""
-BENT = 0.03
-"""Rise over the last plane per distance above which a wall is searched on the path."""
-ROUNDING_MM = 1e-7
 _SIDES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * DIFFERENCE_MM
 
 
@@ -42,15 +45,13 @@ class Tool:
 
     def local(self, x: Array, y: Array) -> Array:
         """Height (n,) of the lower surface in the tool's frame; infinite outside its outline."""
-        height = np.full(np.broadcast(x, y).shape, np.inf)
-        for shape, (dx, dy), raised in self.shapes:
-            height = np.minimum(height, shape(x - dx, y - dy) + raised)
-        return height
+        heights = [shape(x - dx, y - dy) + raised for shape, (dx, dy), raised in self.shapes]
+        return heights[0] if len(heights) == 1 else np.asarray(np.min(heights, axis=0))
 
     def clearance_mm(self, pose: Pose, points_mm: Array) -> Array:
         """Distance (n,) of points (n, 3) below the tool along its axis; infinite outside it."""
-        own = _own(pose, points_mm)
-        return np.asarray(self.local(own[:, 0], own[:, 1]) - own[:, 2])
+        x, y, z = _own(pose, points_mm)
+        return np.asarray(self.local(x, y) - z)
 
     def surface(
         self,
@@ -66,30 +67,29 @@ class Tool:
         tool stands above it. Slopes are computed for points nearer than `reach_mm` only; the other
         planes are perpendicular to the tool's axis.
         """
-        own, turn = _own(pose, points_mm), rotation(pose)
-        height = self.local(own[:, 0], own[:, 1])
-        slopes = np.zeros((len(own), 2))
-        on = np.flatnonzero(height < own[:, 2] + reach_mm)
-        if len(on):
-            around = self.local(own[on, 0] + _SIDES[:, :1], own[on, 1] + _SIDES[:, 1:])
-            for axis in (0, 1):
-                ahead, behind = around[2 * axis], around[2 * axis + 1]
-                slopes[on, axis] = _slope(behind, height[on], ahead)
-        met = np.column_stack([own[:, :2], np.where(np.isfinite(height), height, 0.0)]) @ turn.T
-        met += [pose.x_mm, pose.y_mm, -pose.depth_mm]
-        met[~np.isfinite(height), 2] = np.inf
-        normal = np.column_stack([-slopes, np.ones(len(own))])
-        normal /= np.sqrt(1.0 + (slopes**2).sum(axis=1))[:, None]
-        if pose.tilt_x_deg != 0 or pose.tilt_y_deg != 0 or slopes.any():
-            normal = normal @ turn.T
+        own, turn, origin = _own(pose, points_mm), rotation(pose), _origin(pose)
+        height = self.local(own[0], own[1])
+        on = np.flatnonzero(height < own[2] + reach_mm)
+        at = own[:, on]
+        around = self.local(at[0] + _SIDES[:, :1], at[1] + _SIDES[:, 1:])
+        met, normal = np.empty(points_mm.shape), np.empty(points_mm.shape)
+        tangent_planes(own, height, on, around, origin, turn, met, normal)
         if before is not None:
-            off = before.is_met & ~np.isfinite(height)
-            held = np.flatnonzero(before.is_met & np.isfinite(height))
-            last = _own(pose, before.met_mm[held])
-            facing = before.normal[held] @ turn
-            off[held] = _past_walls(self, last, facing, own[held, :2], height[held])
-            met[off], normal[off] = before.met_mm[off], before.normal[off]
+            kept = self._kept(before, pose, own, height)
+            met[kept], normal[kept] = before.met_mm[kept], before.normal[kept]
         return ToolSurface(met, normal)
+
+    def _kept(
+        self, before: ToolSurface, pose: Pose, own: Array, height: Array
+    ) -> NDArray[np.bool_]:
+        """Whether (n,) a point has left the tool or passed an upward wall since `before`."""
+        kept, steep = np.empty(len(height), dtype=bool), np.empty(len(height), dtype=bool)
+        last = _own(pose, before.met_mm)
+        paths_to_walls(last, before.normal, rotation(pose), own, height, kept, steep)
+        some = np.flatnonzero(steep)
+        if len(some):
+            kept[some] = _past_walls(self, last[:, some].T, own[:2, some].T, height[some])
+        return kept
 
     def carried(self, before: Pose, after: Pose, points_mm: Array) -> Array:
         """Positions at another pose of points (n, 3) that are fixed to the tool."""
@@ -157,66 +157,38 @@ class ToolSurface:
     @property
     def frames(self) -> Array | None:
         """(n, 3, 3): in the columns two tangents and the normal into the tool; None if level."""
-        normal = self.normal
-        if not normal[:, :2].any():
+        if not self.normal[:, :2].any():
             return None
-        # The first tangent has no part along y, the second is the normal times the first.
-        size = np.hypot(normal[:, 0], normal[:, 2])
-        frames = np.empty((len(normal), 3, 3))
-        frames[:, 0, 0], frames[:, 2, 0] = normal[:, 2] / size, -normal[:, 0] / size
-        frames[:, 1, 0] = 0.0
-        frames[:, :, 2] = normal
-        a, c = frames[:, 0, 0], frames[:, 2, 0]
-        frames[:, 0, 1] = normal[:, 1] * c
-        frames[:, 1, 1] = normal[:, 2] * a - normal[:, 0] * c
-        frames[:, 2, 1] = -normal[:, 1] * a
+        frames = np.empty((len(self.normal), 3, 3))
+        node_frames(self.normal, frames)
         return frames
 
 
+def _origin(pose: Pose) -> Array:
+    """The tool's origin (3,) in the sensor frame."""
+    return np.array([pose.x_mm, pose.y_mm, -pose.depth_mm])
+
+
 def _own(pose: Pose, points_mm: Array) -> Array:
-    """Points in the frame of the tool."""
-    return np.asarray((points_mm - [pose.x_mm, pose.y_mm, -pose.depth_mm]) @ rotation(pose))
+    """Points (n, 3) in the frame of the tool, as (3, n)."""
+    own = np.empty((3, len(points_mm)))
+    own_coordinates(points_mm, _origin(pose), rotation(pose), own)
+    return own
 
 
-def _past_walls(
-    tool: Tool, last: Array, facing: Array, now: Array, height: Array
-) -> NDArray[np.bool_]:
+def _past_walls(tool: Tool, last: Array, now: Array, height: Array) -> NDArray[np.bool_]:
     """Whether (n,) the path from `last` (n, 3) on the tool to `now` (n, 2) passes an upward wall.
 
-    All in the frame of the tool; `facing` (n, 3) are the normals at `last`, `height` (n,) is the
-    height of the tool at `now`.
+    All in the frame of the tool; `height` (n,) is the height of the tool at `now`.
     """
-    way = now - last[:, :2]
-    plane = last[:, 2] - (way * facing[:, :2]).sum(axis=1) / np.maximum(facing[:, 2], 1e-9)
-    far = np.hypot(way[:, 0], way[:, 1])
-    jumps = height - plane > BENT * far + ROUNDING_MM
-    some = np.flatnonzero(jumps)
-    if len(some) == 0:
-        return jumps
-    a, b, low, high = last[some, :2], now[some], last[some, 2], height[some]
+    a, b, low, high = last[:, :2], now, last[:, 2], height
+    far = np.hypot(*(now - last[:, :2]).T)
     # Bisection towards the steeper half, down to the step of the difference quotients.
-    while far[some].max() > DIFFERENCE_MM:
+    while far.max() > DIFFERENCE_MM:
         middle = (a + b) / 2
         between = tool.local(middle[:, 0], middle[:, 1])
         first = between >= (low + high) / 2
         a, low = np.where(first[:, None], a, middle), np.where(first, low, between)
         b, high = np.where(first[:, None], middle, b), np.where(first, between, high)
         far = far / 2
-    jumps[some] = high - low > 2 * MOST_SLOPE * far[some] + ROUNDING_MM
-    return jumps
-
-
-def _slope(behind: Array, here: Array, ahead: Array) -> Array:
-    """Central difference; at a rim the one-sided difference within the tool."""
-    with np.errstate(invalid="ignore"):
-        up, down = (ahead - here) / DIFFERENCE_MM, (here - behind) / DIFFERENCE_MM
-    up = np.where(np.isfinite(up), up, down)
-    down = np.where(np.isfinite(down), down, up)
-    # Next to a wall the slope is that of this side.
-    up, down = (
-        np.where((np.abs(one) > 2 * MOST_SLOPE) & (np.abs(other) <= MOST_SLOPE), other, one)
-        for one, other in ((up, down), (down, up))
-    )
-    mean = np.where(np.isfinite(up), (up + down) / 2, 0.0)
-    # What differences of a level face leave is rounding.
-    return np.where(np.abs(mean) < 1e-9, 0.0, np.clip(mean, -MOST_SLOPE, MOST_SLOPE))
+    return np.asarray(high - low > 2 * MOST_SLOPE * far + ROUNDING_MM)

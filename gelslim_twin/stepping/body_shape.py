@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.profile import RIM_MM, Profile, mesh_profile, profile
+from gelslim_twin.contact.profile_kernel import convex_heights
 from gelslim_twin.scene.indenter import Indenter, Sphere
 from gelslim_twin.stepping.step_error import StepError
 
 Array = NDArray[np.float64]
 EXACT_MM = 1e-3
 """Step of the differences by which the curvature of an exact shape is taken."""
-LEVEL = 1e-9
-"""Vertical part of a unit normal below which a face counts as upright."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,20 +87,13 @@ class BoxShape:
 
 def _convex_profile(normals: Array, reach: Array) -> Profile:
     """Lower surface of the points p with n·p <= reach for every outer normal (m, 3)."""
-    down, up = normals[:, 2] < -LEVEL, normals[:, 2] > LEVEL
-    upright = ~(down | up)
-
-    def heights(faces: NDArray[np.bool_], x: Array, y: Array) -> Array:
-        n = normals[faces]
-        along = np.multiply.outer(x, n[:, 0]) + np.multiply.outer(y, n[:, 1])
-        return np.asarray((reach[faces] - along) / n[:, 2])
+    normals = np.ascontiguousarray(normals)
 
     def surface(x: Array, y: Array) -> Array:
-        lower = heights(down, x, y).max(axis=-1)
-        inside = lower <= heights(up, x, y).min(axis=-1) + RIM_MM
-        for n, far in zip(normals[upright], reach[upright], strict=True):
-            inside &= x * n[0] + y * n[1] <= far + RIM_MM
-        return np.where(inside, lower, np.inf)
+        height = np.empty(x.shape)
+        flat = np.ravel(x), np.ravel(y), height.reshape(-1)
+        convex_heights(normals, reach, RIM_MM, *flat)
+        return height
 
     return surface
 

@@ -99,7 +99,7 @@ def test_nodes_lie_on_the_tool(shape: Indenter, place: tuple[float, float]) -> N
     height = tool_height_mm(one.tool, pose, now[:, 0], now[:, 1])
     # A node may end just beyond a rim that it slipped off in this step; the next one lets it go.
     held = touched & np.isfinite(height)
-    assert held.sum() > 0.9 * touched.sum() > 0
+    assert held.sum() > 0.85 * touched.sum() > 0
     assert np.abs(now[held, 2] - height[held]).max() < 3e-3 * 0.4
     assert (now[~touched, 2] < height[~touched] + 2e-3 * 0.4).all()
     for name, most in (("residual", 1e-5), ("penetration_mm", 4e-4), ("complementarity", 1e-3)):
