@@ -163,3 +163,33 @@ def expand(points: Any, weights: Any, out: Any) -> None:
                 u += weights[c, k] * points[m, k, 0]
                 v += weights[c, k] * points[m, k, 1]
             out[m, c, 0], out[m, c, 1] = u, v
+
+
+@njit(**COMPILED)
+def moments(outlines: Any, centres: Any, area: Any) -> None:
+    """Write area centroids (m, 2) and signed areas (m,) of outlines (m, k, 2) (Green's theorem)."""
+    count = outlines.shape[1]
+    for m in range(outlines.shape[0]):
+        u, v = outlines[m, 0, 0], outlines[m, 0, 1]
+        doubled = x = y = ax = ay = 0.0
+        for k in range(1, count + 1):
+            n = k if k < count else 0
+            bx, by = outlines[m, n, 0] - u, outlines[m, n, 1] - v
+            cross = ax * by - bx * ay
+            doubled += cross
+            x += (ax + bx) * cross
+            y += (ay + by) * cross
+            ax, ay = bx, by
+        area[m] = doubled / 2
+        centres[m, 0], centres[m, 1] = u + x / (3 * doubled), v + y / (3 * doubled)
+
+
+@njit(**COMPILED)
+def within(outlines: Any, width: Any, height: Any, found: Any) -> None:
+    """Write whether (m,) all corners (m, k, 2) lie in the picture, pixel centres at integers."""
+    for m in range(outlines.shape[0]):
+        inside = True
+        for k in range(outlines.shape[1]):
+            x, y = outlines[m, k, 0], outlines[m, k, 1]
+            inside &= -0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5
+        found[m] = inside

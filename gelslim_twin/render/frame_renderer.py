@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -98,6 +98,11 @@ class FrameRenderer:
         return light
 
     @cached_property
+    def _planes(self) -> Image:
+        """`still` as (k, h, w)."""
+        return np.ascontiguousarray(self.still.transpose(2, 0, 1))
+
+    @cached_property
     def _blur_field(self) -> BlurField:
         from gelslim_twin.render.defocus import BlurField
 
@@ -179,7 +184,7 @@ class FrameRenderer:
         contrast = np.float32(self.look.contrast)
 
         def write(top: int, out: Image) -> None:
-            compose(self.still, gain, step, ink, contrast, colour, self._glare, top, out)
+            compose(self._planes, gain, step, ink, contrast, colour, self._glare, top, out)
 
         return write
 
@@ -206,11 +211,15 @@ class FrameRenderer:
         self, surface: SurfaceState | None, before: SurfaceState | None, step_s: float
     ) -> tuple[Array, Array]:
         """Outlines when the shutter opens and closes; the same array without motion blur."""
-        now = outlines_px(self.camera, self.dots, surface) if surface else self._rest_outlines
+        now = self._outlines_of(surface) if surface else self._rest_outlines
         if self.look.motion_blur is None or before is None:
             return now, now
-        then = outlines_px(self.camera, self.dots, before)
-        return self.look.motion_blur.start(then, now, step_s), now
+        return self.look.motion_blur.start(self._outlines_of(before), now, step_s), now
+
+    @cached_property
+    def _outlines_of(self) -> Callable[[SurfaceState], Array]:
+        """Outlines on a surface. The last two are kept: one frame's end is the next one's start."""
+        return lru_cache(maxsize=2)(partial(outlines_px, self.camera, self.dots))
 
     @cached_property
     def _on_pad(self) -> Image:
@@ -233,9 +242,11 @@ class FrameRenderer:
 
     def _inside(self, outlines: Array) -> NDArray[np.bool_]:
         """Whether (m,) every corner lies in the picture, whose pixels are about integers."""
-        size = np.array([self.camera.image_width_px, self.camera.image_height_px])
-        inside = (outlines >= -0.5) & (outlines <= size - 0.5)
-        return np.asarray(inside.all(axis=(1, 2)))
+        from gelslim_twin.render.dot_kernel import within
+
+        found = np.empty(len(outlines), dtype=bool)
+        within(outlines, self.camera.image_width_px, self.camera.image_height_px, found)
+        return found
 
     def _ink(
         self,

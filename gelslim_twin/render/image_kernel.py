@@ -23,40 +23,40 @@ def compose(
     """Write rows `top` and on of the grey values: sum over sources of colour · light · (1 - c ink).
 
     `out` (rows, w, 3) float32 says how many; all else has the whole picture's size (h, w).
-    `irradiance` (h, w, k); `gain` (r, c, k) on every `step`-th pixel, bilinear between, or empty
+    `irradiance` (k, h, w); `gain` (r, c, k) on every `step`-th pixel, bilinear between, or empty
     for a level surface; `glare` (h, w, 3) is added, or empty.
     """
-    width, count = irradiance.shape[1:]
-    shaded, spots = gain.size > 0, glare.size > 0
+    count, width = irradiance.shape[0], irradiance.shape[2]
+    shaded, spots, columns = gain.size > 0, glare.size > 0, gain.shape[1]
     one = np.float32(1)
-    row = np.ones((width, count), dtype=np.float32)
+    row, held = np.ones(width, dtype=np.float32), np.empty(columns, dtype=np.float32)
+    # A row of each colour lies together, so that several pixels are computed at once.
+    sums = np.empty((3, width), dtype=np.float32)
     for n in range(out.shape[0]):
         y = top + n
-        if shaded:
-            j = min(y // step, gain.shape[0] - 2)
-            v = np.float32((y - j * step) / step)
-            for i in range(gain.shape[1] - 1):
-                for k in range(count):
-                    left = gain[j, i, k] + v * (gain[j + 1, i, k] - gain[j, i, k])
-                    right = gain[j, i + 1, k] + v * (gain[j + 1, i + 1, k] - gain[j, i + 1, k])
-                    grow = (right - left) / np.float32(step)
+        sums[:] = 0
+        for k in range(count):
+            if shaded:
+                j = min(y // step, gain.shape[0] - 2)
+                v = np.float32((y - j * step) / step)
+                for i in range(columns):
+                    held[i] = gain[j, i, k] + v * (gain[j + 1, i, k] - gain[j, i, k])
+                for i in range(columns - 1):
+                    grow = (held[i + 1] - held[i]) / np.float32(step)
                     for x in range(i * step, min((i + 1) * step, width)):
-                        row[x, k] = left + grow * np.float32(x - i * step)
-                    if i == gain.shape[1] - 2:
-                        for x in range((i + 1) * step, width):
-                            row[x, k] = right
+                        row[x] = held[i] + grow * np.float32(x - i * step)
+                row[(columns - 1) * step :] = held[columns - 1]
+            plane = irradiance[k, y]
+            for m in range(3):
+                share, total = colour[k, m], sums[m]
+                for x in range(width):
+                    total[x] += share * (plane[x] * row[x])
         for x in range(width):
             left_over = one - contrast * ink[y, x]
-            a = b = c = np.float32(0)
-            for k in range(count):
-                light = irradiance[y, x, k] * row[x, k]
-                a += colour[k, 0] * light
-                b += colour[k, 1] * light
-                c += colour[k, 2] * light
-            out[n, x, 0] = a * left_over
-            out[n, x, 1] = b * left_over
-            out[n, x, 2] = c * left_over
-            if spots:
+            for m in range(3):
+                out[n, x, m] = sums[m, x] * left_over
+        if spots:
+            for x in range(width):
                 for m in range(3):
                     out[n, x, m] += glare[y, x, m]
 
@@ -76,7 +76,7 @@ def develop(values: Any, curve: Any, image: Any) -> None:
             image[n] = curve[int(min(max(values[n], zero), most) * np.float32(16) + half)]
 
 
-BITS = 14
+BITS, BATCH = 14, 256
 
 
 @njit(**COMPILED)
@@ -95,11 +95,16 @@ def add_noise(image: Any, first: Any, key: Any, table: Any, read2: Any, shot: An
     values of the unit normal distribution in equal shares.
     """
     golden, mask = np.uint64(0x9E3779B97F4A7C15), np.uint64((1 << BITS) - 1)
-    zero = np.float32(0)
-    for n in range(image.shape[0]):
-        word = mixed(key + golden * np.uint64(first + n + 1))
-        for c in range(3):
-            value = image[n, c]
-            spread = math.sqrt(read2 + shot * max(value, zero))
-            at = (word >> np.uint64(21 * c + 4)) & mask
-            image[n, c] = value + spread * table[at]
+    zero, values = np.float32(0), image.reshape(-1)
+    spread, words = np.empty(3 * BATCH, dtype=np.float32), np.empty(BATCH, dtype=np.uint64)
+    for begin in range(0, image.shape[0], BATCH):
+        count = min(BATCH, image.shape[0] - begin)
+        # Roots and hashes apart from the look-up in the table: several are computed at once.
+        for k in range(3 * count):
+            spread[k] = math.sqrt(read2 + shot * max(values[3 * begin + k], zero))
+        for n in range(count):
+            words[n] = mixed(key + golden * np.uint64(first + begin + n + 1))
+        for n in range(count):
+            for c in range(3):
+                at = (words[n] >> np.uint64(21 * c + 4)) & mask
+                values[3 * (begin + n) + c] += spread[3 * n + c] * table[at]

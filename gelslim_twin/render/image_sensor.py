@@ -43,7 +43,8 @@ class MotionBlur:
 
     def poses(self, start: Array, now: Array) -> NDArray[np.int64]:
         """How many poses (m,) to draw of each dot; 1 for a dot that stands still."""
-        path = np.sqrt(((now - start) ** 2).sum(axis=2).max(axis=1))
+        away = now - start
+        path = np.sqrt((away[..., 0] ** 2 + away[..., 1] ** 2).max(axis=1))
         wanted = np.ceil(path / self.px_per_pose)
         return np.clip(wanted, 1, self.most_poses).astype(np.int64)
 

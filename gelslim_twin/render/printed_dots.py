@@ -78,10 +78,9 @@ def outlines_px(
     cannot project.
     """
     turn = 2 * np.pi / corners
-    rim = dots.rim_mm(rim_points, float(np.sqrt(turn / np.sin(turn))))
-    points = np.zeros((len(dots) * rim_points, 3))
-    points[:, :2] = rim.reshape(-1, 2)
-    points += surface.at(rim.reshape(-1, 2))
+    rim = dots.rim_mm(rim_points, float(np.sqrt(turn / np.sin(turn)))).reshape(-1, 2)
+    points = surface.at(rim)
+    points[:, :2] += rim
     projected = camera.project(points).reshape(len(dots), rim_points, 2)
     if rim_points == corners:
         return projected
@@ -94,13 +93,11 @@ def outlines_px(
 
 def centroids_px(outlines: Array) -> tuple[Array, Array]:
     """Area centroids (m, 2) and signed areas (m,) of outlines (m, k, 2), by Green's theorem."""
-    corners = outlines - outlines[:, :1]
-    after = np.roll(corners, -1, axis=1)
-    cross = corners[..., 0] * after[..., 1] - after[..., 0] * corners[..., 1]
-    doubled = cross.sum(axis=1)
-    with np.errstate(invalid="ignore"):
-        shift = ((corners + after) * cross[..., None]).sum(axis=1) / (3 * doubled)[:, None]
-    return outlines[:, 0] + shift, doubled / 2
+    from gelslim_twin.render.dot_kernel import moments
+
+    centres, area = np.empty((len(outlines), 2)), np.empty(len(outlines))
+    moments(np.ascontiguousarray(outlines, dtype=float), centres, area)
+    return centres, area
 
 
 @cache

@@ -6,10 +6,13 @@ Every use has its own stream, keyed by seed, name and frame; SeedSequence mixes 
 from __future__ import annotations
 
 import zlib
+from functools import lru_cache
 
 import numpy as np
 
 
+# A picture asks for the key of its noise once per strip.
+@lru_cache(maxsize=16)
 def stream_key(seed: int, name: str, frame: int = 0) -> np.uint64:
     """A 64-bit key of one use. Raises ValueError for a negative seed or frame."""
     if seed < 0 or frame < 0:
