@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelslim_twin.contact.profile_kernel import arc_heights
-from gelslim_twin.scene.footprint import stl_corners
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
     FlatPunch,
     Indenter,
+    MeshFile,
     Ring,
     Sphere,
-    Stl,
     TexturedPlane,
     Wedge,
 )
+from gelslim_twin.scene.mesh_file import mesh_corners
 
 Array = NDArray[np.float64]
 Profile = Callable[[Array, Array], Array]
@@ -32,7 +32,7 @@ RIM_MM = 0.01
 
 
 def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
-    """Lower surface of a shape about its own origin. Raises ValueError or OSError for a bad STL."""
+    """Lower surface of a shape about its origin. Raises ValueError or OSError for a bad mesh."""
     match indenter:
         case Sphere():
             return lambda x, y: _arc(indenter.radius_mm, np.hypot(x, y))
@@ -60,8 +60,8 @@ def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
             return lambda x, y: _tipped(tip, lean, np.hypot(x, y))
         case TexturedPlane():
             return _texture(indenter, seed)
-        case Stl():
-            return stl_profile(indenter, folder)
+        case MeshFile():
+            return mesh_file_profile(indenter, folder)
 
 
 def _punch(punch: FlatPunch) -> Profile:
@@ -124,13 +124,20 @@ NEGLIGIBLE = 1e-9
 """Weight of a grid point below which it is ignored."""
 
 
-def stl_profile(shape: Stl, folder: Path) -> Profile:
+def mesh_file_profile(shape: MeshFile, folder: Path) -> Profile:
     """Lower surface of a mesh, centred on the middle of its extents, its lowest point at 0.
 
-    Raises ValueError for a file that is no STL, or a grid of more than four million cells.
+    Raises ValueError for a file that is no mesh, or a grid of more than four million cells.
     """
-    corners = _down(stl_corners(folder / shape.file) * shape.scale, shape.down)
-    return mesh_profile(corners, shape.resolution_mm)[0]
+    return mesh_profile(facets_down(shape, folder), shape.resolution_mm)[0]
+
+
+def facets_down(shape: MeshFile, folder: Path) -> Array:
+    """Facets (n, 3, 3) in mm of a mesh, turned so that its lower side points to -z.
+
+    Raises ValueError for a file that is no mesh, OSError for one that cannot be read.
+    """
+    return _down(mesh_corners(folder / shape.file) * shape.scale, shape.down)
 
 
 def mesh_profile(corners: Array, resolution_mm: float) -> tuple[Profile, Array]:
@@ -147,10 +154,8 @@ def mesh_profile(corners: Array, resolution_mm: float) -> tuple[Profile, Array]:
     Raises:
         ValueError: The height map would have more than four million cells, or one row.
     """
-    points = corners.reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    origin = np.array([*((low + high) / 2)[:2], low[2]])
-    half = (high - low)[:2] / 2
+    origin = lowest_middle(corners)
+    half = np.ptp(corners.reshape(-1, 3)[:, :2], axis=0) / 2
     count = np.ceil(2 * half / resolution_mm).astype(int) + 1
     if count.prod() > _MOST_CELLS or count.min() < 2:
         raise ValueError(
@@ -158,6 +163,13 @@ def mesh_profile(corners: Array, resolution_mm: float) -> tuple[Profile, Array]:
         )
     x, y = (np.linspace(-h, h, n) for h, n in zip(half, count, strict=True))
     return _interpolated(x, y, _lowest(corners - origin, x, y)), origin
+
+
+def lowest_middle(corners: Array) -> Array:
+    """The middle of the extents of facets (n, 3, 3) at the height of their lowest point, (3,)."""
+    points = corners.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([*((low + high) / 2)[:2], low[2]])
 
 
 def rough_profile(plane: TexturedPlane, seed: int) -> Profile:

@@ -35,7 +35,7 @@ class Tool:
 
     @classmethod
     def of(cls, indenters: Sequence[Indenter], folder: Path, seed: int = 0) -> Tool:
-        """The tool of a scene. Raises ValueError or OSError for an STL that cannot be read."""
+        """The tool of a scene. Raises ValueError or OSError for a mesh that cannot be read."""
         return cls(
             tuple(
                 (profile(one, folder, seed), (one.x_mm, one.y_mm), one.raised_mm)

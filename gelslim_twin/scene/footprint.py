@@ -1,17 +1,13 @@
 """Footprint of a tool below the gel's undeformed surface, in closed form by depth.
 
-A shape from an STL file counts with its extents, which are read without a mesh library.
+A mesh counts with its extents.
 """
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from gelslim_twin.effects.contact_estimate import Footprint
 from gelslim_twin.scene.indenter import (
@@ -19,17 +15,16 @@ from gelslim_twin.scene.indenter import (
     Cylinder,
     FlatPunch,
     Indenter,
+    MeshFile,
     Ring,
     Sphere,
-    Stl,
     TexturedPlane,
     Wedge,
 )
+from gelslim_twin.scene.mesh_file import footprint_mm
 
 Pair = Callable[[float], tuple[float, float]]
 """Area in mm² and volume in mm³ at a depth above 0."""
-MAX_BYTES = 500_000_000
-_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def tool_footprint(
@@ -40,7 +35,7 @@ def tool_footprint(
     Parts narrower than the distance `node_pitch_mm` of the nodes count with that width, because
     they push down a node by their whole depth.
 
-    Raises ValueError or OSError for an STL file (in `folder`) that cannot be read.
+    Raises ValueError or OSError for a mesh (in `folder`) that cannot be read.
     """
     shapes = [(_on_nodes(one, folder, node_pitch_mm), one.raised_mm) for one in indenters]
 
@@ -114,7 +109,7 @@ def _pair(indenter: Indenter, folder: Path) -> Pair:
         case TexturedPlane():
             plane = indenter.length_mm * indenter.width_mm
             return lambda d: _waves(plane, indenter.relief_mm, d)
-        case Stl():
+        case MeshFile():
             a, b = footprint_mm(folder / indenter.file, indenter.down, indenter.scale)
             return _prism(a * b)
 
@@ -200,7 +195,7 @@ def _reach_mm(indenter: Indenter, folder: Path, d: float) -> float:
             return _flank(*_tip(indenter), d)
         case TexturedPlane():
             return math.hypot(indenter.length_mm, indenter.width_mm) / 2
-        case Stl():
+        case MeshFile():
             # The lowest point need not lie in the middle.
             return math.hypot(*footprint_mm(folder / indenter.file, indenter.down, indenter.scale))
 
@@ -217,44 +212,3 @@ def _steepest(indenter: Indenter, d: float) -> float:
 
 def _circle(r: float, d: float) -> float:
     return r if d >= r else math.sqrt(2 * r * d - d * d)
-
-
-def stl_corners(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Corners of the facets, (n, 3, 3) in the file's unit, from binary or ASCII STL.
-
-    Raises ValueError for a file that is no STL or holds no facets, OSError where unreadable.
-    """
-    size = os.path.getsize(path)
-    if size > MAX_BYTES:
-        raise ValueError(f"is larger than {MAX_BYTES / 1e6:.0f} MB")
-    data = Path(path).read_bytes()
-    count = int.from_bytes(data[80:84], "little") if size >= 84 else -1
-    if size == 84 + 50 * count:
-        corners = np.frombuffer(data, _FACET, count, 84)["corners"].astype(float)
-    else:
-        corners = _ascii_corners(data)
-    if len(corners) == 0:
-        raise ValueError("holds no facets")
-    if not np.isfinite(corners).all():
-        raise ValueError("holds a corner that is not finite")
-    return corners
-
-
-def _ascii_corners(data: bytes) -> NDArray[np.float64]:
-    lines = data.split(b"\n")
-    if not lines[0].lstrip().lower().startswith(b"solid"):
-        raise ValueError("is no STL file: neither its size nor its first word fits")
-    words = [line.split() for line in lines if line.lstrip().lower().startswith(b"vertex")]
-    try:
-        values = np.array([[float(w) for w in row[1:4]] for row in words])
-        return values.reshape(-1, 3, 3)
-    except ValueError:
-        raise ValueError("is no STL file: its vertices are not threes of three numbers") from None
-
-
-def footprint_mm(path: str | os.PathLike[str], down: str, scale: float) -> tuple[float, float]:
-    """Extents in mm across the direction `down` ("z", "-x", ...). Raises as `stl_corners`."""
-    corners = stl_corners(path).reshape(-1, 3) * scale
-    extents = np.ptp(corners, axis=0)
-    a, b = (extents[i] for i in range(3) if i != "xyz".index(down[-1]))
-    return float(a), float(b)

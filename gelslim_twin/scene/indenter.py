@@ -122,11 +122,10 @@ class TexturedPlane(Placed):
     )
 
 
-class Stl(Placed):
-    """A mesh from an STL file, used as a height map of its lower side."""
+class MeshFile(Placed):
+    """A mesh from a file, used as a height map of its lower side."""
 
-    shape: Literal["stl"] = Field(description="Kind of indenter")
-    file: str = Field(min_length=1, max_length=400, description="STL file, relative to the scene")
+    file: str = Field(min_length=1, max_length=400, description="File, relative to the scene")
     scale: float = Field(default=1.0, gt=0, le=1e4, description="Millimetres per unit of the file")
     down: Literal["x", "-x", "y", "-y", "z", "-z"] = Field(
         default="-z", description="Direction in the file that points into the gel"
@@ -136,7 +135,19 @@ class Stl(Placed):
     )
 
 
+class Mesh(MeshFile):
+    """A mesh from an STL, OBJ or PLY file, used as a height map of its lower side."""
+
+    shape: Literal["mesh"] = Field(description="Kind of indenter")
+
+
+class Stl(MeshFile):
+    """The earlier name of `mesh`."""
+
+    shape: Literal["stl"] = Field(description="Kind of indenter")
+
+
 Indenter = Annotated[
-    Sphere | Cylinder | Ring | FlatPunch | Wedge | Cone | TexturedPlane | Stl,
+    Sphere | Cylinder | Ring | FlatPunch | Wedge | Cone | TexturedPlane | Mesh | Stl,
     Field(discriminator="shape"),
 ]

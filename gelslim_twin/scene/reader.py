@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from gelslim_core.yaml.errors import InputError, Problem, shown
 from gelslim_core.yaml.reader import Loaded, read_model
 from gelslim_core.yaml.schema import reference_markdown, schema_text
-from gelslim_twin.scene.footprint import footprint_mm
+from gelslim_twin.scene.indenter import MeshFile
+from gelslim_twin.scene.mesh_file import KINDS, footprint_mm
 from gelslim_twin.scene.pose import Pose, poses, read_motion_csv
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
 from gelslim_twin.scene.variation import varied
@@ -101,15 +102,13 @@ def read_scene(path: str | os.PathLike[str]) -> LoadedScene:
 
 def _check_meshes(loaded: LoadedScene) -> None:
     for index, indenter in enumerate(loaded.scene.indenters):
-        if indenter.shape != "stl":
+        if not isinstance(indenter, MeshFile):
             continue
         field = f"indenters[{index}].file"
         try:
             footprint_mm(loaded.folder / indenter.file, indenter.down, indenter.scale)
         except ValueError as error:
-            raise loaded.problem(
-                field, shown(indenter.file), str(error), "name an STL file, binary or ASCII"
-            ) from None
+            raise loaded.problem(field, shown(indenter.file), str(error), f"name {KINDS}") from None
         except OSError as error:
             reason = (error.strerror or type(error).__name__).lower()
             raise loaded.problem(

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from gelslim_core.yaml.base import Block
 from gelslim_core.yaml.errors import FieldError
-from gelslim_twin.scene.indenter import Indenter
+from gelslim_twin.scene.indenter import Indenter, MeshFile
 from gelslim_twin.scene.motion import Press, Shear, Slide, Twist, Waypoint
 
 if TYPE_CHECKING:
@@ -131,6 +131,6 @@ def _sized(indenter: Indenter, factor: float) -> Indenter:
         if name.endswith("_mm") and name != "resolution_mm"
         if (value := getattr(indenter, name)) is not None
     }
-    if indenter.shape == "stl":
+    if isinstance(indenter, MeshFile):
         lengths["scale"] = indenter.scale * factor
     return indenter.model_copy(update=lengths)

@@ -9,6 +9,7 @@ from typing import Any
 
 from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.planning.question import bundle_figures, contact_friction, plan_scene
+from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
 from gelslim_twin.simulation.simulate import Mechanics, SimulationJob, simulate
@@ -58,8 +59,10 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         The input of `simulate`.
 
     Raises:
-        InputError: The plan needs an effect that the sensor's pad does not allow.
+        InputError: The plan needs an effect that the sensor's pad does not allow, or the gel meets
+            an undercut of a mesh.
     """
+    require_no_undercut(loaded, sensor)
     plan = plan_scene(loaded, bundle_figures(folder / BUNDLE))
     if {"skin", "nonlinearity"} <= set(plan.order):
         raise loaded.problem(
@@ -82,12 +85,40 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
     )
 
 
+def require_no_undercut(loaded: LoadedScene, sensor: TwinSensor) -> None:
+    """Raise InputError where the gel meets a part of a mesh that is hidden behind a gap.
+
+    Args:
+        loaded: The scene.
+        sensor: The sensor, whose undeformed gel counts.
+    """
+    for index, indenter in enumerate(loaded.scene.indenters):
+        if not isinstance(indenter, MeshFile):
+            continue
+        from gelslim_twin.contact.undercut import undercut_of_file
+
+        hidden = undercut_of_file(indenter, loaded.folder)
+        if hidden is None:
+            continue
+        top_mm = float(sensor.points_mm[:, 2].max())
+        for pose in loaded.poses:
+            met = hidden.below(pose, sensor.size_mm, top_mm)
+            if met is not None:
+                raise loaded.problem(
+                    f"indenters[{index}].file",
+                    indenter.file,
+                    f"the gel meets an undercut at {pose.time_s:g} s, hidden from below by other "
+                    f"parts: {met}",
+                    "turn the mesh, press less deep, or fill the gap in the mesh",
+                )
+
+
 def mechanics_of(
     loaded: LoadedScene, plan: Plan, sensor: TwinSensor, folder: Path | None = None
 ) -> Mechanics:
     """The mechanical model of a planned scene; the pad's compliance is stored in `folder`.
 
-    Only modules of effects in the plan are imported. Raises ValueError or OSError for an STL file
+    Only modules of effects in the plan are imported. Raises ValueError or OSError for a mesh
     that cannot be read.
     """
     chosen = {choice.effect: choice for choice in plan.included}

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.tool import Tool
+from gelslim_twin.contact.undercut import Undercut
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.stepping.body_shape import (
     BallShape,
@@ -48,11 +49,13 @@ class Side:
         tool: Its surface, as the contact takes it.
         frame: Rigid motion (4, 4) from the tool's frame to that of the body.
         smooth_mm: Distance over which the curvature of the surface has a meaning.
+        undercut: What of the body is hidden behind a gap, in the tool's frame; None for nothing.
     """
 
     tool: Tool
     frame: Array
     smooth_mm: float
+    undercut: Undercut | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,16 +82,17 @@ class Body:
     ) -> Body:
         """A body from a closed mesh; its poses place the origin of the mesh.
 
-        The gel sees the surface that faces it as a height map, so that undercuts are ignored.
+        The gel sees the surface that faces it as a height map. A step that would bring the gel to
+        an undercut is refused.
 
         Args:
-            path: STL file, binary or ASCII.
+            path: STL, OBJ or PLY file.
             scale: Millimetres per unit of the file; 1000 for a file in metres.
             resolution_mm: Cell size of the height map.
             name: Name in messages; the file's name by default.
 
         Raises:
-            StepError: The file cannot be read, is no STL, or its surface is not closed.
+            StepError: The file cannot be read, or its surface is not closed.
         """
         _require_positive("resolution_mm", resolution_mm)
         corners = read_closed_mesh(path, scale)
@@ -125,7 +129,7 @@ class Body:
 
         Args:
             indenters: Shapes of a scene file, one at least.
-            folder: Folder that STL files are relative to.
+            folder: Folder that meshes are relative to.
             seed: Seed of random textures.
             name: Name in messages.
 
@@ -162,7 +166,7 @@ class Body:
         frame = np.eye(4)
         frame[:3, :3] = turn.T
         frame[:3, 3] = turn.T @ lower.origin_mm
-        return Side(Tool(lower.shapes), frame, lower.smooth_mm)
+        return Side(Tool(lower.shapes), frame, lower.smooth_mm, lower.undercut)
 
     def _require_upright(self, turn: Array) -> None:
         tilt = math.degrees(math.acos(min(1.0, max(-1.0, turn[2, 2]))))

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.profile import RIM_MM, Profile, mesh_profile, profile
 from gelslim_twin.contact.profile_kernel import convex_heights
-from gelslim_twin.scene.indenter import Indenter, Sphere
+from gelslim_twin.contact.undercut import Undercut, undercut_of
+from gelslim_twin.scene.indenter import Indenter, MeshFile, Sphere
 from gelslim_twin.stepping.step_error import StepError
 
 Array = NDArray[np.float64]
@@ -28,11 +29,13 @@ class LowerSide:
             origin of the side.
         origin_mm: That origin (3,) in the turned frame of the body.
         smooth_mm: Distance over which the curvature of the surface has a meaning.
+        undercut: What of the shape is hidden behind a gap; None where nothing is.
     """
 
     shapes: tuple[tuple[Profile, tuple[float, float], float], ...]
     origin_mm: Array
     smooth_mm: float = EXACT_MM
+    undercut: Undercut | None = None
 
 
 class Shape(Protocol):
@@ -113,11 +116,13 @@ class MeshShape:
 
     def lower_side(self, turn: Array) -> LowerSide:
         """A height map of the turned mesh. Raises StepError for one of too many cells."""
+        turned = self.corners_mm @ turn.T
         try:
-            surface, origin = mesh_profile(self.corners_mm @ turn.T, self.resolution_mm)
+            surface, origin = mesh_profile(turned, self.resolution_mm)
         except ValueError as error:
             raise StepError(f"the mesh has no height map: {error}") from None
-        return LowerSide(((surface, (0.0, 0.0), 0.0),), origin, 2 * self.resolution_mm)
+        shapes = ((surface, (0.0, 0.0), 0.0),)
+        return LowerSide(shapes, origin, 2 * self.resolution_mm, undercut_of(turned - origin))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +143,8 @@ class IndenterShape:
                 for one in self.indenters
             ),
             np.zeros(3),
-            max((2 * one.resolution_mm for one in self.indenters if one.shape == "stl"),
-                default=EXACT_MM),
-        )  # fmt: skip
+            max(
+                (2 * one.resolution_mm for one in self.indenters if isinstance(one, MeshFile)),
+                default=EXACT_MM,
+            ),
+        )

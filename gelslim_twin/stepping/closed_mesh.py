@@ -1,4 +1,4 @@
-"""Reading the surface of a body from an STL file, and proving that it is closed."""
+"""Reading the surface of a body from a mesh file, and proving that it is closed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.scene.footprint import stl_corners
+from gelslim_twin.scene.mesh_file import KINDS, mesh_corners
 from gelslim_twin.stepping.step_error import StepError
 
 Array = NDArray[np.float64]
@@ -18,25 +18,25 @@ def read_closed_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> Array:
     """Read the facets of a closed surface.
 
     Args:
-        path: STL file, binary or ASCII.
+        path: STL, OBJ or PLY file.
         scale: Millimetres per unit of the file.
 
     Returns:
         Corners (n, 3, 3) in mm.
 
     Raises:
-        StepError: The file cannot be read or is no STL, the scale is not above 0, the surface has
+        StepError: The file cannot be read, the scale is not above 0, the surface has
             an open edge, or its facets point inwards.
     """
     if not (np.isfinite(scale) and scale > 0):
         raise StepError(f"scale = {scale}: must be above 0, in millimetres per unit of the file")
     try:
-        corners = stl_corners(path) * scale
+        corners = mesh_corners(path) * scale
     except OSError as error:
         reason = (error.strerror or type(error).__name__).lower()
-        raise StepError(f"{os.fspath(path)}: {reason}; name an STL file") from None
+        raise StepError(f"{os.fspath(path)}: {reason}; name {KINDS}") from None
     except ValueError as error:
-        raise StepError(f"{os.fspath(path)}: {error}; name an STL file") from None
+        raise StepError(f"{os.fspath(path)}: {error}; name {KINDS}") from None
     try:
         require_closed(corners)
     except StepError as error:

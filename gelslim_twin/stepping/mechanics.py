@@ -122,6 +122,8 @@ class StepMechanics:
                 f"{self.thickness_mm:g} mm, the limit is {most:.3g} mm; take shorter time steps, "
                 "or stop the body before"
             )
+        low, high = self.points_mm.min(axis=0), self.points_mm.max(axis=0)
+        placement.require_no_undercut((high[0] - low[0], high[1] - low[1]), high[2])
         large_strain = self._needs_large_strain(contact)
         solver = self._solver
         solver.tool = placement.tool

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.tool import Tool
-from gelslim_twin.contact.tool_group import GroupPose, ToolGroup
+from gelslim_twin.contact.tool_group import GroupPose, ToolGroup, members_of
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.stepping.body import Body, Side
 from gelslim_twin.stepping.rigid_motion import tool_pose
+from gelslim_twin.stepping.step_error import StepError
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class Placement:
         tool: The sides as one tool.
         pose: Its pose at the end of the step.
         before: Its pose at the start; None for the first step.
-        name: Names of the bodies.
+        names: Name of each body.
     """
 
     bodies: tuple[int, ...]
@@ -35,7 +36,27 @@ class Placement:
     tool: Tool
     pose: Pose
     before: Pose | None
-    name: str
+    names: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Names of the bodies in one."""
+        return " and ".join(self.names)
+
+    def require_no_undercut(self, pad_mm: tuple[float, float], top_mm: float) -> None:
+        """Raise StepError where the gel meets a part of a body that is hidden behind a gap.
+
+        Args:
+            pad_mm: Length and width of the pad.
+            top_mm: Height of the highest point of the undeformed gel.
+        """
+        for name, side, pose in zip(self.names, self.sides, members_of(self.pose), strict=True):
+            met = None if side.undercut is None else side.undercut.below(pose, pad_mm, top_mm)
+            if met is not None:
+                raise StepError(
+                    f"body {name}: the gel meets an undercut, hidden from below by other parts: "
+                    f"{met}; turn the body, press less deep, or fill the gap in the mesh"
+                )
 
     def owners(self, places_mm: Array) -> NDArray[np.intp]:
         """Numbers (n,) of the bodies that points (n, 3) of the deformed surface belong to."""
@@ -89,7 +110,7 @@ def placed(
         tools[0] if len(tools) == 1 else ToolGroup((), tools),
         _joined(ends, times_s[1]),
         None if starts is None else _joined(starts, times_s[0]),
-        " and ".join(bodies[k].name for k in near),
+        tuple(bodies[k].name for k in near),
     )
 
 

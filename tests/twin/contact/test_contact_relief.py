@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from sampled import quick
 
-from gelslim_twin.contact.profile import stl_profile
+from gelslim_twin.contact.profile import mesh_file_profile
 from gelslim_twin.scene.indenter import Stl
 
 trimesh = pytest.importorskip(
@@ -68,7 +68,7 @@ def test_heights_are_where_rays_first_hit(name: str, down: str, tmp_path: Path) 
     mesh = bodies()[name]
     mesh.export(tmp_path / "body.stl")  # type: ignore[attr-defined]
     shape = Stl(shape="stl", file="body.stl", resolution_mm=RESOLUTION_MM, down=down, scale=1.5)
-    profile = stl_profile(shape, tmp_path)
+    profile = mesh_file_profile(shape, tmp_path)
     # Corners as the file has them, in single precision.
     turned = seen_from_below(trimesh.load(tmp_path / "body.stl"), down)
     turned.apply_scale(1.5)
@@ -112,7 +112,7 @@ def test_between_grid_points_heights_are_bilinear(tmp_path: Path) -> None:
     """A plane comes out exactly between them; a ball to its curvature over a cell."""
     ball = trimesh.creation.icosphere(subdivisions=5, radius=2.0)
     ball.export(tmp_path / "ball.stl")
-    profile = stl_profile(Stl(shape="stl", file="ball.stl", resolution_mm=0.05), tmp_path)
+    profile = mesh_file_profile(Stl(shape="stl", file="ball.stl", resolution_mm=0.05), tmp_path)
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-1.0, 1.0, (2, 400))
     true = 2.0 - np.sqrt(4.0 - x * x - y * y)

@@ -14,12 +14,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from gelslim_twin.effects.contact_estimate import Footprint, contact_estimate, nonlinear_excess
-from gelslim_twin.scene.footprint import (
-    footprint_mm,
-    stl_corners,
-    tool_footprint,
-)
+from gelslim_twin.scene.footprint import tool_footprint
 from gelslim_twin.scene.indenter import Indenter
+from gelslim_twin.scene.mesh_file import footprint_mm, mesh_corners
 from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import build_pad_mesh
@@ -127,7 +124,7 @@ def test_an_stl_file_is_read_as_by_trimesh(tmp_path, kind):
     (tmp_path / "box.stl").write_bytes(
         data if isinstance(data := mesh.export(file_type=kind), bytes) else data.encode()
     )
-    corners = stl_corners(tmp_path / "box.stl")
+    corners = mesh_corners(tmp_path / "box.stl")
     expected = np.sort(mesh.triangles.reshape(-1, 9), axis=0)
     np.testing.assert_allclose(np.sort(corners.reshape(-1, 9), axis=0), expected, atol=1e-6)
     assert footprint_mm(tmp_path / "box.stl", "-z", 1.0) == pytest.approx((3.0, 4.0))
@@ -220,3 +217,40 @@ def test_the_nonlinear_excess_is_the_measured_table_and_grows():
 def test_no_contact_has_no_force():
     t = contact_estimate(punch(1.0), -0.1, 2.0, 0.147, 0.3223)
     assert (t.normal_n, t.stick_n, t.area_mm2, t.shear_n_per_mm) == (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "ply_ascii"])
+def test_obj_and_ply_files_hold_the_same_facets(tmp_path, kind):
+    mesh = trimesh.creation.icosphere(subdivisions=1, radius=3.0)
+    path = tmp_path / f"ball.{kind[:3]}"
+    data = mesh.export(file_type="ply", encoding="ascii") if kind == "ply_ascii" else mesh.export(
+        file_type=kind
+    )  # fmt: skip
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    np.testing.assert_allclose(mesh_corners(path), mesh.triangles, atol=1e-6)
+
+
+def test_quads_of_an_obj_are_divided_and_its_objects_joined(tmp_path):
+    path = tmp_path / "two.obj"
+    path.write_text(
+        "mtllib none.mtl\no first\nv 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nf 1 2 3 4\n"
+        "o second\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 5 6 7\n"
+    )
+    corners = mesh_corners(path)
+    assert corners.shape == (3, 3, 3)
+    area = np.linalg.norm(np.cross(*np.diff(corners, axis=1).transpose(1, 0, 2)), axis=1) / 2
+    assert area.sum() == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("name", ["bad.obj", "bad.ply", "points.ply", "bad.stl"])
+def test_damaged_meshes_are_refused(tmp_path, name):
+    text = {
+        "bad.obj": "v 0 0 0\nf 1 2 3\n",
+        "bad.ply": "ply\nformat ascii 1.0\nelement vertex 3\nend_header\n1 2\n",
+        "points.ply": "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+        "property float y\nproperty float z\nend_header\n1 2 3\n",
+        "bad.stl": "solid a\nvertex 1 2\n",
+    }
+    (tmp_path / name).write_text(text[name])
+    with pytest.raises(ValueError, match="no"):
+        mesh_corners(tmp_path / name)

@@ -135,3 +135,19 @@ def test_indenters_are_known_from_below_only() -> None:
         body.side(turned("x", 46.0).as_matrix())
     with pytest.raises(StepError):
         Body.from_indenters()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply"])
+def test_a_hundred_thousand_facets_are_where_the_torus_is(tmp_path: Path, kind: str) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
+    mesh = trimesh.creation.torus(10.0, 4.0, major_sections=250, minor_sections=200)
+    assert len(mesh.faces) == 100_000
+    mesh.export(tmp_path / f"torus.{kind}")
+    body, rng = Body.from_mesh(tmp_path / f"torus.{kind}"), np.random.default_rng(6)
+    angle, away = rng.uniform(0, 2 * np.pi, 200), rng.uniform(-2.5, 2.5, 200)
+    places = np.column_stack(
+        [(10 + away) * np.cos(angle), (10 + away) * np.sin(angle), np.full(200, -9.0)]
+    )
+    known = 9.0 - np.sqrt(16.0 - away**2)
+    np.testing.assert_allclose(-signed_depth(body, np.eye(4), places), known, atol=5e-3)
