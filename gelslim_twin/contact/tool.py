@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from gelslim_twin.contact.tool_kernel import (
 )
 from gelslim_twin.scene.indenter import Indenter
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import rotation
 
 Array = NDArray[np.float64]
 _SIDES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * DIFFERENCE_MM
@@ -97,28 +97,6 @@ class Tool:
         end = np.array([after.x_mm, after.y_mm, -after.depth_mm])
         turn = rotation(after) @ rotation(before).T
         return np.asarray((points_mm - start) @ turn.T + end)
-
-
-@lru_cache(maxsize=64)
-def rotation(pose: Pose) -> Array:
-    """Rotation matrix (3, 3) of a pose: twist about z first, then tilt about x, then about y.
-
-    It is read-only, because a contact asks for that of its pose some twenty times.
-    """
-    cz, sz = _cos_sin(pose.twist_deg)
-    cx, sx = _cos_sin(pose.tilt_x_deg)
-    cy, sy = _cos_sin(pose.tilt_y_deg)
-    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    turn = np.asarray(about_y @ about_x @ about_z)
-    turn.flags.writeable = False
-    return turn
-
-
-def _cos_sin(angle_deg: float) -> tuple[float, float]:
-    angle = np.radians(angle_deg)
-    return float(np.cos(angle)), float(np.sin(angle))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.profile import facets_down, lowest_middle
-from gelslim_twin.contact.tool import rotation
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import rotation
 
 Array = NDArray[np.float64]
 POINTS = 256

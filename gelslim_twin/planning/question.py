@@ -20,6 +20,8 @@ from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.scene.scene import Contact
 from ifem_export.errors import IfemError
 
+HIGHEST_MM, LEVELS = 20.0, 100
+"""Heights over its lowest point at which a tilted tool is searched for its lowest point."""
 JUST_TOUCHING_MM = 1e-9
 Vector = tuple[float, float, float]
 
@@ -79,7 +81,8 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
 
     A tilted tool reaches deeper on one side, by its reach times the slope.
     """
-    depths = [_reach(pose, footprint) for pose in poses]
+    profile = _profile(poses, footprint)
+    depths = [_reach(pose, footprint, profile) for pose in poses]
     touching = [i for i, depth in enumerate(depths) if depth > 0]
     if not touching:
         return MotionFigures(len(poses))
@@ -111,7 +114,15 @@ def _tilt(a: Pose, b: Pose) -> float:
     return math.hypot(b.tilt_x_deg - a.tilt_x_deg, b.tilt_y_deg - a.tilt_y_deg)
 
 
-def _reach(pose: Pose, footprint: Footprint) -> float:
+def _profile(poses: Sequence[Pose], footprint: Footprint) -> tuple[tuple[float, float], ...]:
+    """Heights over the lowest point and the reach there; nothing where no pose is tilted."""
+    if not any(pose.tilt_x_deg or pose.tilt_y_deg for pose in poses):
+        return ()
+    heights = (HIGHEST_MM * (k / LEVELS) ** 2 for k in range(1, LEVELS + 1))
+    return tuple((height, footprint.reach_mm(height)) for height in heights)
+
+
+def _reach(pose: Pose, footprint: Footprint, profile: tuple[tuple[float, float], ...]) -> float:
     slope = math.tan(math.radians(math.hypot(pose.tilt_x_deg, pose.tilt_y_deg)))
     reached = pose.depth_mm
     if slope == 0:
@@ -119,7 +130,9 @@ def _reach(pose: Pose, footprint: Footprint) -> float:
     # Two passes, because the tilt may lower shapes that are raised.
     for _ in range(2):
         reached = pose.depth_mm + footprint.reach_mm(max(reached, JUST_TOUCHING_MM)) * slope
-    return reached
+    # A round tool that has rolled touches beside its origin, which is above the gel then.
+    lowered = max((reach * slope - height for height, reach in profile), default=0.0)
+    return max(reached, pose.depth_mm + lowered / math.hypot(1.0, slope))
 
 
 def bundle_figures(path: str | os.PathLike[str]) -> SensorFigures:

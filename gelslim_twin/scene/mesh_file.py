@@ -6,6 +6,7 @@ STL files are read without a mesh library, because a scene is planned from their
 from __future__ import annotations
 
 import os
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -46,10 +47,18 @@ def mesh_corners(path: str | os.PathLike[str]) -> Array:
 
 def footprint_mm(path: str | os.PathLike[str], down: str, scale: float) -> tuple[float, float]:
     """Extents in mm across the direction `down` ("z", "-x", ...). Raises as `mesh_corners`."""
-    corners = mesh_corners(path).reshape(-1, 3) * scale
-    extents = np.ptp(corners, axis=0)
-    a, b = (extents[i] for i in range(3) if i != "xyz".index(down[-1]))
-    return float(a), float(b)
+    state = os.stat(path)
+    extents = _extents(os.fspath(path), state.st_mtime_ns, state.st_size)
+    a, b = (extents[i] * scale for i in range(3) if i != "xyz".index(down[-1]))
+    return a, b
+
+
+# The planner asks for the extents at every pose of a motion.
+@lru_cache(maxsize=16)
+def _extents(path: str, changed_ns: int, size: int) -> tuple[float, float, float]:
+    """Extents in the unit of a file, which is read again when its time or size has changed."""
+    x, y, z = np.ptp(mesh_corners(path).reshape(-1, 3), axis=0).tolist()
+    return x, y, z
 
 
 def _by_trimesh(path: str | os.PathLike[str], kind: str) -> Array:

@@ -63,6 +63,17 @@ class Tilt(Timed):
     angle_deg: float = Field(ge=-45, le=45, description="Right-handed angle of the tilt")
 
 
+class Roll(Timed):
+    """The tool rolls on the gel like a wheel about an axis in the surface, without slipping."""
+
+    move: Literal["roll"] = Field(description="Kind of movement")
+    about: Literal["x", "y"] = Field(description="Direction of the wheel's axle")
+    angle_deg: float = Field(ge=-90, le=90, description="Right-handed angle of the roll")
+    radius_mm: float = Field(
+        gt=0, le=200, description="Height of the axle above the lowest point of the upright tool"
+    )
+
+
 class Hold(Timed):
     """The tool stays where it is while the gel relaxes."""
 
@@ -79,7 +90,7 @@ class Release(Timed):
 
 
 Waypoint = Annotated[
-    Press | Shear | Slide | Twist | Tilt | Hold | Release, Field(discriminator="move")
+    Press | Shear | Slide | Twist | Tilt | Roll | Hold | Release, Field(discriminator="move")
 ]
 
 

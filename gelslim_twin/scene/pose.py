@@ -1,23 +1,18 @@
-"""The pose of the tool at one time, and the poses of a motion by waypoints or by a CSV table."""
+"""The pose of the tool at one time, the poses of a motion by waypoints, and times of frames."""
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
 
-from gelslim_core.yaml.errors import InputError, Problem, listed, shown
-from gelslim_core.yaml.source import MAX_BYTES, read_source
-from gelslim_core.yaml.suggest import closest
 from gelslim_twin.scene.motion import (
-    MAX_POSES,
     Hold,
     Motion,
     Press,
     Release,
+    Roll,
     Shear,
     Slide,
     Tilt,
@@ -55,21 +50,31 @@ class Pose:
 def poses(motion: Motion) -> tuple[Pose, ...]:
     """Poses of a motion by waypoints: the start, touching at depth 0 and time 0, then each step.
 
-    Raises ValueError for a motion by table, which `read_motion_csv` reads.
+    Raises ValueError for a motion by table, which `read_pose_table` reads.
     """
     if motion.waypoints is None:
-        raise ValueError("this motion is a table: read it with read_motion_csv")
+        raise ValueError("this motion is a table: read it with read_pose_table")
     pose = Pose(x_mm=motion.start_x_mm, y_mm=motion.start_y_mm)
-    found = [pose]
+    found, raised = [pose], 0.0
     for waypoint in motion.waypoints:
-        found += between(pose, waypoint)
+        found += between(pose, waypoint, raised)
+        if isinstance(waypoint, Roll):
+            raised += pose.depth_mm - found[-1].depth_mm
         pose = found[-1]
     return tuple(found)
 
 
-def between(start: Pose, waypoint: Waypoint) -> Iterator[Pose]:
-    """The `waypoint.steps` poses from `start`, itself left out, to the end of the movement."""
-    end = _end(start, waypoint)
+def between(start: Pose, waypoint: Waypoint, raised_mm: float = 0.0) -> Iterator[Pose]:
+    """The `waypoint.steps` poses from `start`, itself left out, to the end of the movement.
+
+    `raised_mm` is how far rolling has lifted the tool's origin over the lowest point of the wheel,
+    whose depth the waypoints give.
+    """
+    if isinstance(waypoint, Roll):
+        for step in range(1, waypoint.steps + 1):
+            yield _rolled(start, waypoint, step / waypoint.steps)
+        return
+    end = _end(start, waypoint, raised_mm)
     for step in range(1, waypoint.steps):
         part = step / waypoint.steps
         time_s = start.time_s + part * waypoint.duration_s
@@ -77,11 +82,41 @@ def between(start: Pose, waypoint: Waypoint) -> Iterator[Pose]:
     yield end
 
 
-def _end(start: Pose, waypoint: Waypoint) -> Pose:
+def _rolled(start: Pose, roll: Roll, part: float) -> Pose:
+    """The pose after a part of a roll.
+
+    The centre of the wheel is `radius_mm` above the tool's origin along its axis. It moves level by
+    the radius times the angle, to +x about +y and to -y about +x, and the tool turns about it.
+    """
+    angle = part * roll.angle_deg
+    way = roll.radius_mm * math.radians(angle)
+    turned = (
+        replace(start, tilt_x_deg=start.tilt_x_deg + angle)
+        if roll.about == "x"
+        else replace(start, tilt_y_deg=start.tilt_y_deg + angle)
+    )
+    before, after = _axis(start), _axis(turned)
+    dx, dy, dz = (roll.radius_mm * (a - b) for a, b in zip(before, after, strict=True))
+    return replace(
+        turned,
+        time_s=start.time_s + part * roll.duration_s,
+        x_mm=start.x_mm + dx + (way if roll.about == "y" else 0.0),
+        y_mm=start.y_mm + dy - (way if roll.about == "x" else 0.0),
+        depth_mm=start.depth_mm - dz,
+    )
+
+
+def _axis(pose: Pose) -> tuple[float, float, float]:
+    """Direction of the tool's axis, the third column of its rotation."""
+    a, b = math.radians(pose.tilt_x_deg), math.radians(pose.tilt_y_deg)
+    return math.cos(a) * math.sin(b), -math.sin(a), math.cos(a) * math.cos(b)
+
+
+def _end(start: Pose, waypoint: Waypoint, raised_mm: float) -> Pose:
     pose = replace(start, time_s=start.time_s + waypoint.duration_s)
     match waypoint:
         case Press():
-            return replace(pose, depth_mm=waypoint.depth_mm)
+            return replace(pose, depth_mm=waypoint.depth_mm - raised_mm)
         case Shear() | Slide():
             return replace(pose, x_mm=start.x_mm + waypoint.x_mm, y_mm=start.y_mm + waypoint.y_mm)
         case Twist():
@@ -91,7 +126,9 @@ def _end(start: Pose, waypoint: Waypoint) -> Pose:
         case Tilt():
             return replace(pose, tilt_y_deg=start.tilt_y_deg + waypoint.angle_deg)
         case Release():
-            return replace(pose, depth_mm=-waypoint.clearance_mm)
+            return replace(pose, depth_mm=-waypoint.clearance_mm - raised_mm)
+        case Roll():
+            return _rolled(start, waypoint, 1.0)
         case Hold():
             return pose
 
@@ -126,98 +163,3 @@ def _between(times: Sequence[float], time: float) -> FrameTime:
         return FrameTime(time, before, 0.0)
     start, end = times[before], times[before + 1]
     return FrameTime(time, before, (time - start) / (end - start))
-
-
-LIMITS = {
-    "time_s": (0.0, 1e6),
-    "x_mm": (-100.0, 100.0),
-    "y_mm": (-100.0, 100.0),
-    "depth_mm": (-50.0, 20.0),
-    "twist_deg": (-3600.0, 3600.0),
-    "tilt_x_deg": (-45.0, 45.0),
-    "tilt_y_deg": (-45.0, 45.0),
-}
-COLUMNS, REQUIRED = tuple(LIMITS), ("time_s", "depth_mm")
-
-
-def read_motion_csv(path: str | os.PathLike[str]) -> tuple[Pose, ...]:
-    """The poses in the CSV file at `path`, times increasing; `#` begins a comment line.
-
-    The first line names the columns: `time_s` and `depth_mm`, and any of the others that `Pose`
-    has. Raises `InputError` with every fault found, by line.
-    """
-    source = read_source(path, 10 * MAX_BYTES)
-    rows = [
-        (number, next(csv.reader([line])))
-        for number, line in enumerate(source.text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not rows:
-        raise _refused(source.path, None, "", None, "is empty", f"begin with {','.join(COLUMNS)}")
-    names = _header(source.path, *rows[0])
-    problems: list[Problem] = []
-    found: list[Pose] = []
-    for number, cells in rows[1:]:
-        pose = _pose(source.path, number, names, cells, problems)
-        if pose is None:
-            continue
-        if found and pose.time_s <= found[-1].time_s:
-            message = f"must be above the time of the line before, {found[-1].time_s:g} s"
-            problems.append(
-                Problem(
-                    source.path, number, None, "time_s", f"{pose.time_s:g}", message, "sort lines"
-                )
-            )
-        found.append(pose)
-    if problems:
-        raise listed(problems)
-    if not found:
-        raise _refused(source.path, rows[0][0], "", None, "has no poses", "add lines of numbers")
-    if len(found) > MAX_POSES:
-        message = f"has {len(found)} poses, the limit is {MAX_POSES}"
-        raise _refused(source.path, None, "", None, message, "keep fewer lines")
-    return tuple(found)
-
-
-def _refused(
-    path: str, line: int | None, field: str, value: str | None, message: str, remedy: str
-) -> InputError:
-    return InputError((Problem(path, line, None, field, value, message, remedy),))
-
-
-def _header(path: str, line: int, cells: list[str]) -> tuple[str, ...]:
-    names = tuple(cell.strip() for cell in cells)
-    for name in names:
-        if name not in COLUMNS:
-            near = closest(name, list(COLUMNS))
-            remedy = f"did you mean {near}?" if near else f"the columns are {', '.join(COLUMNS)}"
-            raise _refused(path, line, "", shown(name), "unknown column", remedy)
-        if names.count(name) > 1:
-            raise _refused(path, line, "", name, "column given twice", "delete one")
-    for name in REQUIRED:
-        if name not in names:
-            raise _refused(path, line, name, None, "column missing", f"add the column {name}")
-    return names
-
-
-def _pose(
-    path: str, line: int, names: tuple[str, ...], cells: list[str], problems: list[Problem]
-) -> Pose | None:
-    if len(cells) != len(names):
-        message = f"has {len(cells)} values for {len(names)} columns"
-        problems.append(Problem(path, line, None, "", None, message, "give one value per column"))
-        return None
-    values: dict[str, float] = {}
-    for name, cell in zip(names, cells, strict=True):
-        low, high = LIMITS[name]
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
-        if not low <= value <= high:
-            message = f"must be a number from {low:g} to {high:g}"
-            problems.append(
-                Problem(path, line, None, name, shown(cell.strip()), message, "correct the value")
-            )
-        values[name] = value
-    return Pose(**values) if all(math.isfinite(v) for v in values.values()) else None

@@ -13,7 +13,8 @@ from gelslim_core.yaml.reader import Loaded, read_model
 from gelslim_core.yaml.schema import reference_markdown, schema_text
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.mesh_file import KINDS, footprint_mm
-from gelslim_twin.scene.pose import Pose, poses, read_motion_csv
+from gelslim_twin.scene.pose import Pose, poses
+from gelslim_twin.scene.pose_table import LIMITS, read_pose_table
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
 from gelslim_twin.scene.variation import varied
 
@@ -61,12 +62,28 @@ class LoadedScene(Loaded[Scene]):
             message, _, remedy = str(error).partition("; ")
             raise self.problem("vary", None, message, remedy or "correct it") from None
         moved = self.poses if scene.motion.csv is not None else poses(scene.motion)
-        return replace(self, model=scene, poses=moved)
+        found = replace(self, model=scene, poses=moved)
+        found.require_upright()
+        return found
 
     def with_tolerance(self, force_n: float, image_px: float) -> LoadedScene:
         """The same scene with another tolerance."""
         tolerance = Tolerance(force_n=force_n, image_px=image_px)
         return replace(self, model=self.scene.model_copy(update={"tolerance": tolerance}))
+
+    def require_upright(self) -> None:
+        """Raise InputError for a pose tilted by more than the limit, which rolls may add up to."""
+        most = LIMITS["tilt_x_deg"][1]
+        for pose in self.poses:
+            tilt = max(abs(pose.tilt_x_deg), abs(pose.tilt_y_deg))
+            if tilt > most * (1 + 1e-12):
+                raise self.problem(
+                    "motion",
+                    None,
+                    f"tilts the tool by {tilt:.4g}° at {pose.time_s:g} s, the limit is {most:g}°, "
+                    "because the tool is known from below only",
+                    "tilt or roll less, or give the motion to gelslim.Twin with a mesh",
+                )
 
     def problem(self, field: str, value: str | None, message: str, remedy: str) -> InputError:
         """An error about a field of the scene, on its line or on that of the block it is in."""
@@ -94,9 +111,10 @@ def read_scene(path: str | os.PathLike[str]) -> LoadedScene:
     """
     loaded = read_model(path, Scene)
     motion, folder = loaded.model.motion, Path(loaded.path).parent
-    found = poses(motion) if motion.csv is None else read_motion_csv(folder / motion.csv)
+    found = poses(motion) if motion.csv is None else read_pose_table(folder / motion.csv)
     scene = LoadedScene(**vars(loaded), poses=found)
     _check_meshes(scene)
+    scene.require_upright()
     return scene
 
 

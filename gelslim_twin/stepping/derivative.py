@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.contact_forces import STICK
 from gelslim_twin.contact.gel_state import AnchoredState, StickTargets
-from gelslim_twin.contact.tool import rotation
 from gelslim_twin.contact.tool_group import members_of
+from gelslim_twin.scene.rotation import rotation
 from gelslim_twin.stepping.placement import Placement
 from ifem_export.operators.adjoint_fields import resultants
 

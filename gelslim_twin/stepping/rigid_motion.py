@@ -1,21 +1,17 @@
 """Rigid motions: reading them, and the closed form from and to the tool's pose.
 
-A rigid motion is a matrix (4, 4) that takes points of a body to the sensor frame, in mm. A pose of
-the tool has R = Ry Rx Rz with the angles of tilt about y and x and of the twist about z. The third
-column of R is then (cos a sin b, -sin a, cos a cos b) for the tilts a about x and b about y, and
-the second row is (cos a sin c, cos a cos c, -sin a) for the twist c.
+A rigid motion is a matrix (4, 4) that takes points of a body to the sensor frame, in mm.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gelslim_twin.contact.tool import rotation
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import angles_deg, quaternion_matrix, rotation
 from gelslim_twin.stepping.step_error import StepError
 
 Array = NDArray[np.float64]
@@ -85,13 +81,8 @@ def _of_quaternion(number: int, row: Array) -> Array:
             f"pose of body {number}: the quaternion w, x, y, z = {row[3:]} has the length "
             f"{length:.4g}, must be 1"
         )
-    w, x, y, z = row[3:] / length
     found = np.eye(4)
-    found[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
+    found[:3, :3] = quaternion_matrix(*(row[3:] / length))
     found[:3, 3] = row[:3]
     return found
 
@@ -102,15 +93,8 @@ def tool_pose(motion: Array, time_s: float = 0.0) -> Pose:
     At a tilt of 90° about x, where tilt about y and twist turn about the same axis, the tilt about
     y is 0.
     """
-    turn = motion[:3, :3]
-    tilt_x = math.asin(min(1.0, max(-1.0, -turn[1, 2])))
-    if math.hypot(turn[1, 0], turn[1, 1]) > 1e-12:
-        tilt_y = math.atan2(turn[0, 2], turn[2, 2])
-        twist = math.atan2(turn[1, 0], turn[1, 1])
-    else:
-        tilt_y, twist = 0.0, math.atan2(-turn[0, 1], turn[0, 0])
     x, y, z = (float(v) for v in motion[:3, 3])
-    return Pose(time_s, x, y, -z, *(math.degrees(angle) for angle in (twist, tilt_x, tilt_y)))
+    return Pose(time_s, x, y, -z, *angles_deg(motion[:3, :3]))
 
 
 def motion_of(pose: Pose) -> Array:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from gelslim_force.calibration.design import bundle_camera, marker_heights_mm
 from gelslim_force.motion.marker_motion import Compensation, MarkerView
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.contact.tool import rotation
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import rotation
 from gelslim_twin.validation.score import Spread, spread
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.elements.material import Material

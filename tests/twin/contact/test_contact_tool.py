@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sampled import quick
 from tool_height import tool_height_mm
 
-from gelslim_twin.contact.tool import Tool, ToolSurface, rotation
+from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -23,6 +23,7 @@ from gelslim_twin.scene.indenter import (
     Wedge,
 )
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import rotation
 
 Array = NDArray[np.float64]
 SHAPES: dict[str, Indenter] = {

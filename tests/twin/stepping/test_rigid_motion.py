@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gelslim_twin.contact.tool import rotation
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.rotation import rotation
 from gelslim_twin.stepping.rigid_motion import motion_of, rigid_motions, tool_pose
 from gelslim_twin.stepping.step_error import StepError
 
