@@ -19,6 +19,7 @@ from typing import Any
 
 import force_sigma
 import force_tables
+import linear_gel
 import page_tables
 import tolerance_tables
 import twin_fine
@@ -99,6 +100,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "one-layer": _from("stiffness_ladder", page_tables.one_layer),
         "large-strain": _from("force_ladders", page_tables.large_strain),
         "error-budget": _from("twin_validation", page_tables.error_budget),
+        "linear-gel": _from("linear_gel", linear_gel.table),
     },
 }
 

@@ -49,6 +49,7 @@ STEPS = (
     Step("twin_steps"),
     Step("twin_fine"),
     Step("twin_skin"),
+    Step("linear_gel"),
     Step("rendering"),
     Step("assembly"),
     Step("force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),

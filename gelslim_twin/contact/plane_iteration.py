@@ -129,6 +129,16 @@ class PlaneIteration:
         except ContactError:
             return self._solve(surface, motion_mm, force_n, BisectedNormals())
 
+    def fixed(self, surface: ToolSurface, motion_mm: Array, force_n: Array) -> PlaneSolution:
+        """The balance with planes that stay. Raises ContactError.
+
+        No gaps show the error of the forces here, so their residual is made smaller instead.
+        """
+        goal, fine = self.target_mm - self.offset_mm, FINER * BALANCE * self.tolerance
+        balance = self._balance(surface, motion_mm, goal, force_n, fine, None)
+        gap = surface.gap_mm(self.points_mm + balance.motion_mm + self.offset_mm)
+        return PlaneSolution(balance, surface, gap, balance.sweeps)
+
     def _solve(
         self, surface: ToolSurface, motion_mm: Array, force_n: Array, turning: NormalDamping
     ) -> PlaneSolution:

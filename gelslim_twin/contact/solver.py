@@ -10,6 +10,10 @@ tangential direction t, the conditions at each pose are
 each node, which is updated until all nodes in contact lie on the tool (`plane_iteration`). The set
 of candidate nodes grows until no other node penetrates the tool. Where a step to a pose does not
 converge, it is halved.
+
+With the geometry "rest" the gel meets the tool as in the theory of small displacements: along z, at
+the height of the tool over each node at rest. `geometry_of` says which one is nearer to a gel at
+large strain.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +55,9 @@ CANDIDATE_SHARE = 0.2
 """Gap over depth up to which a node is a candidate, because the gel bulges at the contact."""
 GROWTH_STEPS = 12
 MOST_SUBSTEPS = 200
+Geometry = Literal["displaced", "rest"]
+REST_FROM = 0.4
+"""Poisson's ratio from which the geometry at rest is nearer (bench/linear_gel.py)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +103,13 @@ class ContactSettings:
     longest_step: float = 1.0
     """With friction, the largest displacement of a node in contact in one step, in cell sizes."""
     halvings: int = 6
+    geometry: Geometry = "displaced"
+    """Where a node meets the tool: where it has moved, along the tool's normal; or at rest."""
+
+
+def geometry_of(poissons_ratio: float) -> Geometry:
+    """The geometry whose force is nearer to that of a neo-Hookean gel (docs/physics.md)."""
+    return "rest" if poissons_ratio >= REST_FROM else "displaced"
 
 
 @dataclass(eq=False)
@@ -187,8 +201,9 @@ class ContactSolver:
                 target[nodes], wanted[nodes], self.settings.friction, self.settings.tolerance,
                 deepest, self._correction(nodes),
             )  # fmt: skip
-            found = iteration.solve(surface.at(nodes), moved[nodes], guess[nodes])
-            state, gap = self._state(nodes, found, pose, offset, targets, deepest)
+            solve = iteration.solve if self.settings.geometry == "displaced" else iteration.fixed
+            found = solve(surface.at(nodes), moved[nodes], guess[nodes])
+            state, gap = self._state(nodes, found, pose, surface, offset, targets, deepest)
             into = (gap < -gap_tolerance_mm(self.settings.tolerance, deepest)) & ~wanted
             if not into.any():
                 return state
@@ -226,6 +241,10 @@ class ContactSolver:
     ) -> tuple[ToolSurface, Array]:
         """Tangent planes at all nodes, and the displacement (c,) that forces may cause along n."""
         places = self.points_mm + moved
+        if self.settings.geometry == "rest":
+            tool = self.tool.above(pose, self.points_mm, reach_mm=self._cell)
+            surface = tool.levelled(self.points_mm)
+            return surface, allowed_motion_mm(surface, places, moved - offset)
         # Slopes cost four more evaluations of the tool and matter near the gel only.
         surface = self.tool.surface(pose, places, reach_mm=self._cell).only(on_tool)
         return surface, allowed_motion_mm(surface, places, moved - offset)
@@ -243,6 +262,7 @@ class ContactSolver:
         nodes: Nodes,
         found: PlaneSolution,
         pose: Pose,
+        planes: ToolSurface,
         offset: Array,
         targets: StickTargets,
         deepest: float,
@@ -250,7 +270,10 @@ class ContactSolver:
         """State of the whole surface, and gaps (c,) of all nodes."""
         balance = found.balance
         u = self._displacement(nodes, balance) + offset
-        gap = self.tool.clearance_mm(pose, self.points_mm + u)
+        if self.settings.geometry == "rest":
+            gap = planes.gap_mm(self.points_mm + u)
+        else:
+            gap = self.tool.clearance_mm(pose, self.points_mm + u)
         gap[nodes] = found.gap_mm
         force, touch = np.zeros_like(u), np.zeros(len(u), dtype=np.int8)
         force[nodes], touch[nodes] = balance.force_n, balance.touch

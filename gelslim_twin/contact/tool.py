@@ -24,6 +24,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.rotation import rotation
 
 Array = NDArray[np.float64]
+VERTICAL_STEPS = 2
 _SIDES = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * DIFFERENCE_MM
 
 
@@ -91,6 +92,20 @@ class Tool:
             kept[some] = _past_walls(self, last[:, some].T, own[:2, some].T, height[some])
         return kept
 
+    def above(self, pose: Pose, points_mm: Array, reach_mm: float = np.inf) -> ToolSurface:
+        """Tangent planes of the tool where verticals through points (n, 3) meet it.
+
+        The verticals are along z, whatever the tilt of the tool, so that a few steps of Newton's
+        method find where they meet a tilted one. Arguments as of `surface`.
+        """
+        found = self.surface(pose, points_mm, reach_mm=reach_mm)
+        for _ in range(VERTICAL_STEPS if rotation(pose)[2, 2] < 1.0 else 0):
+            on = np.flatnonzero(found.is_met & (found.gap_mm(points_mm) < reach_mm))
+            ahead = self.surface(pose, found.at(on).over(points_mm[on]))
+            met = ahead.is_met
+            found.met_mm[on[met]], found.normal[on[met]] = ahead.met_mm[met], ahead.normal[met]
+        return found
+
     def carried(self, before: Pose, after: Pose, points_mm: Array) -> Array:
         """Positions at another pose of points (n, 3) that are fixed to the tool."""
         start = np.array([before.x_mm, before.y_mm, -before.depth_mm])
@@ -122,6 +137,19 @@ class ToolSurface:
         met = self.met_mm.copy()
         met[~kept, 2] = np.inf
         return ToolSurface(met, self.normal)
+
+    def over(self, points_mm: Array) -> Array:
+        """Where (n, 3) verticals along z through points (n, 3) meet the planes."""
+        above = np.array(points_mm)
+        rise = self.gap_mm(points_mm) / self.normal[:, 2]
+        above[:, 2] = np.where(self.is_met, points_mm[:, 2] + rise, np.inf)
+        return above
+
+    def levelled(self, points_mm: Array) -> ToolSurface:
+        """Level planes where verticals along z through points (n, 3) meet these planes."""
+        normal = np.zeros_like(self.normal)
+        normal[:, 2] = 1.0
+        return ToolSurface(self.over(points_mm), normal)
 
     def turned(self, other: ToolSurface, share: Array) -> ToolSurface:
         """The same points, with normals interpolated by `share` (n,) from another's."""

@@ -85,12 +85,13 @@ class ToolGroup(Tool):
         for number, (tool, own) in enumerate(zip(self.tools, members_of(pose), strict=True)):
             kept = None if before is None else before.only(np.asarray(held == number))
             surfaces.append(tool.surface(own, points_mm, kept, reach_mm))
-        gaps = [np.where(s.is_met, s.gap_mm(points_mm), np.inf) for s in surfaces]
-        first, at = np.argmin(gaps, axis=0), np.arange(len(points_mm))
-        return ToolSurface(
-            np.stack([s.met_mm for s in surfaces])[first, at],
-            np.stack([s.normal for s in surfaces])[first, at],
-        )
+        return _nearest(surfaces, points_mm)
+
+    def above(self, pose: Pose, points_mm: Array, reach_mm: float = np.inf) -> ToolSurface:
+        """Tangent planes where verticals through points (n, 3) meet the first of the tools."""
+        pairs = zip(self.tools, members_of(pose), strict=True)
+        surfaces = [tool.above(own, points_mm, reach_mm) for tool, own in pairs]
+        return _nearest(surfaces, points_mm)
 
     def carried(self, before: Pose, after: Pose, points_mm: Array) -> Array:
         """Positions at another pose of points (n, 3), each fixed to the tool that it belongs to.
@@ -111,3 +112,13 @@ class ToolGroup(Tool):
         """(k, n) of every tool."""
         pairs = zip(self.tools, members_of(pose), strict=True)
         return np.stack([tool.clearance_mm(own, points_mm) for tool, own in pairs])
+
+
+def _nearest(surfaces: list[ToolSurface], points_mm: Array) -> ToolSurface:
+    """Of several planes at each point (n, 3) the one that it has passed farthest, or is nearest."""
+    gaps = [np.where(s.is_met, s.gap_mm(points_mm), np.inf) for s in surfaces]
+    first, at = np.argmin(gaps, axis=0), np.arange(len(points_mm))
+    return ToolSurface(
+        np.stack([s.met_mm for s in surfaces])[first, at],
+        np.stack([s.normal for s in surfaces])[first, at],
+    )

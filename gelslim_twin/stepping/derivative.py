@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gelslim_twin.contact.contact_forces import STICK
 from gelslim_twin.contact.gel_state import AnchoredState, StickTargets
+from gelslim_twin.contact.solver import Geometry
 from gelslim_twin.contact.tool_group import members_of
 from gelslim_twin.scene.rotation import rotation
 from gelslim_twin.stepping.placement import Placement
@@ -49,6 +50,7 @@ def wrench_derivative(
     placement: Placement,
     motions: Array,
     friction: float,
+    geometry: Geometry = "displaced",
 ) -> Array:
     """Derivative of the wrench on the gel by the poses of the bodies.
 
@@ -59,6 +61,7 @@ def wrench_derivative(
         placement: The bodies near the gel.
         motions: Rigid motions (k, 4, 4) of all bodies.
         friction: Coefficient of friction.
+        geometry: Where the nodes meet the bodies.
 
     Returns:
         (6, 6 k): force in N and torque in N mm about the sensor's origin, by the translation of
@@ -68,7 +71,7 @@ def wrench_derivative(
     assert touched is not None
     places = (points_mm + gel.displacement_mm)[touched.nodes]
     owners = placement.owners(places)
-    laws = _laws(gel, places, owners, placement, motions, friction)
+    laws = _laws(gel, points_mm, owners, placement, motions, friction, geometry)
     n, columns = len(places), laws.by_pose.shape[2]
     rows = laws.by_motion @ compliance.reshape(n, 3, 3 * n)
     grid = rows.reshape(n, 3, n, 3)
@@ -82,20 +85,28 @@ def wrench_derivative(
 
 def _laws(
     gel: AnchoredState,
-    places: Array,
+    points_mm: Array,
     owners: NDArray[np.intp],
     placement: Placement,
     motions: Array,
     friction: float,
+    geometry: Geometry,
 ) -> _Nodes:
     touched = gel.touched
     assert touched is not None
+    rest = points_mm[touched.nodes]
+    places = rest + gel.displacement_mm[touched.nodes]
     force, normal = gel.force_n[touched.nodes], touched.normal
     moved = gel.displacement_mm[touched.nodes] - touched.targets.target_mm
     carried = _carried(places, owners, motions)
     dragged = _dragged(places - moved, touched.targets, owners, placement, motions)
-    bend = _curvature(places, normal, owners, placement)
-    turned = _turned(normal, owners, len(motions)) - bend @ carried
+    if geometry == "rest":
+        bend, turned = np.zeros((len(normal), 3, 3)), np.zeros_like(carried)
+        lifted = _lifted(rest, owners, placement, motions)
+    else:
+        bend = _curvature(places, normal, owners, placement)
+        turned = _turned(normal, owners, len(motions)) - bend @ carried
+        lifted = normal[:, None, :] @ carried
     # Along the normal; along two tangents further down.
     across = _tangents(normal)
     lift = (moved * normal).sum(axis=1)[:, None, None]
@@ -120,10 +131,15 @@ def _laws(
         np.concatenate(
             [np.zeros((len(places), 1, 3)), np.where(sticks, 0.0, slips_by_force)], axis=1
         ),
-        np.concatenate(
-            [normal[:, None, :] @ carried, np.where(sticks, held_by_pose, slips_by_pose)], axis=1
-        ),
+        np.concatenate([lifted, np.where(sticks, held_by_pose, slips_by_pose)], axis=1),
     )
+
+
+def _lifted(rest: Array, owners: NDArray[np.intp], placement: Placement, motions: Array) -> Array:
+    """Change (n, 1, 6 k) of the bodies' heights over points at rest (n, 3), by their poses."""
+    met = placement.tool.above(placement.pose, rest)
+    rise = met.normal[:, None, :] @ _carried(met.over(rest), owners, motions)
+    return np.asarray(rise / met.normal[:, 2][:, None, None])
 
 
 def _tangents(normal: Array) -> Array:
@@ -168,9 +184,9 @@ def _dragged(
         for body, pose in zip(placement.bodies, members_of(placement.pose), strict=True)
     }
     axis = np.stack([axes[body] for body in owners[late].tolist()])
-    # The height over the node grows as the tangent plane moves, along the axis of the tool.
+    # The height over the node is taken along the axis of the tool, which turns with it.
     slant = (met.normal * axis).sum(axis=1)
-    lifted = met.normal[:, None, :] @ _carried(met.met_mm, owners[late], motions)
+    lifted = met.normal[:, None, :] @ _carried(start, owners[late], motions)
     height = lifted / slant[:, None, None]
     rate = targets.share_rate[late, None] * targets.dragged_mm[late]
     found[late] += rate[:, :, None] * height

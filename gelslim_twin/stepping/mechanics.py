@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import GelState
-from gelslim_twin.contact.solver import Candidates, ContactSettings, ContactSolver
+from gelslim_twin.contact.solver import (
+    Candidates,
+    ContactSettings,
+    ContactSolver,
+    Geometry,
+    geometry_of,
+)
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import EffectParameters
 from gelslim_twin.effects.contact import NEWTON_RUNGS, RelaxationParameters
@@ -67,7 +73,8 @@ class StepMechanics:
     _solver: ContactSolver = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        settings = ContactSettings(self.request.solver_tolerance, self.friction)
+        geometry = geometry_of(self.compliance.bundle.material.poissons_ratio)
+        settings = ContactSettings(self.request.solver_tolerance, self.friction, geometry=geometry)
         self._solver = ContactSolver(self.compliance, Tool(()), settings)
         mesh = self.compliance.bundle.mesh
         self.thickness_mm = mesh.layers * mesh.cell_size_mm[2]
@@ -77,6 +84,11 @@ class StepMechanics:
     def points_mm(self) -> Array:
         """Surface nodes (c, 3) at rest."""
         return self._solver.points_mm
+
+    @property
+    def geometry(self) -> Geometry:
+        """Where the nodes of a linear gel meet a body."""
+        return self._solver.settings.geometry
 
     @property
     def rest(self) -> SolvedStep:
@@ -90,7 +102,8 @@ class StepMechanics:
         # Half of the allowed error is left to the law; Newton's method takes a tenth of that.
         allowed = max(NEWTON_RUNGS[-1][1], 0.1 * self.request.force_share)
         tolerance = next(t for _, t, _ in NEWTON_RUNGS if t <= allowed)
-        return NonlinearContact(self._solver, tolerance)
+        settings = replace(self._solver.settings, geometry="displaced")
+        return NonlinearContact(ContactSolver(self.compliance, Tool(()), settings), tolerance)
 
     @cached_property
     def series(self) -> PronySeries | None:
@@ -125,7 +138,7 @@ class StepMechanics:
         low, high = self.points_mm.min(axis=0), self.points_mm.max(axis=0)
         placement.require_no_undercut((high[0] - low[0], high[1] - low[1]), high[2])
         large_strain = self._needs_large_strain(contact)
-        solver = self._solver
+        solver = self._nonlinear.solver if large_strain else self._solver
         solver.tool = placement.tool
         solver.candidates = last.candidates
         if len(last.candidates.block) != 3 * len(last.candidates.nodes):

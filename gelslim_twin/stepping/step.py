@@ -133,6 +133,7 @@ class Step:
             self.placement,
             self.motions,
             self.mechanics.friction,
+            "displaced" if self.large_strain else self.mechanics.geometry,
         )
 
     @cached_property

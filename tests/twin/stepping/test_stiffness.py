@@ -89,6 +89,20 @@ def test_it_is_the_difference_quotient(pad: Path, shape: str, friction: float) -
     assert kept >= 2
 
 
+@pytest.mark.parametrize(("shape", "friction"), [("sphere", 0.0), ("sphere", 5.0), ("box", 0.5)])
+def test_it_is_the_difference_quotient_in_the_geometry_at_rest(
+    tmp_path: Path, shape: str, friction: float
+) -> None:
+    pad, rng = pad_folder(tmp_path, poisson=0.45, cells=12), np.random.default_rng(31)
+    twin = linear_twin(pad, force=EXACT, friction=friction)
+    twin.add(Body.sphere(4.0) if shape == "sphere" else Body.box(3, 2, 4))
+    height, kept = 3.75 if shape == "sphere" else 1.85, 0
+    for _ in range(4):
+        place = np.array([0.1, 0.05, height]) + rng.normal(0, [0.05, 0.05, 0.02])
+        kept += assert_derivative(twin, tilted(place, rng.normal(0, 3, 3)))
+    assert kept >= 3
+
+
 @pytest.mark.slow
 def test_random_bodies_poses_and_frictions(pad: Path) -> None:
     rng = np.random.default_rng(32)
