@@ -25,6 +25,7 @@ from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
 from gelslim_twin.contact.solver import ContactSolver, is_stationary, with_halved_steps
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.compliance.table_size import has_room
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError
 from ifem_export.operators.solver import ConvergenceError
@@ -203,4 +204,6 @@ class NonlinearContact:
     def _offset(self, u: Array) -> Array:
         if not u.any():
             return self._zero
-        return np.asarray(u - self.solver.compliance.whole(self.law.force(u)))
+        compliance = self.solver.compliance
+        assert isinstance(compliance, SurfaceCompliance), "large strain takes rigid bodies"
+        return np.asarray(u - compliance.whole(self.law.force(u)))

@@ -44,7 +44,7 @@ from gelslim_twin.contact.plane_iteration import (
 )
 from gelslim_twin.contact.tool import Tool, ToolSurface
 from gelslim_twin.scene.pose import Pose
-from ifem_export.compliance.pad_compliance import NodeCompliance, PadCompliance
+from ifem_export.compliance.pad_compliance import NodeCompliance, SurfaceResponse
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -73,11 +73,11 @@ class Candidates:
         return cls(np.zeros(0, np.intp), np.zeros((0, 0), np.float32))
 
     @classmethod
-    def of(cls, nodes: Nodes, compliance: PadCompliance) -> Candidates:
+    def of(cls, nodes: Nodes, compliance: SurfaceResponse) -> Candidates:
         """Candidates `nodes` (n,) in this order, with their compliance."""
         return cls(nodes, compliance.block(nodes))
 
-    def including(self, wanted: NDArray[np.bool_], compliance: PadCompliance) -> Candidates:
+    def including(self, wanted: NDArray[np.bool_], compliance: SurfaceResponse) -> Candidates:
         """Candidates that include all `wanted` (c,) nodes, and not too many others."""
         count = int(wanted.sum())
         inside = np.zeros(len(wanted), dtype=bool)
@@ -120,7 +120,7 @@ class ContactSolver:
     exactly with the same `candidates`.
     """
 
-    compliance: PadCompliance
+    compliance: SurfaceResponse
     tool: Tool
     settings: ContactSettings
 

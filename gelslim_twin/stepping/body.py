@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 import os
 from collections import OrderedDict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.contact.soft_layer import SoftLayer
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.contact.undercut import Undercut
 from gelslim_twin.scene.indenter import Indenter
@@ -65,10 +66,12 @@ class Body:
     Attributes:
         shape: Its shape about the origin that its poses place.
         name: Name in messages.
+        layer: The soft layer around its rigid core; None for a rigid body.
     """
 
     shape: Shape
     name: str
+    layer: SoftLayer | None = None
     _sides: OrderedDict[Direction, Side] = field(default_factory=OrderedDict, repr=False)
 
     @classmethod
@@ -139,6 +142,28 @@ class Body:
         if not indenters:
             raise StepError("a tool needs one indenter at least")
         return cls(IndenterShape(indenters, Path(folder), seed), name)
+
+    def with_layer(
+        self, youngs_modulus_mpa: float, thickness_mm: float, poissons_ratio: float = 0.45
+    ) -> Body:
+        """The same outer shape with a soft layer on a rigid core, as a cable has its sheath.
+
+        The layer counts as flat and isotropic, with small strains, as wide as the gel and bonded
+        to the core. It must be much thinner than the body's radius of curvature.
+
+        Args:
+            youngs_modulus_mpa: Young's modulus.
+            thickness_mm: Thickness.
+            poissons_ratio: Poisson's ratio, from 0 to below 0.5.
+
+        Raises:
+            StepError: A number is out of its range.
+        """
+        try:
+            layer = SoftLayer(youngs_modulus_mpa, poissons_ratio, thickness_mm)
+        except ValueError as error:
+            raise StepError(f"body {self.name}: {error}") from None
+        return replace(self, layer=layer)
 
     def side(self, turn: Array) -> Side:
         """The side that faces the gel under the rotation `turn` (3, 3) of the body.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.soft_layer import GelAndLayer, SoftLayer
 from gelslim_twin.contact.solver import (
     Candidates,
     ContactSettings,
@@ -28,6 +29,7 @@ from gelslim_twin.effects.contact_estimate import (
     contact_estimate,
 )
 from gelslim_twin.scene.pose import Pose
+from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.step_error import StepError
@@ -71,6 +73,7 @@ class StepMechanics:
     friction: float
     effects: Mapping[str, EffectParameters]
     _solver: ContactSolver = field(init=False, repr=False)
+    _soft: dict[SoftLayer, ContactSolver] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         geometry = geometry_of(self.compliance.bundle.material.poissons_ratio)
@@ -138,11 +141,12 @@ class StepMechanics:
         low, high = self.points_mm.min(axis=0), self.points_mm.max(axis=0)
         placement.require_no_undercut((high[0] - low[0], high[1] - low[1]), high[2])
         large_strain = self._needs_large_strain(contact)
-        solver = self._nonlinear.solver if large_strain else self._solver
+        large_strain &= placement.layer is None
+        solver = self._nonlinear.solver if large_strain else self._solver_with(placement.layer)
         solver.tool = placement.tool
         solver.candidates = last.candidates
         if len(last.candidates.block) != 3 * len(last.candidates.nodes):
-            solver.candidates = Candidates.of(last.candidates.nodes, self.compliance)
+            solver.candidates = Candidates.of(last.candidates.nodes, solver.compliance)
         if large_strain:
             self._nonlinear.forget()
         solve = self._nonlinear if large_strain else solver
@@ -152,14 +156,45 @@ class StepMechanics:
         excess = 0.0 if large_strain else contact.nonlinear_excess
         return SolvedStep(gel, solver.candidates, large_strain, excess)
 
-    def tangent_compliance(self, solved: SolvedStep, nodes: Nodes) -> Array:
+    def gel_alone(self, gel: GelState, layer: SoftLayer | None) -> GelState:
+        """The gel of a state that was solved for the motion relative to a body with a layer."""
+        if layer is None or not gel.force_n.any():
+            return gel
+        response = self._solver_with(layer).compliance
+        assert isinstance(response, GelAndLayer)
+        own = response.layer_motion_mm(np.arange(len(gel.force_n)), gel.force_n)
+        return replace(gel, displacement_mm=gel.displacement_mm - own)
+
+    def require_layers_fit(self, bodies: Sequence[Body]) -> None:
+        """Raise StepError for a soft layer beside other bodies, or on a gel at large strain."""
+        soft = [body.name for body in bodies if body.layer is not None]
+        if soft and len(bodies) > 1:
+            raise StepError(f"body {soft[0]} has a soft layer and must be the twin's only body")
+        if soft and self.effects["nonlinearity"].use == "on":
+            raise StepError(
+                f"body {soft[0]} has a soft layer, which is linear; nonlinearity must not be on"
+            )
+
+    def _solver_with(self, layer: SoftLayer | None) -> ContactSolver:
+        if layer is None:
+            return self._solver
+        if layer not in self._soft:
+            response = GelAndLayer.of(self.compliance, layer)
+            self._soft[layer] = ContactSolver(response, Tool(()), self._solver.settings)
+        return self._soft[layer]
+
+    def tangent_compliance(
+        self, solved: SolvedStep, nodes: Nodes, layer: SoftLayer | None = None
+    ) -> Array:
         """Compliance (3n, 3n) in mm/N among surface nodes of the gel as it is deformed.
+
+        That of the layer of the body is added.
 
         Raises ContactError for a gel that only the tool keeps from buckling.
         """
         if solved.large_strain:
             return self._nonlinear.compliance(solved.gel, nodes)
-        return self.compliance.block(nodes).astype(float)
+        return self._solver_with(layer).compliance.block(nodes).astype(float)
 
     def _needs_large_strain(self, contact: ContactEstimate) -> bool:
         use = self.effects["nonlinearity"].use

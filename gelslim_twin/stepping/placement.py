@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.contact.soft_layer import SoftLayer
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.contact.tool_group import GroupPose, ToolGroup, members_of
 from gelslim_twin.scene.pose import Pose
@@ -29,6 +30,7 @@ class Placement:
         pose: Its pose at the end of the step.
         before: Its pose at the start; None for the first step.
         names: Name of each body.
+        layer: The soft layer of the body, which is the only one then; None for rigid bodies.
     """
 
     bodies: tuple[int, ...]
@@ -37,6 +39,7 @@ class Placement:
     pose: Pose
     before: Pose | None
     names: tuple[str, ...]
+    layer: SoftLayer | None = None
 
     @property
     def name(self) -> str:
@@ -111,6 +114,7 @@ def placed(
         _joined(ends, times_s[1]),
         None if starts is None else _joined(starts, times_s[0]),
         tuple(bodies[k].name for k in near),
+        bodies[near[0]].layer,
     )
 
 

@@ -129,7 +129,7 @@ class Step:
         return wrench_derivative(
             self.points_mm,
             gel,
-            self.mechanics.tangent_compliance(self.solved, gel.touched.nodes),
+            self.mechanics.tangent_compliance(self.solved, gel.touched.nodes, self.placement.layer),
             self.placement,
             self.motions,
             self.mechanics.friction,

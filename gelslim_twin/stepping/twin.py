@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gelslim_twin.contact.soft_layer import SoftLayer
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.sensor import TwinSensor
@@ -135,7 +136,8 @@ class Twin:
             The same body.
 
         Raises:
-            StepError: It is no body, or the twin was stepped already.
+            StepError: It is no body, the twin was stepped already, or a body with a soft layer is
+                not the only one.
         """
         if not isinstance(body, Body):
             raise StepError(
@@ -144,6 +146,7 @@ class Twin:
             )
         if self._state.number:
             raise StepError("a body is added before the first step; call reset before")
+        self._shared.mechanics.require_layers_fit((*self._bodies, body))
         self._bodies = (*self._bodies, body)
         self._state = self._initial()
         return body
@@ -216,7 +219,8 @@ class Twin:
             self._bodies, motions, last.motions, (last.time_s, last.time_s + step_s), self._top_mm
         )
         solved = self._solved(motions, placement)
-        gel, memory = solved.gel, last.relaxation
+        gel = self._shared.mechanics.gel_alone(solved.gel, self._layer)
+        memory = last.relaxation
         series = self._shared.mechanics.series
         if series is not None:
             from gelslim_twin.contact.relaxation import at_rest, relax
@@ -224,6 +228,7 @@ class Twin:
             memory = at_rest(series, len(gel.force_n)) if memory is None else memory
             force, memory = relax(series, memory, gel.force_n, step_s)
             gel = replace(gel, force_n=force)
+        before = self._shared.mechanics.gel_alone(last.solved.gel, self._layer)
         self._state = TwinState(
             last.key, last.time_s + step_s, last.number + 1, motions, solved, memory
         )
@@ -234,7 +239,7 @@ class Twin:
             points_mm=self.points_mm,
             gel=gel,
             solved=solved,
-            before=last.solved.gel,
+            before=before,
             motions=motions,
             placement=placement,
             request=self._shared.request,
@@ -249,6 +254,10 @@ class Twin:
         if last.motions is not None and np.array_equal(motions, last.motions):
             return last.solved
         return mechanics.advanced(placement, last.solved)
+
+    @property
+    def _layer(self) -> SoftLayer | None:
+        return self._bodies[0].layer if self._bodies else None
 
     @property
     def _top_mm(self) -> float:
