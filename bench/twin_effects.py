@@ -26,6 +26,7 @@ from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_task import mechanics_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 MECHANICS = ("friction", "nonlinearity", "relaxation")
@@ -58,6 +59,11 @@ class Bench:
         steps = np.diff([p.time_s for p in self.loaded.poses])
         return float(np.median(steps)) if len(steps) else 0.0
 
+    @property
+    def compliance(self) -> SurfaceCompliance:
+        """Of the pad, as the folder of the sensor keeps it."""
+        return SurfaceCompliance(self.sensor.bundle, self.folder)
+
     @cached_property
     def question(self) -> Question:
         """All that can be observed, whatever the scene does."""
@@ -78,7 +84,7 @@ class Bench:
 
     def solved(self, **use: str) -> tuple[list[GelState], float]:
         """States and milliseconds per pose, without reading the sensor."""
-        contact = mechanics_of(self.loaded, self.plan(**use), self.sensor, self.folder)
+        contact = mechanics_of(self.loaded, self.plan(**use), self.compliance)
         started = time.perf_counter()
         states = list(contact.states(self.poses))
         return states, 1000 * (time.perf_counter() - started) / len(states)

@@ -95,7 +95,7 @@ class KeptBench(Bench):
 
     def solve(self, plan: Plan) -> list[GelState]:
         """States of the poses, solved now."""
-        contact = mechanics_of(self.loaded, plan, self.sensor, self.folder)
+        contact = mechanics_of(self.loaded, plan, self.compliance)
         return list(contact.states(self.poses))
 
     def mechanics_ms(self, plans: Sequence[Plan], rounds: int) -> list[float]:

@@ -15,10 +15,15 @@ if TYPE_CHECKING:
     from gelslim_core.budget.ladder import Choice
     from gelslim_twin.effects.circumstances import SensorFigures
     from gelslim_twin.planning.plan import Plan
+    from gelslim_twin.planning.planner import Question
     from gelslim_twin.scene.reader import LoadedScene
     from gelslim_twin.validation.score import Validation
+    from ifem_export.compliance.columns import SurfaceCompliance
 
     SceneLike = LoadedScene | str | os.PathLike[str]
+
+USUAL_ERROR = 0.01
+"""Relative error for which a scene is probed where a budget gives a time alone."""
 
 
 def scene_of(scene: SceneLike) -> LoadedScene:
@@ -33,27 +38,30 @@ def scene_of(scene: SceneLike) -> LoadedScene:
 
 
 def plan(scene: SceneLike, budget: Budget | None = None) -> Plan:
-    """Plan which physical effects a contact scene needs. Nothing is simulated.
+    """Plan which physical effects a contact scene needs.
+
+    A few poses of a long run are solved to find the sizes of effects; nothing else is simulated.
 
     Args:
         scene: The result of `read_scene`, or the path of a YAML file.
         budget: Error and time allowed; replaces the tolerance of the scene.
 
     Returns:
-        Each effect with the reason why it is kept or left out, the bound of the error of leaving
-        it out, and the time predicted.
+        Each effect with the reason why it is kept or left out, the error of leaving it out, and
+        the time predicted.
 
     Raises:
         InputError: The scene or its sensor has faults.
         BudgetError: No plan keeps the budget.
     """
     from gelslim.scene_sensor import require_within_gel, sensor_figures
-    from gelslim_twin.planning.question import plan_scene
+    from gelslim_twin.planning.question import question
+    from gelslim_twin.simulation.scene_task import planned
 
     loaded, _ = with_budget(scene_of(scene), budget)
     figures = sensor_figures(loaded)
     require_within_gel(loaded, figures.thickness_mm)
-    return plan_scene(loaded, figures)
+    return planned(loaded, question(loaded, figures), lambda: _compliance(loaded))
 
 
 def simulate(
@@ -167,6 +175,8 @@ def with_budget(
 ) -> tuple[LoadedScene, tuple[Choice, bool] | None]:
     """Give a scene the tolerance of a budget.
 
+    Errors are relative to the force of the deepest contact, for which a few poses are solved.
+
     Returns:
         The scene, unchanged without a budget; and the choice with whether its times are those of
         this machine, or None without a budget.
@@ -177,13 +187,48 @@ def with_budget(
     if budget is None or budget.unlimited:
         return loaded, None
     from gelslim.scene_sensor import sensor_figures
-    from gelslim_twin.planning.question import question
     from gelslim_twin.planning.tolerance_ladder import choose_tolerance
 
     figures = sensor_figures(loaded)
     paces = machine_paces(figures)
-    choice, allowed = choose_tolerance(question(loaded, figures), budget, paces)
+    asked = _solved_question(loaded, figures, budget.error or USUAL_ERROR)
+    choice, allowed = choose_tolerance(asked, budget, paces)
     return loaded.with_tolerance(allowed.force_n, allowed.image_px), (choice, bool(paces))
+
+
+def _solved_question(loaded: LoadedScene, figures: SensorFigures, error: float) -> Question:
+    """Return the question of a scene with its force solved, and the sizes of effects if it pays.
+
+    `error` is the relative error at which it may pay.
+    """
+    from dataclasses import replace
+
+    from gelslim_twin.planning.planner import make_plan
+    from gelslim_twin.planning.probing import effects_to_probe, probe_ms
+    from gelslim_twin.planning.question import question
+    from gelslim_twin.planning.tolerance_ladder import tolerance_at
+    from gelslim_twin.simulation.probe import probed
+
+    asked = question(loaded, figures)
+    if asked.circumstances.contact.normal_n <= 0:
+        return asked
+    compliance = _compliance(loaded)
+    solved = probed(asked, loaded, compliance)
+    allowed = tolerance_at(solved, error)
+    bounded = replace(asked, force_n=allowed.force_n, image_px=allowed.image_px)
+    plan = make_plan(bounded)
+    effects = effects_to_probe(bounded, plan)
+    if not effects:
+        return solved
+    return probed(asked, loaded, compliance, effects, probe_ms(bounded, plan, effects))
+
+
+def _compliance(loaded: LoadedScene) -> SurfaceCompliance:
+    """Return the compliance of the pad of a scene's sensor; nothing is stored."""
+    from gelslim.scene_sensor import scene_bundle
+    from ifem_export.compliance.columns import SurfaceCompliance
+
+    return SurfaceCompliance(scene_bundle(loaded, with_light=False))
 
 
 def twin_key(figures: SensorFigures) -> str:
@@ -220,9 +265,9 @@ def _one(
     from gelslim_twin.simulation.simulate import simulate as simulated
 
     place = _sensor_folder(folder)
-    job = job_of(loaded, stored_sensor(place), place)
     # As in the workers of a data set, where several threads are slower than one.
     with threadpool_limits(limits=1, user_api="blas"):
+        job = job_of(loaded, stored_sensor(place), place)
         ledger = simulated(job, folder, overwrite=overwrite, progress=progress)
     return {"folder": str(folder), "scenes": 1, "poses": len(loaded.poses), **ledger.to_record()}
 

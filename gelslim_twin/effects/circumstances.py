@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from pydantic import Field
 
@@ -17,6 +17,9 @@ from gelslim_twin.effects.contact_estimate import (
     Footprint,
     contact_estimate,
 )
+
+if TYPE_CHECKING:
+    from gelslim_twin.effects.effect import Bound
 
 Use = Literal["auto", "on", "off"]
 
@@ -143,14 +146,45 @@ class MotionFigures:
 
 
 @dataclass(frozen=True)
+class Probed:
+    """What solving the hardest poses of a scene found, before it is planned.
+
+    Attributes:
+        normal_n: Largest normal force on a linear gel.
+        resultant_n: Largest resultant on a linear gel, with the friction of the scene.
+        sizes: By effect, the error of leaving it out as found at these poses, times a safety
+            factor for the other poses. Effects that were not probed are absent.
+        corrected: Error of the contact that is corrected once for large strain, likewise; None
+            where that was not probed.
+        milliseconds: Declared time of the probe.
+    """
+
+    normal_n: float
+    resultant_n: float
+    sizes: Mapping[str, Bound]
+    corrected: Bound | None = None
+    milliseconds: float = 0.0
+
+
+@dataclass(frozen=True)
 class Circumstances:
-    """Everything that bounds depend on: sensor, motion, footprint, friction and parameters."""
+    """Everything that bounds depend on.
+
+    Attributes:
+        sensor: Figures of the sensor.
+        motion: Extreme values of the motion.
+        footprint: Size of the tool by depth.
+        friction: Coulomb's coefficient.
+        parameters: The parameters of every effect by name.
+        probed: What was found by solving; None where all is estimated.
+    """
 
     sensor: SensorFigures
     motion: MotionFigures
     footprint: Footprint
     friction: float
     parameters: Mapping[str, EffectParameters]
+    probed: Probed | None = None
 
     def given(self, effect: str, kind: type[P]) -> P:
         """The parameters of `effect`."""
@@ -177,8 +211,15 @@ class Circumstances:
         return self.contact.area_mm2 / self.sensor.node_pitch_mm**2
 
     @property
+    def normal_n(self) -> float:
+        """Normal force of the deepest contact on a linear gel, solved or estimated."""
+        return self.contact.normal_n if self.probed is None else self.probed.normal_n
+
+    @property
     def force_n(self) -> float:
-        """Upper estimate of the resultant of the deepest contact, with friction, linear gel."""
+        """Largest resultant on a linear gel with friction: solved, or an upper estimate."""
+        if self.probed is not None:
+            return RIDGES * self.probed.resultant_n
         t, mu = self.contact, self.friction
         normal = t.normal_n + min(mu, 1.0) * (t.stick_n - t.normal_n)
         return RIDGES * math.hypot(1.0, mu) * normal

@@ -42,7 +42,7 @@ def solver_error(c: Circumstances, tolerance: float) -> Bound:
     tip = (NARROW / max(NARROW, across)) ** 2 * FEW / max(FEW, c.contact_nodes)
     root = math.sqrt(tolerance)
     places = root * max(PLACES, MOST_PLACES * tip) * c.contact.depth_mm * c.sensor.px_per_mm
-    return geometry(places, root * max(FORCE, MOST_FORCE * tip) * c.contact.normal_n)
+    return geometry(places, root * max(FORCE, MOST_FORCE * tip) * c.normal_n)
 
 
 def normal_contact_bound(c: Circumstances) -> Bound:
@@ -172,13 +172,24 @@ NEWTON_PLACES, NEWTON_FORCE = 0.2, 0.1
 """Errors over depth and over bound per unit of tolerance; solved contacts reach 0.12 and 0.02."""
 NEWTON_RUNGS = (("coarse", 1e-2, 250.0), ("medium", 1e-3, 350.0), ("fine", 1e-4, 450.0))
 """Rungs with their times on the gallery's paths; distant poses or sliding walls take twice that."""
+CORRECTION_MS = 30.0
+"""Time of one correction of a linear contact by the neo-Hookean law."""
+
+
+def correction_ms(c: Circumstances) -> float:
+    """Declared time of one correction on the pad of a sensor."""
+    return CORRECTION_MS * c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
 
 
 def nonlinearity_ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """Relative tolerance of the residual in Newton's method."""
+    """One correction of the linear contact, or the relative tolerance of the residual.
+
+    The correction is offered where a probe has made it at the hardest poses: at large depths the
+    linear displacement inverts cells of the mesh, and there is no such correction.
+    """
     whole, nodes = nonlinearity_bound(c), c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
     places = NEWTON_PLACES * c.contact.depth_mm * c.sensor.px_per_mm
-    return tuple(
+    converged = tuple(
         Rung(
             name,
             geometry(t * places, t * NEWTON_FORCE * whole.force_n).at_most(whole),
@@ -187,6 +198,15 @@ def nonlinearity_ladder(c: Circumstances) -> tuple[Rung, ...]:
         )
         for name, t, ms in NEWTON_RUNGS
     )
+    if c.probed is None or c.probed.corrected is None:
+        return converged
+    once = Rung(
+        "one correction",
+        c.probed.corrected.at_most(whole),
+        correction_ms(c),
+        implementation="gelslim_twin.contact.corrected_contact",
+    )
+    return (once, *converged)
 
 
 NONLINEARITY = Effect(

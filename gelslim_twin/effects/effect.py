@@ -38,6 +38,18 @@ class Bound:
         """The smaller error of each observable."""
         return Bound(*map(min, astuple(self), astuple(other)))
 
+    def at_least(self, other: Bound) -> Bound:
+        """The larger error of each observable."""
+        return Bound(*map(max, astuple(self), astuple(other)))
+
+    def plus(self, other: Bound) -> Bound:
+        """The sum of the errors of each observable."""
+        return Bound(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def times(self, factor: float) -> Bound:
+        """Every error times a factor."""
+        return Bound(*(factor * value for value in astuple(self)))
+
     def to_record(self) -> dict[str, float]:
         """Errors by observable and unit."""
         return {f"{o}_{unit_of(o)}": self.of(o) for o in OBSERVABLES}
@@ -72,6 +84,8 @@ class Rung:
     milliseconds: float
     """Predicted, per pose, on one core."""
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    implementation: str = ""
+    """Module to import, where it is not that of the effect."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +120,18 @@ class Effect:
     refines: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
     does_nothing: Callable[[Circumstances], bool] | None = None
+
+    def size(self, c: Circumstances) -> Bound:
+        """Error of leaving it out: its bound, or what a probe found where that is less."""
+        bound = self.bound(c)
+        if not self.was_probed(c):
+            return bound
+        assert c.probed is not None
+        return bound.at_most(c.probed.sizes[self.name])
+
+    def was_probed(self, c: Circumstances) -> bool:
+        """Whether a probe solved the hardest poses with and without it."""
+        return c.probed is not None and self.name in c.probed.sizes
 
     def is_null(self, c: Circumstances, bound: Bound | None = None) -> bool:
         """Whether its parameters make it do nothing; `bound` is its bound, where it is known."""

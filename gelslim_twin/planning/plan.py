@@ -9,7 +9,8 @@ from typing import Any
 
 from gelslim_twin.effects.effect import Bound, unit_of
 
-FORMAT = "gelslim-plan/1"
+FORMAT = "gelslim-plan/2"
+TITLES = ("effect", "", "if left out", "found by", "rung", "ms", "why")
 
 
 @dataclass(frozen=True)
@@ -19,13 +20,15 @@ class Choice:
     effect: str
     included: bool
     why: str
-    bound: Bound
-    """Largest error of leaving it out."""
+    size: Bound
+    """Error of leaving it out: what a probe found with a safety factor, or else its bound."""
     shares: tuple[tuple[str, float], ...]
     """Per observable, the share of the tolerance that the effect may use up. It is empty where
     nothing observed depends on the effect."""
     error: Bound
-    """Its bound where it is left out, the error of its rung where it is simulated."""
+    """Its size where it is left out, the error of its rung where it is simulated."""
+    probed: bool = False
+    """Whether a probe found the size."""
     formula: str = ""
     rung: str = ""
     rung_parameters: tuple[tuple[str, Any], ...] = ()
@@ -33,11 +36,36 @@ class Choice:
     """Per pose."""
     implementation: str = ""
     """Module to import; empty where left out."""
+    saved_ms: float = 0.0
+    """Per pose, what it would take by its cheapest sufficient rung, where it is left out."""
+
+    @property
+    def spent_ms(self) -> float:
+        """Milliseconds per pose that it takes, negative where leaving it out saves them."""
+        return self.predicted_ms if self.included else -self.saved_ms
+
+    @property
+    def found_by(self) -> str:
+        """How its size was found: `probe` or `bound`."""
+        return "probe" if self.probed else "bound"
 
     @property
     def over_share(self) -> tuple[str, ...]:
         """Observables whose error by this effect exceeds its share."""
         return tuple(o for o, share in self.shares if self.error.of(o) > share)
+
+    def cells(self) -> tuple[str, ...]:
+        """The cells of its row under `TITLES`; saved milliseconds are negative."""
+        value, unit = self.most_relevant(self.size)
+        return (
+            self.effect,
+            "in" if self.included else "out",
+            f"{value:.3g} {unit}" if value else "0",
+            self.found_by if value else "",
+            self.rung,
+            f"{self.spent_ms:+.3g}" if self.spent_ms else "",
+            self.why,
+        )
 
     def most_relevant(self, bound: Bound) -> tuple[float, str]:
         """The value of `bound` that is largest relative to its share, with its unit, N or px."""
@@ -54,13 +82,15 @@ class Choice:
             "effect": self.effect,
             "included": self.included,
             "why": self.why,
-            "bound": self.bound.to_record(),
+            "size": self.size.to_record(),
+            "found_by": self.found_by,
             "formula": self.formula,
             "share": dict(self.shares),
             "error": self.error.to_record(),
             "rung": self.rung,
             "rung_parameters": dict(self.rung_parameters),
             "predicted_ms": self.predicted_ms,
+            "saved_ms": self.saved_ms,
             "implementation": self.implementation,
         }
 
@@ -77,6 +107,7 @@ class Plan:
         choices: One entry per effect.
         order: Names of the included effects, in the order of application.
         poses: Number of poses.
+        probe_ms: Predicted time of the probe, 0 where there was none.
     """
 
     scene: str
@@ -86,6 +117,7 @@ class Plan:
     choices: tuple[Choice, ...]
     order: tuple[str, ...]
     poses: int
+    probe_ms: float = 0.0
 
     @property
     def included(self) -> tuple[Choice, ...]:
@@ -128,6 +160,7 @@ class Plan:
             "poses": self.poses,
             "order": list(self.order),
             "predicted_ms_per_pose": self.predicted_ms,
+            "probe_ms": self.probe_ms,
             "error": {f"{o}_{unit_of(o)}": self.error(o) for o in self.observe},
             "over_tolerance": [o for o, _ in self.over_tolerance],
             "effects": [choice.to_record() for choice in self.choices],
@@ -143,21 +176,19 @@ class Plan:
 
     def __str__(self) -> str:
         """A table as text."""
-        rows = [("effect", "", "bound", "rung", "ms", "why")]
-        for c in self.choices:
-            value, unit = c.most_relevant(c.bound)
-            time = f"{c.predicted_ms:.3g}" if c.included else ""
-            state = "in" if c.included else "out"
-            size = f"{value:.3g} {unit}" if value else "0"
-            rows.append((c.effect, state, size, c.rung, time, c.why))
-        widths = [max(len(row[k]) for row in rows) for k in range(5)]
+        rows = [TITLES, *(choice.cells() for choice in self.choices)]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(TITLES) - 1)]
         lines = [
-            "  ".join(cell.ljust(w) for cell, w in zip(row[:5], widths, strict=True))
-            + f"  {row[5]}"
+            "  ".join(cell.ljust(w) for cell, w in zip(row[:-1], widths, strict=True))
+            + f"  {row[-1]}"
             for row in rows
         ]
-        lines.append(
+        return "\n".join([*lines, self.time_text()])
+
+    def time_text(self) -> str:
+        """The time predicted of a pose, of all poses and of the probe."""
+        text = (
             f"{self.predicted_ms:.3g} ms per pose, {self.poses} poses: "
             f"{self.predicted_ms * self.poses / 1000:.3g} s"
         )
-        return "\n".join(lines)
+        return f"{text}; probe {self.probe_ms / 1000:.2g} s" if self.probe_ms else text

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from gelslim_core.errors import GelslimError
 from gelslim_twin.effects.circumstances import Circumstances
 from gelslim_twin.effects.effect import GIVEN, Bound, Effect, Rung, unit_of
 from gelslim_twin.effects.registry import EFFECTS
+from gelslim_twin.planning.leftover import with_leftover_spent
 from gelslim_twin.planning.plan import Choice, Plan
 
 
@@ -43,10 +44,10 @@ class Question:
     """Bounds and ladders by effect, since the planner needs them in every iteration."""
 
     def weighed(self, effect: Effect) -> tuple[Bound, tuple[Rung, ...]]:
-        """The bound of an effect (zero where its parameters do nothing) and its ladder."""
+        """The size of an effect (zero where its parameters do nothing) and its ladder."""
         if effect not in self._kept:
             c = self.circumstances
-            bound = effect.bound(c)
+            bound = effect.size(c)
             bound = Bound() if effect.is_null(c, bound) else bound
             self._kept[effect] = bound, tuple(effect.ladder(c))
         return self._kept[effect]
@@ -65,8 +66,9 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
 
     For each observable the tolerance is shared evenly among the effects that can use it up. An
     effect left out contributes its bound, a simulated one the error of its rung, and neither may
-    exceed a share, so that the sum keeps the tolerance. Exceptions are effects that the scene
-    switches off and effects whose best rung errs more; `Plan.over_tolerance` lists them.
+    exceed a share, so that the sum keeps the tolerance. What is left of the tolerance then goes to
+    the effects that save most time by it. Exceptions are effects that the scene switches off and
+    effects whose best rung errs more; `Plan.over_tolerance` lists them.
 
     Raises:
         PlanError: The only provider of something needed is switched off.
@@ -77,12 +79,13 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
         needed = _closure(question, effects, needed, decided)
         relevant = [e for e in effects if needed & {*e.provides, *e.refines}]
         shares = _shares(question, relevant)
-        decided = {e.name: _decide(question, e, e in relevant, shares) for e in effects}
+        equal = {e.name: _decide(question, e, e in relevant, shares) for e in effects}
+        decided = _with_leftover_spent(question, relevant, shares, equal)
         wanted = needed.union(*(e.needs for e in effects if decided[e.name].included)) - GIVEN
         if wanted == needed:
             break
         needed = wanted
-    order = _ordered([e for e in effects if decided[e.name].included])
+    order, c = _ordered([e for e in effects if decided[e.name].included]), question.circumstances
     return Plan(
         question.name,
         question.observe,
@@ -90,7 +93,8 @@ def make_plan(question: Question, effects: Sequence[Effect] = EFFECTS) -> Plan:
         question.image_px,
         tuple(decided[e.name] for e in effects),
         tuple(e.name for e in order),
-        question.circumstances.motion.poses,
+        c.motion.poses,
+        0.0 if c.probed is None else c.probed.milliseconds,
     )
 
 
@@ -140,8 +144,8 @@ def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
 
     An effect that must be simulated and has exact rungs only causes none.
     """
-    bound, ladder = question.weighed(effect)
-    lost = bound.of(observable)
+    size, ladder = question.weighed(effect)
+    lost = size.of(observable)
     if lost <= 0:
         return False
     if not effect.provides and lost <= question.tolerance(observable):
@@ -151,22 +155,46 @@ def _may_cost(question: Question, effect: Effect, observable: str) -> bool:
 
 def _decide(question: Question, effect: Effect, relevant: bool, shares: dict[str, float]) -> Choice:
     c, use = question.circumstances, question.use(effect)
-    bound, ladder = question.weighed(effect)
+    size, ladder = question.weighed(effect)
     if not relevant:
-        return _choice(effect, bound, "not observed", {})
+        return _choice(question, effect, "not observed", {})
     if use == "off":
-        return _choice(effect, bound, "switched off", shares)
+        return _choice(question, effect, "switched off", shares)
     if use == "on":
-        return _choice(effect, bound, "switched on", shares, ladder)
+        return _choice(question, effect, "switched on", shares, ladder)
     if effect.provides:
         made = ", ".join(effect.provides)
-        return _choice(effect, bound, f"provides {made}", shares, ladder)
-    if effect.is_null(c, bound):
-        return _choice(effect, bound, "parameters nil", shares)
-    if all(bound.of(observable) <= share for observable, share in shares.items()):
-        return _choice(effect, bound, "below its share", shares)
-    worst = max(shares, key=lambda o: _excess(bound.of(o), shares[o]))
-    return _choice(effect, bound, f"matters to {worst}", shares, ladder)
+        return _choice(question, effect, f"provides {made}", shares, ladder)
+    if effect.is_null(c, size):
+        return _choice(question, effect, "parameters nil", shares)
+    if all(size.of(observable) <= share for observable, share in shares.items()):
+        return _choice(question, effect, "below its share", shares)
+    worst = max(shares, key=lambda o: _excess(size.of(o), shares[o]))
+    return _choice(question, effect, f"matters to {worst}", shares, ladder)
+
+
+def _with_leftover_spent(
+    question: Question,
+    relevant: Sequence[Effect],
+    shares: dict[str, float],
+    decided: dict[str, Choice],
+) -> dict[str, Choice]:
+    """The decisions with what is left of the tolerance spent on savings of time."""
+    cheaper, allowed = {}, {o: question.tolerance(o) for o in question.observe}
+    for effect in relevant:
+        choice, use = decided[effect.name], question.use(effect)
+        if use == "off":
+            # What a scene switches off may err by more than all others together.
+            for o in allowed:
+                allowed[o] += max(0.0, choice.error.of(o) - shares[o])
+        if not choice.included:
+            continue
+        _, ladder = question.weighed(effect)
+        others = [_choice(question, effect, choice.why, shares, (rung,)) for rung in ladder]
+        if use == "auto" and not effect.provides:
+            others.append(_choice(question, effect, "within what others leave", shares))
+        cheaper[effect.name] = others
+    return with_leftover_spent(decided, cheaper, allowed)
 
 
 def _excess(error: float, share: float) -> float:
@@ -174,29 +202,36 @@ def _excess(error: float, share: float) -> float:
 
 
 def _choice(
+    question: Question,
     effect: Effect,
-    bound: Bound,
     why: str,
     shares: dict[str, float],
     ladder: Sequence[Rung] | None = None,
 ) -> Choice:
     """Simulate an effect by a rung of `ladder`, or leave it out where there is no ladder."""
-    pairs = tuple(shares.items())
-    if ladder is None:
-        return Choice(effect.name, False, why, bound, pairs, bound, formula=effect.formula)
-    rung = _rung(ladder, shares)
-    return Choice(
+    size, every = question.weighed(effect)
+    absent = Choice(
         effect.name,
-        True,
+        False,
         why,
-        bound,
-        pairs,
-        rung.error,
+        size,
+        tuple(shares.items()),
+        size,
+        probed=effect.was_probed(question.circumstances),
         formula=effect.formula,
+    )
+    if ladder is None:
+        saved_ms = _rung(every, shares).milliseconds if size != Bound() else 0.0
+        return replace(absent, saved_ms=saved_ms)
+    rung = _rung(ladder, shares)
+    return replace(
+        absent,
+        included=True,
+        error=rung.error,
         rung=rung.name,
         rung_parameters=tuple(sorted(rung.parameters.items())),
         predicted_ms=rung.milliseconds,
-        implementation=effect.implementation,
+        implementation=rung.implementation or effect.implementation,
     )
 
 

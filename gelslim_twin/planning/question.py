@@ -27,21 +27,26 @@ Vector = tuple[float, float, float]
 
 
 def plan_scene(loaded: LoadedScene, sensor: SensorFigures) -> Plan:
-    """Choose the effects that a scene needs.
+    """Choose the effects that a scene needs by their bounds alone.
 
     Args:
         loaded: The scene.
         sensor: Figures of its sensor, for example from `bundle_figures`.
 
     Returns:
-        Every effect with its bound, whether it is simulated, and how finely.
+        Every effect with its size, whether it is simulated, and how finely.
 
     Raises:
         InputError: An effect is switched off without which something observed cannot be computed;
             it names the line.
     """
+    return plan_asked(loaded, question(loaded, sensor))
+
+
+def plan_asked(loaded: LoadedScene, asked: Question) -> Plan:
+    """The plan of a scene's question, such as one with a probe. Raises as `plan_scene`."""
     try:
-        return make_plan(question(loaded, sensor))
+        return make_plan(asked)
     except PlanError as error:
         name = f"effects.{error.effect}" if error.effect else "observe"
         used = f"{name}.use" if f"{name}.use" in loaded.source_map else name

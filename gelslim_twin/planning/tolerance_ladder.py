@@ -39,10 +39,10 @@ class Tolerance:
 def scale(circumstances: Circumstances) -> Tolerance:
     """Force and depth that relative errors refer to.
 
-    The force is the estimate itself, not the upper bound of it that the effects use. Raises
-    BudgetError where nothing touches the gel.
+    The force is that which a probe solved, or else the estimate itself, not the upper bound of it
+    that the effects use. Raises BudgetError where nothing touches the gel.
     """
-    force_n = circumstances.contact.normal_n
+    force_n = circumstances.normal_n
     depth_px = circumstances.contact.depth_mm * circumstances.sensor.px_per_mm
     if not (force_n > 0 and depth_px > 0):
         raise BudgetError(
@@ -117,6 +117,8 @@ def _switched_off(question: Question, effect: str) -> bool:
 
 
 def _outside(circumstances: Circumstances) -> tuple[str, ...]:
+    if circumstances.probed is not None:
+        return ()
     low, high = FITTED_RADII
     ratio = circumstances.contact.radius_mm / circumstances.sensor.thickness_mm
     if low <= ratio <= high:

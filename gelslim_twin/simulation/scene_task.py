@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gelslim_twin.planning.plan import Choice, Plan
-from gelslim_twin.planning.question import bundle_figures, contact_friction, plan_scene
+from gelslim_twin.planning.planner import Question
+from gelslim_twin.planning.probing import effects_to_probe, probe_ms
+from gelslim_twin.planning.question import (
+    bundle_figures,
+    contact_friction,
+    plan_asked,
+    question,
+)
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
 from gelslim_twin.simulation.simulate import Mechanics, SimulationJob, simulate
+
+if TYPE_CHECKING:
+    from ifem_export.compliance.columns import SurfaceCompliance
+    from ifem_export.compliance.pad_compliance import PadCompliance
 
 
 @dataclass(frozen=True)
@@ -48,7 +61,7 @@ def perform(task: SceneTask) -> dict[str, Any]:
 
 
 def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJob:
-    """Plan a scene for a stored sensor and prepare its simulation.
+    """Plan a scene for a stored sensor and prepare its simulation; a probe is made where it pays.
 
     Args:
         loaded: The scene.
@@ -63,7 +76,13 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
             an undercut of a mesh.
     """
     require_no_undercut(loaded, sensor)
-    plan = plan_scene(loaded, bundle_figures(folder / BUNDLE))
+
+    @cache
+    def compliance(skin: bool = False) -> PadCompliance:
+        return pad_compliance(sensor, folder, skin=skin)
+
+    asked = question(loaded, bundle_figures(folder / BUNDLE))
+    plan = planned(loaded, asked, compliance if can_be_probed(sensor) else None)
     if {"skin", "nonlinearity"} <= set(plan.order):
         raise loaded.problem(
             "effects.nonlinearity",
@@ -81,7 +100,7 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         loaded.poses,
         plan,
         sensor,
-        lambda: mechanics_of(loaded, plan, sensor, folder),
+        lambda: mechanics_of(loaded, plan, compliance("skin" in plan.order)),
     )
 
 
@@ -113,10 +132,64 @@ def require_no_undercut(loaded: LoadedScene, sensor: TwinSensor) -> None:
                 )
 
 
-def mechanics_of(
-    loaded: LoadedScene, plan: Plan, sensor: TwinSensor, folder: Path | None = None
-) -> Mechanics:
-    """The mechanical model of a planned scene; the pad's compliance is stored in `folder`.
+def can_be_probed(sensor: TwinSensor) -> bool:
+    """Whether a probe serves a sensor: it takes a bare gel and a table of columns."""
+    from ifem_export.compliance.table_size import has_room
+
+    return sensor.bundle.skin is None and has_room(len(sensor.bundle.mesh.surface))
+
+
+def planned(
+    loaded: LoadedScene, asked: Question, compliance: Callable[[], SurfaceCompliance] | None
+) -> Plan:
+    """Plan a scene; where it pays, a probe finds the sizes of effects before.
+
+    Args:
+        loaded: The scene.
+        asked: The scene as the planner takes it, without a probe.
+        compliance: Gives the compliance of the pad, called only for a probe; None for a pad that
+            is not probed.
+
+    Returns:
+        The plan.
+
+    Raises:
+        InputError: As `plan_scene`.
+    """
+    plan = plan_asked(loaded, asked)
+    effects = effects_to_probe(asked, plan)
+    if not effects or compliance is None:
+        return plan
+    from gelslim_twin.simulation.probe import probed
+
+    spent_ms = probe_ms(asked, plan, effects)
+    return plan_asked(loaded, probed(asked, loaded, compliance(), effects, spent_ms))
+
+
+def pad_compliance(
+    sensor: TwinSensor, folder: Path | None = None, *, skin: bool = False
+) -> PadCompliance:
+    """The compliance of a sensor's pad: a table of columns where that fits, else a convolution.
+
+    Args:
+        sensor: The sensor.
+        folder: Folder that keeps the columns.
+        skin: Whether the coat and the fabric of the gel count.
+    """
+    from ifem_export.compliance.table_size import has_room
+
+    membranes = sensor.bundle.skin.membranes if skin and sensor.bundle.skin else ()
+    if has_room(len(sensor.bundle.mesh.surface)):
+        from ifem_export.compliance.columns import SurfaceCompliance
+
+        return SurfaceCompliance(sensor.bundle, folder, membranes)
+    from ifem_export.compliance.convolved import ConvolvedCompliance
+
+    return ConvolvedCompliance(sensor.bundle, membranes)
+
+
+def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> Mechanics:
+    """The mechanical model of a planned scene on a pad.
 
     Only modules of effects in the plan are imported. Raises ValueError or OSError for a mesh
     that cannot be read.
@@ -128,12 +201,11 @@ def mechanics_of(
     tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:
         tolerance = min(tolerance, _tolerance(chosen["friction"]))
-        skin = sensor.bundle.skin
+        skin = compliance.bundle.skin
         friction = contact_friction(loaded.scene.contact, None if skin is None else skin.friction)
     settings = solver.ContactSettings(tolerance, friction)
     tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
-    membranes = sensor.bundle.skin.membranes if "skin" in chosen and sensor.bundle.skin else ()
-    contact: Any = _linear_contact(solver, sensor, folder, membranes, tool, settings)
+    contact: Any = _linear_contact(solver, compliance, tool, settings)
     if "nonlinearity" in chosen:
         nonlinear = import_module(chosen["nonlinearity"].implementation)
         contact = nonlinear.NonlinearContact(
@@ -147,25 +219,14 @@ def mechanics_of(
     return contact
 
 
-def _linear_contact(
-    solver: Any,
-    sensor: TwinSensor,
-    folder: Path | None,
-    skin: tuple[Any, ...],
-    tool: Any,
-    settings: Any,
-) -> Any:
-    """The contact of a linear gel: by a table of columns where that fits, else by convolution."""
+def _linear_contact(solver: Any, compliance: PadCompliance, tool: Any, settings: Any) -> Any:
     from ifem_export.compliance.table_size import has_room
 
-    if has_room(len(sensor.bundle.mesh.surface)):
-        from ifem_export.compliance.columns import SurfaceCompliance
-
-        return solver.ContactSolver(SurfaceCompliance(sensor.bundle, folder, skin), tool, settings)
+    if has_room(len(compliance.bundle.mesh.surface)):
+        return solver.ContactSolver(compliance, tool, settings)
     from gelslim_twin.contact.fine_contact import FineContact
-    from ifem_export.compliance.convolved import ConvolvedCompliance
 
-    return FineContact(ConvolvedCompliance(sensor.bundle, skin), tool, settings)
+    return FineContact(compliance, tool, settings)
 
 
 def _tolerance(choice: Choice) -> float:

@@ -29,7 +29,7 @@ def test_a_switched_off_effect_that_matters_is_told(capsys):
     over = json.loads(capsys.readouterr().out)["over_tolerance"]
     assert "force" in over
     assert main(["plan", str(SCENES / "shear_sphere.yaml")]) == 0
-    assert "nonlinearity" in capsys.readouterr().out.partition(" poses, ")[2]
+    assert "nonlinearity" in capsys.readouterr().out.partition(" poses: ")[2]
 
 
 def test_json_from_a_bundle_is_that_from_its_spec(tmp_path, capsys):
@@ -47,7 +47,7 @@ def test_json_from_a_bundle_is_that_from_its_spec(tmp_path, capsys):
     for one, other in zip(plans[0]["effects"], plans[1]["effects"], strict=True):
         assert one["included"] == other["included"]
         assert one["rung"] == other["rung"]
-        assert one["bound"] == pytest.approx(other["bound"], rel=1e-6)
+        assert one["size"] == pytest.approx(other["size"], rel=1e-6)
 
 
 @pytest.mark.parametrize(

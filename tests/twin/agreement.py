@@ -23,9 +23,10 @@ from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.scene_task import mechanics_of
+from gelslim_twin.simulation.scene_task import mechanics_of, planned
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation")
@@ -89,6 +90,15 @@ class Trial:
         use = {e.name: "off" if e.name in self.off or e.name in without else "on" for e in EFFECTS}
         return self._planned(use)
 
+    @property
+    def compliance(self) -> SurfaceCompliance:
+        """Of the pad, as the folder of the sensor keeps it."""
+        return SurfaceCompliance(self.sensor.bundle, self.folder)
+
+    def probed(self) -> Plan:
+        """As the planner decides, with a probe where it pays."""
+        return planned(self.loaded, self.asked, lambda: self.compliance)
+
     def _planned(self, use: Mapping[str, str]) -> Plan:
         c = self.asked.circumstances
         given = {n: p.model_copy(update={"use": use[n]}) for n, p in c.parameters.items()}
@@ -108,9 +118,7 @@ class Trial:
 
     def carried_out(self, plan: Plan, states: tuple[GelState, ...] = ()) -> Outcome:
         """The plan's states, solved unless given, and its view of them."""
-        found = states or tuple(
-            mechanics_of(self.loaded, plan, self.sensor, self.folder).states(self.poses)
-        )
+        found = states or tuple(mechanics_of(self.loaded, plan, self.compliance).states(self.poses))
         viewer = Viewer(self.sensor, plan, self.loaded.scene)
         return Outcome(plan, found, viewer, tuple(p.time_s for p in self.poses))
 

@@ -12,7 +12,7 @@ from gelslim.cli.budget import PoseTime, SceneError, budgeted_scene
 from gelslim.cli.options import AsJson
 
 if TYPE_CHECKING:
-    from gelslim_twin.planning.plan import Choice, Plan
+    from gelslim_twin.planning.plan import Plan
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene's YAML file.")]
 
@@ -25,8 +25,9 @@ def plan(
 ) -> int:
     """Print which physical effects a contact scene needs.
 
-    For each effect it says whether it is included and why, the largest error of leaving it out,
-    the chosen rung and the predicted time. Nothing is simulated or written.
+    For each effect it says whether it is included and why, the error of leaving it out and whether
+    a probe or a bound found it, the chosen rung, and the milliseconds per pose that it takes or
+    that leaving it out saves. A few poses of a long run are solved for that; nothing is written.
     """
     from gelslim.contacts import plan as planned
     from gelslim_twin.scene.reader import read_scene
@@ -42,18 +43,16 @@ def plan(
 def print_plan(made: Plan) -> None:
     """Print a table of the effects, and which of them exceed the tolerance."""
     from gelslim_twin.effects.effect import unit_of
+    from gelslim_twin.planning.plan import TITLES
 
     rows = table(padding=(0, 2, 0, 0))
-    for title in ("effect", "", "if left out", "rung", "ms"):
+    for title in TITLES[:-1]:
         rows.add_column(title, no_wrap=True)
-    rows.add_column("why")
+    rows.add_column(TITLES[-1])
     for choice in made.choices:
-        rows.add_row(*_row(choice), style=None if choice.included else "dim")
+        rows.add_row(*choice.cells(), style=None if choice.included else "dim")
     console().print(rows)
-    print(
-        f"{made.scene}: {made.predicted_ms:.3g} ms per pose predicted, {made.poses} poses, "
-        f"{made.predicted_ms * made.poses / 1000:.3g} s."
-    )
+    print(f"{made.scene}: {made.time_text()}.")
     for observable, error in made.over_tolerance:
         unit = "N" if unit_of(observable) == "n" else "px"
         spoilt = [c.effect for c in made.choices if observable in c.over_share]
@@ -62,15 +61,3 @@ def print_plan(made: Plan) -> None:
             f"{', '.join(spoilt)}. Switch it on or raise the tolerance.",
             style="bold red",
         )
-
-
-def _row(choice: Choice) -> tuple[str, ...]:
-    value, unit = choice.most_relevant(choice.bound)
-    return (
-        choice.effect,
-        "in" if choice.included else "out",
-        f"{value:.3g} {unit}" if value else "0",
-        choice.rung,
-        f"{choice.predicted_ms:.3g}" if choice.included else "",
-        choice.why,
-    )

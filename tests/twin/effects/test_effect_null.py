@@ -23,6 +23,7 @@ from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_task import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 
 NULL: dict[str, dict[str, Any]] = {
     "friction": {},
@@ -80,7 +81,8 @@ def _states(folder: Path, plan: Plan, loaded: LoadedScene) -> list[GelState]:
     key = (folder, *((c.effect, c.rung, *c.rung_parameters) for c in chosen))
     if key not in _solved:
         sensor = _sensor(folder / "bundle")
-        _solved[key] = list(mechanics_of(loaded, plan, sensor).states(loaded.poses))
+        pad = SurfaceCompliance(sensor.bundle)
+        _solved[key] = list(mechanics_of(loaded, plan, pad).states(loaded.poses))
     return _solved[key]
 
 
@@ -130,11 +132,13 @@ from gelslim_twin.simulation.scene_task import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.effects.registry import EFFECTS
 from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 place = Path({str(folder)!r})
 loaded = read_scene(place / "bare.yaml")
 plan = plan_scene(loaded, bundle_figures(place / "bundle"))
 sensor = TwinSensor(load_bundle(place / "bundle"))
-assert len(list(mechanics_of(loaded, plan, sensor).states(loaded.poses))) == 4
+pad = SurfaceCompliance(sensor.bundle)
+assert len(list(mechanics_of(loaded, plan, pad).states(loaded.poses))) == 4
 absent = [e.implementation for e in EFFECTS if e.name not in plan.order]
 assert "gelslim_twin.contact.nonlinear" in absent and "gelslim_twin.contact.relaxation" in absent
 print(plan.order, [m for m in absent if m in sys.modules])

@@ -121,7 +121,7 @@ def test_switching_off_what_matters_is_told(tmp_path):
     assert on.over_tolerance == ()
     [(observable, error)] = off.over_tolerance
     assert observable == "force"
-    assert error >= off.choice("nonlinearity").bound.force_n > 0.01
+    assert error >= off.choice("nonlinearity").size.force_n > 0.01
     assert off.choice("nonlinearity").over_share == ("force",)
 
 
@@ -260,7 +260,7 @@ def test_back_chaining_on_a_chain_of_our_own():
     ink = _effect("ink", 9.0, ((0.0, 1.0),), provides=("ink",))
     late = _effect("late", 3.0, ((0.5, 1.0), (0.0, 9.0)), refines=("image",), needs=("map",))
     map_ = _effect("map", 9.0, ((0.0, 2.0),), provides=("map",))
-    tiny = _effect("tiny", 0.05, ((0.0, 1.0),), refines=("image",))
+    tiny = _effect("tiny", 0.05, ((0.0, 1e-3),), refines=("image",))
     effects = (late, tiny, base, ink, map_)
     plan = make_plan(_ask(effects, 1.2), effects)
     assert plan.order == ("ink", "base", "map", "late")
@@ -291,8 +291,41 @@ def test_the_tolerance_is_shared_among_the_effects_that_can_use_it_up() -> None:
     effects = (base, small, rough, limit)
     plan = make_plan(_ask(effects, 1.0), effects)
     assert dict(plan.choice("small").shares) == {"image": pytest.approx(1 / 3)}
-    assert plan.choice("rough").rung == "r1"
+    # What they leave goes to the largest saving: 0.6 of the 0.9 that one rung leaves.
+    assert plan.choice("rough").rung == "r0"
+    assert dict(plan.choice("rough").shares) == {"image": 0.7}
+    assert plan.error("image") == pytest.approx(0.7)
     assert set(plan.order) == {"base", "small", "rough", "limit"}
+
+
+def test_what_is_left_goes_to_the_largest_savings_and_no_further() -> None:
+    """Random effects: the sum of errors is kept, no saving is left over, and none costs time."""
+    rng = random.Random(11)
+    spared = 0
+    for _ in range(60):
+        base = _effect("base", 9.0, ((0.0, 1.0),), provides=("image",))
+        others = tuple(
+            _effect(
+                f"e{k}",
+                rng.choice([0.05, 0.3, 0.6, 2.0]),
+                ((rng.choice([0.0, 0.1, 0.25]), rng.uniform(1, 5)), (0.0, rng.uniform(5, 50))),
+                refines=("image",),
+            )
+            for k in range(rng.randint(1, 5))
+        )
+        effects = (base, *others)
+        asked = _ask(effects, 1.0)
+        plan = make_plan(asked, effects)
+        assert plan.error("image") <= 1.0 + 1e-12
+        room = 1.0 - plan.error("image")
+        for effect in others:
+            choice, (size, ladder) = plan.choice(effect.name), asked.weighed(effect)
+            cheaper = [(size.image_px, 0.0), *((r.error.image_px, r.milliseconds) for r in ladder)]
+            for error, ms in cheaper if choice.included else []:
+                if choice.predicted_ms - ms > 0.01 * plan.predicted_ms:
+                    assert error - choice.error.image_px > room
+            spared += choice.why == "within what others leave"
+    assert spared > 10
 
 
 def test_effects_in_a_circle_are_refused():

@@ -15,6 +15,7 @@ from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.simulation.scene_task import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
 
 BALL = "shape: sphere\n    radius_mm: 6"
 RING = "shape: ring\n    outer_radius_mm: 4\n    inner_radius_mm: 3"
@@ -44,8 +45,9 @@ def test_bound_is_no_less_than_what_leaving_the_effect_out_costs(folder, effect,
             for name, p in c.parameters.items()
         }
         plan = make_plan(replace(asked, circumstances=replace(c, parameters=given)))
-        states = list(mechanics_of(loaded, plan, sensor).states(loaded.poses))
-        return plan.choice(effect).bound, states
+        pad = SurfaceCompliance(sensor.bundle)
+        states = list(mechanics_of(loaded, plan, pad).states(loaded.poses))
+        return plan.choice(effect).size, states
 
     bound, on = solved(**({} if effect == "normal_contact" else {effect: "on"}))
     off = solved()[1]

@@ -1,0 +1,57 @@
+"""What effects leave of their shares of the tolerance, given to those that save time by it.
+
+Equal shares are safe and wasteful, because most effects err by much less than their share. Where
+the sum of the errors allows it, an effect takes a cheaper rung or is left out after all, the
+largest saving of time first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from gelslim_twin.planning.plan import Choice
+
+LEAST_SAVING = 0.01
+"""Smallest saving, over the time of the plan, for which tolerance is used up."""
+
+
+def with_leftover_spent(
+    decided: Mapping[str, Choice],
+    cheaper: Mapping[str, Sequence[Choice]],
+    allowed: Mapping[str, float],
+) -> dict[str, Choice]:
+    """Choices in which no single further saving keeps the tolerance.
+
+    Args:
+        decided: A choice by effect, with errors within the tolerance or not.
+        cheaper: By effect, the other choices about it; effects that have none may be absent.
+        allowed: By observable, the largest sum of the errors of all `decided` effects.
+
+    Returns:
+        The choices, of which some are replaced by one of `cheaper` that takes less time. No sum of
+        errors is above what is allowed, unless it was so before.
+    """
+    found = dict(decided)
+    while True:
+        whole_ms = sum(choice.predicted_ms for choice in found.values())
+        room = {o: most - _total(found, o) for o, most in allowed.items()}
+        best, best_ms = None, LEAST_SAVING * whole_ms
+        for name, others in cheaper.items():
+            now = found[name]
+            for other in others:
+                saved_ms = now.predicted_ms - other.predicted_ms
+                if saved_ms > best_ms and _fits(now, other, room):
+                    best, best_ms = other, saved_ms
+        if best is None:
+            return found
+        shares = tuple((o, max(share, best.error.of(o))) for o, share in best.shares)
+        found[best.effect] = replace(best, shares=shares)
+
+
+def _total(choices: Mapping[str, Choice], observable: str) -> float:
+    return sum(c.error.of(observable) for c in choices.values() if c.shares)
+
+
+def _fits(now: Choice, other: Choice, room: Mapping[str, float]) -> bool:
+    return all(other.error.of(o) - now.error.of(o) <= left for o, left in room.items())

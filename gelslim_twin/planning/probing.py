@@ -1,0 +1,79 @@
+"""Whether a probe pays: solving a few hard poses before a scene is planned for good.
+
+The bounds of friction and large strain are estimates from physics and often several times too
+large. A probe finds their true size. It is made where a bound says that an effect is needed and
+the run is so long that the probe is a small part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gelslim_twin.effects.contact import correction_ms
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import Question
+from gelslim_twin.scene.pose import Pose
+
+PROBED = ("friction", "nonlinearity")
+"""Effects whose size a probe finds."""
+MOST_SHARE = 0.05
+"""Largest time of a probe over that of the run which the bounds ask for, both as declared."""
+MOST_POSES = 12
+"""Poses of the path that a probe solves on a linear gel."""
+
+
+def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
+    """The effects that a probe of a planned scene should size; none where it does not pay.
+
+    Args:
+        question: The scene as the planner takes it, without a probe.
+        plan: Its plan by bounds.
+    """
+    wanted = tuple(
+        c.effect
+        for c in plan.included
+        if c.effect in PROBED and question.circumstances.parameters[c.effect].use == "auto"
+    )
+    run_ms = plan.predicted_ms * plan.poses
+    return wanted if wanted and probe_ms(question, plan, wanted) <= MOST_SHARE * run_ms else ()
+
+
+def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
+    """Declared time of a probe that sizes `effects`."""
+    chosen = {c.effect: c.predicted_ms for c in plan.included}
+    linear_ms = chosen["normal_contact"] + chosen.get("friction", 0.0)
+    paths = 2 if "friction" in effects else 1
+    poses = min(MOST_POSES, plan.poses)
+    motion = question.circumstances.motion
+    straight = not (motion.lateral_mm or motion.twist_deg or motion.tilt_deg)
+    # Two corrections of the hardest pose, or of two; setting up the law takes as long as one.
+    laws = 0 if "nonlinearity" not in effects else 3 if straight else 5
+    return poses * paths * linear_ms + laws * correction_ms(question.circumstances)
+
+
+def probed_poses(poses: Sequence[Pose]) -> tuple[Pose, ...]:
+    """At most `MOST_POSES` of a path, in order: its extremes, its end, and others evenly between.
+
+    Extremes are the deepest pose, the one farthest aside from where the deepest is, and those of
+    the largest twist and tilt.
+    """
+    if len(poses) <= MOST_POSES:
+        return tuple(poses)
+    every = range(len(poses))
+    deepest = max(every, key=lambda k: poses[k].depth_mm)
+    still = poses[deepest]
+
+    def aside(k: int) -> float:
+        return (poses[k].x_mm - still.x_mm) ** 2 + (poses[k].y_mm - still.y_mm) ** 2
+
+    kept = {
+        deepest,
+        len(poses) - 1,
+        max(every, key=aside),
+        max(every, key=lambda k: abs(poses[k].twist_deg - still.twist_deg)),
+        max(every, key=lambda k: abs(poses[k].tilt_x_deg) + abs(poses[k].tilt_y_deg)),
+    }
+    # The pose that lies farthest from those kept comes next.
+    while len(kept) < MOST_POSES:
+        kept.add(max(every, key=lambda k: min(abs(k - other) for other in kept)))
+    return tuple(poses[k] for k in sorted(kept))

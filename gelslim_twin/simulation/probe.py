@@ -1,0 +1,202 @@
+"""The probe: a few poses of a scene solved before it is planned.
+
+They are solved on a linear gel, which gives the force that relative errors refer to. Where large
+strain is to be sized, the hardest of them are corrected once by the law at large strain; where
+friction is, all of them are solved without it too. Safety factors cover the other poses and what
+one correction leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gelslim_twin.contact.corrected_contact import (
+    LinearStep,
+    corrected,
+    correction_law,
+    linear_steps,
+    unfit,
+)
+from gelslim_twin.contact.gel_state import ContactError, GelState
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
+from gelslim_twin.contact.tool import Tool
+from gelslim_twin.effects.circumstances import Probed
+from gelslim_twin.effects.effect import Bound, geometry
+from gelslim_twin.planning.planner import Question
+from gelslim_twin.planning.probing import probed_poses
+from gelslim_twin.scene.reader import LoadedScene
+from ifem_export.compliance.columns import SurfaceCompliance
+from ifem_export.markers.interpolation import marker_to_node
+from ifem_export.operators.single_thread import single_threaded
+
+TOLERANCE = 1e-2
+"""Of the contact: its error is a small part of the safety factors."""
+FORCE_SAFETY, FRICTION_SAFETY, PLACES_SAFETY = 1.25, 2.0, 2.0
+"""Factors on what is found of forces, for large strain and for friction, and of displacements.
+They cover the poses between: in 72 random scenes the size over the whole path was up to 1.15 times
+(forces, large strain), 1.8 times (forces, friction) and 1.9 times (displacements) what is found."""
+REST_SAFETY, REST_SHARE = 2.0, 0.1
+"""Further factor on what a second correction changes, and its least share of the first."""
+RIM_NODES, RIM_PLACES = 2, 2.0
+"""Nodes that a wall of the tool may hold in one gel and not in the other, at poses between: their
+whole force counts, and as displacement this multiple of the depth. In the same scenes two nodes and
+the largest displacement of 1.5 times the depth were needed."""
+DIGITS = 3
+"""Significant digits of what is found, rounded up: the last bits depend on the machine."""
+
+
+@single_threaded
+def probed(
+    asked: Question,
+    loaded: LoadedScene,
+    compliance: SurfaceCompliance,
+    effects: Sequence[str] = (),
+    milliseconds: float = 0.0,
+) -> Question:
+    """The question with the force of the scene, and the sizes of `effects`, solved.
+
+    Args:
+        asked: The scene as the planner takes it.
+        loaded: The scene.
+        compliance: Compliance of the pad, which keeps the columns that it computes.
+        effects: Which of `probing.PROBED` to size.
+        milliseconds: Declared time of the probe.
+
+    Returns:
+        The question, unchanged where the contact of a pose is not solved. An effect whose size is
+        not found keeps its bound.
+    """
+    tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
+    probe = _Probe(asked, compliance, tool)
+    try:
+        steps = probe.steps(loaded)
+    except ContactError:
+        return asked
+    sizes, once = dict[str, Bound](), None
+    if "friction" in effects and (free := probe.frictionless(steps)):
+        held = [step.state for step in steps]
+        sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
+    if "nonlinearity" in effects and (hard := probe.corrections(steps)):
+        linear, first, second = zip(*hard, strict=True)
+        sizes["nonlinearity"] = size = probe.largest(linear, first)
+        rest = probe.largest(first, second).times(REST_SAFETY)
+        once = rest.at_least(size.times(REST_SHARE))
+        if math.isinf(asked.circumstances.footprint.steepest(probe.depth_mm)):
+            rim = probe.rim(linear)
+            sizes["nonlinearity"], once = size.plus(rim), once.plus(rim)
+    forces = [step.state.force_n.sum(axis=0) for step in steps]
+    found = Probed(
+        _rounded_up(max(-float(force[2]) for force in forces)),
+        _rounded_up(max(float(np.linalg.norm(force)) for force in forces)),
+        sizes,
+        once,
+        milliseconds,
+    )
+    if found.normal_n <= 0:
+        return asked
+    return replace(asked, circumstances=replace(asked.circumstances, probed=found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Probe:
+    """Solves the poses of a probe."""
+
+    asked: Question
+    compliance: SurfaceCompliance
+    tool: Tool
+
+    def _solver(self, friction: float) -> ContactSolver:
+        return ContactSolver(self.compliance, self.tool, ContactSettings(TOLERANCE, friction))
+
+    def steps(self, loaded: LoadedScene) -> list[LinearStep]:
+        """The linear contact, with the friction of the scene, at the poses of the probe."""
+        solver = self._solver(self.asked.circumstances.friction)
+        return list(linear_steps(solver, probed_poses(loaded.poses)))
+
+    def frictionless(self, steps: Sequence[LinearStep]) -> list[GelState]:
+        """The contact at the same poses without friction; empty where it is not found."""
+        poses = tuple(step.pose for step in steps)
+        try:
+            return [step.state for step in linear_steps(self._solver(0.0), poses)]
+        except ContactError:
+            return []
+
+    def corrections(self, steps: Sequence[LinearStep]) -> list[tuple[GelState, GelState, GelState]]:
+        """The hardest poses on a linear gel, corrected once, and twice; empty where not found."""
+        if unfit(self.compliance.bundle) is not None:
+            return []
+        solver, found = self._solver(self.asked.circumstances.friction), []
+        law = correction_law(solver)
+        for step in _hardest(steps):
+            try:
+                first = corrected(solver, law, step)
+                found.append((step.state, first, corrected(solver, law, step, first)))
+            except ContactError:
+                return []
+        return found
+
+    @property
+    def depth_mm(self) -> float:
+        """Of the deepest contact."""
+        return self.asked.circumstances.motion.depth_mm
+
+    def rim(self, states: Iterable[GelState]) -> Bound:
+        """What nodes at the walls of the tool may differ by besides."""
+        shares = [
+            float(np.linalg.norm(s.force_n.sum(axis=0))) * min(1.0, RIM_NODES / touched)
+            for s in states
+            if (touched := int((s.touch > 0).sum()))
+        ]
+        px = RIM_PLACES * self.depth_mm * self.asked.circumstances.sensor.px_per_mm
+        return geometry(_rounded_up(px), _rounded_up(max(shares, default=0.0)))
+
+    @cached_property
+    def _to_markers(self) -> Any:
+        """(m, c) from the surface nodes to the markers; None where no marker is observed."""
+        bundle = self.compliance.bundle
+        if bundle.markers is None or not {"markers", "image"} & {*self.asked.observe}:
+            return None
+        return marker_to_node(bundle.mesh.surface_mm, bundle.markers.positions_mm)
+
+    def largest(
+        self,
+        ones: Iterable[GelState],
+        others: Iterable[GelState],
+        force_safety: float = FORCE_SAFETY,
+    ) -> Bound:
+        """Largest differences of states in pairs, with the safety factors."""
+        scale = self.asked.circumstances.sensor.px_per_mm
+        force = places = dots = 0.0
+        for one, other in zip(ones, others, strict=True):
+            moved = one.displacement_mm - other.displacement_mm
+            lost = (one.force_n - other.force_n).sum(axis=0)
+            force = max(force, float(np.linalg.norm(lost)))
+            places = max(places, scale * float(np.linalg.norm(moved, axis=1).max()))
+            if self._to_markers is not None:
+                shift = np.linalg.norm(self._to_markers @ moved, axis=1)
+                dots = max(dots, scale * float(shift.max()))
+        found = (force * force_safety, *(p * PLACES_SAFETY for p in (places, dots, dots)))
+        return Bound(*(_rounded_up(value) for value in found))
+
+
+def _hardest(steps: Sequence[LinearStep]) -> list[LinearStep]:
+    """The steps with the largest force, and with the largest force along the surface."""
+    forces = [step.state.force_n.sum(axis=0) for step in steps]
+    order = range(len(steps))
+    whole = max(order, key=lambda k: float(np.linalg.norm(forces[k])))
+    aside = max(order, key=lambda k: math.hypot(forces[k][0], forces[k][1]))
+    return [steps[k] for k in sorted({whole, aside})]
+
+
+def _rounded_up(value: float) -> float:
+    """The value rounded up to `DIGITS` significant digits."""
+    if value <= 0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(value)) - DIGITS + 1)
+    return float(f"{math.ceil(value / unit) * unit:.{DIGITS}g}")

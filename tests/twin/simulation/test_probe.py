@@ -1,0 +1,206 @@
+"""The probe: when it pays, what it finds, and that plans with it keep the tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agreement import Trial
+from random_contact_scenes import Values, random_contact
+from scene_samples import GALLERY, MINIMAL, SENSOR, load
+from sim_rig import small_sensor
+
+from gelslim_twin.contact.corrected_contact import CorrectedContact
+from gelslim_twin.contact.nonlinear import NonlinearContact
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
+from gelslim_twin.contact.tool import Tool
+from gelslim_twin.planning.planner import make_plan
+from gelslim_twin.planning.probing import MOST_POSES, MOST_SHARE, effects_to_probe, probed_poses
+from gelslim_twin.planning.question import bundle_figures, question
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.scene.reader import LoadedScene, read_scene
+from gelslim_twin.simulation.probe import probed
+from gelslim_twin.simulation.scene_task import planned
+from ifem_export.bundle.files import load_bundle
+from ifem_export.compliance.columns import SurfaceCompliance
+
+SCENE = """\
+format: gelslim-scene/1
+name: probed
+sensor: {bundle: bundle}
+indenters:
+  - {shape: sphere, radius_mm: 6}
+motion:
+  waypoints:
+    - {move: press, depth_mm: 0.4, steps: 24, duration_s: 0.4}
+contact: {friction: 0.5}
+observe: [force]
+tolerance: {force_n: FORCE}
+"""
+
+
+def no_compliance() -> SurfaceCompliance:
+    raise AssertionError("a probe that does not pay was made")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("probe")
+    small_sensor(place)
+    return place
+
+
+def scene(folder: Path, force_n: float, old: str = "", new: str = "") -> LoadedScene:
+    text = SCENE.replace("FORCE", repr(force_n))
+    assert old in text
+    path = folder / "probed.yaml"
+    path.write_text(text.replace(old, new) if old else text)
+    return read_scene(path)
+
+
+def test_a_probe_is_made_for_long_runs_that_a_bound_makes_dear(tmp_path: Path) -> None:
+    text = MINIMAL.replace("observe: [force]", "observe: [force]\ntolerance: {force_n: 0.001}")
+    paid = {}
+    for steps in (1, 400):
+        asked = question(
+            load(tmp_path, text.replace("mm: 0.5}", f"mm: 0.5, steps: {steps}}}")), SENSOR
+        )
+        plan = make_plan(asked)
+        assert "nonlinearity" in plan.order
+        paid[steps] = effects_to_probe(asked, plan)
+    assert paid[1] == ()
+    assert "nonlinearity" in paid[400]
+    # What a scene decides itself is not probed, nor what its bound leaves out.
+    forced = replace(
+        asked,
+        circumstances=replace(
+            asked.circumstances,
+            parameters={
+                n: p.model_copy(update={"use": "on"})
+                for n, p in asked.circumstances.parameters.items()
+            },
+        ),
+    )
+    assert effects_to_probe(forced, make_plan(forced)) == ()
+    loose = replace(asked, force_n=100.0)
+    assert effects_to_probe(loose, make_plan(loose)) == ()
+
+
+@pytest.mark.parametrize("path", GALLERY, ids=lambda p: p.stem)
+def test_a_probe_is_a_small_part_of_the_run_that_bounds_ask_for(path: Path) -> None:
+    from gelslim_twin.planning.probing import probe_ms
+
+    asked = question(read_scene(path), SENSOR)
+    plan = make_plan(asked)
+    effects = effects_to_probe(asked, plan)
+    if effects:
+        assert probe_ms(asked, plan, effects) <= MOST_SHARE * plan.predicted_ms * plan.poses
+    else:
+        assert planned(read_scene(path), asked, no_compliance) == plan
+
+
+def test_the_poses_of_a_probe_hold_the_extremes_of_the_path() -> None:
+    rng = np.random.default_rng(4)
+    path = tuple(Pose(float(k), *rng.normal(size=6)) for k in range(200))
+    kept = probed_poses(path)
+    assert len(kept) == MOST_POSES
+    assert list(kept) == sorted(kept, key=lambda pose: pose.time_s)
+    deepest = max(path, key=lambda pose: pose.depth_mm)
+    assert {deepest, path[-1], max(path, key=lambda p: abs(p.twist_deg - deepest.twist_deg))} <= {
+        *kept
+    }
+    assert probed_poses(path[:3]) == path[:3]
+
+
+def test_a_pin_has_the_force_it_was_solved_to_have(folder: Path) -> None:
+    """The height map of a pin of 0.4 mm radius holds a node or none; the estimate errs by far."""
+    loaded = scene(folder, 0.01, "shape: sphere, radius_mm: 6", "shape: flat_punch, radius_mm: 0.4")
+    asked = question(loaded, bundle_figures(folder / "bundle"))
+    pad = SurfaceCompliance(load_bundle(folder / "bundle"))
+    found = probed(asked, loaded, pad)
+    tool = Tool.of(loaded.scene.indenters, loaded.folder, 0)
+    states = list(ContactSolver(pad, tool, ContactSettings(1e-6, 0.5)).states(loaded.poses))
+    true_n = max(-float(s.force_n[:, 2].sum()) for s in states)
+    assert found.circumstances.normal_n == pytest.approx(true_n, rel=0.02)
+    assert asked.circumstances.normal_n > 1.3 * true_n
+
+
+def test_a_plan_with_a_probe_keeps_less_and_keeps_the_tolerance(folder: Path) -> None:
+    """Against the neo-Hookean gel with friction; the bound alone would keep Newton's method."""
+    pad = SurfaceCompliance(load_bundle(folder / "bundle"))
+    figures = bundle_figures(folder / "bundle")
+    loaded = scene(folder, 0.012)
+    asked = question(loaded, figures)
+    bounded = make_plan(asked)
+    assert bounded.choice("nonlinearity").implementation == "gelslim_twin.contact.nonlinear"
+    plan = planned(loaded, asked, lambda: pad)
+    choice = plan.choice("nonlinearity")
+    assert choice.found_by == "probe"
+    assert 0 < choice.size.force_n < bounded.choice("nonlinearity").size.force_n
+    assert plan.predicted_ms < 0.5 * bounded.predicted_ms
+    assert plan.probe_ms > 0
+    # The same plan again, to the last byte: the run folder's key depends on it.
+    fresh = SurfaceCompliance(load_bundle(folder / "bundle"))
+    assert planned(loaded, asked, lambda: fresh).to_json() == plan.to_json()
+    tool = Tool.of(loaded.scene.indenters, loaded.folder, 0)
+    solvers = [ContactSolver(pad, tool, ContactSettings(1e-4, 0.5)) for _ in range(3)]
+    poses = loaded.poses[::8]
+    linear = list(solvers[0].states(poses))
+    once = list(CorrectedContact(solvers[1]).states(poses))
+    true = list(NonlinearContact(solvers[2], 1e-4).states(poses))
+
+    def apart(states: list) -> float:
+        pairs = zip(states, true, strict=True)
+        return max(float(np.linalg.norm((a.force_n - b.force_n).sum(axis=0))) for a, b in pairs)
+
+    assert 0.3 * choice.size.force_n < apart(linear) <= choice.size.force_n
+    assert apart(once) <= choice.error.force_n <= 0.2 * choice.size.force_n
+
+
+def long_scene(seed: int) -> tuple:
+    """A random scene with four times the poses, and a tolerance of 0.5 to 20 %."""
+    finger, values = random_contact(seed)
+    for move in values["motion"]["waypoints"]:
+        move["steps"] *= 4
+    return finger, values
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2007, 2009, 2010, 2013, 2019, 2041, 2060, 2064])
+def test_what_a_probe_finds_covers_the_whole_path(tmp_path: Path, seed: int) -> None:
+    """Large strain over all poses against the size found at two of them, friction likewise.
+
+    Seeds of pins, of walls that a rim of nodes slides over, and of slip between the poses probed.
+    """
+    finger, values = long_scene(seed)
+    one = Trial.of(finger, values, tmp_path)
+    both = ("friction", "nonlinearity")
+    asked = replace(one.asked, observe=("force", "displacement", "markers"))
+    found = probed(asked, one.loaded, one.compliance, both).circumstances.probed
+    assert found is not None
+    tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
+    mu, pad = one.loaded.scene.contact.friction, one.compliance
+
+    def solver(friction: float) -> ContactSolver:
+        return ContactSolver(pad, tool, ContactSettings(1e-3, friction))
+
+    runs: Values = {
+        "linear": list(solver(mu).states(one.poses)),
+        "strained": list(NonlinearContact(solver(mu)).states(one.poses)),
+        "once": list(CorrectedContact(solver(mu)).states(one.poses)),
+        "slippery": list(solver(0.0).states(one.poses)),
+    }
+    bounds = (
+        ("linear", "strained", found.sizes["nonlinearity"]),
+        ("once", "strained", found.corrected),
+        ("linear", "slippery", found.sizes["friction"]),
+    )
+    scale = one.asked.circumstances.sensor.px_per_mm
+    for name, other, bound in bounds:
+        for a, b in zip(runs[name], runs[other], strict=True):
+            force = float(np.linalg.norm((a.force_n - b.force_n).sum(axis=0)))
+            moved = np.linalg.norm(a.displacement_mm - b.displacement_mm, axis=1).max()
+            assert force <= bound.force_n + 1e-3 * found.resultant_n, name
+            assert scale * moved <= bound.displacement_px + 0.05, name
