@@ -144,6 +144,11 @@ class MotionFigures:
     speed_mm_s: float = 0.0
     """Largest speed of any point of the contact region, in contact."""
 
+    @property
+    def is_straight(self) -> bool:
+        """Whether the tool in contact moves along the gel's normal only."""
+        return not (self.lateral_mm or self.twist_deg or self.tilt_deg)
+
 
 @dataclass(frozen=True)
 class Probed:

@@ -162,7 +162,7 @@ def nonlinearity_bound(c: Circumstances) -> Bound:
 def _one_node(c: Circumstances) -> float:
     """Share of the force on one node for a tool with walls that moves sideways, otherwise 0."""
     t = c.contact
-    if t.area_mm2 == 0 or not (c.motion.lateral_mm or c.motion.twist_deg or c.motion.tilt_deg):
+    if t.area_mm2 == 0 or c.motion.is_straight:
         return 0.0
     walls = math.isinf(c.footprint.steepest(t.depth_mm))
     return min(1.0, c.sensor.node_pitch_mm**2 / t.area_mm2) if walls else 0.0

@@ -129,6 +129,6 @@ MARKER_PRINT = Effect(
     bound=marker_print_bound,
     formula="sigma sqrt(2 ln(n/0.001)) f/Z; a pitch where dots are missing; d/4 for odd ones",
     ladder=lambda c: (Rung("drawn", optics(0.0), 0.05 * c.sensor.markers / 575),),
-    implementation="gelslim_twin.render.printed_dots",
+    implementation="gelslim_twin.render.print_faults",
     refines=("markers",),
 )

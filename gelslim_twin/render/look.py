@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from gelslim_twin.render.blemishes import Dirt, Specular
     from gelslim_twin.render.defocus import Defocus
     from gelslim_twin.render.image_sensor import Compression, Exposure, MotionBlur, SensorNoise
-    from gelslim_twin.render.printed_dots import MarkerPrint
+    from gelslim_twin.render.print_faults import MarkerPrint
     from gelslim_twin.render.shading import Shading
 
 Rays = Literal["exact", "paraxial"]
@@ -106,7 +106,7 @@ def sensor_look(aperture_mm: float, focus_mm: float, seed: int = 0) -> Look:
     from gelslim_twin.render.blemishes import Dirt, Specular
     from gelslim_twin.render.defocus import Defocus
     from gelslim_twin.render.image_sensor import Exposure, MotionBlur, SensorNoise
-    from gelslim_twin.render.printed_dots import MarkerPrint
+    from gelslim_twin.render.print_faults import MarkerPrint
     from gelslim_twin.render.shading import Shading
 
     return Look(

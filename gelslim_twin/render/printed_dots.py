@@ -7,14 +7,12 @@ true centre is the centroid of this area, which is not the image of the dot's ce
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-from gelslim_twin.render.random_stream import stream
 
 if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
@@ -110,32 +108,3 @@ def _series(points: int, corners: int) -> Array:
     whole = 1 + 2 * np.cos(orders * apart[..., None]).sum(axis=2) + np.cos(points / 2 * apart)
     weights: Array = whole / points
     return weights
-
-
-@dataclass(frozen=True)
-class MarkerPrint:
-    """Faults of the print: standard deviation of positions per axis, missing and irregular dots.
-
-    Each semi-axis of an irregular dot is drawn between 0.5 and 1.5 times the nominal one.
-    """
-
-    jitter_mm: float = 0.0
-    missing_percent: float = 0.0
-    odd_percent: float = 0.0
-    seed: int = 0
-
-    def apply(self, dots: PrintedDots) -> PrintedDots:
-        """The print with its faults, each kind from its own random stream."""
-        count = len(dots)
-        shift = stream(self.seed, "print jitter").standard_normal((count, 2))
-        absent = stream(self.seed, "missing dots").random(count) < self.missing_percent / 100
-        drawn = stream(self.seed, "odd dots").random((count, 4))
-        odd = (drawn[:, 0] < self.odd_percent / 100)[:, None]
-        size = np.where(odd, 0.5 + drawn[:, 1:3], 1.0)
-        return replace(
-            dots,
-            centres_mm=dots.centres_mm + self.jitter_mm * shift,
-            semi_axes_mm=dots.semi_axes_mm * size,
-            turn_rad=np.where(odd[:, 0], np.pi * drawn[:, 3], dots.turn_rad),
-            present=dots.present & ~absent,
-        )

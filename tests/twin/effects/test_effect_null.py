@@ -140,6 +140,8 @@ sensor = TwinSensor(load_bundle(place / "bundle"))
 pad = SurfaceCompliance(sensor.bundle)
 assert len(list(mechanics_of(loaded, plan, pad).states(loaded.poses))) == 4
 absent = [e.implementation for e in EFFECTS if e.name not in plan.order]
+absent += ["gelslim_twin.contact.coulomb_kernel", "gelslim_twin.contact.corrected_contact"]
+assert "gelslim_twin.contact.coulomb_contact" in absent
 assert "gelslim_twin.contact.nonlinear" in absent and "gelslim_twin.contact.relaxation" in absent
 print(plan.order, [m for m in absent if m in sys.modules])
 """

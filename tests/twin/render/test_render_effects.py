@@ -19,7 +19,8 @@ from gelslim_twin.render.blemishes import Dirt, Specular
 from gelslim_twin.render.defocus import BlurField, Defocus, kernel_taps
 from gelslim_twin.render.image_sensor import Compression, Exposure, MotionBlur, SensorNoise
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.printed_dots import MarkerPrint, PrintedDots
+from gelslim_twin.render.print_faults import MarkerPrint
+from gelslim_twin.render.printed_dots import PrintedDots
 from gelslim_twin.render.random_stream import stream, stream_key
 from gelslim_twin.render.shading import Shading
 

@@ -13,6 +13,7 @@ from scene_samples import GALLERY, MINIMAL, SENSOR, load
 from sim_rig import small_sensor
 
 from gelslim_twin.contact.corrected_contact import CorrectedContact
+from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.nonlinear import NonlinearContact
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
@@ -204,3 +205,33 @@ def test_what_a_probe_finds_covers_the_whole_path(tmp_path: Path, seed: int) -> 
             moved = np.linalg.norm(a.displacement_mm - b.displacement_mm, axis=1).max()
             assert force <= bound.force_n + 1e-3 * found.resultant_n, name
             assert scale * moved <= bound.displacement_px + 0.05, name
+
+
+def without_compression(one: Trial) -> Trial:
+    """The scene with pictures as they are before rounding, and the planner free to choose."""
+    c = one.asked.circumstances
+    given = {n: p.model_copy(update={"use": "auto"}) for n, p in c.parameters.items()}
+    given["compression"] = given["compression"].model_copy(update={"use": "off"})
+    return replace(one, asked=replace(one.asked, circumstances=replace(c, parameters=given)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2200, 2212))
+def test_plans_with_a_probe_agree_with_everything_on(tmp_path: Path, seed: int) -> None:
+    """Random scenes at a random tolerance of 0.5 to 20 % of the largest force and of the depth."""
+    one = without_compression(Trial.of(*long_scene(seed), tmp_path))
+    try:
+        whole = one.carried_out(one.full())
+    except ContactError as error:
+        pytest.skip(f"nothing to compare: {error}")
+    level = float(np.exp(np.random.default_rng(seed).uniform(np.log(0.005), np.log(0.2))))
+    force = max(float(np.linalg.norm(s.force_n.sum(axis=0))) for s in whole.states)
+    c = one.asked.circumstances
+    depth_px = c.motion.depth_mm * c.sensor.px_per_mm
+    allowed = {"force_n": max(1e-9, level * force), "image_px": max(1e-9, level * depth_px)}
+    at = replace(one, asked=replace(one.asked, **allowed))
+    plan = at.probed()
+    found = at.differences(whole, at.carried_out(plan), plan.observe)
+    for observable, error in found.items():
+        limit = allowed["force_n" if observable == "force" else "image_px"]
+        assert error <= max(limit, plan.error(observable)) + 1e-9, (observable, plan.order)
