@@ -1,4 +1,4 @@
-"""Contact with a neo-Hookean gel by one correction of the contact with a linear one.
+"""Contact with a neo-Hookean gel by one or two corrections of the contact with a linear one.
 
 With the displacement u of a contact, the forces F(u) that hold the surface there at large strain
 and the linear compliance C, the contact is solved once more with the displacement u - C F(u)
@@ -137,7 +137,7 @@ def corrected_twice(
 
 @dataclass(eq=False)
 class CorrectedContact:
-    """Solves the contact along a sequence of poses, like `ContactSolver`, with one correction each.
+    """Solves the contact along a sequence of poses, like `ContactSolver`, with few corrections.
 
     Every pose starts from the difference of the two laws at the pose before, so that along a path
     of small steps little is left to correct. Poses that cannot be corrected, because the
@@ -145,6 +145,8 @@ class CorrectedContact:
     """
 
     solver: ContactSolver
+    corrections: int = 1
+    """Corrections per pose."""
 
     def __post_init__(self) -> None:
         """Raises ContactError for a pad to which the neo-Hookean law does not apply."""
@@ -181,5 +183,7 @@ class CorrectedContact:
         if not now.force_n.any():
             self._offset = np.zeros_like(self._offset)
             return GelState.at_rest(len(self._offset))
-        self._offset = self._correction.offset_mm(now, self._offset)
-        return self.solver.step(start, came, pose, self._offset, now)
+        for _ in range(self.corrections):
+            self._offset = self._correction.offset_mm(now, self._offset)
+            now = self.solver.step(start, came, pose, self._offset, now)
+        return now

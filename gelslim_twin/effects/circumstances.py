@@ -159,15 +159,15 @@ class Probed:
         resultant_n: Largest resultant on a linear gel, with the friction of the scene.
         sizes: By effect, the error of leaving it out as found at these poses, times a safety
             factor for the other poses. Effects that were not probed are absent.
-        corrected: Error of the contact that is corrected once for large strain, likewise; None
-            where that was not probed.
+        corrected: Errors of the contact that is corrected for large strain once per pose, and
+            twice; empty where that was not probed.
         milliseconds: Declared time of the probe.
     """
 
     normal_n: float
     resultant_n: float
     sizes: Mapping[str, Bound]
-    corrected: Bound | None = None
+    corrected: tuple[Bound, ...] = ()
     milliseconds: float = 0.0
 
 

@@ -174,6 +174,7 @@ NEWTON_RUNGS = (("coarse", 1e-2, 250.0), ("medium", 1e-3, 350.0), ("fine", 1e-4,
 """Rungs with their times on the gallery's paths; distant poses or sliding walls take twice that."""
 CORRECTION_MS = 30.0
 """Time of one correction of a linear contact by the neo-Hookean law."""
+CORRECTIONS = {1: "correction", 2: "2 corrections"}
 
 
 def correction_ms(c: Circumstances) -> float:
@@ -182,10 +183,10 @@ def correction_ms(c: Circumstances) -> float:
 
 
 def nonlinearity_ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """One correction of the linear contact, or the relative tolerance of the residual.
+    """Corrections of the linear contact, or the relative tolerance of the residual.
 
-    The correction is offered where a probe has made it at the hardest poses: at large depths the
-    linear displacement inverts cells of the mesh, and there is no such correction.
+    Corrections are offered where a probe has made them at the hardest poses: at large depths the
+    linear displacement inverts cells of the mesh, and there is none.
     """
     whole, nodes = nonlinearity_bound(c), c.sensor.surface_nodes * c.sensor.layers / (43 * 43 * 4)
     places = NEWTON_PLACES * c.contact.depth_mm * c.sensor.px_per_mm
@@ -198,15 +199,19 @@ def nonlinearity_ladder(c: Circumstances) -> tuple[Rung, ...]:
         )
         for name, t, ms in NEWTON_RUNGS
     )
-    if c.probed is None or c.probed.corrected is None:
+    if c.probed is None:
         return converged
-    once = Rung(
-        "one correction",
-        c.probed.corrected.at_most(whole),
-        correction_ms(c),
-        implementation="gelslim_twin.contact.corrected_contact",
+    corrected = tuple(
+        Rung(
+            f"{CORRECTIONS[count]} per pose",
+            error.at_most(whole),
+            count * correction_ms(c),
+            {"corrections": count},
+            implementation="gelslim_twin.contact.corrected_contact",
+        )
+        for count, error in enumerate(c.probed.corrected, start=1)
     )
-    return (once, *converged)
+    return corrected + converged
 
 
 NONLINEARITY = Effect(

@@ -18,8 +18,9 @@ PROBED = ("friction", "nonlinearity")
 """Effects whose size a probe finds."""
 MOST_SHARE = 0.05
 """Largest time of a probe over that of the run which the bounds ask for, both as declared."""
-MOST_POSES = 12
-"""Poses of the path that a probe solves on a linear gel."""
+MOST_POSES, STRAIGHT_POSES = 12, 4
+"""Poses of the path that a probe solves on a linear gel, and those of a straight press, of which
+the deepest is the hardest."""
 
 
 def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
@@ -49,18 +50,20 @@ def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
     paths = 2 if "friction" in effects else 1
     poses = min(MOST_POSES, plan.poses)
     straight = question.circumstances.motion.is_straight
+    poses = min(STRAIGHT_POSES if straight else MOST_POSES, plan.poses)
     # Two corrections of the hardest pose, or of two; setting up the law takes as long as one.
     laws = 0 if "nonlinearity" not in effects else 3 if straight else 5
     return poses * paths * linear_ms + laws * correction_ms(question.circumstances)
 
 
-def probed_poses(poses: Sequence[Pose]) -> tuple[Pose, ...]:
-    """At most `MOST_POSES` of a path, in order: its extremes, its end, and others evenly between.
+def probed_poses(poses: Sequence[Pose], is_straight: bool = False) -> tuple[Pose, ...]:
+    """A few poses of a path, in order: its extremes, its end, and others evenly between.
 
     Extremes are the deepest pose, the one farthest aside from where the deepest is, and those of
     the largest twist and tilt.
     """
-    if len(poses) <= MOST_POSES:
+    most = STRAIGHT_POSES if is_straight else MOST_POSES
+    if len(poses) <= most:
         return tuple(poses)
     every = range(len(poses))
     deepest = max(every, key=lambda k: poses[k].depth_mm)
@@ -77,6 +80,6 @@ def probed_poses(poses: Sequence[Pose]) -> tuple[Pose, ...]:
         max(every, key=lambda k: abs(poses[k].tilt_x_deg) + abs(poses[k].tilt_y_deg)),
     }
     # The pose that lies farthest from those kept comes next.
-    while len(kept) < MOST_POSES:
+    while len(kept) < most:
         kept.add(max(every, key=lambda k: min(abs(k - other) for other in kept)))
     return tuple(poses[k] for k in sorted(kept))

@@ -45,6 +45,8 @@ REST_SHARE = 0.05
 """Least error of one correction as a share of the first. What a second correction changes at a pose
 that is reached in one jump covers what one correction per pose leaves: with these values that was
 at most 0.72 of it."""
+TWICE_SHARE = 0.4
+"""Error of two corrections per pose over that of one."""
 RIM_NODES, RIM_PLACES = 2, 2.0
 """Nodes that a sliding wall of the tool may hold in one gel and not in the other, at poses between:
 their whole force counts, and as displacement this multiple of the depth. In the same scenes two
@@ -80,7 +82,7 @@ def probed(
         steps = probe.steps(loaded)
     except ContactError:
         return asked
-    sizes, once = dict[str, Bound](), None
+    sizes, errors = dict[str, Bound](), tuple[Bound, ...]()
     if "friction" in effects and (free := probe.frictionless(steps)):
         held = [step.state for step in steps]
         sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
@@ -88,15 +90,17 @@ def probed(
         linear, first, second = zip(*hard, strict=True)
         sizes["nonlinearity"] = size = probe.largest(linear, first)
         once = probe.largest(first, second).at_least(size.times(REST_SHARE))
+        errors = (once, once.times(TWICE_SHARE))
         if probe.has_sliding_walls:
             rim = probe.rim(linear)
-            sizes["nonlinearity"], once = size.plus(rim), once.plus(rim)
+            sizes["nonlinearity"] = size.plus(rim)
+            errors = tuple(error.plus(rim) for error in errors)
     forces = [step.state.force_n.sum(axis=0) for step in steps]
     found = Probed(
         _rounded_up(max(-float(force[2]) for force in forces)),
         _rounded_up(max(float(np.linalg.norm(force)) for force in forces)),
         sizes,
-        once,
+        errors,
         milliseconds,
     )
     if found.normal_n <= 0:
@@ -117,8 +121,9 @@ class _Probe:
 
     def steps(self, loaded: LoadedScene) -> list[LinearStep]:
         """The linear contact, with the friction of the scene, at the poses of the probe."""
-        solver = self._solver(self.asked.circumstances.friction)
-        return list(linear_steps(solver, probed_poses(loaded.poses)))
+        c = self.asked.circumstances
+        poses = probed_poses(loaded.poses, c.motion.is_straight)
+        return list(linear_steps(self._solver(c.friction), poses))
 
     def frictionless(self, steps: Sequence[LinearStep]) -> list[GelState]:
         """The contact at the same poses without friction; empty where it is not found."""

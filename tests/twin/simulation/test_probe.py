@@ -191,11 +191,13 @@ def test_what_a_probe_finds_covers_the_whole_path(tmp_path: Path, seed: int) -> 
         "linear": list(solver(mu).states(one.poses)),
         "strained": list(NonlinearContact(solver(mu)).states(one.poses)),
         "once": list(CorrectedContact(solver(mu)).states(one.poses)),
+        "twice": list(CorrectedContact(solver(mu), 2).states(one.poses)),
         "slippery": list(solver(0.0).states(one.poses)),
     }
     bounds = (
         ("linear", "strained", found.sizes["nonlinearity"]),
-        ("once", "strained", found.corrected),
+        ("once", "strained", found.corrected[0]),
+        ("twice", "strained", found.corrected[1]),
         ("linear", "slippery", found.sizes["friction"]),
     )
     scale = one.asked.circumstances.sensor.px_per_mm
