@@ -85,7 +85,7 @@ def drops(rows: Iterable[Data], header: Data) -> LadderRecord:
         name="planner",
         title="The planner's choice of effects",
         question="Scenes with every effect, then one less after the other; errors as shares of "
-        "each scene's tolerance. Ours is what the planner keeps.",
+        "each scene's tolerance. Ours is what the planner keeps by bounds alone, without a probe.",
         paper=NO_PAPER,
         reference="Everything on",
         error_label="error over the scene's tolerance",

@@ -21,6 +21,7 @@ import force_sigma
 import force_tables
 import linear_gel
 import page_tables
+import planning_figure
 import tolerance_tables
 import twin_fine
 import twin_skin
@@ -68,6 +69,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
     },
     "docs/digital_twin.md": {
         "validation": _from("twin_validation", twin_tables.validation_text),
+        "twin-planning": _from("twin_planning", planning_figure.table),
         "twin-effects": _from("twin_ladders", twin_tables.scenes_text),
         "twin-contact": _from("twin_ladders", twin_tables.contact_text),
         "twin-fine": _from("twin_fine", twin_fine.table),

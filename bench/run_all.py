@@ -46,6 +46,7 @@ STEPS = (
     Step("normal_sources"),
     Step("force_sigma", quick=None),
     Step("twin_ladders"),
+    Step("twin_planning"),
     Step("twin_steps"),
     Step("twin_fine"),
     Step("twin_skin"),

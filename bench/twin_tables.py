@@ -26,15 +26,15 @@ PARTS = {
 
 
 def scenes_text(data: dict[str, Any]) -> str:
-    """Return the effects by scene, and the choice of the planner by scene."""
+    """Return the effects by scene."""
     rows = data["effects"]
     scenes = list(dict.fromkeys(r["scene"] for r in rows))
     effects = list(dict.fromkeys(r["effect"] for r in rows))
     lines = [
         "Each cell gives the milliseconds per pose or frame without → with the effect, and the "
-        "largest error of leaving it out. It is **bold** where the planner includes the effect. "
-        f"At most {data['poses_at_most']} poses of a scene were solved, each with the path to it "
-        f"from the one before. {where(data, 'scenes')}.",
+        "largest error of leaving it out. It is **bold** where the bounds alone include the "
+        f"effect. At most {data['poses_at_most']} poses of a scene were solved, each with the path "
+        f"to it from the one before. {where(data, 'scenes')}.",
         "",
     ]
     by = {(r["scene"], r["effect"]): r for r in rows}
@@ -49,7 +49,6 @@ def scenes_text(data: dict[str, Any]) -> str:
             if any(cells):
                 lines.append(f"| `{scene}` | " + " | ".join(cells) + " |")
         lines.append("")
-    lines += choice_lines(data["drops"])
     return "\n".join(lines)
 
 
@@ -62,26 +61,6 @@ def effect_cell(row: dict[str, Any]) -> str:
     ]
     text = f"{ms(row['ms_without'])} → {ms(row['ms_with'])}; {', '.join(errors)}"
     return f"**{text}**" if row["auto"] == "in" else text
-
-
-def choice_lines(drops: Rows) -> list[str]:
-    """Return cost and error of the planner's choice beside those of all effects."""
-    lines = [
-        "| scene | all effects, ms | planner, ms | error of the planner's choice | tolerance "
-        "used |",
-        "|---|---:|---:|---|---:|",
-    ]
-    for scene in dict.fromkeys(r["scene"] for r in drops):
-        here = {r["label"]: r for r in drops if r["scene"] == scene}
-        whole, auto = here["everything on"], here["auto"]
-        errors = ", ".join(
-            f"{o} {v:.2g} {'N' if o == 'force' else 'px'}" for o, v in auto["error"].items()
-        )
-        lines.append(
-            f"| `{scene}` | {ms(whole['ms'])} | {ms(auto['ms'])} | {errors} "
-            f"| {auto['of_tolerance']:.0%} |"
-        )
-    return lines
 
 
 def contact_text(data: dict[str, Any]) -> str:

@@ -187,6 +187,20 @@ def test_the_planners_choice_keeps_every_tolerance() -> None:
     assert max(r["of_tolerance"] for r in chosen) <= 1
 
 
+def test_planning_with_a_probe_keeps_every_tolerance_and_saves() -> None:
+    """Measured on the gallery and on random scenes; what was forced by a scene is not counted."""
+    cases = stored("twin_planning")["cases"]
+    rows = [row for row in cases.values() if "used" in row]
+    assert len({row["scene"] for row in rows if "scene" in row}) >= 9
+    assert sum("seed" in row for row in rows) >= 5
+    for row in rows:
+        for observable, share in row["used"].items():
+            assert share <= max(1.0, row["promised"][observable])
+    loose = [row for name, row in cases.items() if name.endswith(" loose")]
+    ratios = sorted((row["ms"] + row["planning_ms"]) / row["whole_ms"] for row in loose)
+    assert ratios[len(ratios) // 2] <= 0.2
+
+
 def test_planning_costs_at_most_a_hundredth() -> None:
     """Planning and records alone, and a quarter of the pairs of whole runs."""
     part = stored("twin_ladders")["overhead"]
