@@ -24,7 +24,8 @@ from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import LoadedScene
-from gelslim_twin.simulation.scene_task import mechanics_of, planned
+from gelslim_twin.simulation.scene_mechanics import mechanics_of
+from gelslim_twin.simulation.scene_task import planned
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.compliance.columns import SurfaceCompliance
 

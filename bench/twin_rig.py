@@ -20,7 +20,7 @@ from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.scene_task import mechanics_of
+from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, store_sensor, stored_sensor
 
 ROOT = Path(__file__).parents[1]

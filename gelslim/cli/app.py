@@ -14,6 +14,7 @@ from gelslim.cli.commands.bundle import bundle, bundle_export, bundle_info
 from gelslim.cli.commands.calibrate import calibrate
 from gelslim.cli.commands.calibrate_gel import calibrate_gel
 from gelslim.cli.commands.calibrate_light import calibrate_light
+from gelslim.cli.commands.calibrate_look import calibrate_look
 from gelslim.cli.commands.cameras import cameras
 from gelslim.cli.commands.check import check
 from gelslim.cli.commands.derive import derive
@@ -54,7 +55,7 @@ COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
     "Search for one": (thinner, explore, optimise),
     "Try it before it is built": (tolerance, light, plan, simulate, validate),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),
-    "Measure with it": (calibrate, calibrate_gel, calibrate_light, force, track),
+    "Measure with it": (calibrate, calibrate_gel, calibrate_light, calibrate_look, force, track),
     "This program": (doctor, bench, schema),
 }
 """The commands under the headings of their list."""

@@ -212,6 +212,13 @@ class SensorNoiseParameters(EffectParameters):
     read_noise_electrons: float = Field(
         default=5.0, ge=0, le=1000, description="Standard deviation of the read noise"
     )
+    grain_px: float = Field(
+        default=0.0,
+        ge=0,
+        le=8,
+        description="Standard deviation of the Gaussian filter that correlates the noise of "
+        "neighbouring pixels, as demosaicing and compression do; 0 for none",
+    )
 
 
 def sigma_share(c: Circumstances) -> float:

@@ -48,7 +48,8 @@ class Dirt:
         ink = np.zeros(light.shape[:2], dtype=np.float32)
         draw_dots(
             seen, seen, np.ones(count, dtype=bool), np.ones(count, dtype=np.int64),
-            np.ones((count, 1)), np.zeros(count, dtype=np.int64), ink,
+            np.ones((count, 1)), np.zeros(count, dtype=np.int64),
+            np.ones(count, dtype=np.float32), ink,
         )  # fmt: skip
         return light * (1 - np.float32(self.opacity) * ink)[..., None]
 

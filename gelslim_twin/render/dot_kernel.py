@@ -100,13 +100,13 @@ def _blurred(cover: Any, taps: Any, reach: Any) -> Any:
 
 @njit(**COMPILED)
 def draw_dots(
-    start: Any, end: Any, drawn: Any, poses: Any, taps: Any, reach: Any, ink: Any
+    start: Any, end: Any, drawn: Any, poses: Any, taps: Any, reach: Any, opacity: Any, ink: Any
 ) -> None:
     """Add the dots' coverage to `ink` (h, w) float32, at most 1.
 
     Outlines `start`, `end` (m, k, 2) in px, pixel centres at integers, at the exposure's begin
     and end; `poses` (m,) of the path between are averaged (midpoints). `taps` (m, t) with `reach`
-    (m,): each dot's blur, reach 0 for none.
+    (m,): each dot's blur, reach 0 for none. `opacity` (m,) is the ink of each dot over the usual.
     """
     height, width = ink.shape
     polygon = np.empty(start.shape[1:])
@@ -148,7 +148,7 @@ def draw_dots(
             patch = _blurred(patch, taps[m], reach[m])
         for y in range(max(0, -top), min(rows, height - top)):
             for x in range(max(0, -left), min(columns, width - left)):
-                at = ink[y + top, x + left] + patch[y, x]
+                at = ink[y + top, x + left] + opacity[m] * patch[y, x]
                 ink[y + top, x + left] = min(at, np.float32(1.0))
 
 

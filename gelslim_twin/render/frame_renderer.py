@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_optics.light.light_map import LightMap
     from gelslim_twin.render.defocus import BlurField
+    from gelslim_twin.render.photographed import PhotographedGel
     from ifem_export.markers.grid import MarkerGrid
 
 
@@ -62,6 +63,7 @@ class FrameRenderer:
         look: The effects to render.
         top: The outer surface at rest where it is crowned; None for a flat one.
         mono: Whether the camera sees brightness alone, by the first response of `light`.
+        photographed: The untouched gel as a built sensor sees it; None draws it from the design.
     """
 
     camera: VirtualCamera
@@ -71,13 +73,15 @@ class FrameRenderer:
     look: Look
     top: DomedTop | None = None
     mono: bool = False
+    photographed: PhotographedGel | None = None
 
     @cached_property
     def dots(self) -> PrintedDots:
         """The dots as printed, with the faults of the print."""
-        nominal = PrintedDots.nominal(self.grid)
+        seen = self.photographed
+        printed = PrintedDots.nominal(self.grid) if seen is None else seen.dots
         faults = self.look.marker_print
-        return nominal if faults is None else faults.apply(nominal)
+        return printed if faults is None else faults.apply(printed)
 
     @cached_property
     def sight(self) -> Sight:
@@ -87,6 +91,8 @@ class FrameRenderer:
     @cached_property
     def still(self) -> Image:
         """Irradiance (h, w, k) seen by each pixel at rest, without dots, with dirt and defocus."""
+        if self.photographed is not None:
+            return self.photographed.irradiance
         seen = None if self.top is None else self.top.seen_mm(self.sight)
         light = still_irradiance(self.camera, self.sight, self.light, self.pad, seen)
         if self.look.dirt is not None:
@@ -112,10 +118,11 @@ class FrameRenderer:
 
     @cached_property
     def _glare(self) -> Image:
-        if self.look.specular is None:
-            return _NONE
-        glare = self.look.specular.glare(self.still.shape[:2], self.light.colour)
-        return glare * np.float32(self._scale)
+        seen = _NONE if self.photographed is None else self.photographed.glare_dn
+        if self.look.specular is not None:
+            spots = self.look.specular.glare(self.still.shape[:2], self.light.colour)
+            seen = seen + spots if seen.size and spots.size else spots if spots.size else seen
+        return seen * np.float32(self._scale)
 
     @cached_property
     def _shading_sight(self) -> Sight | None:
@@ -181,7 +188,8 @@ class FrameRenderer:
                 gain = 1 + (gain - 1) * self._on_pad
             step = self.look.shading.pixel_step
         colour = (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
-        contrast = np.float32(self.look.contrast)
+        share = 1.0 if self.photographed is None else self.photographed.ink_share
+        contrast = np.full(3, self.look.contrast * np.asarray(share), dtype=np.float32)
 
         def write(top: int, out: Image) -> None:
             compose(self._planes, gain, step, ink, contrast, colour, self._glare, top, out)
@@ -195,12 +203,15 @@ class FrameRenderer:
         height, width = ink.shape
         write, noise = self._composer(ink, surface), self.look.sensor_noise
         gain = 1.0 if self.look.exposure is None else self.look.exposure.gain
+        grain = _NONE if noise is None else noise.grain((height, width), number)
         image = np.empty((height, width, 3), dtype=np.uint8)
         strip = np.empty((_STRIP, width, 3), dtype=np.float32)
         for top in range(0, height, _STRIP):
             rows = strip[: min(_STRIP, height - top)]
             write(top, rows)
-            if noise is not None:
+            if noise is not None and grain.size:
+                noise.add(rows, gain, grain[top : top + _STRIP])
+            elif noise is not None:
                 noise.apply(rows, gain, number, top * width)
             develop(rows.reshape(-1), self._curve, image[top : top + _STRIP].reshape(-1))
         if self.mono:
@@ -274,5 +285,5 @@ class FrameRenderer:
                 points += surface.at(self.dots.centres_mm)
             taps, reach = kernel_taps(self.look.defocus.sigma_px(self._blur_field, points, scale))
         ink = np.zeros((self.camera.image_height_px, self.camera.image_width_px), dtype=np.float32)
-        draw_dots(start, now, drawn, poses, taps, reach, ink)
+        draw_dots(start, now, drawn, poses, taps, reach, self.dots.opacity, ink)
         return ink

@@ -23,8 +23,8 @@ def compose(
     """Write rows `top` and on of the grey values: sum over sources of colour · light · (1 - c ink).
 
     `out` (rows, w, 3) float32 says how many; all else has the whole picture's size (h, w).
-    `irradiance` (k, h, w); `gain` (r, c, k) on every `step`-th pixel, bilinear between, or empty
-    for a level surface; `glare` (h, w, 3) is added, or empty.
+    `irradiance` (k, h, w); `contrast` (3,) of the channels; `gain` (r, c, k) on every `step`-th
+    pixel, bilinear between, or empty for a level surface; `glare` (h, w, 3) is added, or empty.
     """
     count, width = irradiance.shape[0], irradiance.shape[2]
     shaded, spots, columns = gain.size > 0, glare.size > 0, gain.shape[1]
@@ -52,9 +52,8 @@ def compose(
                 for x in range(width):
                     total[x] += share * (plane[x] * row[x])
         for x in range(width):
-            left_over = one - contrast * ink[y, x]
             for m in range(3):
-                out[n, x, m] = sums[m, x] * left_over
+                out[n, x, m] = sums[m, x] * (one - contrast[m] * ink[y, x])
         if spots:
             for x in range(width):
                 for m in range(3):

@@ -71,17 +71,34 @@ class SensorNoise:
     """Read noise `read_dn` in grey values and `electrons_per_dn`, both at gain 1.
 
     The variance of a value v is (gain · read)² + gain · v / electrons_per_dn; infinitely many
-    electrons have no shot noise.
+    electrons have no shot noise. Where `grain_px` is above 0, the noise has the correlation of
+    white noise behind a Gaussian filter of that standard deviation, as demosaicing and compression
+    leave it; the variance stays.
     """
 
     read_dn: float = 0.0
     electrons_per_dn: float = float("inf")
     seed: int = 0
+    grain_px: float = 0.0
+
+    def grain(self, shape: tuple[int, int], frame: int = 0) -> NDArray[np.float32]:
+        """Correlated noise (h, w, 3) of unit variance of frame number `frame`; empty for none."""
+        if self.grain_px == 0:
+            return np.zeros((0, 0, 3), dtype=np.float32)
+        from scipy.ndimage import gaussian_filter
+
+        from gelslim_twin.render.image_kernel import add_noise
+
+        white = np.zeros((*shape, 3), dtype=np.float32)
+        key, one, none = stream_key(self.seed, "sensor noise", frame), np.float32(1), np.float32(0)
+        add_noise(white.reshape(-1, 3), 0, key, normal_table(), one, none)
+        spread = (self.grain_px, self.grain_px, 0)
+        return np.asarray(gaussian_filter(white, spread, mode="wrap") / _left(self.grain_px))
 
     def apply(
         self, image: NDArray[np.float32], gain: float = 1.0, frame: int = 0, first: int = 0
     ) -> None:
-        """Add the noise of frame number `frame` to `image` (h, w, 3), in place.
+        """Add white noise of frame number `frame` to `image` (h, w, 3), in place.
 
         A strip of a picture has the picture's noise if `first` is the number of its first pixel.
         """
@@ -99,15 +116,31 @@ class SensorNoise:
             np.float32(shot),
         )
 
+    def add(self, image: NDArray[np.float32], gain: float, grain: NDArray[np.float32]) -> None:
+        """Add `grain` (h, w, 3) with the variance of each value to `image` (h, w, 3), in place."""
+        shot = np.float32(gain / self.electrons_per_dn)
+        variance = np.float32((gain * self.read_dn) ** 2) + shot * np.maximum(image, 0)
+        image += np.sqrt(variance) * grain
+
+
+@cache
+def _left(grain_px: float) -> np.float32:
+    """Standard deviation of white noise of unit variance behind the Gaussian filter."""
+    from scipy.ndimage import gaussian_filter1d
+
+    impulse = np.zeros(2 * int(4 * grain_px + 2) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    return np.float32((gaussian_filter1d(impulse, grain_px) ** 2).sum())
+
 
 def noise_of_electrons(
-    full_well_electrons: float, read_noise_electrons: float, seed: int
+    full_well_electrons: float, read_noise_electrons: float, seed: int, grain_px: float = 0.0
 ) -> SensorNoise:
     """Noise of a sensor whose white pixel holds `full_well_electrons`; none without electrons."""
     if full_well_electrons == 0:
         return SensorNoise()
     per_dn = full_well_electrons / 255
-    return SensorNoise(read_noise_electrons / per_dn, per_dn, seed)
+    return SensorNoise(read_noise_electrons / per_dn, per_dn, seed, grain_px)
 
 
 @cache

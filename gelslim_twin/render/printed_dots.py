@@ -25,12 +25,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PrintedDots:
-    """Ellipses of ink on the undeformed surface: centres (m, 2), semi-axes (m, 2), angles (m,)."""
+    """Ellipses of ink on the undeformed surface: centres (m, 2), semi-axes (m, 2), angles (m,).
+
+    `opacity` (m,) is the ink of each dot over the usual.
+    """
 
     centres_mm: Array
     semi_axes_mm: Array
     turn_rad: Array
     present: NDArray[np.bool_]
+    opacity: NDArray[np.float32]
 
     @classmethod
     def nominal(cls, grid: MarkerGrid) -> PrintedDots:
@@ -41,6 +45,7 @@ class PrintedDots:
             semi_axes_mm=np.column_stack([half, half]),
             turn_rad=np.zeros(len(half)),
             present=np.ones(len(half), dtype=bool),
+            opacity=np.ones(len(half), dtype=np.float32),
         )
 
     def __len__(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
@@ -18,6 +19,9 @@ from gelslim_twin.scene.pose_table import LIMITS, read_pose_table
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
 from gelslim_twin.scene.variation import varied
 
+if TYPE_CHECKING:
+    from gelslim_twin.scene.built_look import BuiltLook
+
 
 @dataclass(frozen=True)
 class LoadedScene(Loaded[Scene]):
@@ -27,9 +31,11 @@ class LoadedScene(Loaded[Scene]):
         model: The scene, also called `scene`.
         path: The file it was read from.
         poses: Poses of the tool in the order of time.
+        look: The look that the scene names, whose values its effects have.
     """
 
     poses: tuple[Pose, ...]
+    look: BuiltLook | None = None
 
     @property
     def scene(self) -> Scene:
@@ -115,7 +121,21 @@ def read_scene(path: str | os.PathLike[str]) -> LoadedScene:
     scene = LoadedScene(**vars(loaded), poses=found)
     _check_meshes(scene)
     scene.require_upright()
-    return scene
+    return scene if scene.scene.look is None else _with_look(scene, scene.scene.look)
+
+
+def _with_look(loaded: LoadedScene, name: str) -> LoadedScene:
+    """The scene with the values of its look, where it gives none itself."""
+    # Only scenes with a look load what reads it.
+    from gelslim_twin.scene.built_look import LookError, read_look
+
+    try:
+        look = read_look(loaded.folder / name)
+    except LookError as error:
+        message, _, remedy = str(error).rpartition("; ")
+        raise loaded.problem("look", shown(name), message, remedy) from None
+    effects = loaded.scene.effects.completed(look.effect_values())
+    return replace(loaded, model=loaded.scene.model_copy(update={"effects": effects}), look=look)
 
 
 def _check_meshes(loaded: LoadedScene) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field, create_model, model_validator
@@ -86,6 +87,16 @@ class EffectsBlock(Block):
             found[effect.name] = effect.parameters(use=given) if isinstance(given, str) else given
         return found
 
+    def completed(self, values: Mapping[str, Mapping[str, float]]) -> Effects:
+        """These effects with parameters by effect and name, where the scene gives none itself."""
+        changed: dict[str, EffectParameters] = {}
+        own = self.parameters()
+        for name, known in values.items():
+            given = own[name]
+            free = {n: v for n, v in known.items() if n not in given.model_fields_set}
+            changed[name] = given.model_copy(update=free)
+        return self.model_copy(update=changed)
+
 
 if TYPE_CHECKING:
     Effects = EffectsBlock
@@ -115,6 +126,13 @@ class Scene(Block):
         description="Name of the scene, which is also that of the output folder",
     )
     sensor: Sensor = Field(description="The sensor that is touched")
+    look: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=400,
+        description="File of `gelslim calibrate-look`, relative to the scene file: pictures look "
+        "like those of that built sensor; without it, as the effects say",
+    )
     indenters: tuple[Indenter, ...] = Field(
         min_length=1, max_length=16, description="Rigid shapes that form one tool and move together"
     )

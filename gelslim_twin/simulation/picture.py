@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.render.look import Look, plan_camera, plan_look
+from gelslim_twin.scene.built_look import BuiltLook
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.markers.interpolation import marker_to_node
@@ -28,16 +29,24 @@ MOTTLE, VIGNETTING = 0.04, 0.7
 
 @dataclass(frozen=True, eq=False)
 class Viewer:
-    """Camera and renderer of one sensor, with the effects of a plan."""
+    """Camera and renderer of one sensor, with the effects of a plan and the look of the built one.
+
+    Without a look the sensor is drawn as designed.
+    """
 
     sensor: TwinSensor
     plan: Plan
     scene: Scene
+    look: BuiltLook | None = None
 
     @cached_property
     def camera(self) -> VirtualCamera:
         """The camera of the plan."""
-        return plan_camera(self.plan, self.sensor.camera_record)
+        return plan_camera(self.plan, self._camera_record)
+
+    @property
+    def _camera_record(self) -> Mapping[str, Any]:
+        return self.sensor.camera_record if self.look is None else self.look.camera
 
     @cached_property
     def _to_markers(self) -> Any:
@@ -56,9 +65,11 @@ class Viewer:
     @cached_property
     def renderer(self) -> FrameRenderer:
         """Draws frames."""
-        scene, record = self.scene, self.sensor.camera_record
-        look = plan_look(self.plan, scene.effects.parameters(), record, scene.seed)
-        return sensor_renderer(self.sensor, self.camera, look, scene.seed)
+        scene = self.scene
+        effects = plan_look(self.plan, scene.effects.parameters(), self._camera_record, scene.seed)
+        if self.look is not None:
+            return _built_renderer(self.sensor, self.camera, self.look, effects)
+        return sensor_renderer(self.sensor, self.camera, effects, scene.seed)
 
     @cached_property
     def surface(self) -> Callable[[GelState], SurfaceState]:
@@ -74,6 +85,19 @@ class Viewer:
         """Frame `number`; `before` is the state of the frame `step_s` seconds earlier."""
         earlier = None if before is None else self.surface(before)
         return self.renderer.frame(self.surface(state), earlier, number=number, step_s=step_s)
+
+
+def _built_renderer(
+    sensor: TwinSensor, camera: VirtualCamera, look: BuiltLook, effects: Look
+) -> FrameRenderer:
+    """The renderer of a sensor as built."""
+    from gelslim_twin.appearance.drawing import look_renderer
+    from gelslim_twin.render.surface_state import DomedTop
+    from gelslim_twin.render.surroundings import Pad
+
+    pad = Pad(*sensor.size_mm, sensor.corner_radius_mm)
+    top = DomedTop.of_nodes(sensor.points_mm)
+    return look_renderer(look, camera, sensor.grid, sensor.light(), pad, effects, top)
 
 
 def sensor_renderer(

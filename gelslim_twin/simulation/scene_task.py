@@ -1,4 +1,4 @@
-"""A planned scene as a job, its mechanical model, and one scene of a data set as a task."""
+"""A planned scene as a job, and one scene of a data set as a task."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gelslim_twin.planning.plan import Choice, Plan
+from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probing import effects_to_probe, probe_ms
 from gelslim_twin.planning.question import (
     bundle_figures,
-    contact_friction,
     plan_asked,
     question,
 )
+from gelslim_twin.scene.built_look import BuiltLook, LookError
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.reader import LoadedScene, read_scene
+from gelslim_twin.simulation.scene_mechanics import can_be_probed, mechanics_of, pad_compliance
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
-from gelslim_twin.simulation.simulate import Mechanics, SimulationJob, simulate
+from gelslim_twin.simulation.simulate import SimulationJob, simulate
 
 if TYPE_CHECKING:
-    from ifem_export.compliance.columns import SurfaceCompliance
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 
@@ -72,9 +72,11 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         The input of `simulate`.
 
     Raises:
-        InputError: The plan needs an effect that the sensor's pad does not allow, or the gel meets
-            an undercut of a mesh.
+        InputError: The plan needs an effect that the sensor's pad does not allow, the gel meets an
+            undercut of a mesh, or the scene's look is that of another sensor.
     """
+    if loaded.look is not None:
+        require_sensor_of_look(loaded, loaded.look, sensor)
     require_no_undercut(loaded, sensor)
 
     @cache
@@ -101,7 +103,17 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         plan,
         sensor,
         lambda: mechanics_of(loaded, plan, compliance("skin" in plan.order)),
+        loaded.look,
     )
+
+
+def require_sensor_of_look(loaded: LoadedScene, look: BuiltLook, sensor: TwinSensor) -> None:
+    """Raise InputError for a look of another sensor than that of the scene."""
+    try:
+        look.require_bundle(sensor.bundle)
+    except LookError as error:
+        message, _, remedy = str(error).rpartition(": ")
+        raise loaded.problem("look", None, message, remedy) from None
 
 
 def require_no_undercut(loaded: LoadedScene, sensor: TwinSensor) -> None:
@@ -132,15 +144,8 @@ def require_no_undercut(loaded: LoadedScene, sensor: TwinSensor) -> None:
                 )
 
 
-def can_be_probed(sensor: TwinSensor) -> bool:
-    """Whether a probe serves a sensor: it takes a bare gel and a table of columns."""
-    from ifem_export.compliance.table_size import has_room
-
-    return sensor.bundle.skin is None and has_room(len(sensor.bundle.mesh.surface))
-
-
 def planned(
-    loaded: LoadedScene, asked: Question, compliance: Callable[[], SurfaceCompliance] | None
+    loaded: LoadedScene, asked: Question, compliance: Callable[[], PadCompliance] | None
 ) -> Plan:
     """Plan a scene; where it pays, a probe finds the sizes of effects before.
 
@@ -161,73 +166,9 @@ def planned(
     if not effects or compliance is None:
         return plan
     from gelslim_twin.simulation.probe import probed
+    from ifem_export.compliance.columns import SurfaceCompliance
 
+    pad = compliance()
+    assert isinstance(pad, SurfaceCompliance), "a probe takes a table of columns"
     spent_ms = probe_ms(asked, plan, effects)
-    return plan_asked(loaded, probed(asked, loaded, compliance(), effects, spent_ms))
-
-
-def pad_compliance(
-    sensor: TwinSensor, folder: Path | None = None, *, skin: bool = False
-) -> PadCompliance:
-    """The compliance of a sensor's pad: a table of columns where that fits, else a convolution.
-
-    Args:
-        sensor: The sensor.
-        folder: Folder that keeps the columns.
-        skin: Whether the coat and the fabric of the gel count.
-    """
-    from ifem_export.compliance.table_size import has_room
-
-    membranes = sensor.bundle.skin.membranes if skin and sensor.bundle.skin else ()
-    if has_room(len(sensor.bundle.mesh.surface)):
-        from ifem_export.compliance.columns import SurfaceCompliance
-
-        return SurfaceCompliance(sensor.bundle, folder, membranes)
-    from ifem_export.compliance.convolved import ConvolvedCompliance
-
-    return ConvolvedCompliance(sensor.bundle, membranes)
-
-
-def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> Mechanics:
-    """The mechanical model of a planned scene on a pad.
-
-    Only modules of effects in the plan are imported. Raises ValueError or OSError for a mesh
-    that cannot be read.
-    """
-    chosen = {choice.effect: choice for choice in plan.included}
-    solver = import_module(chosen["normal_contact"].implementation)
-    from gelslim_twin.contact.tool import Tool
-
-    tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
-    if "friction" in chosen:
-        tolerance = min(tolerance, _tolerance(chosen["friction"]))
-        skin = compliance.bundle.skin
-        friction = contact_friction(loaded.scene.contact, None if skin is None else skin.friction)
-    settings = solver.ContactSettings(tolerance, friction)
-    tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
-    contact: Any = _linear_contact(solver, compliance, tool, settings)
-    if "nonlinearity" in chosen:
-        nonlinear = import_module(chosen["nonlinearity"].implementation)
-        contact = nonlinear.NonlinearContact(
-            contact, **dict(chosen["nonlinearity"].rung_parameters)
-        )
-    if "relaxation" in chosen:
-        given = loaded.scene.effects.parameters()["relaxation"].model_dump()["terms"]
-        relaxation = import_module(chosen["relaxation"].implementation)
-        fractions, times_s = (tuple(t[n] for t in given) for n in ("fraction", "time_s"))
-        contact = relaxation.RelaxingContact(contact, relaxation.PronySeries(fractions, times_s))
-    return contact
-
-
-def _linear_contact(solver: Any, compliance: PadCompliance, tool: Any, settings: Any) -> Any:
-    from ifem_export.compliance.table_size import has_room
-
-    if has_room(len(compliance.bundle.mesh.surface)):
-        return solver.ContactSolver(compliance, tool, settings)
-    from gelslim_twin.contact.fine_contact import FineContact
-
-    return FineContact(compliance, tool, settings)
-
-
-def _tolerance(choice: Choice) -> float:
-    return float(dict(choice.rung_parameters)["tolerance"])
+    return plan_asked(loaded, probed(asked, loaded, pad, effects, spent_ms))

@@ -20,6 +20,7 @@ from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.outputs.canvas import encoded
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.planning.plan import Plan
+from gelslim_twin.scene.built_look import BuiltLook
 from gelslim_twin.scene.pose import FrameTime, Pose, frame_times
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.records import FrameTruth, StateStore, fields_npz, wrench_csv
@@ -56,6 +57,7 @@ class SimulationJob:
         plan: The effects to simulate.
         sensor: The sensor.
         mechanics: Makes the solver; called only if there is something to solve.
+        look: The look of the built sensor; None for that of the design.
     """
 
     scene: Scene
@@ -63,6 +65,7 @@ class SimulationJob:
     plan: Plan
     sensor: TwinSensor
     mechanics: Callable[[], Mechanics]
+    look: BuiltLook | None = None
 
     @property
     def key(self) -> str:
@@ -71,7 +74,9 @@ class SimulationJob:
         material = f"{bundle.material} {bundle.formulation}"
         if bundle.skin is not None:
             material += f" {bundle.skin}"
-        scene = self.scene.model_dump_json() + repr(self.poses)
+        scene = self.scene.model_dump_json(exclude={"look"}) + repr(self.poses)
+        if self.look is not None:
+            scene += self.look.digest
         return simulation_key(scene, self.plan.to_json(), bundle.geometry_hash, material)
 
 
@@ -192,7 +197,7 @@ def _seen(
     if "markers" in observe or "image" in observe:
         from gelslim_twin.simulation.picture import Viewer
 
-        viewer = Viewer(job.sensor, job.plan, job.scene)
+        viewer = Viewer(job.sensor, job.plan, job.scene, job.look)
     before: GelState | None = None
     for number, when in enumerate(times):
         state = _at(states, when)

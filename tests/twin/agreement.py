@@ -23,7 +23,8 @@ from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.scene_task import mechanics_of, planned
+from gelslim_twin.simulation.scene_mechanics import mechanics_of
+from gelslim_twin.simulation.scene_task import planned
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance

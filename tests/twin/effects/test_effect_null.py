@@ -20,7 +20,7 @@ from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.question import bundle_figures, plan_scene
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
-from gelslim_twin.simulation.scene_task import mechanics_of
+from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -128,7 +128,7 @@ from pathlib import Path
 from gelslim_twin.planning.question import plan_scene
 from gelslim_twin.scene.reader import read_scene
 from gelslim_twin.planning.question import bundle_figures
-from gelslim_twin.simulation.scene_task import mechanics_of
+from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.effects.registry import EFFECTS
 from ifem_export.bundle.files import load_bundle

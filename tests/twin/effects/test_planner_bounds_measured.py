@@ -12,7 +12,7 @@ from gelslim_twin.effects.effect import OBSERVABLES
 from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import read_scene
-from gelslim_twin.simulation.scene_task import mechanics_of
+from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance

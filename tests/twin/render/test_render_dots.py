@@ -36,7 +36,7 @@ def drawn(polygon: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     ink = np.zeros(shape, dtype=np.float32)
     one = np.ascontiguousarray(polygon[None], dtype=float)
     none, single = np.zeros(1, dtype=np.int64), np.ones(1, dtype=np.int64)
-    draw_dots(one, one, np.ones(1, bool), single, np.ones((1, 1)), none, ink)
+    draw_dots(one, one, np.ones(1, bool), single, np.ones((1, 1)), none, np.ones(1), ink)
     return ink
 
 
@@ -157,7 +157,7 @@ def test_truth_is_the_centroid_of_the_ink_that_is_drawn():
     count = len(sparse)
     draw_dots(
         outlines, outlines, frame.drawn, np.ones(count, np.int64),
-        np.ones((count, 1)), np.zeros(count, np.int64), ink,
+        np.ones((count, 1)), np.zeros(count, np.int64), np.ones(count), ink,
     )  # fmt: skip
     for centre, size in zip(frame.centres_px, frame.diameter_px, strict=True):
         x0, y0 = np.rint(centre).astype(int)
