@@ -24,6 +24,7 @@ import page_tables
 import planning_figure
 import tolerance_tables
 import twin_fine
+import twin_look
 import twin_skin
 import twin_steps
 import twin_tables
@@ -75,6 +76,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-fine": _from("twin_fine", twin_fine.table),
         "twin-skin": _from("twin_skin", twin_skin.table),
         "twin-overhead": _from("twin_ladders", twin_tables.overhead_text),
+        "twin-look": _from("twin_look", twin_look.table),
     },
     "docs/twin_steps.md": {"steps": _from("twin_steps", twin_steps.table)},
     "docs/stiffness.md": {

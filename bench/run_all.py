@@ -51,6 +51,7 @@ STEPS = (
     Step("twin_fine"),
     Step("twin_skin"),
     Step("linear_gel"),
+    Step("twin_look", quick=None, writes=False),
     Step("rendering"),
     Step("assembly"),
     Step("force_latency", ("--frames", "3000"), ("--quick", "--timed", "96")),

@@ -261,8 +261,8 @@ def _diagnosis(fitted: FittedLook, found: dict[str, Any]) -> tuple[str, ...]:
         f"Noise: {look.read_dn:.2f} grey values without light and {look.electrons_per_dn:.1f} "
         f"electrons per grey value, both in linear light, with a grain of {look.grain_px:.2f} px.",
         f"Structural similarity of the drawn picture at rest: {rest['similarity']:.3f} without "
-        f"noise, where the real noise leaves {rest['similarity_limit']:.3f} at most; "
-        f"{rest['similarity_with_noise']:.3f} with noise of its own.",
+        f"noise, {rest['similarity_with_noise']:.3f} with noise of its own; noise alone leaves the "
+        f"drawn picture {rest['similarity_with_itself']:.3f} with itself.",
         f"Dot contrast {real['dot_contrast']:.2f} real, {drawn['dot_contrast']:.2f} drawn; edge "
         f"width {real['edge_percent']:.2f} and {drawn['edge_percent']:.2f} % of the view; noise "
         f"{real['noise_dn']:.2f} and {drawn['noise_dn']:.2f} grey values.",
@@ -287,7 +287,7 @@ def _warnings(fitted: FittedLook, found: dict[str, Any], presses: int) -> tuple[
             "without further pictures fine texture of the coat counts as noise: give the folder of "
             "some presses"
         )
-    if found["rest"]["similarity"] < _LEAST_ALIKE * found["rest"]["similarity_limit"]:
+    if found["rest"]["similarity"] < _LEAST_ALIKE * found["rest"]["similarity_with_itself"]:
         lines.append(
             f"the drawn picture at rest has a structural similarity of only "
             f"{found['rest']['similarity']:.2f}; look at both in the report"

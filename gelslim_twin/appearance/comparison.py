@@ -93,15 +93,14 @@ def compare_rest(
 
     Returns:
         Plain data: similarities, error of the profiles, and the figures of both pictures.
-            `similarity_limit` is that of the two drawn pictures: no picture without noise can be
-            more like one with this noise.
+            `similarity_with_itself` is that of the two drawn pictures: what noise alone leaves.
     """
     real = rest.picture
     return {
         "similarity": similarity(drawn, real),
         "similarity_on_gel": similarity(drawn, real, fitted.on_pad),
         "similarity_with_noise": similarity(noisy, real),
-        "similarity_limit": similarity(drawn, noisy),
+        "similarity_with_itself": similarity(drawn, noisy),
         "profile_error_dn": profile_error_dn(noisy, real, fitted.on_pad).tolist(),
         "real": figures_of(real, fitted, rest).to_record(),
         "drawn": figures_of(noisy, fitted, rest).to_record(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,9 @@ _RIDGE = 1e-3
 _ROUNDS = 12
 _SAMPLES = 20_000
 _LEAST_DN = 0.5
+_LEAST_EXPLAINED = 0.7
+"""Share of the darkness of a dot, at least, that an ellipse of ink explains. Others, cut by the
+edge of the gel for example, stay in the bare picture and do not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +72,18 @@ class RestPicture:
     def planes(self) -> Picture:
         """(h, w, c)."""
         return np.atleast_3d(self.picture)
+
+    def without(self, left_out: Mask) -> RestPicture:
+        """Without some of the dots (m,), which then belong to the bare picture."""
+        kept = ~left_out
+        return replace(
+            self,
+            markers=self.markers[kept],
+            places_mm=self.places_mm[kept],
+            centres_px=self.centres_px[kept],
+            moments_px2=self.moments_px2[kept],
+            missing=np.union1d(self.missing, self.markers[left_out]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +127,12 @@ def fit_look(
     """
     planes = rest.planes
     linear = to_linear(planes, gamma)
-    dots = SeenDots(rest.centres_px, rest.moments_px2, _defocus_px(rest))
     try:
-        ink = fit_ink(linear, dots, rest.pitch_px)
+        ink = fit_ink(linear, _dots_of(rest), rest.pitch_px)
+        plain = ink.explained >= _LEAST_EXPLAINED
+        if not plain.all() and plain.any():
+            rest = rest.without(~plain)
+            ink = fit_ink(linear, _dots_of(rest), rest.pitch_px)
         noise = fit_noise(
             planes, ink.covered, gamma, [(np.atleast_3d(p), mask) for p, mask in others]
         )
@@ -146,10 +164,14 @@ def fit_look(
         markers=rest.markers,
         dots_mm=np.column_stack([rest.places_mm[:, :2], axes]),
         turn_rad=turn,
-        opacity=np.ones(0) if ink.dots.opacity is None else ink.dots.opacity,
+        opacity=ink.dots.ink_share,
         missing=rest.missing,
     )
     return FittedLook(look, ink, noise, on_pad)
+
+
+def _dots_of(rest: RestPicture) -> SeenDots:
+    return SeenDots(rest.centres_px, rest.moments_px2, _defocus_px(rest))
 
 
 def to_linear(picture: Picture, gamma: float) -> Array:

@@ -49,6 +49,11 @@ class SeenDots:
     defocus_px: Array
     opacity: Array | None = None
 
+    @property
+    def ink_share(self) -> Array:
+        """(m,) ink of each dot over that of the darkest."""
+        return np.ones(len(self.centres_px)) if self.opacity is None else self.opacity
+
     def outlines_px(self, size: float = 1.0) -> Array:
         """Outlines (m, k, 2), stretched by `size`."""
         moments = np.empty((len(self.centres_px), 2, 2))
@@ -68,11 +73,10 @@ class SeenDots:
 
         outlines, count = self.outlines_px(size), len(self.centres_px)
         taps, reach = kernel_taps(np.hypot(self.defocus_px, blur_px))
-        opacity = np.ones(count) if self.opacity is None else self.opacity
         ink = np.zeros(shape[:2], dtype=np.float32)
         draw_dots(
             outlines, outlines, np.ones(count, dtype=bool), np.ones(count, dtype=np.int64),
-            taps, reach, opacity.astype(np.float32), ink,
+            taps, reach, self.ink_share.astype(np.float32), ink,
         )  # fmt: skip
         return ink
 
@@ -102,7 +106,7 @@ class FittedInk:
         contrast: (c,) share of the light that the ink of the darkest dots absorbs.
         bare: (h, w, c) the picture in linear grey values with the dots filled in.
         covered: (h, w) pixels that ink covers in part.
-        unexplained: Share of the squared darkness of the dots that the model leaves.
+        explained: (m,) share of the squared darkness around each dot that the model explains.
     """
 
     dots: SeenDots
@@ -110,7 +114,7 @@ class FittedInk:
     contrast: Array
     bare: Array
     covered: Mask
-    unexplained: float
+    explained: Array
 
 
 def fit_ink(linear: Array, dots: SeenDots, pitch_px: float) -> FittedInk:
@@ -138,8 +142,8 @@ def fit_ink(linear: Array, dots: SeenDots, pitch_px: float) -> FittedInk:
     dots = replace(dots, moments_px2=dots.moments_px2 * size**2)
     opacity, contrast = _opacity(linear, bare, dots, blur)
     inked = replace(dots, opacity=opacity)
-    left = _unexplained(linear, bare, near, inked.ink(linear.shape, 1.0, blur), contrast)
-    return FittedInk(inked, blur, contrast, bare, covered, left)
+    explained = _explained(linear, bare, near, inked, blur, contrast)
+    return FittedInk(inked, blur, contrast, bare, covered, explained)
 
 
 def filled(picture: Array, covered: Mask, spread_px: float) -> Array:
@@ -202,6 +206,22 @@ def _opacity(linear: Array, bare: Array, dots: SeenDots, blur: float) -> tuple[A
     share = dark.sum(axis=1) / np.maximum((full * contrast).sum(axis=1), 1e-9)
     darkest = max(float(np.quantile(share, _DARKEST)), 1e-6)
     return np.clip(share / darkest, 0.0, 1.0), np.clip(contrast * darkest, 0.0, 1.0)
+
+
+def _explained(
+    linear: Array, bare: Array, near: Mask, dots: SeenDots, blur: float, contrast: Array
+) -> Array:
+    """Share (m,) of the squared darkness of the pixels of each dot that the model explains."""
+    from scipy.spatial import cKDTree
+
+    rows, columns = np.nonzero(near)
+    _, owner = cKDTree(dots.centres_px).query(np.column_stack([columns, rows]))
+    dark = (bare - linear)[rows, columns]
+    ink = dots.ink(linear.shape, 1.0, blur)[rows, columns, None]
+    left = dark - bare[rows, columns] * ink * contrast
+    count = len(dots.centres_px)
+    off, whole = (np.bincount(owner, (v**2).sum(axis=1), count) for v in (left, dark))
+    return np.asarray(1 - off / np.maximum(whole, 1e-12))
 
 
 def _misfit(

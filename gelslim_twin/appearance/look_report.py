@@ -75,8 +75,8 @@ def _rest_table(rest: Mapping[str, Any]) -> str:
     errors = ", ".join(f"{v:.2f}" for v in rest["profile_error_dn"])
     return (
         table_html(("figure", "real", "drawn"), rows)
-        + f"<p>Structural similarity: {rest['similarity']:.3f} without noise (at most "
-        f"{rest['similarity_limit']:.3f} for the real noise), "
+        + f"<p>Structural similarity: {rest['similarity']:.3f} without noise (noise "
+        f"alone leaves the drawn picture {rest['similarity_with_itself']:.3f} with itself), "
         f"{rest['similarity_on_gel']:.3f} on the gel alone, {rest['similarity_with_noise']:.3f} "
         "with noise. Mean rows and columns of the gel differ by "
         f"{errors} grey values (root mean square, by channel).</p>"

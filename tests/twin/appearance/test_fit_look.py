@@ -73,6 +73,20 @@ def test_a_hidden_look_is_found(fitted: FittedLook) -> None:
 
 
 @pytest.mark.slow
+def test_a_mono_camera_has_one_channel() -> None:
+    design = replace(design_light(), colour=np.ones((2, 3)))
+    mono = replace(Hidden(green_level=0.0).renderer(design), mono=True)
+    rest = seen_at_rest(mono.frame(), design)
+    found = fit_look(rest, gamma=GAMMA)
+    assert found.look.bare.shape == rest.picture.shape == (240, 320)
+    assert found.look.contrast == pytest.approx(Hidden().contrast, abs=0.04)
+    _, plain = renderers(found.look, rest, PRINT)
+    clean = replace(Hidden(green_level=0.0).renderer(design, noise=False), mono=True)
+    assert plain.frame().image.ndim == 2
+    assert similarity(plain.frame().image, clean.frame().image) > 0.97
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_hidden_looks_are_found(seed: int) -> None:
     rng = np.random.default_rng([7, seed])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from render_rig import AXIS_X, AXIS_Y, CAMERA, PAD, dent, light, moved, renderer
+from render_rig import AXIS_X, AXIS_Y, CAMERA, PAD, coarse, dent, light, moved, renderer
 
 from gelslim_optics.light.light_map import LED_COLOURS, LightMap, red_green_sides
 from gelslim_twin.render.defocus import Defocus
@@ -199,3 +199,29 @@ def test_invalid_light_is_refused_with_the_field(change):
     }  # fmt: skip
     with pytest.raises(ValueError, match=next(iter(change))):
         LightMap(**(values | change))
+
+
+@pytest.mark.parametrize("lamps", [1, 2, 3, 4])
+def test_the_light_of_any_number_of_lamps_adds_up(lamps):
+    """A frame of all lamps is the sum of frames of single ones: light is linear in its sources."""
+    rng = np.random.default_rng(lamps)
+    x, y = (np.linspace(-size / 2, size / 2, 5) for size in (PAD.length_mm, PAD.width_mm))
+    fields = {
+        "irradiance": rng.uniform(0.3, 1.5, (5, 5, lamps)),
+        "azimuth_deg": rng.uniform(-180, 180, lamps),
+        "elevation_deg": rng.uniform(20, 60, lamps),
+        "colour": rng.uniform(0.0, 0.4, (lamps, 3)),
+    }
+    ink = np.full((240, 320), 0.25, dtype=np.float32)
+    look = Look(level_dn=60.0, contrast=0.5, shading=Shading())
+
+    def values(*chosen):
+        kept = list(chosen)
+        part = {n: v[..., kept] if n == "irradiance" else v[kept] for n, v in fields.items()}
+        small = renderer(look, camera=coarse(CAMERA), light=LightMap(x, y, **part))
+        return small.values(ink, dent(0.8))
+
+    whole = values(*range(lamps))
+    apart = sum(values(k) for k in range(lamps))
+    assert whole.std() > 1
+    np.testing.assert_allclose(whole, apart, rtol=2e-5, atol=1e-3)
