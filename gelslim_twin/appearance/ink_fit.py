@@ -202,7 +202,13 @@ def _opacity(linear: Array, bare: Array, dots: SeenDots, blur: float) -> tuple[A
         full += bare[at] * ink[at][:, None]
     absorbed = dark / np.maximum(full, 1e-9)
     lit = full > _LEAST_LIGHT * np.median(full, axis=0)
-    contrast = np.array([np.median(a[used]) for a, used in zip(absorbed.T, lit.T, strict=True)])
+    # A channel without any light has no contrast.
+    contrast = np.array(
+        [
+            np.median(a[used]) if used.any() else 0.0
+            for a, used in zip(absorbed.T, lit.T, strict=True)
+        ]
+    )
     share = dark.sum(axis=1) / np.maximum((full * contrast).sum(axis=1), 1e-9)
     darkest = max(float(np.quantile(share, _DARKEST)), 1e-6)
     return np.clip(share / darkest, 0.0, 1.0), np.clip(contrast * darkest, 0.0, 1.0)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gelslim_twin.contact.soft_layer import SoftLayer
+from gelslim_twin.scene.built_look import BuiltLook, read_look
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.sensor import TwinSensor
@@ -45,11 +46,13 @@ class _Sensor:
     request: Request
     scene: Scene
     mechanics: StepMechanics
+    look: BuiltLook | None = None
 
     @cached_property
     def viewer(self) -> Viewer:
         """Camera and renderer."""
-        return stepped_viewer(self.sensor, self.folder, self.scene, self.request)
+        viewer = stepped_viewer(self.sensor, self.folder, self.scene, self.request)
+        return replace(viewer, look=self.look)
 
     def view(self) -> Viewer:
         """The viewer, made at the first call."""
@@ -79,6 +82,7 @@ class Twin:
         effects: Mapping[str, Any] | None = None,
         keep: str | os.PathLike[str] | None = None,
         seed: int = 0,
+        look: str | os.PathLike[str] | None = None,
     ) -> None:
         """Open a sensor.
 
@@ -91,9 +95,11 @@ class Twin:
             effects: The block `effects` of a scene file, such as {"nonlinearity": "off"}.
             keep: Folder that keeps the compliance of the pad for the next twin; none by default.
             seed: Seed of noise, dirt and print faults.
+            look: File of `gelslim calibrate-look`: pictures look like those of that built sensor.
 
         Raises:
             StepError: There is no such folder, or a setting cannot be used.
+            LookError: The look cannot be read, or is that of another sensor.
             IfemError: The bundle is damaged, its pad is too fine, or it has no markers or no
                 camera where these are observed.
         """
@@ -105,12 +111,17 @@ class Twin:
         request = Request.read(observe, tolerance)
         sensor = TwinSensor(load_bundle(folder))
         scene = stepped_scene(request, friction, effects, seed, pad_size_mm(sensor))
+        built = None if look is None else read_look(look)
+        if built is not None:
+            built.require_bundle(sensor.bundle)
+            seen = scene.effects.completed(built.effect_values())
+            scene = scene.model_copy(update={"effects": seen})
         skin = _membranes(sensor, scene.effects.parameters())
         compliance = SurfaceCompliance(sensor.bundle, _made(keep), skin)
         mechanics = StepMechanics(
             compliance, request, scene.contact.friction, scene.effects.parameters()
         )
-        self._shared = _Sensor(sensor, folder, request, scene, mechanics)
+        self._shared = _Sensor(sensor, folder, request, scene, mechanics, built)
         if request.seen:
             _ = self._shared.viewer
         self._bodies: tuple[Body, ...] = ()

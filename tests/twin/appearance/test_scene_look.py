@@ -22,9 +22,12 @@ from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.image_sensor import Exposure, SensorNoise
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.shading import Shading
-from gelslim_twin.scene.built_look import read_look, write_look
+from gelslim_twin.scene.built_look import LookError, read_look, write_look
+from gelslim_twin.scene.indenter import Sphere
 from gelslim_twin.simulation.picture import sensor_renderer
 from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.stepping.body import Body
+from gelslim_twin.stepping.twin import Twin
 from ifem_export.bundle.files import load_bundle
 
 CONTRAST, BLUR_PX, READ_DN, PER_DN = 0.6, 1.2, 1.0, 40.0
@@ -104,10 +107,21 @@ def test_a_look_is_calibrated_and_a_scene_drawn_with_it(tmp_path: Path, capsys) 
     assert main(["simulate", str(tmp_path / "scene.yaml"), "-o", str(run)]) == 0
     frames = sorted((run / "frames").iterdir())
     last = read_picture(frames[-1])
+    stepped = stepped_picture(bundle, look)
     clean = replace(built, look=replace(built.look, sensor_noise=None)).frame().image
+    assert similarity(stepped, clean) > 0.97 * similarity(built.frame().image, clean)
     assert similarity(last, built.frame(number=9).image) > 0.97 * similarity(
         clean, built.frame(number=9).image
     ) * similarity(clean, built.frame(number=8).image)
+
+
+def stepped_picture(bundle: Path, look: Path) -> np.ndarray:
+    """The untouched gel as a stepped twin draws it."""
+    twin = Twin(bundle, observe=("image",), look=look)
+    twin.add(Body.from_indenters(Sphere(shape="sphere", radius_mm=4.0)))
+    away = np.eye(4)
+    away[2, 3] = 5.0
+    return np.asarray(twin.step([away], dt=0.01).image())
 
 
 @pytest.mark.slow
@@ -116,5 +130,7 @@ def test_the_look_of_another_sensor_is_refused(tmp_path: Path, capsys) -> None:
     write_look(plain_look(3), tmp_path / "look.json")
     scene = SCENE.format(bundle="bundle").replace("observe:", "look: look.json\nobserve:")
     (tmp_path / "scene.yaml").write_text(scene, encoding="utf-8")
+    with pytest.raises(LookError, match="belongs to a sensor of geometry drawn"):
+        stepped_picture(tmp_path / "bundle", tmp_path / "look.json")
     assert main(["simulate", str(tmp_path / "scene.yaml"), "-o", str(tmp_path / "o" / "run")]) == 2
     assert "look belongs to a sensor of geometry drawn" in " ".join(capsys.readouterr().err.split())
