@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration import checks
 from gelslim_force.calibration.design import bundle_grid, marker_heights_mm
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.frames.upright import upright
@@ -127,18 +126,22 @@ def rest_picture(
     if is_mono(bundle.camera) and image.ndim == 3:
         image = np.ascontiguousarray(image[..., 0])
     markers = calibration.markers
-    heights = marker_heights_mm(bundle)[markers]
-    expected = np.flatnonzero(checks.markers_in_view(calibration.camera, calibration.grid))
+    heights, pitch_px = marker_heights_mm(bundle), usual_distance(calibration.reference_px)
+    print_mm = np.column_stack([calibration.grid.positions_mm, heights])
+    size = np.array([calibration.camera.image_width_px, calibration.camera.image_height_px])
+    # Dots cut by the edge of the picture are in it too, though not found.
+    beyond = np.abs(calibration.camera.project(print_mm) - (size - 1) / 2) - size / 2
+    seen = np.flatnonzero((beyond < pitch_px / 2).all(axis=1))
     return RestPicture(
         picture=image,
         camera=calibration.camera,
         camera_record={**bundle.camera, **calibration.camera.to_record()},
         markers=markers,
-        places_mm=np.column_stack([calibration.rest_mm, heights]),
+        places_mm=np.column_stack([calibration.rest_mm, heights[markers]]),
         centres_px=calibration.reference_px,
         moments_px2=calibration.dots.moments_px2,
-        missing=np.setdiff1d(expected, markers),
-        pitch_px=usual_distance(calibration.reference_px),
+        missing=np.setdiff1d(seen, markers),
+        pitch_px=pitch_px,
         light=light,
         pad=pad_of(bundle),
         geometry_hash=bundle.geometry_hash,

@@ -48,7 +48,7 @@ class RestPicture:
         places_mm: (m, 3) where they are on the gel.
         centres_px: (m, 2) where they are seen.
         moments_px2: (m, 3) their second moments.
-        missing: (n,) ids of dots that should be seen and are not.
+        missing: (n,) ids of dots that are in the picture, at least in part, and were not found.
         pitch_px: Usual distance of the dots.
         light: Light of the design.
         pad: Outline of the gel.

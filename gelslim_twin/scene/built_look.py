@@ -62,7 +62,7 @@ class BuiltLook:
         dots_mm: (m, 4) centre x, y and semi-axes of each dot on the gel at rest.
         turn_rad: (m,) angle of the first semi-axis from x to y.
         opacity: (m,) ink of each dot over that of the darkest.
-        missing: (n,) ids of the dots that should be in the picture and are not.
+        missing: (n,) ids of the dots in the picture that were not found; they are not drawn.
         judged: What the drawn picture has in common with the real one, as plain data.
         diagnosis: What was found, in sentences.
         warnings: What should be looked at before the look is trusted.

@@ -74,9 +74,10 @@ def seen(name: str) -> tuple[RestPicture, Any]:
     places = camera.backproject(rest.dots.centres_px, 0.0)
     grid = SimpleNamespace(positions_mm=places[:, :2], diameter_mm=np.full(len(places), 0.5))
     dots = rest.dots.take(whole)
+    cut = np.setdiff1d(np.arange(len(places)), whole)
     found = RestPicture(
         image, camera, dict(camera.to_record()), whole, places[whole], dots.centres_px,
-        dots.moments_px2, np.zeros(0, dtype=np.int64), rest.pitch_px, light, Pad(*size), "real",
+        dots.moments_px2, cut, rest.pitch_px, light, Pad(*size), "real",
     )  # fmt: skip
     return found, grid
 
