@@ -55,13 +55,15 @@ class WholeDots:
         seen, near = tracked.tracks.tracked, self.reference.neighbours
         if not seen.any():
             return tracked
-        growth, stretch = self.beyond_strain(tracked)
-        # Comparisons with the NaN of a dot that is not seen are false: it is not whole.
-        change = np.maximum(np.abs(growth - median(growth)), stretch)
-        whole = change < _LARGEST_CHANGE
-        covered, beside, lost = (np.empty_like(whole) for _ in range(3))
-        wk.far_from_neighbours(growth, near, _COVERED, covered)
-        whole &= ~covered
+        covered, beside, lost = (np.empty_like(seen) for _ in range(3))
+        change, whole = np.full(len(seen), np.nan), np.zeros_like(seen)
+        # Where dots are blurred, or strain varies between the markers, either may be nearer.
+        for growth, stretch in (self.changes(tracked), self.beyond_strain(tracked)):
+            # Comparisons with the NaN of a dot that is not seen are false: it is not whole.
+            now = np.maximum(np.abs(growth - median(growth)), stretch)
+            wk.far_from_neighbours(growth, near, _COVERED, covered)
+            whole |= (now < _LARGEST_CHANGE) & ~covered
+            change = np.fmin(change, now)
         wk.beside_gap(whole, near, _NEXT, _LEAST_MISSING, _WORN, beside)
         wk.beside_lost(seen, near, _NEXT, _LEAST_LOST, lost)
         changed = change > max(_CUT, _CUT_OVER_USUAL * median(change))
