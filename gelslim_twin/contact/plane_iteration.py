@@ -134,8 +134,8 @@ class PlaneIteration:
 
         No gaps show the error of the forces here, so their residual is made smaller instead.
         """
-        goal, fine = self.target_mm - self.offset_mm, FINER * BALANCE * self.tolerance
-        balance = self._balance(surface, motion_mm, goal, force_n, fine, None)
+        fine = FINER * BALANCE * self.tolerance
+        balance = self._balance(surface, motion_mm, self.offset_mm, force_n, fine, None)
         gap = surface.gap_mm(self.points_mm + balance.motion_mm + self.offset_mm)
         return PlaneSolution(balance, surface, gap, balance.sweeps)
 

@@ -5,12 +5,16 @@ See `layer_elimination` for the blocks, and `mirrored_kernel` for the waves.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numba import njit
 
+from gelslim_core.kernel_cache import drop_stale
 from ifem_export.operators.mirrored_kernel import load_pair, store_pair
+
+drop_stale(["layer_kernel"], ["mirrored_kernel"], Path(__file__).parent)
 
 
 @njit(cache=True, nogil=True)

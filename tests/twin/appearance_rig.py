@@ -17,7 +17,7 @@ from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
 from gelslim_twin.render.image_sensor import Exposure, SensorNoise
 from gelslim_twin.render.look import Look
-from gelslim_twin.render.printed_dots import MarkerPrint
+from gelslim_twin.render.print_faults import MarkerPrint
 from gelslim_twin.render.shading import Shading
 from gelslim_twin.scene.built_look import BuiltLook
 from ifem_export.markers.grid import MarkerGrid, build_marker_grid
