@@ -31,6 +31,7 @@ def proven() -> tuple[ProvenStep, ...]:
     return prove(steps, samples.meshes_of(NAME))
 
 
+@pytest.mark.slow
 def test_the_record_gives_the_steps_back() -> None:
     found = proven()
     record = json.loads(json.dumps(assembly_record(NAME, found), allow_nan=False))

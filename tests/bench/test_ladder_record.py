@@ -79,6 +79,7 @@ def test_bad_ladders_are_refused(rungs: tuple[RungRecord, ...]) -> None:
         some_ladder(rungs=rungs)
 
 
+@pytest.mark.slow
 def test_zero_and_single_rungs_are_drawn_and_figures_repeat() -> None:
     assert drawn(some_ladder()) == drawn(some_ladder())
     assert drawn(some_ladder(rungs=(RungRecord("only", 0.0, 0.0, is_ours=True),)))

@@ -93,6 +93,7 @@ def test_times_are_kept_beside_and_the_bundle_is_untouched(
     assert str(times_path(laddered.times_key).parents[2]) in said.replace("\n", "")
 
 
+@pytest.mark.slow
 def test_a_time_budget_uses_this_machines_times(
     sensor: Path, laddered: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -18,6 +18,7 @@ from gelslim_core.optional_library import install_command
 VARY = ["--vary", "gel.length_mm=16:24:4", "--vary", "camera.f_number=2,4"]
 
 
+@pytest.mark.slow
 def test_table_pictures_and_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     folder = tmp_path / "ein Raum ä"

@@ -102,6 +102,7 @@ def test_depth_maps_give_the_normal_force(sensor: Path, tmp_path: Path, capsys) 
     assert answer["last_wrench"][:3] == pytest.approx([*SHEAR_N, -NORMAL_N], abs=0.05)
 
 
+@pytest.mark.slow
 def test_moving_markers_without_a_patch_leave_the_normal_force_unknown(
     sensor: Path, tmp_path: Path, capsys
 ) -> None:

@@ -14,6 +14,7 @@ from gelslim_twin.effects.registry import EFFECTS
 SCENES = ROOT / "designs" / "scenes"
 
 
+@pytest.mark.slow
 def test_the_table_names_every_effect_and_the_time(capsys):
     assert main(["plan", str(SCENES / "press_sphere.yaml")]) == 0
     shown = capsys.readouterr().out
@@ -32,6 +33,7 @@ def test_a_switched_off_effect_that_matters_is_told(capsys):
     assert "nonlinearity" in capsys.readouterr().out.partition(" poses: ")[2]
 
 
+@pytest.mark.slow
 def test_json_from_a_bundle_is_that_from_its_spec(tmp_path, capsys):
     bundle = tmp_path / "sensor"
     spec = ROOT / "designs" / "mini20.yaml"

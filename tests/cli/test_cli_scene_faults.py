@@ -62,6 +62,7 @@ def test_the_only_waypoint_refused_is_one_fault(tmp_path, capsys, value, named):
     assert named in lines[0]
 
 
+@pytest.mark.slow
 def test_a_tool_held_above_its_origin_may_go_deeper(tmp_path):
     raised = ("radius_mm: 10", "radius_mm: 10\n    raised_mm: 4.5")
     assert main(["plan", str(_scene(tmp_path, raised, ("depth_mm: 0.8", "depth_mm: 5")))]) == 0

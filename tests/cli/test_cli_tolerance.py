@@ -21,6 +21,7 @@ def unprepared(folder: Path, name: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_answer_for_programs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     design = str(unprepared(tmp_path, "mini20"))
     assert main(["tolerance", design, *FEW, "0.8", "--json", "--seed", "3"]) == 1

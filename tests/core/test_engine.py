@@ -44,6 +44,7 @@ def test_what_a_task_raises_comes_through(jobs: int) -> None:
         list(Engine(jobs).run(pool_tasks.fails, [4, 5, 6]))
 
 
+@pytest.mark.slow
 def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("gelslim_core.jobs.CONNECT_S", 1)

@@ -100,6 +100,7 @@ def test_a_tv_distortion_holds_at_the_field_of_view_of_the_sheet() -> None:
     )
 
 
+@pytest.mark.slow
 def test_an_f_theta_lens_has_the_field_of_view_of_its_arc() -> None:
     """Sensor width = 2 f θ: the angle of the sheet is that of the arc, not of the tangent."""
     focal, wide = 2.0, {"model": "kannala_brandt"}

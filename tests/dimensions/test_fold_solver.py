@@ -93,6 +93,7 @@ def test_no_global_optimiser_finds_a_thinner_fold(
     assert d.feasible() or best > BEYOND_MM
 
 
+@pytest.mark.slow
 def test_batch_equals_single_designs() -> None:
     overrides = drawn(11, 7)
     overrides["design.light_guide.bend_radius_ratio"] = np.linspace(0.8, 4, 7)
@@ -110,6 +111,7 @@ def test_unknown_override_is_refused() -> None:
         derive_batch(shipped("mini20"), {"design.gel.size_mm": [1.0]})
 
 
+@pytest.mark.slow
 def test_two_fresh_processes_agree_to_the_bit() -> None:
     code = (
         "from fold_samples import mini20\n"
@@ -140,6 +142,7 @@ def check_kept(d: Dimensions) -> None:
     assert np.all(d["finger.depth_mm"][ok] >= d["guide.stack_mm"][ok] - 1e-9)
 
 
+@pytest.mark.slow
 def test_feasible_designs_of_a_batch_keep_their_limits() -> None:
     check_kept(derive_batch(shipped("mini20"), drawn(21, 60)))
 

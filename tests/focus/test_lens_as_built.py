@@ -144,6 +144,7 @@ def test_the_blur_in_the_picture_is_that_of_the_rule(name: str) -> None:
     is_blurred_as_the_rule_says(design(name))
 
 
+@pytest.mark.slow
 def test_a_picture_of_a_finger_built_to_the_letter_calibrates() -> None:
     """`view.focal_px` was once f / pitch, and the finger of the build guide was refused."""
     seen_by_calibration(bundle_of("mini20"), ThinLens.as_built(design("mini20")), samples=24)

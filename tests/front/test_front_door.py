@@ -53,6 +53,7 @@ def test_a_finger_from_the_front_door(tmp_path: Path) -> None:
     assert gelslim.load_bundle(tmp_path / "bundle").geometry_hash == made.bundle.geometry_hash
 
 
+@pytest.mark.slow
 def test_a_plan_from_the_front_door() -> None:
     made = gelslim.plan(ROOT / "designs" / "scenes" / "press_sphere.yaml")
     effects = {choice.effect for choice in made.choices if choice.included}

@@ -95,6 +95,7 @@ def test_outline_tolerances_and_light_come_back(built: Path, spec_file: Path) ->
     assert np.ptp(across[:, 0]) > 0.1 * across[:, 0].mean()
 
 
+@pytest.mark.slow
 def test_a_bundle_without_the_new_parts_still_serves(measured: Path) -> None:
     bundle: Bundle = replace(load_bundle(measured), outline=None, tolerances={}, light={})
     sensor = TwinSensor(bundle)

@@ -119,6 +119,7 @@ def test_pictures_on_their_side_are_turned_and_no_others(bundle: Bundle) -> None
     assert upright(picture, landscape) is picture
 
 
+@pytest.mark.slow
 def test_frames_as_the_camera_gives_them_calibrate_and_measure(
     bundle: Bundle, pictures: tuple[Any, Any]
 ) -> None:

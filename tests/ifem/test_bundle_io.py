@@ -135,6 +135,7 @@ def test_a_failed_swap_puts_the_old_bundle_back(bundle, stored, monkeypatch):
     assert [p.name for p in stored.parent.iterdir()] == ["bundle"]
 
 
+@pytest.mark.slow
 def test_the_same_pad_gives_the_same_bytes_in_a_fresh_process(pristine, tmp_path):
     code = (
         "import sys; sys.path.insert(0, 'tests/ifem');"

@@ -247,6 +247,7 @@ def test_a_damaged_crown_is_refused(name, change, file, tmp_path):
     assert caught.value.file == file
 
 
+@pytest.mark.slow
 def test_the_ladder_of_a_dome_has_the_exact_rungs():
     mesh = domed(cells=(10, 9, 4))
     fine = build_pad_mesh(

@@ -146,6 +146,7 @@ def test_operators_of_the_infinite_pad_have_the_pads_lattice(weighting: str) -> 
         assert np.array_equal(guess.weight, weight[rows])
 
 
+@pytest.mark.slow
 def test_a_crowned_pad_takes_the_displacement_of_its_true_surface_as_unknown() -> None:
     """Nodal displacements are u = T v, and the surface lies at the shift between two nodes."""
     mesh = domed()

@@ -36,6 +36,7 @@ def hanging(shape: Any, limit_deg: float = 45.0) -> tuple[Overhang, ...]:
     return overhangs(Surface(meshed(shape)), limit_deg)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thickness", [0.3, 0.66, 1.2, 3.0])
 def test_a_plate_is_as_thick_as_it_is(thickness: float) -> None:
     for turn in ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (30.0, 20.0, 10.0)):

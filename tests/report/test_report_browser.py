@@ -84,6 +84,7 @@ def page() -> bytes:
     return render_report(report_sample.report())
 
 
+@pytest.mark.slow
 def test_viewer_draws_every_triangle_and_the_page_is_silent(tmp_path, page):
     done = browse(tmp_path, page, "--dump-dom", "--window-size=1280,900")
     viewer = re.search(r'<div id="viewer"[^>]*>', done.stdout).group()

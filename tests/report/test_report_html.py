@@ -172,6 +172,7 @@ def test_hostile_text_stays_text():
     assert re.fullmatch(r"\./[A-Za-z0-9%/._-]+", link)
 
 
+@pytest.mark.slow
 def test_same_data_gives_the_same_bytes_in_a_fresh_process(page):
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import report_sample, hashlib\n"

@@ -60,6 +60,7 @@ def test_a_store_that_holds_another_design_makes_the_same_parts(path: str, value
         assert ours[name] == pytest.approx(figures, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_only_what_read_the_changed_value_is_made_again() -> None:
     store = PartStore()
     thin, thick = (changed("design.mount.flange_thickness_mm", value) for value in (5, 6))

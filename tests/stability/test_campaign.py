@@ -65,6 +65,7 @@ def test_a_hanging_case_is_stopped(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     assert outcome.reasons == ("timeout in solids",)
 
 
+@pytest.mark.slow
 def test_samples_are_reproducible_and_legal() -> None:
     first, again = (list(islice((sample(SEED, i) for i in range(40)), 40)) for _ in range(2))
     assert [s.text for s in first] == [s.text for s in again]

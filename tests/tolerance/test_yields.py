@@ -122,6 +122,7 @@ def test_tolerances_of_half_a_size_give_finite_numbers(focusing: dict) -> None:
         assert stage.yields()[ALL].share < 0.05
 
 
+@pytest.mark.slow
 def test_the_record_of_absurd_tolerances_is_finite() -> None:
     record = study_record(
         tolerance_study(with_values(spec("gelslim2"), HUGE), samples=256, least_yield=1e-9)

@@ -147,6 +147,7 @@ def test_contact_at_a_known_depth_is_that_of_brute_force(patch, indenter, depth)
     assert (found >= -1e-9 * push.max()).all()
 
 
+@pytest.mark.slow
 def test_depth_at_the_pads_edge():
     """The patch of a contact that the edge cuts, by brute force at half the node spacing."""
     fine, points = pad((32, 32), 0.25)

@@ -97,6 +97,7 @@ def test_rest_is_no_force_and_no_nan(case) -> None:
         assert np.isnan(found.slip_margin)
 
 
+@pytest.mark.slow
 def test_wrench_covariance_is_that_of_many_draws(case) -> None:
     bundle, operator, _force, _moved = case
     points = np.asarray(bundle.mesh.nodes_mm)[bundle.mesh.surface]
@@ -209,6 +210,7 @@ def test_masked_fit_holds_pressure_between_the_nodes(case) -> None:
     assert np.linalg.norm(found - true) < 0.8 * np.linalg.norm(bare - true)
 
 
+@pytest.mark.slow
 def test_masked_fit_of_a_neo_hookean_gel(case) -> None:
     bundle, operator, force, moved = case
     law = FiniteStrainForce(bundle, tolerance=1e-4)

@@ -67,6 +67,7 @@ def test_six_components_from_a_grey_picture() -> None:
     assert (apart < 0.5 * found.wrench.standard_deviation).all()
 
 
+@pytest.mark.slow
 def test_a_force_that_the_markers_hardly_show_is_unknown() -> None:
     """A deviation of the normal force above its share is no answer; the tangential ones are."""
     source = mono().normal

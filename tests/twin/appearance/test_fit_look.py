@@ -51,6 +51,7 @@ def check(hidden: Hidden, found: FittedLook) -> None:
     assert ends[0, 1] - ends[1, 1] == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_hidden_look_is_found(fitted: FittedLook) -> None:
     check(Hidden(), fitted)
     design = design_light()

@@ -71,6 +71,7 @@ def test_hertz_on_a_half_space() -> None:
     assert errors[-1] < 0.005
 
 
+@pytest.mark.slow
 def test_hertz_on_a_thick_pad() -> None:
     """A small ball on a pad five contact radii thick and wide; the rest is its finite size."""
     depth, radius, poisson = 0.25, 4.0, 0.3

@@ -74,6 +74,7 @@ def test_same_contact_as_with_the_table(name: str, friction: float, place: float
     assert apart(found, true) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_press_at_the_edge_is_that_of_the_table() -> None:
     pad, poses = small_pad(0.45, 12, 2), pressed_and_dragged(5.0)[1:3]
     tool, settings = Tool.of([BALL], Path()), ContactSettings(1e-4, 0.6)

@@ -98,6 +98,7 @@ def solved(folder: Path, loaded: LoadedScene) -> list[GelState]:
     return list(job.mechanics().states(loaded.poses[:4]))
 
 
+@pytest.mark.slow
 def test_a_scene_in_fabric_changes_its_forces(tmp_path: Path) -> None:
     """By the skin alone; switched off, the states are those of the bare gel bit for bit."""
     skin = Skin(None, Membrane(0.5), 0.3)

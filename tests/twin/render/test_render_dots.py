@@ -54,6 +54,7 @@ def polygons():
             yield p
 
 
+@pytest.mark.slow
 def test_coverage_is_the_area_that_shapely_cuts_out_of_each_pixel():
     checked = 0
     for p in polygons():

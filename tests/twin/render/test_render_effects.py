@@ -59,6 +59,7 @@ def bare() -> np.ndarray:
     return picture(Look())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(NULL))
 def test_an_effect_at_null_is_the_effect_absent_bit_for_bit(name):
     assert np.array_equal(picture(Look(**{name: NULL[name]})), bare())
