@@ -55,6 +55,8 @@ CANDIDATE_SHARE = 0.2
 """Gap over depth up to which a node is a candidate, because the gel bulges at the contact."""
 GROWTH_STEPS = 12
 MOST_SUBSTEPS = 200
+CARRIED = 0.25
+"""Way of the tool in one step, over the pitch of the nodes, up to which it carries what sticks."""
 Geometry = Literal["displaced", "rest"]
 REST_FROM = 0.4
 """Poisson's ratio from which the geometry at rest is nearer (bench/linear_gel.py)."""
@@ -185,9 +187,13 @@ class ContactSolver:
         below = self.tool.clearance_mm(pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
-        moved = self._carried_mm(last, ahead) if start is None else start.displacement_mm
-        guess = (last if start is None else start).force_n
-        wanted = last.touch > 0
+        first = last if start is None else start
+        moved, guess = first.displacement_mm, first.force_n
+        wanted = np.zeros(len(moved), dtype=bool)
+        if self._is_short(last, ahead):
+            wanted = last.touch > 0
+            if start is None:
+                moved = np.where((last.touch == STICK)[:, None], ahead, moved)
         for _ in range(GROWTH_STEPS):
             surface, room = self._room(pose, moved, offset, on_tool)
             deepest = -float(np.min(room, initial=0.0))
@@ -211,9 +217,15 @@ class ContactSolver:
             moved, guess = state.displacement_mm, state.force_n
         raise ContactError("the contact region keeps growing: take smaller steps of the motion")
 
-    def _carried_mm(self, last: GelState, ahead_mm: Array) -> Array:
-        """Initial guess of the displacement (c, 3): the tool carries the nodes that stick to it."""
-        return np.where((last.touch == STICK)[:, None], ahead_mm, last.displacement_mm)
+    def _is_short(self, last: GelState, ahead_mm: Array) -> bool:
+        """Whether the tool moves little on what it holds.
+
+        A step then starts with what sticks carried along, in contact as before. Over a longer way
+        a rim that passes a node would be found to hold it.
+        """
+        way = np.linalg.norm((ahead_mm - last.displacement_mm)[last.touch == STICK], axis=1)
+        pitch_mm = min(self.compliance.bundle.mesh.cell_size_mm[:2])
+        return float(way.max(initial=0.0)) < CARRIED * pitch_mm
 
     def targets(self, last: GelState, before: Pose | None, pose: Pose) -> StickTargets:
         """Where nodes stick from their first contact."""
