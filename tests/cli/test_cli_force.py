@@ -115,6 +115,7 @@ def test_moving_markers_without_a_patch_leave_the_normal_force_unknown(
     assert answer["problems"]
 
 
+@pytest.mark.slow
 def test_video_and_recording(sensor: Path, tmp_path: Path, capsys) -> None:
     pytest.importorskip("cv2")
     pytest.importorskip("mcap")

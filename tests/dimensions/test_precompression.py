@@ -103,6 +103,7 @@ def agrees(name: str) -> None:
     assert found.least[0] == pytest.approx(true.least, abs=0.06)
 
 
+@pytest.mark.slow
 def test_frame_agrees_with_solid_elements() -> None:
     pytest.importorskip("skfem", reason="scikit-fem: the bezel is NOT checked against it")
     agrees("gelslim2, aluminium")

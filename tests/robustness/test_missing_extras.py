@@ -106,6 +106,7 @@ def test_light_is_drawn_with_plots_and_without_cad(place: Path, tmp_path: Path) 
     assert list((tmp_path / "out").glob("*.png"))
 
 
+@pytest.mark.slow
 def test_doctor_lists_what_is_missing_and_how_to_get_it(tmp_path: Path) -> None:
     done = without(EVERYTHING, ["doctor", "--quick", "--json"], tmp_path)
     assert done.returncode == 0, done.stderr

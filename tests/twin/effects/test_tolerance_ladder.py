@@ -136,6 +136,7 @@ def test_a_contact_beyond_the_fit_is_said(tmp_path: Path) -> None:
     assert not any("0.7 to 3" in r for r in choice.remarks)
 
 
+@pytest.mark.slow
 def test_the_command_plans_with_the_budget(tmp_path: Path, capsys) -> None:
     small_sensor(tmp_path)
     scene = str(written_scene(tmp_path))
