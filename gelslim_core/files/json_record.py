@@ -45,3 +45,17 @@ def read_json_record(
         raise refused(f"{error.args[0]} is missing", True) from error
     except (ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
         raise refused(str(error), True) from error
+
+
+def refusal(place: Path, kind: str, remedy: str, reason: str, opened: bool) -> str:
+    """Words for a file that holds no record of a kind.
+
+    Args:
+        place: The file.
+        kind: What it should hold, such as "light calibration".
+        remedy: What to do.
+        reason: Why it is refused.
+        opened: Whether it could be opened.
+    """
+    what = f"{place} is no {kind}" if opened else f"{place}"
+    return f"{what}: {reason}; {remedy}"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.json_record import read_json_record
+from gelslim_core.files.json_record import read_json_record, refusal
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.error import CalibrationError
 
@@ -160,8 +160,7 @@ def read_light_calibration(path: str | os.PathLike[str]) -> LightCalibration:
     place = Path(path)
 
     def refused(reason: str, opened: bool) -> CalibrationError:
-        what = f"{place} is no light calibration" if opened else f"{place}"
-        return CalibrationError("file", f"{what}: {reason}; {_MAKE}")
+        return CalibrationError("file", refusal(place, "light calibration", _MAKE, reason, opened))
 
     return read_json_record(place, _calibration_of, refused)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_core.files.json_record import read_json_record
+from gelslim_core.files.json_record import read_json_record, refusal
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.presses.press_error import PressError
@@ -209,8 +209,7 @@ def read_gel_calibration(path: str | os.PathLike[str]) -> GelCalibration:
     place = Path(path)
 
     def refused(reason: str, opened: bool) -> PressError:
-        what = f"{place} is no gel calibration" if opened else f"{place}"
-        return PressError("file", f"{what}: {reason}; {_MAKE}")
+        return PressError("file", refusal(place, "gel calibration", _MAKE, reason, opened))
 
     return read_json_record(place, _calibration_of, refused)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_core.errors import GelslimError
-from gelslim_core.files.json_record import read_json_record
+from gelslim_core.files.json_record import read_json_record, refusal
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.calibration.stored_picture import picture_of, picture_record
 
@@ -194,8 +194,7 @@ def read_look(path: str | os.PathLike[str]) -> BuiltLook:
     place = Path(path)
 
     def refused(reason: str, opened: bool) -> LookError:
-        what = f"{place} is no look of a sensor" if opened else f"{place}"
-        return LookError(f"{what}: {reason}; {_MAKE}")
+        return LookError(refusal(place, "look of a sensor", _MAKE, reason, opened))
 
     return read_json_record(place, _look_of, refused)
 
