@@ -57,7 +57,8 @@ class WholeDots:
             return tracked
         covered, beside, lost = (np.empty_like(seen) for _ in range(3))
         change, whole = np.full(len(seen), np.nan), np.zeros_like(seen)
-        # Where dots are blurred, or strain varies between the markers, either may be nearer.
+        # Blur hides a part of the strain, and strain varies between the markers: a dot has to
+        # agree with one of the two only.
         for growth, stretch in (self.changes(tracked), self.beyond_strain(tracked)):
             # Comparisons with the NaN of a dot that is not seen are false: it is not whole.
             now = np.maximum(np.abs(growth - median(growth)), stretch)
