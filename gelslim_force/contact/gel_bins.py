@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import binary_erosion, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from gelslim_force.contact.patch import ContactPatch
@@ -51,6 +51,11 @@ class GelBins:
             nodes = np.asarray(surface_mm, dtype=float)
             self.on_pad &= near_surface(self.x_mm, self.y_mm, nodes)
         self._last: tuple[Array, tuple[int, int]] | None = None
+
+    @cached_property
+    def inner(self) -> Mask:
+        """Bins on the pad and not at its edge."""
+        return np.asarray(binary_erosion(self.on_pad, iterations=2, border_value=0))
 
     @cached_property
     def tree(self) -> cKDTree:

@@ -130,7 +130,7 @@ class PatchFinder:
 
     def _outline(self, region: Mask) -> ContactPatch | None:
         found = region_patch(
-            region, self._bins.on_pad, self._bins.x_mm, self._bins.y_mm, self.indenter
+            region, self._bins.inner, self._bins.x_mm, self._bins.y_mm, self.indenter
         )
         if found is None:
             return None

@@ -16,13 +16,17 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _OUTLINE_ERROR = 0.15
 """Relative error of a size from the outline alone: the light also changes outside the patch."""
+_CLOSING = 3
+"""Gaps of up to twice as many bins are closed."""
+_MOST_STEPS = 50
+_SMALL_GAIN = 1e-9
 _FEWEST = 6
 """Smallest number of points of an outline that determine its shape."""
 
 
 def region_patch(
     region: Mask,
-    on_pad: Mask,
+    inner: Mask,
     x_mm: Array,
     y_mm: Array,
     indenter: Indenter | None,
@@ -31,7 +35,8 @@ def region_patch(
 
     Args:
         region: (rows, columns) bins whose light changed.
-        on_pad: (rows, columns) bins on the pad.
+        inner: (rows, columns) bins on the pad and not at its edge. Where the region ends with the
+            pad or the picture, its edge is not the rim of the patch.
         x_mm: (rows, columns) positions of the bins on the gel.
         y_mm: (rows, columns) likewise.
         indenter: Determines the shape of the patch, which is a disc if None.
@@ -39,13 +44,15 @@ def region_patch(
     Returns:
         The patch with its covariance; None where the outline does not determine it.
     """
-    closed = ndimage.binary_closing(np.pad(region, 3), iterations=3)[3:-3, 3:-3]
-    filled = ndimage.binary_fill_holes(closed | region)
-    rim = filled & ~ndimage.binary_erosion(filled, border_value=1)
-    # Where the region ends with the pad or the picture, its edge is not the rim of the patch.
-    rim &= ndimage.binary_erosion(on_pad, iterations=2, border_value=0)
-    points = np.column_stack([x_mm[rim], y_mm[rim]])
-    inside = np.column_stack([x_mm[filled], y_mm[filled]])
+    found = ndimage.find_objects(region.astype(np.uint8))
+    if not found:
+        return None
+    # Closing and filling do not leave the box: the rest of the picture costs nothing.
+    box = found[0]
+    filled = _filled(region[box])
+    rim = filled & ~ndimage.binary_erosion(filled) & inner[box]
+    points = np.column_stack([x_mm[box][rim], y_mm[box][rim]])
+    inside = np.column_stack([x_mm[box][filled], y_mm[box][filled]])
     if len(points) < _FEWEST:
         return None
     if isinstance(indenter, Flat):
@@ -53,23 +60,29 @@ def region_patch(
     covariance = np.zeros((4, 4))
     try:
         if indenter is not None and indenter.patch_kind == "strip":
-            (offset, half, angle), found = fit_strip(points)
+            (offset, half, angle), spread = fit_strip(points)
             axis = getattr(indenter, "axis_deg", None)
             angle = angle if axis is None else float(np.deg2rad(axis))
             patch = strip_patch(offset, half, angle, inside.mean(axis=0))
-            covariance[:] = strip_covariance(found, angle)
+            covariance[:] = strip_covariance(spread, angle)
         else:
-            (x, y, half), found = fit_circle(points)
+            (x, y, half), spread = fit_circle(points)
             patch = ContactPatch("disc", np.array([x, y]), float(half))
-            covariance[:3, :3] = found
+            covariance[:3, :3] = spread
     except (ValueError, np.linalg.LinAlgError):
         return None
     if not (np.isfinite(half) and half < 1.2 * np.ptp(inside, axis=0).max()):
         return None
-    spread = (_OUTLINE_ERROR * float(half)) ** 2
-    covariance[2, 2] += spread
-    covariance[:2, :2] += np.eye(2) * spread / 4
+    error = (_OUTLINE_ERROR * float(half)) ** 2
+    covariance[2, 2] += error
+    covariance[:2, :2] += np.eye(2) * error / 4
     return replace(patch, covariance=covariance, method="outline")
+
+
+def _filled(region: Mask) -> Mask:
+    closed = ndimage.binary_closing(np.pad(region, _CLOSING), iterations=_CLOSING)
+    inside = slice(_CLOSING, -_CLOSING)
+    return np.asarray(ndimage.binary_fill_holes(closed[inside, inside] | region))
 
 
 def circle_start(points_mm: Array) -> Array:
@@ -98,21 +111,49 @@ def circle_start(points_mm: Array) -> Array:
 
 
 def fit_circle(points_mm: Array) -> tuple[Array, Array]:
-    """Centre and radius (3,) by a robust fit of the distances, with covariance (3, 3)."""
-    start = circle_start(points_mm)
+    """Centre and radius (3,) by a robust fit of the distances, with covariance (3, 3).
 
-    def distance(p: Array) -> Array:
-        return np.asarray(np.hypot(points_mm[:, 0] - p[0], points_mm[:, 1] - p[1]) - p[2])
+    The loss is that of `scipy.optimize.least_squares(loss="soft_l1")`, Σ 2 c² (√(1 + d²/c²) - 1),
+    with c of twice the scatter about the first circle. Damped steps with the curvature of the loss
+    take a fifth of its time for three unknowns.
+    """
+    values = circle_start(points_mm)
+    distance = _from_circle(points_mm, values)
+    scale = 2 * max(float(1.4826 * np.median(np.abs(distance))), 1e-6)
+    loss = _soft_loss(distance / scale)
+    damping = 1e-3
+    for _ in range(_MOST_STEPS):
+        jacobian, gradient = _circle_slope(points_mm, values, distance, scale)
+        normal = jacobian.T @ jacobian
+        step = -np.linalg.solve(normal + damping * np.diag(normal.diagonal()), gradient)
+        trial = _from_circle(points_mm, values + step)
+        gain = loss - _soft_loss(trial / scale)
+        if gain > 0:
+            values, distance, loss, damping = values + step, trial, loss - gain, damping / 10
+        else:
+            damping *= 10
+        if abs(gain) <= _SMALL_GAIN * loss:
+            break
+    jacobian, _ = _circle_slope(points_mm, values, distance, scale)
+    return values, _covariance(jacobian, distance, 3)
 
-    def slope(p: Array) -> Array:
-        away = p[:2] - points_mm
-        return np.column_stack([away / np.hypot(*away.T)[:, None], -np.ones(len(away))])
 
-    scale = max(float(1.4826 * np.median(np.abs(distance(start)))), 1e-6)
-    found = least_squares(
-        distance, start, jac=slope, loss="soft_l1", f_scale=2 * scale, max_nfev=50
-    )
-    return found.x, _covariance(found.jac, distance(found.x), 3)
+def _circle_slope(
+    points_mm: Array, values: Array, distance: Array, scale: float
+) -> tuple[Array, Array]:
+    """Root of the curvature of half the loss (n, 3), and its gradient (3,)."""
+    share = 1 + (distance / scale) ** 2
+    towards = (values[:2] - points_mm) / (distance + values[2])[:, None]
+    slope = np.column_stack([towards, -np.ones(len(towards))])
+    return slope * share[:, None] ** -0.75, slope.T @ (distance / np.sqrt(share))
+
+
+def _soft_loss(relative: Array) -> float:
+    return float((np.sqrt(1 + relative**2) - 1).sum())
+
+
+def _from_circle(points_mm: Array, values: Array) -> Array:
+    return np.asarray(np.hypot(*(points_mm - values[:2]).T) - values[2])
 
 
 def fit_strip(points_mm: Array) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from camera_rig import finger_view
 from sampled import quick
+from scipy.optimize import least_squares
 from shaded_frames import CAMERA, GRID, PAD_MM, contact, pressed_heights, shaded, sight
 
 from gelslim_force.contact.indenter import Cylinder, Flat, Sphere
@@ -283,6 +284,24 @@ def test_flat_punch_is_placed_by_its_outline():
     assert (lower.size_mm, lower.length_mm) == (a, b)
     seen = CAMERA.project([[*lower.centre_mm, -0.3], [*patch.centre_mm, 0.0]])
     assert np.linalg.norm(seen[0] - seen[1]) < 0.5
+
+
+def test_the_circle_is_that_of_a_general_robust_fit():
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        count, radius = int(rng.integers(8, 80)), rng.uniform(0.5, 5.0)
+        turn = rng.uniform(0, rng.uniform(1.0, 6.28), count)
+        points = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        points += rng.normal(0, 0.03, points.shape)
+        points[rng.random(count) < 0.15] += rng.normal(0, 0.5, 2)
+        start = circle_start(points)
+
+        def distance(p, points=points):
+            return np.hypot(*(points - p[:2]).T) - p[2]
+
+        scale = 2 * 1.4826 * np.median(np.abs(distance(start)))
+        robust = least_squares(distance, start, loss="soft_l1", f_scale=scale, xtol=1e-12)
+        np.testing.assert_allclose(fit_circle(points)[0], robust.x, atol=1e-3 * robust.x[2])
 
 
 def test_circle_and_strip_fits_have_honest_errors():
