@@ -96,14 +96,16 @@ class LowPass:
 
         Wider low-passes cost more and are tried only while the estimate falls.
         """
-        noisy = 2 * self.traces @ noise.variances
+        from gelslim_force.forces.low_pass_kernel import spread_out
+
+        noisy = (2 * self.traces @ noise.variances).tolist()
         smooth, chosen, least = force_n.copy(), [0, 0], [np.inf, np.inf]
+        tried = np.empty_like(smooth)
         for k, spread in enumerate(self.spreads):
-            tried = spread @ force_n if self.widths_mm[k] else force_n
-            fell, lost = False, force_n - tried
-            squared = np.einsum("ij,ij->j", lost, lost)
+            fell = False
+            lost = spread_out(spread.indptr, spread.indices, spread.data, force_n, tried)
             for part, columns in enumerate(_PARTS):
-                error = squared[columns].sum() + noisy[k, part]
+                error = lost[part] + noisy[k][part]
                 if error < least[part]:
                     fell, least[part], chosen[part] = True, error, k
                     smooth[:, columns] = tried[:, columns]
