@@ -27,7 +27,7 @@ from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
 from gelslim_force.joint.normal_equations import NormalEquations, huber
 from gelslim_force.joint.off_design import OffDesign
-from gelslim_force.joint.region import contact_nodes, pressing_nodes
+from gelslim_force.joint.region import contact_nodes, is_new_contact, pressing_nodes
 from gelslim_force.joint.responses import Responses
 from gelslim_force.joint.settings import JointSettings
 from gelslim_force.joint.variance_components import scaled_covariance
@@ -149,8 +149,7 @@ class JointEstimator:
             begun = self._rounds(frame, region, _State(still, still, 1.0), self.settings.rounds)
         else:
             begun = last.region, _State(last.force_n, last.displacement_mm, last.gain)
-            if (region & ~self.lattice.widened(last.seen, 1)).any():
-                # A contact that was not there before is not next to the nodes that pressed.
+            if is_new_contact(region, last.seen, self.lattice):
                 begun = self._rounds(frame, region, begun[1], self.settings.rounds)
         nodes = region & self.lattice.widened(begun[0], 1)
         return self._found(

@@ -24,6 +24,8 @@ LEAST_POWER = 6.0
 _LEAST_VALID = 0.2
 _CLOSED, _OPENED = 4, 1
 """Steps by which gaps, such as dots, are closed, and by which specks are removed."""
+_GROWS_FAST = 0.1
+"""Share of the nodes seen that are new in one frame and not next to those seen before."""
 _DENT, _LEAST_DENT = 0.25, 0.1
 """Share of a line's depth from which it is in the dent, and of the greatest depth from which a
 line counts."""
@@ -57,10 +59,33 @@ def contact_nodes(
 
 def _continued(region: Mask, hidden: Mask, lattice: NodeLattice) -> Mask:
     """(c,) the region with what is hidden next to it, where the contact may go on."""
-    parts, _ = ndimage.label(lattice.picture(hidden), np.ones((3, 3)))
-    part = parts[lattice.place[:, 0], lattice.place[:, 1]]
+    part = _parts(hidden, lattice)
     beside = np.unique(part[lattice.widened(region, 1)])
     return np.asarray(region | (np.isin(part, beside) & hidden))
+
+
+def is_new_contact(region: Mask, before: Mask, lattice: NodeLattice) -> bool:
+    """Whether nodes seen hold a contact that the frame before did not show, or one that grew fast.
+
+    The rim of a contact that shears comes and goes by a few nodes; those are no new contact.
+
+    Args:
+        region: (c,) nodes seen in this frame.
+        before: (c,) nodes seen in the frame before.
+        lattice: Their places.
+    """
+    reached = region & lattice.widened(before, 1)
+    fresh = int((region & ~reached).sum())
+    if not 0 < fresh <= _GROWS_FAST * int(region.sum()):
+        return fresh > 0
+    part = _parts(region, lattice)
+    return not np.isin(part[region], part[reached]).all()
+
+
+def _parts(nodes: Mask, lattice: NodeLattice) -> NDArray[np.int32]:
+    """(c,) number of the connected part that each of the nodes belongs to, 0 for the others."""
+    parts, _ = ndimage.label(lattice.picture(nodes), np.ones((3, 3)))
+    return np.asarray(parts[lattice.place[:, 0], lattice.place[:, 1]])
 
 
 def pressing_nodes(
