@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from gelslim.cli.answer import print_json, say
+from gelslim.cli.calibration_files import CalibrationFiles, tell
 from gelslim.cli.options import AsJson, SensorBundle
-from gelslim.cli.output import replace_file, require_own_file
-
-if TYPE_CHECKING:
-    from gelslim_force.calibration.sensor_calibration import Calibration
 
 
 def calibrate(
@@ -54,15 +50,13 @@ def calibrate(
     pictures, and pictures with contact (exit status 2). The focal length alone is known to about
     1 % from one picture, to 0.2 % with measured intrinsics.
     """
-    from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate as calibrated
     from gelslim_force.calibration.file import calibration_record
     from gelslim_force.calibration.intrinsics import read_intrinsics
     from gelslim_force.calibration.reference_picture import read_reference
     from ifem_export.bundle.files import load_bundle
 
-    if out is not None:
-        require_own_file(out, b"gelslim-calibration/", "calibration")
+    files = CalibrationFiles("calibration", b"gelslim-calibration/", out)
     sensor = load_bundle(bundle)
     found = calibrated(
         sensor,
@@ -70,19 +64,7 @@ def calibrate(
         allow_contact=allow_contact,
         intrinsics=None if intrinsics is None else read_intrinsics(intrinsics),
     )
-    record = calibration_record(found)
-    if out is not None:
-        replace_file(out, json_bytes(record))
-    if as_json:
-        print_json(record)
-        return 0
-    _describe(found)
-    print(f"Wrote {out}" if out else "The calibration was not written; -o FILE writes it.")
+    files.answer(
+        calibration_record(found), lambda: tell(found.diagnosis, found.warnings), as_json=as_json
+    )
     return 0
-
-
-def _describe(found: Calibration) -> None:
-    for line in found.diagnosis:
-        say(line)
-    for line in found.warnings:
-        say(f"Warning: {line}.", style="yellow")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim.cli.answer import console, print_json, say, table
+from gelslim.cli.answer import console, say, table
+from gelslim.cli.calibration_files import CalibrationFiles, tell
 from gelslim.cli.options import AsJson, SensorBundle
-from gelslim.cli.output import replace_file, require_own_file
 
 if TYPE_CHECKING:
     from gelslim_force.presses.gel_calibration import GelCalibration
@@ -68,7 +68,6 @@ def calibrate_gel(
     time. With -o it writes a file that `gelslim force --gel-calibration` takes, which then uses
     the gel as built and adds its uncertainty to the standard deviations.
     """
-    from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.presses.calibrate_gel import calibrate_gel as calibrated
@@ -78,26 +77,20 @@ def calibrate_gel(
     from gelslim_force.presses.press_pictures import press_pictures, reference_of
     from ifem_export.bundle.files import load_bundle
 
-    if out is not None:
-        require_own_file(out, b"gelslim-gel-calibration/", "calibration of a gel")
-    if report is not None:
-        require_own_file(report, b"gelslim", "report of gelslim")
+    files = CalibrationFiles("calibration of a gel", b"gelslim-gel-calibration/", out, report)
     listed = read_loads(loads)
     rest, rest_name = reference_of(presses, listed, reference)
     pictures = press_pictures(presses, [load.picture for load in listed])
     sensor = load_bundle(bundle)
     camera = read_calibration(calibration) if calibration else calibrate(sensor, rest)
     found = calibrated(sensor, camera, rest, pictures, listed, ball_mm, fit_ratio=fit_ratio)
-    record = gel_calibration_record(found)
-    if out is not None:
-        replace_file(out, json_bytes(record))
-    if report is not None:
-        replace_file(report, gel_report_html(found).encode("utf-8"))
-    if as_json:
-        print_json({**record, "reference": rest_name})
-        return 0
-    _describe(found, rest_name)
-    say(f"Wrote {out}." if out else "Nothing was written; -o FILE writes the calibration.")
+    files.answer(
+        gel_calibration_record(found),
+        lambda: _describe(found, rest_name),
+        page=lambda: gel_report_html(found),
+        as_json=as_json,
+        more={"reference": rest_name},
+    )
     return 0
 
 
@@ -118,7 +111,4 @@ def _describe(found: GelCalibration, reference: str) -> None:
             f"{press['marker_rms_px']:.3f}",
         )
     console().print(shown)
-    for line in found.diagnosis:
-        say(line)
-    for line in found.warnings:
-        say(f"Warning: {line}.", style="yellow")
+    tell(found.diagnosis, found.warnings)

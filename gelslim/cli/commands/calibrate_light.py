@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gelslim.cli.answer import console, print_json, say, table
+from gelslim.cli.answer import console, say, table
+from gelslim.cli.calibration_files import CalibrationFiles, tell
 from gelslim.cli.options import AsJson, SensorBundle
-from gelslim.cli.output import replace_file, require_own_file
 
 if TYPE_CHECKING:
     from gelslim_force.joint.light_calibration import LightCalibration
@@ -58,7 +58,6 @@ def calibrate_light(
     Refuses presses of a ball of another size, and pictures whose light no ball explains. With -o it
     writes a file that `gelslim force --light-calibration` takes.
     """
-    from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.calibration.reference_picture import read_reference
@@ -69,10 +68,7 @@ def calibrate_light(
     from gelslim_force.presses.press_pictures import picture_names, press_pictures
     from ifem_export.bundle.files import load_bundle
 
-    if out is not None:
-        require_own_file(out, b"gelslim-light-calibration/", "calibration of a light")
-    if report is not None:
-        require_own_file(report, b"gelslim", "report of gelslim")
+    files = CalibrationFiles("calibration of a light", b"gelslim-light-calibration/", out, report)
     sensor, rest = load_bundle(bundle), read_reference(reference)
     gel = None if gel_calibration is None else read_gel_calibration(gel_calibration)
     names = [
@@ -81,16 +77,12 @@ def calibrate_light(
     pictures = press_pictures(presses, names)
     camera = read_calibration(calibration) if calibration else calibrate(sensor, rest)
     found = calibrated(sensor, camera, rest, pictures, ball_mm, gel=gel, fit_ball=fit_ball)
-    record = light_calibration_record(found)
-    if out is not None:
-        replace_file(out, json_bytes(record))
-    if report is not None:
-        replace_file(report, light_report_html(found).encode("utf-8"))
-    if as_json:
-        print_json(record)
-        return 0
-    _describe(found)
-    say(f"Wrote {out}." if out else "Nothing was written; -o FILE writes the calibration.")
+    files.answer(
+        light_calibration_record(found),
+        lambda: _describe(found),
+        page=lambda: light_report_html(found),
+        as_json=as_json,
+    )
     return 0
 
 
@@ -116,7 +108,4 @@ def _describe(found: LightCalibration) -> None:
         )
     console().print(shown)
     say("Under each colour the share of its change that is explained; gain over that of the fit.")
-    for line in found.diagnosis:
-        say(line)
-    for line in found.warnings:
-        say(f"Warning: {line}.", style="yellow")
+    tell(found.diagnosis, found.warnings)

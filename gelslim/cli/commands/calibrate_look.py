@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from gelslim.cli.answer import print_json, say
+from gelslim.cli.calibration_files import CalibrationFiles, tell
 from gelslim.cli.options import AsJson, SensorBundle
-from gelslim.cli.output import replace_file, require_own_file
-
-if TYPE_CHECKING:
-    from gelslim_twin.scene.built_look import BuiltLook
 
 
 def calibrate_look(
@@ -59,7 +55,6 @@ def calibrate_look(
     dot, the point spread, the noise and its spectrum, and what else the picture shows: texture,
     reflections, walls. With -o it writes a file that a scene takes as `look`.
     """
-    from gelslim_core.files.replaced_file import json_bytes
     from gelslim_force.calibration.calibration import calibrate
     from gelslim_force.calibration.file import read_calibration
     from gelslim_force.calibration.reference_picture import read_reference
@@ -71,10 +66,7 @@ def calibrate_look(
     from gelslim_twin.simulation.sensor import TwinSensor
     from ifem_export.bundle.files import load_bundle
 
-    if out is not None:
-        require_own_file(out, b"gelslim-look/", "look of a sensor")
-    if report is not None:
-        require_own_file(report, b"gelslim", "report of gelslim")
+    files = CalibrationFiles("look of a sensor", b"gelslim-look/", out, report)
     sensor, reference = load_bundle(bundle), read_reference(rest)
     names = [
         name
@@ -92,21 +84,11 @@ def calibrate_look(
         if light_calibration is None
         else read_light_calibration(light_calibration),
     )
-    record = look_record(found.look)
-    if out is not None:
-        replace_file(out, json_bytes(record))
-    if report is not None:
-        replace_file(report, look_report_html(found).encode("utf-8"))
-    if as_json:
-        print_json(record)
-        return 0
-    _describe(found.look)
-    say(f"Wrote {out}." if out else "Nothing was written; -o FILE writes the look.")
+    look = found.look
+    files.answer(
+        look_record(look),
+        lambda: tell(look.diagnosis, look.warnings),
+        page=lambda: look_report_html(found),
+        as_json=as_json,
+    )
     return 0
-
-
-def _describe(look: BuiltLook) -> None:
-    for line in look.diagnosis:
-        say(line)
-    for line in look.warnings:
-        say(f"Warning: {line}.", style="yellow")
