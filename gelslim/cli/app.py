@@ -31,6 +31,7 @@ from gelslim.cli.commands.new import examples, new
 from gelslim.cli.commands.optimise import optimise
 from gelslim.cli.commands.plan import plan
 from gelslim.cli.commands.schema import schema
+from gelslim.cli.commands.score import score
 from gelslim.cli.commands.simulate import simulate
 from gelslim.cli.commands.thinner import thinner
 from gelslim.cli.commands.tolerance import tolerance
@@ -55,7 +56,15 @@ COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
     "Search for one": (thinner, explore, optimise),
     "Try it before it is built": (tolerance, light, plan, simulate, validate),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),
-    "Measure with it": (calibrate, calibrate_gel, calibrate_light, calibrate_look, force, track),
+    "Measure with it": (
+        calibrate,
+        calibrate_gel,
+        calibrate_light,
+        calibrate_look,
+        force,
+        track,
+        score,
+    ),
     "This program": (doctor, bench, schema),
 }
 """The commands under the headings of their list."""

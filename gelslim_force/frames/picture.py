@@ -104,7 +104,7 @@ class PictureFolder(FrameSource):
         """
         place = Path(path)
         self.frames_per_s = frames_per_s
-        self.files = [place] if place.is_file() else _pictures(place)
+        self.files = [place] if place.is_file() else pictures_of(place)
         self.count = len(self.files)
         self.shape = self._usual_shape(place)
 
@@ -139,7 +139,11 @@ class PictureFolder(FrameSource):
         return Counter(shapes).most_common(1)[0][0]
 
 
-def _pictures(folder: Path) -> list[Path]:
+def pictures_of(folder: Path) -> list[Path]:
+    """Pictures of a folder, frame2 before frame10.
+
+    Raises FrameSourceError if the folder cannot be read or has none.
+    """
     try:
         names = [entry.name for entry in os.scandir(folder) if entry.is_file()]
     except OSError as error:

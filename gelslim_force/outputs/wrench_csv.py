@@ -21,7 +21,7 @@ from gelslim_core.errors import OutputError, disk_error
 from gelslim_force.forces.frame_result import FrameResult
 from gelslim_force.tracking.tracks import MarkerStatus
 
-_AXES = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
+AXES = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
 _STATUS = {
     "tracked": MarkerStatus.TRACKED,
     "predicted": MarkerStatus.PREDICTED,
@@ -35,8 +35,8 @@ NUMBERS = (
     "time_s",
     "stamp_s",
     "sensor_s",
-    *_AXES,
-    *(f"sigma_{axis}" for axis in _AXES),
+    *AXES,
+    *(f"sigma_{axis}" for axis in AXES),
     "normal_known",
     "coverage",
     *_STATUS,
@@ -77,12 +77,12 @@ class WrenchTable:
     @property
     def wrench(self) -> NDArray[np.float64]:
         """(n, 6) force in N, then torque in N mm."""
-        return self.numbers[:, [NUMBERS.index(axis) for axis in _AXES]]
+        return self.numbers[:, [NUMBERS.index(axis) for axis in AXES]]
 
     @property
     def sigma(self) -> NDArray[np.float64]:
         """(n, 6) standard deviations in N and N mm."""
-        return self.numbers[:, [NUMBERS.index(f"sigma_{axis}") for axis in _AXES]]
+        return self.numbers[:, [NUMBERS.index(f"sigma_{axis}") for axis in AXES]]
 
 
 def header() -> str:

@@ -7,14 +7,13 @@ picture without contact.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gelslim_core.files.csv_table import Row, number_of, read_csv_table
 from gelslim_force.presses.press_error import PressError
 
 NEWTON_PER_GRAM = 9.80665e-3
@@ -57,27 +56,11 @@ def read_loads(path: str | os.PathLike[str]) -> tuple[Load, ...]:
             picture is named twice. The message names the file and the line.
     """
     place = Path(path)
-    try:
-        text = place.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise _refusal(place, f"{(error.strerror or 'cannot be read').lower()}; {_FORM}") from error
-    except UnicodeDecodeError as error:
-        raise _refusal(place, "it is not a text file in UTF-8; save the table as CSV") from error
-    lines = text.splitlines()
-    if not lines or not lines[0].strip():
-        raise _refusal(place, f"it is empty; {_FORM}")
-    separator = max(",;\t", key=lines[0].count)
-    rows = csv.reader(io.StringIO(text), delimiter=separator)
-    head = [name.strip().lower() for name in next(rows)]
+    head, rows = read_csv_table(place, _FORM, _error)
     unit = _load_unit(place, head)
     found: dict[str, Load] = {}
-    for number, row in enumerate(rows, start=2):
-        if not any(cell.strip() for cell in row):
-            continue
-        where = f"{place}, line {number}"
-        if len(row) != len(head):
-            raise _refusal(where, f"{len(row)} values for the {len(head)} columns of line 1")
-        load = _load(where, dict(zip(head, (cell.strip() for cell in row), strict=True)), unit)
+    for where, row in rows:
+        load = _load(where, row, unit)
         if load.picture in found:
             raise _refusal(where, f"picture {load.picture} is in an earlier line too")
         found[load.picture] = load
@@ -86,7 +69,7 @@ def read_loads(path: str | os.PathLike[str]) -> tuple[Load, ...]:
     return tuple(found.values())
 
 
-def _load_unit(place: Path, head: list[str]) -> str:
+def _load_unit(place: Path, head: Sequence[str]) -> str:
     """`n` or `g`, from the names of the columns."""
     units = [unit for unit in _UNITS if f"load_{unit}" in head]
     if "picture" not in head or len(units) != 1:
@@ -100,7 +83,7 @@ def _load_unit(place: Path, head: list[str]) -> str:
     return units[0]
 
 
-def _load(where: str, row: Mapping[str, str], unit: str) -> Load:
+def _load(where: str, row: Row, unit: str) -> Load:
     name = row["picture"]
     if not name:
         raise _refusal(where, "the name of the picture is missing")
@@ -121,21 +104,16 @@ def _load(where: str, row: Mapping[str, str], unit: str) -> Load:
     return Load(name, value, sigma, time_s)
 
 
-def _number(where: str, row: Mapping[str, str], column: str) -> float:
-    text = row[column]
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise _refusal(
-            where,
-            f"{column} = {text!r}: must be a number with a decimal point, without a unit"
-            if text
-            else f"{column} is missing; give the load of picture {row['picture']}",
-        )
+def _number(where: str, row: Row, column: str) -> float:
+    value = number_of(where, row, column, _error)
+    if math.isnan(value):
+        raise _refusal(where, f"{column} is missing; give the load of picture {row['picture']}")
     return value
 
 
 def _refusal(where: object, reason: str) -> PressError:
-    return PressError("table", f"{where}: {reason}")
+    return _error(f"{where}: {reason}")
+
+
+def _error(message: str) -> PressError:
+    return PressError("table", message)

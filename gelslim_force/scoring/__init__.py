@@ -1,0 +1,1 @@
+"""Forces of a run against forces that were measured otherwise."""
