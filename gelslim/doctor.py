@@ -29,6 +29,7 @@ DISTRIBUTIONS = {
     "PIL": "pillow",
     "gerber_writer": "gerber-writer",
     "mcap_ros2": "mcap-ros2-support",
+    "rerun": "rerun-sdk",
 }
 """Distributions whose name differs from that of their module."""
 LIMIT_S = 120

@@ -38,6 +38,7 @@ EXTRAS = (
     Extra("view", ("pyvista",), "pictures of the finger in the report and in family"),
     Extra("vision", ("cv2", "PIL"), "videos, cameras and image files for force and simulate"),
     Extra("record", ("pyarrow", "mcap", "mcap_ros2"), "Parquet tables and ROS 2 recordings"),
+    Extra("rerun", ("rerun",), "force --rerun: recordings for the Rerun viewer"),
     Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
     Extra("sim", ("mujoco",), "examples/mujoco_grasp.py, in which a physics engine steps the twin"),

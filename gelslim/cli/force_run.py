@@ -36,10 +36,13 @@ class RunOutputs:
     """Overlay pictures, spread over the run."""
     video: Path | None
     mcap: Path | None
+    rerun: Path | None
     view: bool
     """Show the run in a browser while it takes place."""
     overwrite: bool
     quiet: bool
+    finger: Path | None = None
+    """Model of the finger that the Rerun recording shows around the gel."""
 
 
 def result_sinks(
@@ -63,6 +66,8 @@ def result_sinks(
     sinks: list[Any] = []
     if outputs.mcap is not None:
         sinks.append(_recording(stack, outputs.mcap, identity, outputs.overwrite))
+    if outputs.rerun is not None:
+        sinks.append(_rerun_log(stack, outputs, outputs.rerun, pipeline))
     if outputs.video is not None:
         sinks.append(_video(stack, outputs.video, overlay, frames_per_s, outputs.overwrite))
     fields = None if outputs.fields == "none" else outputs.fields
@@ -108,6 +113,21 @@ def _recording(stack: ExitStack, target: Path, identity: Any, overwrite: bool) -
         require_own_file(target, b"gelslim", "recording of gelslim")
         target.unlink(missing_ok=True)
     return RecorderSink(stack.enter_context(McapRecording(target, about=identity)))
+
+
+def built_finger(bundle: Path) -> Path | None:
+    """Model of the finger beside its bundle, where `gelslim build` wrote both."""
+    models = sorted(bundle.resolve().parent.glob("*.glb"))
+    return models[0] if len(models) == 1 else None
+
+
+def _rerun_log(stack: ExitStack, outputs: RunOutputs, target: Path, pipeline: ForcePipeline) -> Any:
+    from gelslim_force.outputs.rerun_log import RerunLog
+
+    if target.exists() and not outputs.overwrite:
+        raise CommandError(f"{target} exists; give another --rerun, or --force to replace it")
+    rest_px = pipeline.calibration.reference.positions_px
+    return stack.enter_context(RerunLog(target, rest_px, outputs.finger))
 
 
 def _video(
@@ -219,6 +239,10 @@ FieldFormat = Annotated[str, typer.Option(help="Format of the force fields: npz,
 OverlayVideo = Annotated[Path | None, typer.Option(help="Overlay video to write, .mp4 or .avi.")]
 Recording = Annotated[
     Path | None, typer.Option(help="Recording with ROS 2 messages to write, .mcap.")
+]
+RerunRecording = Annotated[
+    Path | None,
+    typer.Option(help="Recording for the Rerun viewer to write, .rrd; needs the extra rerun."),
 ]
 Latest = Annotated[
     bool | None,

@@ -68,7 +68,7 @@ def soak(out: Path) -> dict[str, object]:
             memory.append(resident_kb())
 
     outputs = RunOutputs(
-        out, "npz", 1, video=None, mcap=None, view=False, overwrite=False, quiet=True
+        out, "npz", 1, video=None, mcap=None, rerun=None, view=False, overwrite=False, quiet=True
     )
     with ExitStack() as stack:
         sinks, pictures = result_sinks(stack, pipeline, outputs, {}, 30.0)

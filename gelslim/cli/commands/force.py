@@ -64,6 +64,7 @@ def force(
     pictures: OverlayPictures = 6,
     video: option.OverlayVideo = None,
     mcap: option.Recording = None,
+    rerun: option.RerunRecording = None,
     view: option.LiveView = False,
     latest: option.Latest = None,
     most_frames: MostFrames = None,
@@ -104,7 +105,10 @@ def force(
     built = built_gel(sensor, camera, gel_calibration, settings)
     light = built_light(sensor, light_calibration)
     folder = out or Path("out") / f"{bundle.resolve().name}-force"
-    outputs = RunOutputs(folder, fields, pictures, video, mcap, view, overwrite, quiet=as_json)
+    outputs = RunOutputs(
+        folder, fields, pictures, video, mcap, rerun, view, overwrite, quiet=as_json,
+        finger=option.built_finger(bundle),
+    )  # fmt: skip
     with open_frames(frames, latest=latest) as source:
         if depth_maps is not None:
             normal: NormalSource | None = _depth_source(built, depth_maps, depth_sigma_mm)
