@@ -66,7 +66,7 @@ class RerunLog(AbstractContextManager["RerunLog"]):
             OutputError: The file cannot be made.
             MissingLibraryError: rerun-sdk is not installed.
         """
-        self._rr = optional_library.load("rerun", "recordings for the Rerun viewer")
+        self._rr = optional_library.load("rerun", "a recording for the Rerun viewer")
         self.path = Path(path)
         if self.path.suffix.lower() != ".rrd":
             raise OutputError(f"{self.path}: the name of such a recording must end in .rrd")
@@ -212,7 +212,7 @@ class RerunLog(AbstractContextManager["RerunLog"]):
 
     def _layout(self) -> Any:
         """Picture and gel on the left, forces over time on the right."""
-        blueprint = optional_library.load("rerun.blueprint", "recordings for the Rerun viewer")
+        blueprint = optional_library.load("rerun.blueprint", "a recording for the Rerun viewer")
         plots = [
             blueprint.TimeSeriesView(
                 origin=f"wrench/{part}", name=name, plot_legend=blueprint.PlotLegend(visible=False)
