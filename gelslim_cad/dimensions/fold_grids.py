@@ -26,8 +26,11 @@ SHRINK = 0.7
 LEVELS = 8
 RIM = 0.6
 """A best candidate beyond this share of the half width lies at the rim of its axis."""
-STARTS = 12
-"""Bands into which the coarse grid's mean ray angles are split."""
+BANDS = 12
+"""Into which the coarse grid's mean ray angles are split."""
+STARTS = BANDS + 1
+"""The last one keeps the view upright, where near and far edge have the same pixels: the most
+pixels lie on this narrow ridge, from which the coarse spreads of a band lead away."""
 NEAR_DEPTH_MM, NEAR_LENGTH_MM, NEAR_PX, NEAR_BEYOND_MM, NEAR_MISSED = 0.5, 5.0, 1.0, 5.0, 0.1
 """How far the best candidate of a band may be above that of the best band and still be polished: in
 mm of depth or length or in pixels of the goal; in mm outside the housing; as a part of the score
@@ -50,12 +53,14 @@ BestOfGrids = Callable[[Array, Array, Array, Array], Best]
 def best_of_bands(count: int, best_of_grids: BestOfGrids) -> Best:
     """The best candidate of each band; candidate and grid i are of design i % `count`."""
     axes = [np.linspace(lo, hi, n) for lo, hi, n in zip(LOWER, UPPER, COARSE, strict=True)]
-    bands = np.repeat(axes[0].reshape(STARTS, -1), count, axis=0)
+    mids = np.vstack([axes[0].reshape(BANDS, -1), np.zeros(len(axes[0]) // BANDS)])
+    bands = np.repeat(mids, count, axis=0)
     rest = [np.broadcast_to(axis, (len(bands), len(axis))) for axis in axes[1:]]
     best = best_of_grids(bands, rest[0], rest[1], np.full(len(bands), np.inf))
     ticks = np.linspace(-1.0, 1.0, FINE)
     step = (UPPER - LOWER) / (np.array(COARSE) - 1)
     width = np.tile(step[:, None], len(bands))
+    width[0, -count:] = 0.0
     for _ in range(LEVELS):
         middle = np.stack(best[:3])
         around = [

@@ -44,8 +44,12 @@ def failed(d: Dimensions) -> set[str]:
     return {c.id for c in check(d) if c.status == "fail"}
 
 
+def with_lens(changes: dict[str, Any]) -> Dimensions:
+    return finger("gelslim3_lens", {ENVELOPE + "max_thickness_mm": None, **changes})
+
+
 @pytest.mark.parametrize(
-    "make", [mini20, pytest.param(wide, marks=pytest.mark.slow)], ids=["mini20", "board"]
+    "make", [mini20, pytest.param(with_lens, marks=pytest.mark.slow)], ids=["mini20", "lens"]
 )
 def test_a_length_limit_is_kept_by_a_thicker_finger(make: Any) -> None:
     shortest = make({ENVELOPE + "goal": "shortest"})["finger.length_mm"]
