@@ -92,13 +92,15 @@ class FineContact(ContactSolver):
         pose: Pose,
         offset_mm: Array | None = None,
         start: GelState | None = None,
+        *,
+        offset_is_free: bool = False,
     ) -> GelState:
         """As `ContactSolver.step`. Raises ContactError and ConvergenceError."""
         assert isinstance(self.compliance, ConvolvedCompliance)
         rtol = max(LEAST_RTOL, SHARE * self.settings.tolerance)
         self._motion = ExactMotion(self.compliance, rtol)
         self._given = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
-        return super().step(last, before, pose, offset_mm, start)
+        return super().step(last, before, pose, offset_mm, start, offset_is_free=offset_is_free)
 
     def _correction(self, nodes: Nodes) -> RimCorrection:
         return RimCorrection(self._motion, nodes, self._given[nodes])

@@ -6,15 +6,15 @@ Viscoelasticity, 1.2):
 
     F(t) = F_e(t) - sum of g_i (F_e(t) - q_i(t)),   q_i' = F_e' - q_i / tau_i.
 
-Between two poses the elastic force runs straight, for which the update of q_i is exact (Taylor,
-Pister and Goudreau 1970), whatever the step. The surface is taken to follow the elastic solution:
+Between two poses the elastic force runs straight, for which the update of q_i is exact (`prony`),
+whatever the step. The surface is taken to follow the elastic solution:
 exact while nodes in contact stay in contact. A node that the indenter leaves loses its force at
-once, although the real surface would follow for a moment; tensile forces are set to zero.
+once, although the real surface would follow for a moment; tensile forces are set to zero. For the
+shape of such a surface see `viscoelastic_contact`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,22 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.prony import PronySeries
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class PronySeries:
-    """g(t) = 1 - sum of fractions (1 - exp(-t / times)); no terms: an elastic gel."""
-
-    fractions: tuple[float, ...] = ()
-    times_s: tuple[float, ...] = ()
-
-    @property
-    def is_null(self) -> bool:
-        """Whether nothing decays."""
-        return not any(self.fractions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +54,8 @@ def relax(
     change = new - state.elastic_n
     internal = np.empty_like(state.internal_n)
     force = new.copy()
-    for k, (g, tau) in enumerate(zip(series.fractions, series.times_s, strict=True)):
-        ratio = step_s / tau
-        # (1 - exp(-x)) / x is 1 at 0.
-        mean = -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
-        internal[k] = math.exp(-ratio) * state.internal_n[k] + mean * change
+    for k, (g, kept, mean) in enumerate(series.factors(step_s)):
+        internal[k] = kept * state.internal_n[k] + mean * change
         if g:
             force -= g * (new - internal[k])
     # A zero keeps its sign where nothing decays.

@@ -175,16 +175,22 @@ class ContactSolver:
         pose: Pose,
         offset_mm: Array | None = None,
         start: GelState | None = None,
+        *,
+        offset_is_free: bool = False,
     ) -> GelState:
         """State at `pose` in one step from the state `last` at `before`; raises ContactError.
 
         `offset_mm` (c, 3) is a displacement without contact forces, by which a nonlinear gel
-        differs from C. `start` is an initial guess.
+        differs from C. With `offset_is_free` it is the shape that the surface has while nothing
+        touches it, at which the tool then meets it. `start` is an initial guess.
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
         targets = self.targets(last, before, pose)
         target, ahead = targets.target_mm, targets.ahead_mm
-        below = self.tool.clearance_mm(pose, self.points_mm + ahead * [1.0, 1.0, 0.0])
+        met = ahead * [1.0, 1.0, 0.0]
+        if offset_is_free:
+            met[:, 2] = offset[:, 2]
+        below = self.tool.clearance_mm(pose, self.points_mm + met)
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
         first = last if start is None else start

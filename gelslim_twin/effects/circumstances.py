@@ -143,6 +143,12 @@ class MotionFigures:
     """From first contact to the end of the motion."""
     speed_mm_s: float = 0.0
     """Largest speed of any point of the contact region, in contact."""
+    step_mm: float = 0.0
+    """Largest change of depth between two poses, in contact."""
+    step_aside_mm: float = 0.0
+    """Largest way sideways of any point of the contact region between two poses, in contact."""
+    recedes: bool = False
+    """Whether the tool rises from where it has pressed the gel."""
 
     @property
     def is_straight(self) -> bool:

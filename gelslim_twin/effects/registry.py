@@ -20,9 +20,10 @@ from gelslim_twin.effects.grey_values import (
     SPECULAR,
 )
 from gelslim_twin.effects.skin import SKIN
+from gelslim_twin.effects.viscoelasticity import VISCOELASTICITY
 
 EFFECTS: tuple[Effect, ...] = (
-    *(NORMAL_CONTACT, SKIN, FRICTION, NONLINEARITY, RELAXATION),
+    *(NORMAL_CONTACT, SKIN, FRICTION, NONLINEARITY, RELAXATION, VISCOELASTICITY),
     *(PERSPECTIVE, REFRACTION, LENS_DISTORTION, MARKER_PRINT, DRAWING),
     *(SHADING, DIRT, DEFOCUS, SPECULAR, MOTION_BLUR, EXPOSURE, SENSOR_NOISE, COMPRESSION),
 )

@@ -92,7 +92,7 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
     if not touching:
         return MotionFigures(len(poses))
     reach = footprint.reach_mm(max(depths))
-    lateral = turned = speed = 0.0
+    lateral = turned = speed = step = step_aside = 0.0
     for (i, a), (j, b) in pairwise(enumerate(poses)):
         if depths[i] <= 0 and depths[j] <= 0:
             continue
@@ -104,6 +104,7 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
         pushed = min(deepest, footprint.steepest(deepest) * aside) if aside > 0 else 0.0
         way = math.hypot(aside, b.depth_mm - a.depth_mm) + pushed
         speed = max(speed, way / (b.time_s - a.time_s))
+        step, step_aside = max(step, abs(depths[j] - depths[i])), max(step_aside, aside)
     return MotionFigures(
         poses=len(poses),
         depth_mm=max(depths),
@@ -112,6 +113,9 @@ def motion_figures(poses: Sequence[Pose], footprint: Footprint) -> MotionFigures
         tilt_deg=max(math.hypot(p.tilt_x_deg, p.tilt_y_deg) for p in poses),
         contact_s=poses[-1].time_s - poses[max(0, touching[0] - 1)].time_s,
         speed_mm_s=speed,
+        step_mm=step,
+        step_aside_mm=step_aside,
+        recedes=any(b < a and a > 0 for a, b in pairwise(depths)),
     )
 
 

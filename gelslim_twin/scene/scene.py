@@ -79,6 +79,18 @@ class SceneCamera(Block):
 class EffectsBlock(Block):
     """`auto`, `on` or `off` for each effect, or a block with `use` and its parameters."""
 
+    @model_validator(mode="after")
+    def _one_series(self) -> EffectsBlock:
+        given = self.parameters()
+        both = ("relaxation", "viscoelasticity")
+        if all(getattr(given[name], "terms", ()) for name in both):
+            raise FieldError(
+                "viscoelasticity.terms",
+                "are given beside those of relaxation, a gel has one Prony series",
+                "delete one of the two blocks",
+            )
+        return self
+
     def parameters(self) -> dict[str, EffectParameters]:
         """The parameters of every effect by name; a bare word stands for the defaults with it."""
         found: dict[str, EffectParameters] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from gelslim_twin.simulation.sensor import TwinSensor
 from gelslim_twin.simulation.simulate import Mechanics
 
 if TYPE_CHECKING:
+    from gelslim_twin.contact.prony import PronySeries
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 CONTACTS = {
@@ -73,12 +75,24 @@ def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> 
         choice = chosen["nonlinearity"]
         strained = getattr(import_module(choice.implementation), CONTACTS[choice.implementation])
         contact = strained(contact, **dict(choice.rung_parameters))
+    if "viscoelasticity" in chosen:
+        choice = chosen["viscoelasticity"]
+        module = import_module(choice.implementation)
+        given = loaded.scene.effects.parameters()["viscoelasticity"].model_dump()["terms"]
+        contact = module.ViscoelasticContact(
+            contact, _series(given), **dict(choice.rung_parameters)
+        )
     if "relaxation" in chosen:
         given = loaded.scene.effects.parameters()["relaxation"].model_dump()["terms"]
         relaxation = import_module(chosen["relaxation"].implementation)
-        fractions, times_s = (tuple(t[n] for t in given) for n in ("fraction", "time_s"))
-        contact = relaxation.RelaxingContact(contact, relaxation.PronySeries(fractions, times_s))
+        contact = relaxation.RelaxingContact(contact, _series(given))
     return contact
+
+
+def _series(terms: Sequence[Mapping[str, float]]) -> PronySeries:
+    from gelslim_twin.contact.prony import PronySeries
+
+    return PronySeries(*(tuple(term[name] for term in terms) for name in ("fraction", "time_s")))
 
 
 def _linear_contact(solver: Any, compliance: PadCompliance, tool: Any, settings: Any) -> Any:

@@ -92,6 +92,15 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
             "the sensor's gel has a coat or a fabric, large deformation takes a bare gel",
             "switch one of them off (effects: {nonlinearity: off} or {skin: off})",
         )
+    if {"viscoelasticity", "nonlinearity"} <= set(plan.order):
+        raise loaded.problem(
+            "effects.viscoelasticity",
+            None,
+            "the contact of a viscoelastic gel is solved at small strain, large deformation was "
+            "chosen too",
+            "switch nonlinearity off, or give the terms to `relaxation`, which keeps the shape of "
+            "the elastic gel",
+        )
     for choice in plan.included:
         if choice.effect == "nonlinearity":
             problem = import_module(choice.implementation).unfit(sensor.bundle)

@@ -37,7 +37,7 @@ from ifem_export.compliance.columns import SurfaceCompliance
 
 if TYPE_CHECKING:
     from gelslim_twin.contact.nonlinear import NonlinearContact
-    from gelslim_twin.contact.relaxation import PronySeries
+    from gelslim_twin.contact.prony import PronySeries
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
@@ -115,7 +115,7 @@ class StepMechanics:
         assert isinstance(given, RelaxationParameters)
         if given.use == "off" or not any(term.fraction for term in given.terms):
             return None
-        from gelslim_twin.contact.relaxation import PronySeries
+        from gelslim_twin.contact.prony import PronySeries
 
         return PronySeries(
             tuple(t.fraction for t in given.terms), tuple(t.time_s for t in given.terms)

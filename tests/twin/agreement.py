@@ -30,7 +30,7 @@ from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
-MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation")
+MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity")
 MATCH_PX = 3.0
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gelslim_twin.contact.relaxation import PronySeries, at_rest, relax
+from gelslim_twin.contact.prony import PronySeries
+from gelslim_twin.contact.relaxation import at_rest, relax
 
 SERIES = PronySeries((0.2, 0.15, 0.05), (0.05, 0.7, 20.0))
 PUSH = np.array([[0.1, -0.2, -1.0], [0.0, 0.05, -0.3]])

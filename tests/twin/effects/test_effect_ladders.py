@@ -33,6 +33,7 @@ TIMES_MS = {
     "nonlinearity": (250.0, 350.0, 450.0),
     "skin": (0.0,),
     "relaxation": (0.01 + 8e-5 * 1849,),
+    "viscoelasticity": tuple(0.02 * n + 1.4 * (n - 1) for n in (1, 2, 4, 8, 16)),
     "perspective": (0.05,),
     "refraction": (0.02, 0.1),
     "lens_distortion": (0.02,),
@@ -76,6 +77,8 @@ def test_times_grow_with_the_size(what: str) -> None:
         expected = [factor * t for t in TIMES_MS[name]]
         if (what, name) == ("nodes", "relaxation"):
             expected = [0.01 + 16e-5 * 1849]
+        if (what, name) == ("nodes", "viscoelasticity"):
+            expected = [0.02 * n + 6 * 1.4 * (n - 1) for n in (1, 2, 4, 8, 16)]
         if (what, name) == ("pixels", "defocus"):
             expected = [0.5 + 6 * 1.0]
         assert [rung.milliseconds for rung in ladder(larger)] == pytest.approx(expected), name

@@ -28,6 +28,7 @@ from ifem_export.compliance.columns import SurfaceCompliance
 NULL: dict[str, dict[str, Any]] = {
     "friction": {},
     "relaxation": {"terms": []},
+    "viscoelasticity": {"terms": []},
     "lens_distortion": {},
     "marker_print": {"jitter_mm": 0, "missing_percent": 0, "odd_percent": 0},
     "shading": {"ambient_share": 1},
@@ -71,7 +72,7 @@ def _sensor(place: Path) -> TwinSensor:
     return TwinSensor(load_bundle(place))
 
 
-MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation")
+MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity")
 _solved: dict[tuple[Any, ...], list[GelState]] = {}
 
 

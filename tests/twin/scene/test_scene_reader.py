@@ -79,6 +79,11 @@ def test_faults_are_named_with_line_value_and_remedy(tmp_path, old, new, expecte
             "relaxation: {terms: [{fraction: 0.6, time_s: 1}, {fraction: 0.5, time_s: 2}]}",
             "S:12 effects.relaxation.terms: have fractions that sum to 1.1, must be below 1",
         ),
+        (
+            "{relaxation: {terms: [{fraction: 0.1, time_s: 1}]},"
+            " viscoelasticity: {terms: [{fraction: 0.2, time_s: 1}]}}",
+            "S:12 effects.viscoelasticity.terms: are given beside those of relaxation",
+        ),
         ("compression: {quality: 400}", "S:12 effects.compression.quality = 400: must be <= 95"),
     ],
 )
