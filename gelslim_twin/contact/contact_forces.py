@@ -41,7 +41,7 @@ def solve_contact_forces(
     compliance: Array | NDArray[np.float32] | NodeConvolution,
     height_mm: Array,
     target_mm: Array,
-    friction: float,
+    friction: float | Array,
     start_n: Array | None = None,
     tolerance: float = 1e-3,
     frames: Array | None = None,
@@ -55,7 +55,7 @@ def solve_contact_forces(
         height_mm: (n,) largest displacement of each node along its normal (the gap at rest);
             inf for a node that is never in contact.
         target_mm: (n, 2) displacement along its tangents of a node that sticks.
-        friction: coefficient μ >= 0.
+        friction: coefficient μ >= 0, of all nodes or of each (n,).
         start_n: (n, 3) forces to start from.
         tolerance: on `ContactForces.residual`, and on the error of the forces that follows from
             the rate of convergence; frictionless contact is solved to rounding, or to 1e-8 with
@@ -68,7 +68,7 @@ def solve_contact_forces(
         ContactError: the tolerance is not reached, or the input is invalid.
     """
     n = len(height_mm)
-    if not (np.isfinite(friction) and friction >= 0):
+    if not (np.isfinite(friction) & (np.asarray(friction) >= 0)).all():
         raise ContactError(f"friction = {friction}: must be finite and at least 0")
     if np.isnan(height_mm).any() or not np.isfinite(target_mm).all():
         raise ContactError("the heights or the targets of the nodes hold NaN")
@@ -80,9 +80,11 @@ def solve_contact_forces(
         from gelslim_twin.contact.convolved_forces import ConvolvedContact
 
         axes = np.tile(np.eye(3), (n, 1, 1)) if frames is None else frames
+        if not isinstance(friction, float | int):
+            raise ContactError("a convolution takes one coefficient of friction for all nodes")
         convolved = ConvolvedContact(compliance, height_mm, target_mm, friction, axes)
         return convolved.balance(start, tolerance)
-    if friction == 0:
+    if not np.any(friction):
         return _frictionless(compliance, height_mm, start, frames)
     from gelslim_twin.contact.coulomb_contact import FrictionalContact
 

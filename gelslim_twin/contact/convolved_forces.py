@@ -76,7 +76,8 @@ class ConvolvedContact:
         """Relative residual as in `ContactForces`; sets the contact status `touch`."""
         own = np.empty(force.size)
         answers(
-            self._own, self.frames, self._height, self._target, self.friction,
+            self._own, self.frames, self._height, self._target,
+            np.full(len(self._height), self.friction),
             np.ascontiguousarray(force).reshape(-1), np.ascontiguousarray(motion).reshape(-1),
             own, self.touch,
         )  # fmt: skip

@@ -43,7 +43,7 @@ class FrictionalContact:
         compliance: Array | NDArray[np.float32],
         height: Array,
         target: Array,
-        friction: float,
+        friction: float | Array,
         frames: Array | None,
     ) -> None:
         n = len(height)
@@ -53,7 +53,7 @@ class FrictionalContact:
         self.own = np.ascontiguousarray(self.frames.transpose(0, 2, 1) @ blocks @ self.frames)
         self.height = np.ascontiguousarray(height, dtype=float)
         self.target = np.ascontiguousarray(target, dtype=float)
-        self.mu = float(friction)
+        self.mu = np.array(np.broadcast_to(friction, len(height)), dtype=float)
         self.touch = np.zeros(len(height), dtype=np.int8)
 
     def balance(self, start: Array, start_mm: Array | None, tolerance: float) -> ContactForces:
@@ -96,10 +96,10 @@ class FrictionalContact:
                             changes = [np.inf, np.inf]
                     last = residual
         raise ContactError(
-            f"the contact of {len(self.height)} nodes with friction {self.mu:g} did not converge "
-            f"in {sweeps} sweeps: the smallest residual is {best:.1e} of the forces, the tolerance "
-            f"{tolerance:.1e}; take smaller steps of the motion, a lower friction or a larger "
-            "tolerance",
+            f"the contact of {len(self.height)} nodes with friction {self.mu.max():g} did not "
+            f"converge in {sweeps} sweeps: the smallest residual is {best:.1e} of the forces, the "
+            f"tolerance {tolerance:.1e}; take smaller steps of the motion, a lower friction or a "
+            "larger tolerance",
             best,
         )
 
@@ -157,21 +157,21 @@ class FrictionalContact:
         right = np.column_stack([self.target[on], self.height[on]])
         at = np.flatnonzero(self.touch[on] == SLIP)
         force = present.reshape(m, 3)[at]
-        own = matrix.reshape(m, 3, m, 3)[at, :, at, :]
+        own, mu = matrix.reshape(m, 3, m, 3)[at, :, at, :], self.mu[on][at]
         # G = f_t + μ f_z d with d along f_t - ρ slip, ρ of the size of the node's stiffness.
         rho = 2.0 / (own[:, 0, 0] + own[:, 1, 1])
         along = force[:, :2] - rho[:, None] * (moved[at, :2] - right[at, :2])
         size = np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-300)
         d = along / size[:, None]
-        swing = (self.mu * np.maximum(-force[:, 2], 0.0) / size)[:, None, None] * (
+        swing = (mu * np.maximum(-force[:, 2], 0.0) / size)[:, None, None] * (
             np.eye(2) - d[:, :, None] * d[:, None, :]
         )
         rows = np.matmul(swing * rho[:, None, None], c.reshape(m, 3, -1)[at, :2])
         grid = rows.reshape(len(at), 2, m, 3)
         grid[np.arange(len(at)), :, at, :2] += np.eye(2) - swing
-        grid[np.arange(len(at)), :, at, 2] += self.mu * d
+        grid[np.arange(len(at)), :, at, 2] += mu[:, None] * d
         matrix[at, :2] = rows
-        right[at, :2] = rows @ present - (force[:, :2] + self.mu * force[:, 2:] * d)
+        right[at, :2] = rows @ present - (force[:, :2] + mu[:, None] * force[:, 2:] * d)
         x = np.zeros(3 * n)
         local = lu_solve(lu_factor(matrix.reshape(3 * m, 3 * m)), right.reshape(-1))
         x[dof] = np.einsum("mab,mb->ma", q, local.reshape(m, 3)).reshape(-1)

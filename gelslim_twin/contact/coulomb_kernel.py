@@ -80,7 +80,7 @@ def node_force(w: Any, rx: float, ry: float, rz: float, friction: float) -> Any:
 
 @njit(cache=True)
 def _wanted(
-    k: int, own: Any, frames: Any, height: Any, target: Any, friction: float, f: Any, u: Any
+    k: int, own: Any, frames: Any, height: Any, target: Any, friction: Any, f: Any, u: Any
 ) -> Any:
     """Force along x, y, z that node k takes if the others keep theirs, and its touch."""
     a, q, w = 3 * k, frames[k], own[k]
@@ -94,7 +94,7 @@ def _wanted(
     r0 = target[k, 0] - u0 + w[0, 0] * f0 + w[0, 1] * f1 + w[0, 2] * f2
     r1 = target[k, 1] - u1 + w[1, 0] * f0 + w[1, 1] * f1 + w[1, 2] * f2
     r2 = height[k] - u2 + w[2, 0] * f0 + w[2, 1] * f1 + w[2, 2] * f2
-    g0, g1, g2, state = node_force(w, r0, r1, r2, friction)
+    g0, g1, g2, state = node_force(w, r0, r1, r2, friction[k])
     gx = q[0, 0] * g0 + q[0, 1] * g1 + q[0, 2] * g2
     gy = q[1, 0] * g0 + q[1, 1] * g1 + q[1, 2] * g2
     gz = q[2, 0] * g0 + q[2, 1] * g1 + q[2, 2] * g2
@@ -108,7 +108,7 @@ def sweep(
     frames: Any,
     height: Any,
     target: Any,
-    friction: float,
+    friction: Any,
     relaxation: float,
     backwards: bool,
     f: Any,
@@ -119,9 +119,9 @@ def sweep(
 
     compliance (3n, 3n); frames (n, 3, 3) with the two tangents and the normal of each node in
     columns, own (n, 3, 3) each node's compliance in its frame; height (n,) the most it may move
-    along its normal, target (n, 2) where it would stick along its tangents; f and u (3n,) forces
-    and motion along x, y, z; touch (n,). `relaxation` is the share of each node's change that is
-    made.
+    along its normal, target (n, 2) where it would stick along its tangents; friction (n,)
+    coefficient of each node; f and u (3n,) forces and motion along x, y, z; touch (n,).
+    `relaxation` is the share of each node's change that is made.
     """
     n = len(height)
     total = 0.0
@@ -152,7 +152,7 @@ def answers(
     frames: Any,
     height: Any,
     target: Any,
-    friction: float,
+    friction: Any,
     f: Any,
     u: Any,
     g: Any,

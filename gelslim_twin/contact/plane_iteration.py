@@ -107,7 +107,7 @@ class PlaneIteration:
     """Displacement (n, 3) of nodes that stick."""
     wanted: NDArray[np.bool_]
     """Whether (n,) a node may be in contact."""
-    friction: float
+    friction: float | Array
     tolerance: float
     deepest_mm: float
     correction: Correction | None = None
@@ -162,7 +162,7 @@ class PlaneIteration:
                 if turn < EDGES_FROM
                 else max(self.gap_tolerance_mm, self._edge_mm)
             )
-            if worst <= slack and (inner_tolerance <= fine or self.friction == 0):
+            if worst <= slack and (inner_tolerance <= fine or not np.any(self.friction)):
                 return PlaneSolution(balance, used, gap, sweeps)
             if inner_tolerance <= fine:
                 # The residual of the forces keeps nodes off the tool, so it must become smaller.

@@ -210,7 +210,7 @@ class ContactSolver:
             nodes = self.candidates.nodes
             iteration = PlaneIteration(
                 self.tool, pose, self.candidates.block, self.points_mm[nodes], offset[nodes],
-                target[nodes], wanted[nodes], self.settings.friction, self.settings.tolerance,
+                target[nodes], wanted[nodes], self._friction(nodes), self.settings.tolerance,
                 deepest, self._correction(nodes),
             )  # fmt: skip
             solve = iteration.solve if self.settings.geometry == "displaced" else iteration.fixed
@@ -266,6 +266,10 @@ class ContactSolver:
         # Slopes cost four more evaluations of the tool and matter near the gel only.
         surface = self.tool.surface(pose, places, reach_mm=self._cell).only(on_tool)
         return surface, allowed_motion_mm(surface, places, moved - offset)
+
+    def _friction(self, nodes: Nodes) -> float | Array:
+        """Coefficient of friction, of all nodes or of each of `nodes` (n,)."""
+        return self.settings.friction
 
     def _correction(self, nodes: Nodes) -> Correction | None:
         """What the compliance of the candidates lacks."""

@@ -20,10 +20,12 @@ from gelslim_twin.effects.grey_values import (
     SPECULAR,
 )
 from gelslim_twin.effects.skin import SKIN
+from gelslim_twin.effects.sliding_friction import SLIDING_FRICTION
 from gelslim_twin.effects.viscoelasticity import VISCOELASTICITY
 
 EFFECTS: tuple[Effect, ...] = (
-    *(NORMAL_CONTACT, SKIN, FRICTION, NONLINEARITY, RELAXATION, VISCOELASTICITY),
+    *(NORMAL_CONTACT, SKIN, FRICTION, SLIDING_FRICTION, NONLINEARITY),
+    *(RELAXATION, VISCOELASTICITY),
     *(PERSPECTIVE, REFRACTION, LENS_DISTORTION, MARKER_PRINT, DRAWING),
     *(SHADING, DIRT, DEFOCUS, SPECULAR, MOTION_BLUR, EXPOSURE, SENSOR_NOISE, COMPRESSION),
 )

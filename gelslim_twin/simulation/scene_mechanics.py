@@ -66,11 +66,16 @@ def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> 
     tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:
         tolerance = min(tolerance, _tolerance(chosen["friction"]))
+    if chosen.keys() & {"friction", "sliding_friction"}:
         skin = compliance.bundle.skin
         friction = contact_friction(loaded.scene.contact, None if skin is None else skin.friction)
     settings = solver.ContactSettings(tolerance, friction)
     tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
-    contact: Any = _linear_contact(solver, compliance, tool, settings)
+    contact: Any
+    if "sliding_friction" in chosen:
+        contact = _sliding_contact(loaded, chosen["sliding_friction"], compliance, tool, settings)
+    else:
+        contact = _linear_contact(solver, compliance, tool, settings)
     if "nonlinearity" in chosen:
         choice = chosen["nonlinearity"]
         strained = getattr(import_module(choice.implementation), CONTACTS[choice.implementation])
@@ -103,6 +108,16 @@ def _linear_contact(solver: Any, compliance: PadCompliance, tool: Any, settings:
     from gelslim_twin.contact.fine_contact import FineContact
 
     return FineContact(compliance, tool, settings)
+
+
+def _sliding_contact(
+    loaded: LoadedScene, choice: Choice, compliance: PadCompliance, tool: Any, settings: Any
+) -> Any:
+    module = import_module(choice.implementation)
+    given = loaded.scene.effects.parameters()["sliding_friction"].model_dump(exclude={"use"})
+    kinetic = settings.friction if given["kinetic"] is None else given["kinetic"]
+    law = module.SlidingLaw(settings.friction, kinetic, given["speed_mm_s"], given["memory_mm"])
+    return module.SlidingContact(compliance, tool, settings, law, **dict(choice.rung_parameters))
 
 
 def _tolerance(choice: Choice) -> float:

@@ -85,22 +85,7 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
 
     asked = question(loaded, bundle_figures(folder / BUNDLE))
     plan = planned(loaded, asked, compliance if can_be_probed(sensor) else None)
-    if {"skin", "nonlinearity"} <= set(plan.order):
-        raise loaded.problem(
-            "effects.nonlinearity",
-            None,
-            "the sensor's gel has a coat or a fabric, large deformation takes a bare gel",
-            "switch one of them off (effects: {nonlinearity: off} or {skin: off})",
-        )
-    if {"viscoelasticity", "nonlinearity"} <= set(plan.order):
-        raise loaded.problem(
-            "effects.viscoelasticity",
-            None,
-            "the contact of a viscoelastic gel is solved at small strain, large deformation was "
-            "chosen too",
-            "switch nonlinearity off, or give the terms to `relaxation`, which keeps the shape of "
-            "the elastic gel",
-        )
+    require_compatible(loaded, sensor, plan)
     for choice in plan.included:
         if choice.effect == "nonlinearity":
             problem = import_module(choice.implementation).unfit(sensor.bundle)
@@ -114,6 +99,47 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         lambda: mechanics_of(loaded, plan, compliance("skin" in plan.order)),
         loaded.look,
     )
+
+
+EXCLUDED = {
+    "skin": (
+        "nonlinearity",
+        "the sensor's gel has a coat or a fabric, large deformation takes a bare gel",
+        "switch one of them off (effects: {nonlinearity: off} or {skin: off})",
+    ),
+    "viscoelasticity": (
+        "viscoelasticity",
+        "the contact of a viscoelastic gel is solved at small strain, large deformation was "
+        "chosen too",
+        "switch nonlinearity off, or give the terms to `relaxation`, which keeps the shape of "
+        "the elastic gel",
+    ),
+    "sliding_friction": (
+        "sliding_friction",
+        "friction that depends on the speed is solved at small strain, large deformation was "
+        "chosen too",
+        "switch one of them off (effects: {nonlinearity: off} or {sliding_friction: off})",
+    ),
+}
+"""Effects that large strain excludes, each with the effect to name, the reason and the remedy."""
+
+
+def require_compatible(loaded: LoadedScene, sensor: TwinSensor, plan: Plan) -> None:
+    """Raise InputError for a plan whose effects exclude each other or need another pad."""
+    from ifem_export.compliance.table_size import has_room
+
+    for effect, (named, message, remedy) in EXCLUDED.items():
+        if {effect, "nonlinearity"} <= set(plan.order):
+            raise loaded.problem(f"effects.{named}", None, message, remedy)
+    nodes = len(sensor.bundle.mesh.surface)
+    if "sliding_friction" in plan.order and not has_room(nodes):
+        raise loaded.problem(
+            "effects.sliding_friction",
+            None,
+            f"the sensor's pad has {nodes} surface nodes, more than friction that depends on the "
+            "speed takes",
+            "switch it off, or lower the sensor's mesh.nodes_per_marker_pitch",
+        )
 
 
 def require_sensor_of_look(loaded: LoadedScene, look: BuiltLook, sensor: TwinSensor) -> None:

@@ -30,7 +30,8 @@ from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
-MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity")
+MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity",
+             "sliding_friction")  # fmt: skip
 MATCH_PX = 3.0
 
 

@@ -75,6 +75,7 @@ class Problem:
         self.height = rng.uniform(-1.0, 0.5, NODES)
         self.target = 0.5 * rng.standard_normal((NODES, 2))
         self.force = rng.standard_normal((NODES, 3))
+        self.friction = FRICTION * (1 + 0.3 * np.sin(np.arange(NODES)))
         blocks = self.compliance.reshape(NODES, 3, NODES, 3)
         self.own = np.array([q.T @ blocks[k, :, k] @ q for k, q in enumerate(self.frames)])
 
@@ -85,7 +86,7 @@ class Problem:
         others[k] = 0.0
         beside = q.T @ (self.compliance[rows] @ others.reshape(-1))
         goal = np.array([*self.target[k], self.height[k]])
-        *found, state = node_force(self.own[k], *(goal - beside), FRICTION)
+        *found, state = node_force(self.own[k], *(goal - beside), self.friction[k])
         return q @ found, state
 
 
@@ -94,7 +95,9 @@ def test_answers_are_the_forces_of_single_nodes(seed: int) -> None:
     p = Problem(seed)
     found, touch = np.empty(3 * NODES), np.zeros(NODES, dtype=np.int8)
     moved = p.compliance @ p.force.reshape(-1)
-    answers(p.own, p.frames, p.height, p.target, FRICTION, p.force.reshape(-1), moved, found, touch)
+    answers(
+        p.own, p.frames, p.height, p.target, p.friction, p.force.reshape(-1), moved, found, touch
+    )
     expected = [p.wanted(k, p.force) for k in range(NODES)]
     np.testing.assert_allclose(found.reshape(-1, 3), [f for f, _ in expected], atol=1e-12)
     assert list(touch) == [state for _, state in expected]
@@ -114,7 +117,7 @@ def test_a_sweep_goes_from_node_to_node(seed: int, relaxation: float, backwards:
     f, kinds = p.force.reshape(-1).copy(), np.zeros(NODES, dtype=np.int8)
     u = p.compliance @ f
     change = sweep(
-        p.compliance, p.own, p.frames, p.height, p.target, FRICTION, relaxation, backwards, f, u,
+        p.compliance, p.own, p.frames, p.height, p.target, p.friction, relaxation, backwards, f, u,
         kinds,
     )  # fmt: skip
     np.testing.assert_allclose(f.reshape(-1, 3), force, atol=1e-11)
@@ -133,12 +136,13 @@ def test_a_sweep_leaves_slipping_nodes_on_the_cone_to_rounding() -> None:
     touch = np.zeros(NODES, dtype=np.int8)
     level = np.tile(np.eye(3), (NODES, 1, 1))
     own = 0.3 * p.own
-    sweep(p.compliance, own, level, p.height, p.target, FRICTION, 1.0, False, f, u, touch)
+    sweep(p.compliance, own, level, p.height, p.target, p.friction, 1.0, False, f, u, touch)
     slips = touch == SLIP
     assert slips.sum() > 1
     assert touch[0] == FREE
     side = np.hypot(*f.reshape(-1, 3)[slips, :2].T)
-    np.testing.assert_allclose(side, -FRICTION * f.reshape(-1, 3)[slips, 2], rtol=1e-15)
+    limit = -p.friction[slips] * f.reshape(-1, 3)[slips, 2]
+    np.testing.assert_allclose(side, limit, rtol=1e-15)
 
 
 def test_motion_is_added_up_from_the_nodes_with_a_force() -> None:

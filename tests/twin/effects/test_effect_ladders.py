@@ -30,6 +30,7 @@ APART = circumstances(sensor=REFERENCE, motion=replace(MOTION, depth_mm=0.0))
 TIMES_MS = {
     "normal_contact": (1.2, 1.3, 1.5, 1.8, 2.1),
     "friction": (0.4,),
+    "sliding_friction": (0.1, 0.1, 0.1),
     "nonlinearity": (250.0, 350.0, 450.0),
     "skin": (0.0,),
     "relaxation": (0.01 + 8e-5 * 1849,),

@@ -29,6 +29,7 @@ NULL: dict[str, dict[str, Any]] = {
     "friction": {},
     "relaxation": {"terms": []},
     "viscoelasticity": {"terms": []},
+    "sliding_friction": {},
     "lens_distortion": {},
     "marker_print": {"jitter_mm": 0, "missing_percent": 0, "odd_percent": 0},
     "shading": {"ambient_share": 1},
@@ -72,7 +73,8 @@ def _sensor(place: Path) -> TwinSensor:
     return TwinSensor(load_bundle(place))
 
 
-MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity")
+MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity",
+             "sliding_friction")  # fmt: skip
 _solved: dict[tuple[Any, ...], list[GelState]] = {}
 
 
