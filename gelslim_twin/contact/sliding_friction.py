@@ -49,6 +49,11 @@ class SlidingLaw:
     speed_mm_s: float
     memory_mm: float
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether the coefficient is the same at all speeds."""
+        return self.kinetic == self.static
+
     def coefficient(self, mean_mm_s: Array) -> Array:
         """mu (n,) at mean slip speeds (n,) in mm/s."""
         fallen = -np.expm1(-mean_mm_s / self.speed_mm_s)
@@ -91,11 +96,15 @@ class SlidingContact(ContactSolver):
                 f"friction at rest is {self.law.static:g} in the law of sliding and "
                 f"{self.settings.friction:g} in the contact; give the same"
             )
-        self._longest = min(self._longest, self.step_share * self.law.memory_mm)
+        if not self.law.is_constant:
+            self._longest = min(self._longest, self.step_share * self.law.memory_mm)
         self._coefficient = np.full(len(self.points_mm), self.law.static)
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """As `ContactSolver.states`; a contact at rest forgets its speed meanwhile."""
+        if self.law.is_constant:
+            yield from super().states(poses)
+            return
         state, before = GelState.at_rest(len(self.points_mm)), None
         for pose in poses:
             state, before = self.advanced(state, before, pose), pose

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gelslim_twin.effects.adhesion import ADHESION
 from gelslim_twin.effects.contact import FRICTION, NONLINEARITY, NORMAL_CONTACT, RELAXATION
 from gelslim_twin.effects.dot_contrast import DEFOCUS, DRAWING, EXPOSURE
 from gelslim_twin.effects.dot_positions import (
@@ -24,7 +25,7 @@ from gelslim_twin.effects.sliding_friction import SLIDING_FRICTION
 from gelslim_twin.effects.viscoelasticity import VISCOELASTICITY
 
 EFFECTS: tuple[Effect, ...] = (
-    *(NORMAL_CONTACT, SKIN, FRICTION, SLIDING_FRICTION, NONLINEARITY),
+    *(NORMAL_CONTACT, SKIN, FRICTION, SLIDING_FRICTION, ADHESION, NONLINEARITY),
     *(RELAXATION, VISCOELASTICITY),
     *(PERSPECTIVE, REFRACTION, LENS_DISTORTION, MARKER_PRINT, DRAWING),
     *(SHADING, DIRT, DEFOCUS, SPECULAR, MOTION_BLUR, EXPOSURE, SENSOR_NOISE, COMPRESSION),

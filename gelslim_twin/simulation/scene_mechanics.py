@@ -76,6 +76,10 @@ def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> 
         contact = _sliding_contact(loaded, chosen["sliding_friction"], compliance, tool, settings)
     else:
         contact = _linear_contact(solver, compliance, tool, settings)
+    if "adhesion" in chosen:
+        work_j_m2 = loaded.scene.effects.parameters()["adhesion"].model_dump()["work_j_m2"]
+        module = import_module(chosen["adhesion"].implementation)
+        contact = module.AdhesiveContact(contact, work_j_m2)
     if "nonlinearity" in chosen:
         choice = chosen["nonlinearity"]
         strained = getattr(import_module(choice.implementation), CONTACTS[choice.implementation])

@@ -101,45 +101,56 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
     )
 
 
-EXCLUDED = {
-    "skin": (
-        "nonlinearity",
+LARGE = "large deformation was chosen too"
+EXCLUDED = (
+    (
+        ("nonlinearity", "skin"),
         "the sensor's gel has a coat or a fabric, large deformation takes a bare gel",
         "switch one of them off (effects: {nonlinearity: off} or {skin: off})",
     ),
-    "viscoelasticity": (
-        "viscoelasticity",
-        "the contact of a viscoelastic gel is solved at small strain, large deformation was "
-        "chosen too",
+    (
+        ("viscoelasticity", "nonlinearity"),
+        f"the contact of a viscoelastic gel is solved at small strain, {LARGE}",
         "switch nonlinearity off, or give the terms to `relaxation`, which keeps the shape of "
         "the elastic gel",
     ),
-    "sliding_friction": (
-        "sliding_friction",
-        "friction that depends on the speed is solved at small strain, large deformation was "
-        "chosen too",
+    (
+        ("sliding_friction", "nonlinearity"),
+        f"friction that depends on the speed is solved at small strain, {LARGE}",
         "switch one of them off (effects: {nonlinearity: off} or {sliding_friction: off})",
     ),
-}
-"""Effects that large strain excludes, each with the effect to name, the reason and the remedy."""
+    (
+        ("adhesion", "nonlinearity"),
+        f"the bonds of a tacky gel are solved at small strain, {LARGE}",
+        "switch one of them off (effects: {nonlinearity: off} or {adhesion: off})",
+    ),
+    (
+        ("adhesion", "viscoelasticity"),
+        "the bonds of a tacky gel are solved on an elastic gel, a viscoelastic one was chosen too",
+        "switch one of them off (effects: {viscoelasticity: off} or {adhesion: off})",
+    ),
+)
+"""Effects that exclude each other, the first of which is named, the reason, and the remedy."""
+TABLE_ONLY = ("sliding_friction", "adhesion")
+"""Effects that take a table of the compliance's columns."""
 
 
 def require_compatible(loaded: LoadedScene, sensor: TwinSensor, plan: Plan) -> None:
     """Raise InputError for a plan whose effects exclude each other or need another pad."""
     from ifem_export.compliance.table_size import has_room
 
-    for effect, (named, message, remedy) in EXCLUDED.items():
-        if {effect, "nonlinearity"} <= set(plan.order):
-            raise loaded.problem(f"effects.{named}", None, message, remedy)
+    for pair, message, remedy in EXCLUDED:
+        if set(pair) <= set(plan.order):
+            raise loaded.problem(f"effects.{pair[0]}", None, message, remedy)
     nodes = len(sensor.bundle.mesh.surface)
-    if "sliding_friction" in plan.order and not has_room(nodes):
-        raise loaded.problem(
-            "effects.sliding_friction",
-            None,
-            f"the sensor's pad has {nodes} surface nodes, more than friction that depends on the "
-            "speed takes",
-            "switch it off, or lower the sensor's mesh.nodes_per_marker_pitch",
-        )
+    for effect in TABLE_ONLY:
+        if effect in plan.order and not has_room(nodes):
+            raise loaded.problem(
+                f"effects.{effect}",
+                None,
+                f"the sensor's pad has {nodes} surface nodes, more than this effect takes",
+                "switch it off, or lower the sensor's mesh.nodes_per_marker_pitch",
+            )
 
 
 def require_sensor_of_look(loaded: LoadedScene, look: BuiltLook, sensor: TwinSensor) -> None:

@@ -31,7 +31,7 @@ from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
 MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity",
-             "sliding_friction")  # fmt: skip
+             "sliding_friction", "adhesion")  # fmt: skip
 MATCH_PX = 3.0
 
 

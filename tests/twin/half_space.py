@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,11 +31,12 @@ class HalfSpace:
         mesh = SimpleNamespace(surface_mm=self.points_mm, cell_size_mm=(pitch_mm, pitch_mm, 1.0))
         self.bundle: Any = SimpleNamespace(mesh=mesh)
 
-    def _between(self, rows: Nodes, columns: Nodes) -> Array:
-        """Motion (n, 3, m, 3) of nodes (n,) by 1 N on nodes (m,) along each axis."""
-        apart = self.points_mm[rows][:, None] - self.points_mm[columns]
+    @cached_property
+    def whole(self) -> Array:
+        """Motion (c, 3, c, 3) of all nodes by 1 N on each along each axis."""
+        apart = self.points_mm[:, None] - self.points_mm
         h = self.pitch_mm / 2
-        inverse, xx, xy = np.zeros((3, len(rows), len(columns)))
+        xx, xy = np.zeros((2, self.nodes, self.nodes))
         yy = np.zeros_like(xx)
         for sx in (1, -1):
             for sy in (1, -1):
@@ -45,7 +47,7 @@ class HalfSpace:
                 yy += sign * x * np.log(y + r)
                 xy -= sign * r
         inverse = xx + yy
-        nu, found = self.POISSON, np.zeros((len(rows), 3, len(columns), 3))
+        nu, found = self.POISSON, np.zeros((self.nodes, 3, self.nodes, 3))
         found[:, 2, :, 2] = (1 - nu) * inverse
         found[:, 0, :, 0] = (1 - nu) * inverse + nu * xx
         found[:, 1, :, 1] = (1 - nu) * inverse + nu * yy
@@ -55,12 +57,14 @@ class HalfSpace:
     def block(self, nodes: Nodes, known: Any = None) -> NDArray[np.float32]:
         """See `SurfaceResponse`."""
         size = 3 * len(nodes)
-        return self._between(nodes, nodes).reshape(size, size).astype(np.float32)
+        own = self.whole[np.asarray(nodes)][:, :, np.asarray(nodes)]
+        return own.reshape(size, size).astype(np.float32)
 
     def displacement(self, nodes: Nodes, force_n: Array, known_mm: Array | None = None) -> Array:
         """See `SurfaceResponse`."""
-        whole = self._between(np.arange(self.nodes), np.asarray(nodes))
-        return np.einsum("iajb,jb->ia", whole, force_n)
+        force = np.zeros((self.nodes, 3))
+        force[nodes] = force_n
+        return (self.whole.reshape(3 * self.nodes, -1) @ force.ravel()).reshape(-1, 3)
 
     def store(self) -> None:
         """Nothing took time to compute."""

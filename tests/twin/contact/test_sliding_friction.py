@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -102,8 +103,9 @@ def test_the_error_falls_with_the_step():
 
 
 def test_with_one_coefficient_it_is_the_contact_of_coulomb_bit_for_bit():
-    law = SlidingLaw(0.6, 0.6, 1.0, 10.0)
-    poses = dragged(1.0, 0.6, 3)
+    law = SlidingLaw(0.6, 0.6, 1.0, 0.1)
+    moves = dragged(1.0, 0.6, 3)
+    poses = (*moves, replace(moves[-1], time_s=9.0), replace(moves[-1], time_s=9.5, x_mm=0.4))
     plain = ContactSolver(pad(), BALL, settings(law)).states(poses)
     for one, other in zip(solved(law, poses), plain, strict=True):
         assert one.force_n.tobytes() == other.force_n.tobytes()

@@ -73,6 +73,7 @@ def test_a_finer_mesh_is_nearer_to_mindlin() -> None:
     assert fine[1] < 0.6 * coarse[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("poisson", [0.32, 0.49])
 def test_the_boundary_travels_one_way_under_growing_shear(poisson: float) -> None:
     """On a bonded pad: from the rim inwards, until all of the contact slips."""

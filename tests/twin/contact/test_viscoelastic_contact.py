@@ -199,6 +199,7 @@ def test_a_small_cycle_dissipates_what_the_loss_modulus_says(ratio: float) -> No
     assert lost == pytest.approx(np.pi * 0.005**2 * stiffness * loss, rel=0.01)
 
 
+@pytest.mark.slow
 def test_no_closed_path_gives_energy():
     """Random presses from no contact to no contact, at random speeds."""
     random = np.random.default_rng(5)

@@ -31,6 +31,7 @@ TIMES_MS = {
     "normal_contact": (1.2, 1.3, 1.5, 1.8, 2.1),
     "friction": (0.4,),
     "sliding_friction": (0.1, 0.1, 0.1),
+    "adhesion": (6.0,),
     "nonlinearity": (250.0, 350.0, 450.0),
     "skin": (0.0,),
     "relaxation": (0.01 + 8e-5 * 1849,),
@@ -50,7 +51,7 @@ TIMES_MS = {
     "compression": (2.0,),
 }
 GROWS_WITH = {
-    "nodes": ("normal_contact", "friction", "nonlinearity"),
+    "nodes": ("normal_contact", "friction", "adhesion", "nonlinearity"),
     "dots": ("perspective", "refraction", "lens_distortion", "marker_print"),
     "pixels": ("drawing", "shading", "specular", "motion_blur", "exposure", "sensor_noise",
                "compression"),

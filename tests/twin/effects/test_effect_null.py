@@ -30,6 +30,7 @@ NULL: dict[str, dict[str, Any]] = {
     "relaxation": {"terms": []},
     "viscoelasticity": {"terms": []},
     "sliding_friction": {},
+    "adhesion": {},
     "lens_distortion": {},
     "marker_print": {"jitter_mm": 0, "missing_percent": 0, "odd_percent": 0},
     "shading": {"ambient_share": 1},
@@ -74,7 +75,7 @@ def _sensor(place: Path) -> TwinSensor:
 
 
 MECHANICS = ("normal_contact", "friction", "nonlinearity", "relaxation", "viscoelasticity",
-             "sliding_friction")  # fmt: skip
+             "sliding_friction", "adhesion")  # fmt: skip
 _solved: dict[tuple[Any, ...], list[GelState]] = {}
 
 
@@ -106,9 +107,11 @@ def outcome(folder: Path, effects: dict[str, Any]) -> tuple[tuple[str, ...], byt
 
 DRAWN = ("motion_blur", "exposure", "sensor_noise", "marker_print", "dirt", "specular")
 """Tried in every run on the renderer alone, in the tests of its effects."""
+SOLVED = ("viscoelasticity", "sliding_friction", "adhesion")
+"""Tried in every run on the contact alone, in the tests of these contacts."""
 
 
-@pytest.mark.parametrize("name", quick(sorted(NULL), lambda name: name not in DRAWN))
+@pytest.mark.parametrize("name", quick(sorted(NULL), lambda name: name not in (*DRAWN, *SOLVED)))
 def test_switched_on_with_nothing_to_do_it_changes_nothing(folder: Path, name: str) -> None:
     on_order, on = outcome(folder, {name: {"use": "on", **NULL[name]}})
     off_order, off = outcome(folder, {name: {"use": "off"}})
