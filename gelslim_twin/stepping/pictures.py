@@ -32,6 +32,10 @@ BALL_SHARE, DEPTH_SHARE, MOVE_S = 0.25, 0.25, 0.1
 """
 
 
+SCENES_ONLY = ("viscoelasticity", "sliding_friction", "adhesion")
+"""Effects that single steps do not have."""
+
+
 def stepped_scene(
     request: Request,
     friction: float,
@@ -59,7 +63,7 @@ def stepped_scene(
             raise StepError(f"effects: {name!r} is unknown; {hint}")
     depth = DEPTH_SHARE * size_mm[2]
     try:
-        return Scene.model_validate_json(
+        scene = Scene.model_validate_json(
             json.dumps(
                 {
                     "format": FORMAT,
@@ -86,6 +90,18 @@ def stepped_scene(
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise StepError(f"{where} = {first['input']!r}: {first['msg'].lower()}") from None
+    _require_stepped(scene)
+    return scene
+
+
+def _require_stepped(scene: Scene) -> None:
+    given = scene.effects.parameters()
+    for name in SCENES_ONLY:
+        asked = given[name]
+        if asked.use != "off" and asked.model_copy(update={"use": "auto"}) != type(asked)():
+            raise StepError(
+                f"effects: {name} is simulated in scenes only; leave it out, or switch it off"
+            )
 
 
 def stepped_viewer(sensor: TwinSensor, folder: Path, scene: Scene, request: Request) -> Viewer:
