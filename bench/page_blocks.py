@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import drawn_light_table
 import force_sigma
 import force_tables
 import linear_gel
@@ -77,6 +78,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-skin": _from("twin_skin", twin_skin.table),
         "twin-overhead": _from("twin_ladders", twin_tables.overhead_text),
         "twin-look": _from("twin_look", twin_look.table),
+        "drawn-light": _from("drawn_light", drawn_light_table.table),
     },
     "docs/twin_steps.md": {"steps": _from("twin_steps", twin_steps.table)},
     "docs/stiffness.md": {

@@ -183,7 +183,8 @@ class FrameRenderer:
         gain, step = _NONE, 1
         if self.look.shading is not None and surface is not None and surface.moves:
             assert self._shading_sight is not None
-            gain = self.look.shading.gain(self._shading_sight, surface, self.light)
+            rest_mm = None if self.top is None else self.top.nodes_mm(surface)
+            gain = self.look.shading.gain(self._shading_sight, surface, self.light, rest_mm)
             if self.top is not None:
                 gain = 1 + (gain - 1) * self._on_pad
             step = self.look.shading.pixel_step

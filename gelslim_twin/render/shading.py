@@ -2,19 +2,22 @@
 
 The coat is a Lambertian reflector. Light in the direction d (unit vector) gives the irradiance d·n
 on a surface with outward normal n, and none where d·n is negative (attached shadow). Traced light
-has its directions at each place, with what the coat has scattered back; see `LightFans`. A further
-ambient share does not depend on the slope.
+has its directions at each place, with what the coat has scattered back; see `LightFans`. Shadows
+that one part of the surface casts on another are those of `relief`. A further ambient share does
+not depend on the shape.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_optics.light.light_fans import STEEPEST
+from gelslim_twin.render.relief import Relief
 from gelslim_twin.render.surroundings import Sight
 
 if TYPE_CHECKING:
@@ -28,25 +31,42 @@ _ROUNDS, _NEAR_MM = 8, 1e-3
 
 @dataclass(frozen=True)
 class Shading:
-    """Ambient share of the light, and spacing `pixel_step` of the lattice that is computed."""
+    """Ambient share of the light, and spacing `pixel_step` of the lattice that is computed.
+
+    Without `relief` the surface casts no shadows, and its height does not count.
+    """
 
     ambient_share: float = 0.0
     pixel_step: int = 4
+    relief: bool = True
 
-    def gain(self, sight: Sight, state: SurfaceState, light: LightMap) -> NDArray[np.float32]:
-        """Irradiance (rows, columns, k) over that of a level surface, on the lattice of `sight`."""
-        from gelslim_twin.render.surface_kernel import fan_light, seen_slopes
+    def gain(
+        self, sight: Sight, state: SurfaceState, light: LightMap, rest_mm: Array | None = None
+    ) -> NDArray[np.float32]:
+        """Irradiance (rows, columns, k) over that of a level surface, on the lattice of `sight`.
+
+        `rest_mm` is the height (ny, nx) of a crowned gel at rest at the nodes of `state`.
+        """
+        from gelslim_twin.render.surface_kernel import apply_relief, fan_light, seen_slopes
 
         rest = sight.rest_mm.reshape(-1, 2)
-        slopes = np.zeros((len(rest), 2))
+        slopes, met = np.zeros((len(rest), 2)), np.empty((len(rest), 2))
         seen_slopes(
             state.padded_mm, state.origin_mm, state.step_mm,
-            rest, sight.slope.reshape(-1, 2), _ROUNDS, _NEAR_MM, slopes,
+            rest, sight.slope.reshape(-1, 2), _ROUNDS, _NEAR_MM, slopes, met,
         )  # fmt: skip
         gain = np.empty((len(rest), light.sources), dtype=np.float32)
         fans = light.light_fans
         fan_light(
             slopes, rest, fans.tables, np.array(fans.lower_mm), np.array(fans.upper_mm), STEEPEST,
-            self.ambient_share, gain,
+            0.0, gain,
         )  # fmt: skip
+        if self.relief:
+            apply_relief(met, *_relief_of(light).on(state, rest_mm), gain)
+        gain += np.float32(self.ambient_share) * (1 - gain)
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
+
+
+@lru_cache(maxsize=8)
+def _relief_of(light: LightMap) -> Relief:
+    return Relief(light)

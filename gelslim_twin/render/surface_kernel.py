@@ -67,9 +67,17 @@ def displacement(padded: Any, origin: Any, step: Any, points: Any, out: Any) -> 
 
 @njit(**COMPILED)
 def seen_slopes(
-    padded: Any, origin: Any, step: Any, rest: Any, lean: Any, rounds: Any, near: Any, slopes: Any
+    padded: Any,
+    origin: Any,
+    step: Any,
+    rest: Any,
+    lean: Any,
+    rounds: Any,
+    near: Any,
+    slopes: Any,
+    met: Any,
 ) -> None:
-    """Write the slopes (n, 2) of the deformed surface where rays meet it.
+    """Write the slopes (n, 2) of the deformed surface and its points `met` (n, 2) that rays meet.
 
     A ray is at rest (n, 2) + lean (n, 2) z. The material point X with X + u(X) on the ray is
     found by X = rest + lean u_z(X) - u_xy(X), `rounds` times or until it moves less than `near`.
@@ -85,6 +93,7 @@ def seen_slopes(
             or abs(2 * (y - origin[1]) / step[1] - ny + 1) > ny + 5
         ):
             slopes[n, 0] = slopes[n, 1] = 0.0
+            met[n, 0], met[n, 1] = x, y
             continue
         i, s = cell_of((x - origin[0]) / step[0], nx)
         j, t = cell_of((y - origin[1]) / step[1], ny)
@@ -101,6 +110,7 @@ def seen_slopes(
             weights(t, wy, dy)
             if left < near:
                 break
+        met[n, 0], met[n, 1] = x, y
         xx, yx, zx = _here(padded, j, i, wy, dx)
         xy, yy, zy = _here(padded, j, i, dy, wx)
         xx, yx, zx = 1 + xx / step[0], yx / step[0], zx / step[0]
@@ -150,6 +160,22 @@ def fan_light(
                     light += share * ((1.0 - t) * low + t * high)
             light /= size
             out[n, k] = light + ambient * (1.0 - light)
+
+
+@njit(**COMPILED)
+def apply_relief(met: Any, factor: Any, origin: Any, step: Any, light: Any) -> None:
+    """Multiply light (n, k) by `factor` (ny, nx, k) at points `met` (n, 2), bilinear.
+
+    The factor is on a lattice of nodes from `origin` in steps of `step` (2,).
+    """
+    ny, nx = factor.shape[0], factor.shape[1]
+    for n in range(met.shape[0]):
+        i, u = _part((met[n, 0] - origin[0]) / step[0], nx)
+        j, v = _part((met[n, 1] - origin[1]) / step[1], ny)
+        for k in range(light.shape[1]):
+            low = (1.0 - u) * factor[j, i, k] + u * factor[j, i + 1, k]
+            high = (1.0 - u) * factor[j + 1, i, k] + u * factor[j + 1, i + 1, k]
+            light[n, k] *= (1.0 - v) * low + v * high
 
 
 @njit(**COMPILED)

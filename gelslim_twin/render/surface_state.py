@@ -150,9 +150,13 @@ class DomedTop:
         if motion is None:
             return self.rest
         raised = motion.displacement_mm.copy()
-        grid = np.stack(np.meshgrid(motion.x_mm, motion.y_mm), axis=2)
-        raised[..., 2] += self.height_mm(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+        raised[..., 2] += self.nodes_mm(motion)
         return replace(motion, displacement_mm=raised)
+
+    def nodes_mm(self, state: SurfaceState) -> Array:
+        """Heights (ny, nx) at the nodes of a state."""
+        grid = np.stack(np.meshgrid(state.x_mm, state.y_mm), axis=2)
+        return self.height_mm(grid.reshape(-1, 2)).reshape(grid.shape[:2])
 
     def seen_mm(self, sight: Sight) -> Array:
         """Points (h, w, 2) of the crowned surface at rest where the rays of `sight` meet it."""

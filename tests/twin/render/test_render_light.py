@@ -68,7 +68,7 @@ def test_light_from_bins_keeps_place_and_mean():
 
 @pytest.mark.parametrize("slope", [(0.0, 0.1), (0.15, 0.0), (-0.1, -0.2), (0.0, 0.7)])
 def test_a_tilted_plane_is_as_bright_as_lambert_says(slope):
-    shading = Shading(ambient_share=0.2)
+    shading = Shading(ambient_share=0.2, relief=False)
     gain = shading.gain(
         Sight.of(CAMERA, shading.pixel_step), tilted(*slope), light(elevation_deg=30)
     )
@@ -83,7 +83,7 @@ def test_a_tilted_plane_is_as_bright_as_lambert_says(slope):
 
 def test_shading_is_seen_where_the_line_of_sight_meets_the_dent():
     """The darkest red lies on the far flank, projected through the camera at its depth."""
-    shading, lit = Shading(pixel_step=1, ambient_share=0.0), light()
+    shading, lit = Shading(pixel_step=1, relief=False), light()
     state = dent(0.6, 0.0, 0.0)
     gain = shading.gain(Sight.of(CAMERA, shading.pixel_step), state, lit)
     y, x = np.unravel_index(gain[..., 0].argmin(), gain.shape[:2])

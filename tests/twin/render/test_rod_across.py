@@ -42,7 +42,7 @@ def test_light_from_the_sides_shows_a_rod_along_and_hardly_one_across() -> None:
     for name, off in (("along", y), ("across", x)):
         u = np.zeros((*x.shape, 3))
         u[..., 2] = -0.3 * np.exp(-((off / 1.5) ** 2))
-        shading = Shading(ambient_share=0.0)
+        shading = Shading(relief=False)
         gain = shading.gain(
             Sight.of(CAMERA, shading.pixel_step), SurfaceState(AXIS_X, AXIS_Y, u), light()
         )
