@@ -5,12 +5,14 @@
 # gels comes from the twin, at 500 steps a second. A video shows the scene beside what both sensors see.
 #
 #     pip install 'gelslim-cad[sim,vision]'
-#     python examples/mujoco_grasp.py
+#     python examples/mujoco_grasp.py                # fingers drawn as boxes, sensor of a shipped design
+#     python examples/mujoco_grasp.py out/gelslim2   # the fingers and the sensor that `gelslim build` wrote there
 #
 # The names of joints, actuators and sites are those of `robot/gripper.xml`, which `gelslim build` writes with the
 # fingers as solids.
 
 # %%
+import sys
 import time
 from pathlib import Path
 from tempfile import mkdtemp
@@ -24,7 +26,8 @@ from gelslim_core.optional_library import load
 
 mujoco = load("mujoco", "the physics of this example")
 RADIUS_MM, MASS_KG, GRIP_N, LOOSE_N, LIFT_M = 9.0, 0.1, 0.9, 0.4, 0.03
-DT_S, FRAME_EVERY = 0.002, 20
+DT_S, FRAME_EVERY, GAP_M = 0.002, 20, 0.003
+BUILT = Path(sys.argv[1]) if len(sys.argv) == 2 and not sys.argv[1].startswith("-") else None
 
 SCENE = f"""
 <mujoco model="grasp">
@@ -48,7 +51,7 @@ SCENE = f"""
       {
     "".join(
         f'''
-      <body name="{side}_jaw" pos="{sign * (RADIUS_MM / 1000 + 0.003)} 0 0" gravcomp="1">
+      <body name="{side}_jaw" pos="{sign * (RADIUS_MM / 1000 + GAP_M)} 0 0" gravcomp="1">
         <joint name="{side}_jaw" type="slide" axis="{-sign} 0 0" range="0 0.02" damping="30"/>
         <geom type="box" size="0.004 0.01 0.012" pos="{sign * 0.006} 0 0" mass="0.1" contype="0" conaffinity="0"
               rgba="0.3 0.35 0.4 1"/>
@@ -71,18 +74,55 @@ SCENE = f"""
 """
 
 # %% [markdown]
-# The sensor of a shipped finger. The gel relaxes a little, which takes the energy out of vibrations. The twin is told to
+# With built fingers the scene is their `robot/gripper.xml`: a ball takes the place of its box. The gels no longer
+# collide, because their contact comes from the twin, nor do the cases, whose convex hulls fill the window of the gel.
+
+
+# %%
+def built_model(folder):
+    """The gripper of a build with a ball as its object."""
+    spec = mujoco.MjSpec.from_file(str(folder / "robot" / "gripper.xml"))
+    spec.option.timestep = DT_S
+    for name in (
+        f"{side}_collision_{part}" for side in ("left", "right") for part in ("gel", "case")
+    ):
+        piece = spec.geom(name)
+        piece.contype = piece.conaffinity = 0
+    ball, post = spec.geom("object"), spec.geom("post")
+    ball.type, ball.mass = mujoco.mjtGeom.mjGEOM_SPHERE, MASS_KG
+    ball.size = [RADIUS_MM / 1000, 0, 0]
+    post.type, post.size = mujoco.mjtGeom.mjGEOM_CYLINDER, [0.004, post.size[2], 0]
+    spec.body("object").pos = [0, 0, post.pos[2] + post.size[1] + RADIUS_MM / 1000]
+    spec.worldbody.add_camera(
+        name="front", pos=[0, -0.3, 0.09], xyaxes=[1, 0, 0, 0, 0.2, 1], fovy=35
+    )
+    return spec.compile()
+
+
+def started(model):
+    """The scene at its start, the gels a gap away from the ball."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for side in ("left", "right"):
+        away_m = abs(data.site(f"{side}_gel").xpos[0]) - RADIUS_MM / 1000
+        data.joint(f"{side}_jaw").qpos = away_m - GAP_M
+    mujoco.mj_forward(model, data)
+    return data
+
+
+# %% [markdown]
+# The sensor of the build, or of a shipped finger. The gel relaxes a little, which takes the energy out of vibrations. The twin is told to
 # stay with the linear gel; `step.excess` says what that costs.
 
 # %%
 folder = Path(mkdtemp())
-for name, text in example("mini20").files("finger").items():
-    (folder / name).write_text(text, encoding="utf-8")
-gelslim.write_bundle(
-    folder / "bundle", gelslim.make_bundle(folder / "finger.yaml", measure=False).bundle
-)
+bundle = folder / "bundle" if BUILT is None else BUILT / "bundle"
+if BUILT is None:
+    for name, text in example("mini20").files("finger").items():
+        (folder / name).write_text(text, encoding="utf-8")
+    gelslim.write_bundle(bundle, gelslim.make_bundle(folder / "finger.yaml", measure=False).bundle)
 left = gelslim.Twin(
-    folder / "bundle",
+    bundle,
     observe=("force", "image"),
     tolerance={"force": "2%"},
     friction=0.8,
@@ -130,9 +170,8 @@ def commands(time_s):
 
 
 # %%
-model = mujoco.MjModel.from_xml_string(SCENE)
-data = mujoco.MjData(model)
-mujoco.mj_forward(model, data)
+model = mujoco.MjModel.from_xml_string(SCENE) if BUILT is None else built_model(BUILT)
+data = started(model)
 try:
     renderer = mujoco.Renderer(model, 480, 640)
 except Exception as error:  # no display and no EGL: MuJoCo raises what its loader raises

@@ -32,6 +32,7 @@ def test_an_example_runs(
         pytest.importorskip(module, reason=f"NOT TESTED: the example {path.stem} needs {module}")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tempfile.mkdtemp", lambda: str(tmp_path))
+    monkeypatch.setattr("sys.argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out
     assert "assert " in path.read_text(encoding="utf-8")
