@@ -235,7 +235,10 @@ def test_a_ball_shades_blue_along_the_finger_and_red_and_green_across() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("tip", "seen"), [("none", False), ("blue", True)])
 def test_a_rod_across_the_finger_is_found_by_the_light_of_the_tip(tip: str, seen: bool) -> None:
-    """Two lights from the sides hardly change under a rod that lies from one to the other."""
+    """The slopes of a rod that lies from side to side hardly change the light of two sides.
+
+    Its depth shifts their light a little, so that a part of it may be found, not the rod.
+    """
     drawn, radius, half = renderer(tip), 8.0, 1.0
     cap = dent(np.abs(X - 1.0), radius, half)
     rest, touched = drawn.frame(), drawn.frame(pressed(cap, X, Y))
@@ -248,11 +251,14 @@ def test_a_rod_across_the_finger_is_found_by_the_light_of_the_tip(tip: str, seen
         indenter=parse_indenter(f"cylinder:{radius:g}"),
     )
     patch = finder.find(touched.image, touched.centres_px)
-    assert (patch is not None) == seen
-    if patch is not None:
+    if seen:
+        assert patch is not None
         assert abs(patch.angle_deg) == pytest.approx(90, abs=2)
         assert patch.centre_mm[0] == pytest.approx(1.0, abs=0.1)
         assert patch.size_mm == pytest.approx(half, rel=0.2)
+    elif patch is not None:
+        assert patch.size_mm < 0.8 * half
+        assert abs(patch.centre_mm[1]) > 5.0
 
 
 def test_the_paths_of_the_tip_start_at_the_end_face() -> None:
