@@ -39,7 +39,14 @@ def test_the_extras_are_those_of_the_package() -> None:
         wanted = {line.partition(">")[0] for line in listed[extra.name]}
         named = {doctor.DISTRIBUTIONS.get(m, m) for m in extra.modules}
         assert named == wanted, extra.name
-    assert {e.name for e in EXTRAS} == set(listed) - {"dev", "docs", "mutants", "peers", "all"}
+    assert {e.name for e in EXTRAS} == set(listed) - {
+        "dev",
+        "docs",
+        "mutants",
+        "peers",
+        "mitsuba",
+        "all",
+    }
 
 
 def test_a_missing_extra_is_named_with_its_command(
