@@ -1,9 +1,13 @@
-"""Contact with a neo-Hookean gel by one or two corrections of the contact with a linear one.
+"""Contact with a neo-Hookean gel by few corrections of the contact with a linear one.
 
 With the displacement u of a contact, the forces F(u) that hold the surface there at large strain
 and the linear compliance C, the contact is solved once more with the displacement u - C F(u)
-without contact forces. This is one step of the iteration of `nonlinear`, which needs several and
-checks what is left.
+without contact forces. This is one step of the iteration of `nonlinear`.
+
+A correction shows how much it changes. A later one at the same pose changes a fraction of that, so
+that the change limits what is left. Between poses the displacement without contact forces is kept
+as long as the gel has moved so little that a correction is expected to change less than the
+tolerance. The error is thus controlled along the path, without knowledge of the scene.
 """
 
 from __future__ import annotations
@@ -11,6 +15,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,17 +34,27 @@ __all__ = [
     "CorrectedContact",
     "Correction",
     "LinearStep",
-    "corrected_twice",
+    "corrected",
     "linear_steps",
     "unfit",
 ]
 
 Array = NDArray[np.float64]
-LAW_TOLERANCE, LAW_STEPS, INNER_RTOL, REST_RTOL = 3e-2, 20, 1e-2, 1e-2
-"""Of the inner nodes, and of the motion by what is left of the forces: these errors are a small
-part of what one correction leaves."""
-TOLERANCE = 1e-2
-"""Of Newton's method, at poses that cannot be corrected."""
+LAW_TOLERANCE, LAW_STEPS = 3e-2, 40
+"""Of the inner nodes: this error is a small part of what one correction leaves."""
+LAW_SHARE, SOLVED_SHARE = 3.0, 1 / 3
+"""The law's tolerance over that of a contact where that is less, and that of linear equations over
+the law's."""
+LEFT = 0.5
+"""What is left after a correction over what it has changed, at most: a second correction changes
+0.1 to 0.3 of what the first does in the scenes of the gallery."""
+GROWTH = 3.0
+"""Factor on what the next correction is expected to change: the two laws differ by the square of
+the displacement, so that the change per displacement grows along a path."""
+MOST_CORRECTIONS = 6
+CONVERGED, CONVERGED_SHARE = 1e-2, 0.2
+"""Largest tolerance of `NonlinearContact` where corrections do not converge, and as a share of the
+tolerance here."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +65,17 @@ class Correction:
     """
 
     bundle: Bundle
+    tolerance: float = LAW_TOLERANCE
+    """Of the equilibrium of the inner nodes, over the forces at the surface."""
+
+    @property
+    def _solved(self) -> float:
+        return SOLVED_SHARE * self.tolerance
 
     @cached_property
     def _law(self) -> FiniteStrainForce:
         return FiniteStrainForce(
-            self.bundle, tolerance=LAW_TOLERANCE, most_steps=LAW_STEPS, inner_rtol=INNER_RTOL
+            self.bundle, tolerance=self.tolerance, most_steps=LAW_STEPS, inner_rtol=self._solved
         )
 
     @cached_property
@@ -77,7 +99,7 @@ class Correction:
             rest = self._law.force(state.displacement_mm) - state.force_n
             load = np.zeros((len(self.bundle.mesh.free), 3))
             load[-len(rest) :] = rest
-            moved = self._solver.solve(load, REST_RTOL).x.reshape(-1, 3)
+            moved = self._solver.solve(load, self._solved).x.reshape(-1, 3)
         except (FiniteStrainError, ConvergenceError) as error:
             raise ContactError(str(error)) from error
         return np.asarray(offset_mm - moved[-len(rest) :])
@@ -111,69 +133,91 @@ def linear_steps(solver: ContactSolver, poses: tuple[Pose, ...]) -> Iterator[Lin
         yield LinearStep(state, last, start, pose)
 
 
-def corrected_twice(
-    solver: ContactSolver, correction: Correction, step: LinearStep
-) -> tuple[GelState, GelState]:
-    """The contact of a linear step corrected by the law at large strain once, and once more.
+def corrected(solver: ContactSolver, correction: Correction, step: LinearStep) -> GelState:
+    """The contact of a linear step corrected once by the law at large strain.
 
     Args:
         solver: Solver of the linear contact; its candidates may grow.
         correction: The difference of the laws.
         step: The linear step.
 
-    Returns:
-        Both states.
-
     Raises:
         ContactError: The contact does not converge, or the displacement of the linear gel is too
             large for the law.
     """
-    found, offset_mm = [step.state], np.zeros_like(solver.points_mm)
-    for _ in range(2):
-        offset_mm = correction.offset_mm(found[-1], offset_mm)
-        found.append(solver.step(step.last, step.before, step.pose, offset_mm, found[-1]))
-    return found[1], found[2]
+    offset_mm = correction.offset_mm(step.state, np.zeros_like(solver.points_mm))
+    return solver.step(step.last, step.before, step.pose, offset_mm, step.state)
+
+
+@dataclass(frozen=True, eq=False)
+class _LastCorrected:
+    """The last corrected pose, and what its first correction changed per change of the contact."""
+
+    state: GelState
+    per_mm: float = inf
+    """Change of the displacement over that of the contact since the correction before."""
+    per_n: float = inf
+    """Change of the resultant, likewise."""
+
+    def expected(self, now: GelState) -> tuple[float, float]:
+        """What a correction of `now` would change of displacement in mm and resultant in N."""
+        if not self.state.force_n.any():
+            return inf, inf
+        mm, n = _apart(now, self.state)
+        return GROWTH * self.per_mm * mm, GROWTH * self.per_n * n
 
 
 @dataclass(eq=False)
 class CorrectedContact:
-    """Solves the contact along a sequence of poses, like `ContactSolver`, with few corrections.
+    """Solves the contact along a sequence of poses, like `ContactSolver`, on a neo-Hookean gel.
 
-    Every pose starts from the difference of the two laws at the pose before, so that along a path
-    of small steps little is left to correct. Poses that cannot be corrected, because the
-    displacement inverts a cell, are solved by `NonlinearContact`.
+    From a pose on where corrections do not converge, for example because the displacement inverts
+    a cell, the states are those of `NonlinearContact`.
     """
 
     solver: ContactSolver
-    corrections: int = 1
-    """Corrections per pose."""
+    tolerance: float = 0.02
+    """Error of displacements and of the resultant, over the largest so far."""
 
     def __post_init__(self) -> None:
         """Raises ContactError for a pad to which the neo-Hookean law does not apply."""
         problem = unfit(self.solver.compliance.bundle)
         if problem is not None:
             raise ContactError("; ".join(problem))
-        self._correction = Correction(self.solver.compliance.bundle)
-        self._offset = np.zeros_like(self.solver.points_mm)
+        law = min(LAW_TOLERANCE, LAW_SHARE * self.tolerance)
+        self._correction = Correction(self.solver.compliance.bundle, law)
+        self._none = np.zeros_like(self.solver.points_mm)
+        self._restart()
 
     def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
         """A state per pose, starting from the undeformed gel. Raises ContactError."""
-        state = GelState.at_rest(len(self.solver.points_mm))
+        state = GelState.at_rest(len(self._none))
         before: Pose | None = None
-        for pose in poses:
+        self._most_mm = self._most_n = 0.0
+        self._restart()
+        for number, pose in enumerate(poses):
             if before is None or not is_stationary(before, pose):
-                state = self._advanced(state, before, pose)
+                try:
+                    state = self._corrected(state, before, pose)
+                except ContactError:
+                    yield from self._converged(poses, number)
+                    return
             before = pose
             yield GelState(state.displacement_mm, state.force_n, state.touch, state.solver)
         self.solver.compliance.store()
 
-    def _advanced(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
-        try:
-            return self._corrected(last, before, pose)
-        except ContactError:
-            self.solver.candidates = Candidates.none()
-            whole = NonlinearContact(self.solver, TOLERANCE)
-            return whole.advanced(last, before, pose)
+    def _converged(self, poses: tuple[Pose, ...], number: int) -> Iterator[GelState]:
+        """The states from pose `number` on by `NonlinearContact`.
+
+        It starts at the first pose: which nodes a sliding wall holds depends on the path.
+        """
+        self.solver.candidates = Candidates.none()
+        tolerance = min(CONVERGED, CONVERGED_SHARE * self.tolerance)
+        return islice(NonlinearContact(self.solver, tolerance).states(poses), number, None)
+
+    def _restart(self) -> None:
+        """Start from a gel at rest, of which only is known that it needs a correction."""
+        self._offset, self._last = self._none, _LastCorrected(GelState.at_rest(len(self._none)))
 
     def _corrected(self, last: GelState, before: Pose | None, pose: Pose) -> GelState:
         start = now = last
@@ -181,9 +225,36 @@ class CorrectedContact:
             start, now = now, self.solver.step(now, before, middle, self._offset)
             before, came = middle, before
         if not now.force_n.any():
-            self._offset = np.zeros_like(self._offset)
-            return GelState.at_rest(len(self._offset))
-        for _ in range(self.corrections):
+            self._restart()
+            return GelState.at_rest(len(self._none))
+        if self._is_within(*self._last.expected(now)):
+            return now
+        uncorrected = now
+        for done in range(MOST_CORRECTIONS):
             self._offset = self._correction.offset_mm(now, self._offset)
-            now = self.solver.step(start, came, pose, self._offset, now)
-        return now
+            found = self.solver.step(start, came, pose, self._offset, now)
+            mm, n = _apart(found, now)
+            if done == 0:
+                first_mm, first_n = mm, n
+            now = found
+            self._most_mm = max(self._most_mm, float(np.abs(now.displacement_mm).max()))
+            self._most_n = max(self._most_n, float(np.linalg.norm(now.force_n.sum(axis=0))))
+            if self._is_within(LEFT * mm, LEFT * n):
+                by_mm, by_n = _apart(uncorrected, self._last.state)
+                self._last = _LastCorrected(now, _rate(first_mm, by_mm), _rate(first_n, by_n))
+                return now
+        raise ContactError(f"corrections still move the surface by {mm:.1e} mm")
+
+    def _is_within(self, mm: float, n: float) -> bool:
+        return mm <= self.tolerance * self._most_mm and n <= self.tolerance * self._most_n
+
+
+def _rate(change: float, of: float) -> float:
+    return change / of if of > 0 else inf
+
+
+def _apart(one: GelState, other: GelState) -> tuple[float, float]:
+    """Largest difference of displacements in mm, and that of the resultants in N."""
+    moved = one.displacement_mm - other.displacement_mm
+    lost = (one.force_n - other.force_n).sum(axis=0)
+    return float(np.linalg.norm(moved, axis=1).max()), float(np.linalg.norm(lost))

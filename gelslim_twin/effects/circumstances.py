@@ -151,9 +151,14 @@ class MotionFigures:
     """Whether the tool rises from where it has pressed the gel."""
 
     @property
+    def slides(self) -> bool:
+        """Whether the tool in contact moves along the gel or turns about its normal."""
+        return bool(self.lateral_mm or self.twist_deg)
+
+    @property
     def is_straight(self) -> bool:
         """Whether the tool in contact moves along the gel's normal only."""
-        return not (self.lateral_mm or self.twist_deg or self.tilt_deg)
+        return not (self.slides or self.tilt_deg)
 
 
 @dataclass(frozen=True)
@@ -163,17 +168,16 @@ class Probed:
     Attributes:
         normal_n: Largest normal force on a linear gel.
         resultant_n: Largest resultant on a linear gel, with the friction of the scene.
+        moved_mm: Largest displacement of the surface.
         sizes: By effect, the error of leaving it out as found at these poses, times a safety
             factor for the other poses. Effects that were not probed are absent.
-        corrected: Errors of the contact that is corrected for large strain once per pose, and
-            twice; empty where that was not probed.
         milliseconds: Declared time of the probe.
     """
 
     normal_n: float
     resultant_n: float
+    moved_mm: float
     sizes: Mapping[str, Bound]
-    corrected: tuple[Bound, ...] = ()
     milliseconds: float = 0.0
 
 
@@ -220,6 +224,11 @@ class Circumstances:
     def contact_nodes(self) -> float:
         """Nodes under the tool at the deepest contact."""
         return self.contact.area_mm2 / self.sensor.node_pitch_mm**2
+
+    @property
+    def has_walls(self) -> bool:
+        """Whether a wall of the tool reaches into the gel."""
+        return math.isinf(self.footprint.steepest(self.contact.depth_mm))
 
     @property
     def normal_n(self) -> float:

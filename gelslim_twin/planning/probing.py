@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gelslim_twin.effects.contact import correction_ms
+from gelslim_twin.effects.contact import convergence_ms, correction_ms
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.scene.pose import Pose
@@ -17,7 +17,8 @@ from gelslim_twin.scene.pose import Pose
 PROBED = ("friction", "nonlinearity")
 """Effects whose size a probe finds."""
 MOST_SHARE = 0.05
-"""Largest time of a probe over that of the run which the bounds ask for, both as declared."""
+"""Largest time of a probe over that of the run with large strain solved to convergence, both as
+declared."""
 MOST_POSES, STRAIGHT_POSES = 12, 4
 """Poses of the path that a probe solves on a linear gel, and those of a straight press, of which
 the deepest is the hardest."""
@@ -35,7 +36,11 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
         for c in plan.included
         if c.effect in PROBED and question.circumstances.parameters[c.effect].use == "auto"
     )
-    most_ms = MOST_SHARE * plan.predicted_ms * plan.poses
+    ms = {c.effect: c.predicted_ms for c in plan.included}
+    converged_ms = dict(ms)
+    if "nonlinearity" in ms:
+        converged_ms["nonlinearity"] = convergence_ms(question.circumstances)
+    most_ms = MOST_SHARE * sum(converged_ms.values()) * plan.poses
     # Friction takes a second path; large strain alone saves most of the time.
     for effects in (wanted, tuple(name for name in wanted if name == "nonlinearity")):
         if effects and probe_ms(question, plan, effects) <= most_ms:
@@ -51,8 +56,8 @@ def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
     poses = min(MOST_POSES, plan.poses)
     straight = question.circumstances.motion.is_straight
     poses = min(STRAIGHT_POSES if straight else MOST_POSES, plan.poses)
-    # Two corrections of the hardest pose, or of two; setting up the law takes as long as one.
-    laws = 0 if "nonlinearity" not in effects else 3 if straight else 5
+    # A correction of the hardest pose, or of two; setting up the law takes as long as one.
+    laws = 0 if "nonlinearity" not in effects else 2 if straight else 3
     return poses * paths * linear_ms + laws * correction_ms(question.circumstances)
 
 

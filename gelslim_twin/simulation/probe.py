@@ -19,17 +19,19 @@ import numpy as np
 from gelslim_twin.contact.corrected_contact import (
     Correction,
     LinearStep,
-    corrected_twice,
+    corrected,
     linear_steps,
     unfit,
 )
 from gelslim_twin.contact.gel_state import ContactError, GelState
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
-from gelslim_twin.effects.circumstances import Probed
+from gelslim_twin.effects.circumstances import MotionFigures, Probed
+from gelslim_twin.effects.contact import RIM_NODES, RIM_PLACES
 from gelslim_twin.effects.effect import Bound, geometry
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probing import probed_poses
+from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
@@ -41,16 +43,6 @@ FORCE_SAFETY, FRICTION_SAFETY, PLACES_SAFETY = 1.25, 2.0, 2.0
 """Factors on what is found of forces, for large strain and for friction, and of displacements.
 They cover the poses between: in 66 random scenes the size over the whole path was up to 1.18 times
 (forces, large strain), 1.8 times (forces, friction) and 1.8 times (displacements) what is found."""
-REST_SHARE = 0.05
-"""Least error of one correction as a share of the first. What a second correction changes at a pose
-that is reached in one jump covers what one correction per pose leaves: with these values that was
-at most 0.72 of it."""
-TWICE_SHARE = 0.4
-"""Error of two corrections per pose over that of one."""
-RIM_NODES, RIM_PLACES = 2, 2.0
-"""Nodes that a sliding wall of the tool may hold in one gel and not in the other, at poses between:
-their whole force counts, and as displacement this multiple of the depth. In the same scenes two
-nodes and 1.5 times the depth were needed."""
 DIGITS = 3
 """Significant digits of what is found, rounded up: the last bits depend on the machine."""
 
@@ -74,33 +66,35 @@ def probed(
 
     Returns:
         The question, unchanged where the contact of a pose is not solved. An effect whose size is
-        not found keeps its bound.
+        not found keeps its bound. A tool that meets no node at any pose counts as not in contact.
     """
     tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
     probe = _Probe(asked, compliance, tool)
+    if not probe.touches(loaded.poses):
+        # Nodes, not areas, meet the tool: it passes between them or beside the pad.
+        here, none = asked.circumstances, Probed(0.0, 0.0, 0.0, {}, milliseconds)
+        apart = replace(here, motion=MotionFigures(here.motion.poses), probed=none)
+        return replace(asked, circumstances=apart)
     try:
         steps = probe.steps(loaded)
     except ContactError:
         return asked
-    sizes, errors = dict[str, Bound](), tuple[Bound, ...]()
+    sizes = dict[str, Bound]()
     if "friction" in effects and (free := probe.frictionless(steps)):
         held = [step.state for step in steps]
         sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
     if "nonlinearity" in effects and (hard := probe.corrections(steps)):
-        linear, first, second = zip(*hard, strict=True)
-        sizes["nonlinearity"] = size = probe.largest(linear, first)
-        once = probe.largest(first, second).at_least(size.times(REST_SHARE))
-        errors = (once, once.times(TWICE_SHARE))
+        linear, strained = zip(*hard, strict=True)
+        sizes["nonlinearity"] = probe.largest(linear, strained)
         if probe.has_sliding_walls:
             rim = probe.rim(linear)
-            sizes["nonlinearity"] = size.plus(rim)
-            errors = tuple(error.plus(rim) for error in errors)
+            sizes["nonlinearity"] = sizes["nonlinearity"].plus(rim)
     forces = [step.state.force_n.sum(axis=0) for step in steps]
     found = Probed(
         _rounded_up(max(-float(force[2]) for force in forces)),
         _rounded_up(max(float(np.linalg.norm(force)) for force in forces)),
+        _rounded_up(max(float(np.abs(step.state.displacement_mm).max()) for step in steps)),
         sizes,
-        errors,
         milliseconds,
     )
     if found.normal_n <= 0:
@@ -125,6 +119,11 @@ class _Probe:
         poses = probed_poses(loaded.poses, c.motion.is_straight)
         return list(linear_steps(self._solver(c.friction), poses))
 
+    def touches(self, poses: Sequence[Pose]) -> bool:
+        """Whether any node of the undeformed surface is below the tool at one of these poses."""
+        points = np.asarray(self.compliance.bundle.mesh.surface_mm)
+        return any((self.tool.clearance_mm(pose, points) < 0).any() for pose in poses)
+
     def frictionless(self, steps: Sequence[LinearStep]) -> list[GelState]:
         """The contact at the same poses without friction; empty where it is not found."""
         poses = tuple(step.pose for step in steps)
@@ -133,15 +132,15 @@ class _Probe:
         except ContactError:
             return []
 
-    def corrections(self, steps: Sequence[LinearStep]) -> list[tuple[GelState, GelState, GelState]]:
-        """The hardest poses on a linear gel, corrected once, and twice; empty where not found."""
+    def corrections(self, steps: Sequence[LinearStep]) -> list[tuple[GelState, GelState]]:
+        """The hardest poses on a linear gel, and corrected once; empty where not found."""
         if unfit(self.compliance.bundle) is not None:
             return []
         solver, found = self._solver(self.asked.circumstances.friction), []
         correction = Correction(self.compliance.bundle)
         for step in _hardest(steps):
             try:
-                found.append((step.state, *corrected_twice(solver, correction, step)))
+                found.append((step.state, corrected(solver, correction, step)))
             except ContactError:
                 return []
         return found
@@ -155,7 +154,7 @@ class _Probe:
     def has_sliding_walls(self) -> bool:
         """Whether a wall of the tool moves over nodes of the gel."""
         c = self.asked.circumstances
-        return not c.motion.is_straight and math.isinf(c.footprint.steepest(self.depth_mm))
+        return not c.motion.is_straight and c.has_walls
 
     def rim(self, states: Iterable[GelState]) -> Bound:
         """What nodes at the walls of the tool may differ by besides."""

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from effect_samples import BOUND, FIGURES, LADDER, MOTION, ball, circumstances, values
 
-from gelslim_twin.effects.circumstances import SensorFigures
+from gelslim_twin.effects.circumstances import MotionFigures, Probed, SensorFigures
+from gelslim_twin.effects.contact import CORRECTED_RUNGS
 from gelslim_twin.effects.effect import Bound, Rung, geometry, optics, picture
 from gelslim_twin.effects.grey_values import MotionBlurParameters, ShadingParameters, grey_share
 
@@ -32,7 +33,7 @@ TIMES_MS = {
     "friction": (0.4,),
     "sliding_friction": (0.1, 0.1, 0.1),
     "adhesion": (6.0,),
-    "nonlinearity": (250.0, 350.0, 450.0),
+    "nonlinearity": (8.0, 12.0, 18.0, 26.0, 34.0, 50.0, 64.0, 80.0, 250.0, 350.0, 450.0),
     "skin": (0.0,),
     "relaxation": (0.01 + 8e-5 * 1849,),
     "viscoelasticity": tuple(0.02 * n + 1.4 * (n - 1) for n in (1, 2, 4, 8, 16)),
@@ -137,7 +138,7 @@ def test_friction_leaves_its_error_to_the_contact() -> None:
 def test_large_strain_errs_by_the_tolerance_at_most_by_all(mu: float) -> None:
     c = circumstances(mu)
     whole = BOUND["nonlinearity"](c)
-    rungs = LADDER["nonlinearity"](c)
+    rungs = LADDER["nonlinearity"](c)[-3:]
     for t, rung in zip((1e-2, 1e-3, 1e-4), rungs, strict=True):
         expected = geometry(t * 0.2 * 0.35 * FIGURES.px_per_mm, t * 0.1 * whole.force_n)
         assert values(rung.error) == pytest.approx(values(expected))
@@ -146,6 +147,46 @@ def test_large_strain_errs_by_the_tolerance_at_most_by_all(mu: float) -> None:
     least = BOUND["nonlinearity"](slight)
     assert 0 < least.markers_px < 1e-2 * 0.2 * 1e-5 * FIGURES.px_per_mm
     assert LADDER["nonlinearity"](slight)[0].error.markers_px == least.markers_px
+
+
+def test_corrections_err_by_their_tolerance_and_more_where_walls_slide() -> None:
+    """Of what is solved: the force and displacement of a probe, with the factor 1.25."""
+    held = replace(MOTION, lateral_mm=0.0, twist_deg=0.0)
+    found = Probed(1.0, 2.0, 0.4, {})
+    px, depth_px = FIGURES.px_per_mm, 0.35 * FIGURES.px_per_mm
+
+    def errors(motion: MotionFigures, steepest: float) -> dict[float, Bound]:
+        tool = replace(ball(14.0), steepest=lambda _d: steepest)
+        c = replace(circumstances(0.3, motion=motion, footprint=tool), probed=found)
+        rungs = [r for r in LADDER["nonlinearity"](c) if "corrected_contact" in r.implementation]
+        assert [r.parameters["tolerance"] for r in rungs] == [t for t, _ in CORRECTED_RUNGS]
+        assert rungs[0].milliseconds < rungs[-1].milliseconds
+        nodes.append(c.contact_nodes)
+        whole.append(BOUND["nonlinearity"](c))
+        return {r.parameters["tolerance"]: r.error for r in rungs}
+
+    nodes, whole = list[float](), list[Bound]()
+    smooth, straight = errors(held, 0.5), errors(held, math.inf)
+    sliding = errors(MOTION, math.inf)
+
+    def expected(t: float) -> Bound:
+        return geometry(2 * t * 1.25 * 0.4 * px, 0.75 * t * 1.25 * 2.0)
+
+    for t in (0.01, 0.002):
+        assert values(smooth[t]) == values(straight[t]) == pytest.approx(values(expected(t)))
+    rim = geometry(2 * depth_px, 2 / nodes[-1] * 1.25 * 2.0)
+    capped = expected(0.01).plus(rim).at_most(whole[-1])
+    assert values(sliding[0.01]) == pytest.approx(values(capped))
+    assert values(sliding[0.005]) == pytest.approx(values(expected(0.005)))
+    assert sliding[0.002] == sliding[0.005]
+    assert straight[0.05].displacement_px == pytest.approx(smooth[0.05].displacement_px + depth_px)
+
+
+def test_what_a_scene_switches_on_is_solved_until_it_converges() -> None:
+    c = circumstances()
+    forced = c.parameters["nonlinearity"].model_copy(update={"use": "on"})
+    on = replace(c, parameters={**c.parameters, "nonlinearity": forced})
+    assert [r.name for r in LADDER["nonlinearity"](on)] == ["coarse", "medium", "fine"]
 
 
 def test_apparent_depths_miss_what_oblique_rays_and_pressed_gel_lift() -> None:
