@@ -96,6 +96,11 @@ def used(row: dict[str, Any]) -> float:
     return float(max(row["used"].values()))
 
 
+def _of_promised(row: dict[str, Any]) -> float:
+    """The error found over the one that the plan promises, where each is largest."""
+    return used(row) / max([*row["promised"].values(), 1e-12])
+
+
 def table(data: dict[str, Any]) -> str:
     """The tables of the guide."""
     cases: Rows = data["cases"]
@@ -123,6 +128,13 @@ def table(data: dict[str, Any]) -> str:
     if done:
         what = f"{len(done)} random scenes at random tolerances from 0.5 to 20 %"
         texts.append(_summary(what, done) + (f" {refused} more are refused." if refused else ""))
+        whole = [*shown, *done]
+        texts.append(
+            f"All {len(whole)} cases together take {median(map(ratio, whole)):.2f} of the time of "
+            f"everything on in the median and use {median(map(used, whole)):.0%} of the tolerance; "
+            f"of what the plans promise, {median(map(_of_promised, whole)):.0%} in the median and "
+            f"{max(map(_of_promised, whole)):.0%} at most."
+        )
     return "\n\n".join(texts)
 
 

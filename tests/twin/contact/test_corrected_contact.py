@@ -1,0 +1,127 @@
+"""Corrections of a linear contact keep their tolerance against a gel that is solved to converge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agreement import Trial
+from contact_pads import small_pad
+from random_contact_scenes import random_contact
+
+from gelslim_twin.contact import corrected_contact
+from gelslim_twin.contact.corrected_contact import CorrectedContact, Correction
+from gelslim_twin.contact.gel_state import ContactError, GelState
+from gelslim_twin.contact.nonlinear import NonlinearContact
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
+from gelslim_twin.contact.tool import Tool
+from gelslim_twin.effects.contact import CORRECTED_RUNGS, HELD_AT, corrected_error
+from gelslim_twin.scene.indenter import Sphere
+from gelslim_twin.scene.pose import Pose
+from gelslim_twin.simulation.probe import probed
+from ifem_export.compliance.columns import SurfaceCompliance
+
+PRESS, SHEAR = Pose(depth_mm=0.5), Pose(x_mm=0.4, depth_mm=0.5)
+PATH = (Pose(), *even_steps(Pose(), PRESS, 8), *even_steps(PRESS, SHEAR, 4), Pose(x_mm=0.4))
+
+
+def ball() -> ContactSolver:
+    pad = SurfaceCompliance(small_pad(0.3223, 12, 2, 12.0))
+    tool = Tool.of([Sphere(shape="sphere", radius_mm=5)], Path())
+    return ContactSolver(pad, tool, ContactSettings(1e-5, 0.5))
+
+
+def apart(one: list[GelState], other: list[GelState]) -> tuple[float, float]:
+    """Largest differences of resultants in N and of displacements in mm."""
+    pairs = list(zip(one, other, strict=True))
+    return (
+        max(float(np.linalg.norm((a.force_n - b.force_n).sum(axis=0))) for a, b in pairs),
+        max(
+            float(np.linalg.norm(a.displacement_mm - b.displacement_mm, axis=1).max())
+            for a, b in pairs
+        ),
+    )
+
+
+@pytest.mark.slow
+def test_the_tolerance_is_kept_with_fewer_corrections_the_looser_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    true = list(NonlinearContact(ball(), 1e-4).states(PATH))
+    force_n = max(float(np.linalg.norm(s.force_n.sum(axis=0))) for s in true)
+    moved_mm = max(float(np.abs(s.displacement_mm).max()) for s in true)
+    linear_n, _ = apart(list(ball().states(PATH)), true)
+    assert linear_n > 0.08 * force_n
+    counted, offset = [0], Correction.offset_mm
+
+    def count(self: Correction, *given: object) -> object:
+        counted[0] += 1
+        return offset(self, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Correction, "offset_mm", count)
+    made = []
+    for tolerance in (0.1, 0.02, 0.005, 0.001):
+        counted[0] = 0
+        found = list(CorrectedContact(ball(), tolerance).states(PATH))
+        n, mm = apart(found, true)
+        assert n <= 0.75 * tolerance * force_n, tolerance
+        assert mm <= 2 * tolerance * moved_mm, tolerance
+        made.append(counted[0])
+        assert not found[-1].displacement_mm.any()
+    assert made == sorted(made)
+    assert 0 < made[0] < len(PATH) / 2
+
+
+def test_poses_that_cannot_be_corrected_are_solved_to_converge(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The whole path, since which nodes are held depends on it."""
+    path, asked = PATH[:4], list[tuple[float, tuple[Pose, ...]]]()
+    deep = GelState.at_rest(len(ball().points_mm))
+
+    class Converging:
+        def __init__(self, _solver: ContactSolver, tolerance: float) -> None:
+            self.tolerance = tolerance
+
+        def states(self, poses: tuple[Pose, ...]) -> Iterator[GelState]:
+            asked.append((self.tolerance, poses))
+            return (replace(deep, solver={"number": float(k)}) for k in range(len(poses)))
+
+    def inverted(*_given: object) -> None:
+        raise ContactError("a cell is inverted")
+
+    monkeypatch.setattr(corrected_contact, "NonlinearContact", Converging)
+    monkeypatch.setattr(Correction, "offset_mm", inverted)
+    found = list(CorrectedContact(ball(), 0.01).states(path))
+    assert asked == [(pytest.approx(0.002), path)]
+    assert [s.solver.get("number") for s in found] == [None, 1.0, 2.0, 3.0]
+
+
+SLIDING_WALLS = (2014, 2017, 2019, 2021, 2027, 2029, 2041, 2042, 2044, 2045, 2053, 2060, 2083)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2013, 2026, 2028, 2038, 2040, 2059, *SLIDING_WALLS])
+def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) -> None:
+    """Seeds at which sliding walls hold other nodes at 2 %, deep ones, and gels of ν = 0.49."""
+    finger, values = random_contact(seed)
+    for move in values["motion"]["waypoints"]:
+        move["steps"] *= 4
+    one = Trial.of(finger, values, tmp_path)
+    tool = Tool.of(one.loaded.scene.indenters, one.loaded.folder, seed)
+    c = probed(one.asked, one.loaded, one.compliance).circumstances
+    settings = ContactSettings(1e-6, c.friction)
+
+    def solver() -> ContactSolver:
+        return ContactSolver(one.compliance, tool, settings)
+
+    true = list(NonlinearContact(solver(), 1e-3).states(one.poses))
+    for tolerance in (0.02, HELD_AT):
+        assert tolerance in [t for t, _ in CORRECTED_RUNGS]
+        n, mm = apart(list(CorrectedContact(solver(), tolerance).states(one.poses)), true)
+        allowed = corrected_error(c, tolerance)
+        assert n <= allowed.force_n, tolerance
+        assert mm * c.sensor.px_per_mm <= allowed.displacement_px, tolerance
