@@ -182,13 +182,10 @@ CORRECTED_RUNGS = (
 gallery's paths; below 1 % a correction itself takes longer."""
 CORRECTED_PLACES, CORRECTED_FORCE = 2.0, 0.75
 """Errors over depth and over force per unit of tolerance: solved contacts reach 1.7 and 0.53."""
-FLIPS_FROM = 0.03
-"""Tolerance above which a node at a wall of the tool may be held in one gel and free in the other;
-seen at 0.1."""
 HELD_AT = 0.005
-"""Tolerance at which a corrected contact holds the same nodes at sliding walls as a converged one:
-in 13 of 13 random scenes, and in two that are not corrected to it but solved until they converge;
-at 0.02 in 11. A finer tolerance does not lessen the error there."""
+"""Tolerance at which a corrected contact holds the same nodes at walls of the tool as a converged
+one. At 0.02 a node was held in one and free in the other in two of 13 random scenes whose walls
+slide, and in one of a deep straight press. Where walls slide a finer tolerance does not help."""
 RIM_NODES, RIM_PLACES = 2, 2.0
 """Nodes that a sliding wall of the tool may hold in one gel and not in the other: their whole force
 counts, and as displacement this multiple of the depth. In random scenes two nodes and 1.5 times the
@@ -222,7 +219,7 @@ def corrected_error(c: Circumstances, tolerance: float) -> Bound:
     if slides and tolerance > HELD_AT:
         lost_n = c.force_n * min(1.0, RIM_NODES / c.contact_nodes) if c.contact_nodes else 0.0
         return error.plus(geometry(RIM_PLACES * depth_px, lost_n))
-    return error.plus(geometry(depth_px)) if c.has_walls and tolerance > FLIPS_FROM else error
+    return error.plus(geometry(depth_px)) if c.has_walls and tolerance > HELD_AT else error
 
 
 def converged_error(c: Circumstances, tolerance: float) -> Bound:

@@ -104,9 +104,12 @@ SLIDING_WALLS = (2014, 2017, 2019, 2021, 2027, 2029, 2041, 2042, 2044, 2045, 205
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2013, 2026, 2028, 2038, 2040, 2059, *SLIDING_WALLS])
+@pytest.mark.parametrize("seed", [2013, 2026, 2028, 2038, 2040, 2059, 2204, *SLIDING_WALLS])
 def test_rungs_keep_their_error_along_random_paths(tmp_path: Path, seed: int) -> None:
-    """Seeds at which sliding walls hold other nodes at 2 %, deep ones, and gels of ν = 0.49."""
+    """Seeds at which walls hold other nodes at 2 %, deep ones, and gels of ν = 0.49.
+
+    In 2027 Newton's method at 1e-2 and at 1e-3 differ by 0.7 % of the force.
+    """
     finger, values = random_contact(seed)
     for move in values["motion"]["waypoints"]:
         move["steps"] *= 4

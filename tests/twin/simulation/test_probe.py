@@ -239,12 +239,11 @@ def without_compression(one: Trial) -> Trial:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2027, *range(2200, 2212)])
+@pytest.mark.parametrize("seed", range(2200, 2212))
 def test_plans_with_a_probe_agree_with_everything_on(tmp_path: Path, seed: int) -> None:
     """Random scenes at a random tolerance of 0.5 to 20 % of the largest force and of the depth.
 
-    In 2027 walls slide over the gel in a deep contact: Newton's method at 1e-2 and at 1e-3 differ
-    by 0.7 % of the force there.
+    In 2204 a deep press held a node at a wall that is free when solved until it converges.
     """
     one = without_compression(Trial.of(*long_scene(seed), tmp_path))
     try:
