@@ -48,13 +48,27 @@ def grey_share(c: Circumstances) -> float:
     return (1 - p.ambient_share) * min(1 / math.sin(angle) - 1, slope / math.tan(angle))
 
 
+def missed_share(c: Circumstances, pixel_step: int) -> float:
+    """Share of the light that a lattice of values every p pixels misses between them.
+
+    Slopes vary over the thickness h: p²/(8 (h f/Z)²) of their change. At a wall of the tool they
+    change from one node to the next, and the lattice misses what lies between its pixels.
+    """
+    reach = c.sensor.thickness_mm * c.sensor.px_per_mm
+    missed = pixel_step**2 / (8 * reach * reach)
+    if c.has_walls:
+        pitch_px = c.sensor.node_pitch_mm * c.sensor.px_per_mm
+        missed = max(missed, min(1.0, (pixel_step - 1) / pitch_px))
+    return grey_share(c) * missed
+
+
 def shading_ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """A value every few pixels; slopes vary over the thickness h: p² / (8 (h f/Z)²) is missed."""
-    size, reach = c.sensor.frame_px / 307200, c.sensor.thickness_mm * c.sensor.px_per_mm
+    """A value every few pixels, interpolated between them."""
+    size = c.sensor.frame_px / 307200
     return tuple(
         Rung(
             f"every {p} px",
-            picture(shift_px(c, grey_share(c) * p * p / (8 * reach * reach))),
+            picture(shift_px(c, missed_share(c, p))),
             (0.6 + 40 / p**2) * size,
             {"pixel_step": p},
         )
