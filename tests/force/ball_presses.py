@@ -16,6 +16,7 @@ from pressed_samples import calibration, lit_bundle, reference
 from scipy.interpolate import CubicSpline
 from sensor_samples import sensor_grid
 from shaded_frames import PAD_MM, shaded, sight
+from synthetic import moved_rims
 
 from gelslim_force.calibration.sensor_calibration import Calibration
 from ifem_export.bundle.bundle import Bundle
@@ -91,15 +92,16 @@ def ball_picture(
         away = np.minimum(np.hypot(*offset.T), disc.r_mm[-2])
         seen = along(away)
     slope = steep(away) / np.maximum(away, 1e-9)
-    dots = sensor_grid().positions_mm - place_mm
-    r = np.hypot(*dots.T)
-    unit = dots / np.maximum(r, 1e-9)[:, None]
-    moved = np.column_stack(
-        [unit * CubicSpline(disc.r_mm, outward)(r)[:, None], CubicSpline(disc.r_mm, height)(r)]
-    )
+    out, down = CubicSpline(disc.r_mm, outward), CubicSpline(disc.r_mm, height)
+
+    def motion(places_mm: Array) -> Array:
+        away = places_mm - place_mm
+        r = np.hypot(*away.T)
+        return np.column_stack([away * (out(r) / np.maximum(r, 1e-9))[:, None], down(r)])
+
     frame = shaded(
         (slope * offset[:, 0], slope * offset[:, 1]),
-        noise=noise, seed=seed, moved_mm=moved, camera=off_centre_view(),
-        light_gain=built.light_gain(rest),
+        noise=noise, seed=seed, moved_mm=moved_rims(motion, sensor_grid()),
+        camera=off_centre_view(), light_gain=built.light_gain(rest),
     )  # fmt: skip
     return frame.image

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 from sensor_samples import sensor_bundle, sensor_grid
 from shaded_frames import AMBIENT, ELEVATION, lines_of_sight, shaded
-from synthetic import Frame
+from synthetic import Frame, moved_rims
 
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.sensor_calibration import Calibration
@@ -240,12 +240,15 @@ def drawn(
     slopes = np.zeros((2, len(material)))
     for slope, order in zip(slopes, ((1, 0), (0, 1)), strict=True):
         slope[inside] = splines[2].ev(*material[inside].T, *order)
-    dots = np.column_stack([s.ev(*sensor_grid().positions_mm.T) for s in splines])
+
+    def motion(places_mm: Array) -> Array:
+        return np.column_stack([s.ev(*places_mm.T) for s in splines])
+
     frame = shaded(
         (slopes[0], slopes[1]),
         noise=noise,
         seed=seed + 100,
-        moved_mm=dots,
+        moved_mm=moved_rims(motion, sensor_grid()),
         brightness=brightness,
         camera=off_centre_view(),
     )
@@ -255,7 +258,7 @@ def drawn(
         frame.image,
         lumped(force_n, mesh, sensor_bundle().mesh),
         wrench,
-        np.column_stack([s.ev(*nodes.T) for s in splines]),
+        motion(nodes),
     )
 
 

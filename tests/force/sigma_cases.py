@@ -22,6 +22,7 @@ from scipy.ndimage import affine_transform
 from scipy.stats import norm
 from sensor_samples import sensor_grid
 from shaded_frames import lines_of_sight, shaded
+from synthetic import moved_rims
 
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.markers.interpolation import marker_to_node
@@ -32,7 +33,7 @@ CONDITIONS = ("quiet", "noisy", "dirty", "drifting")
 LIGHT_GAIN = 0.2
 """Standard deviation of its logarithm."""
 RADII_MM = (4.0, 5.0, 6.35, 8.0)
-_YOUNG, _THICKNESS, _RATIO = 0.03, 0.015, 0.004
+MODULUS_SIGMA, _THICKNESS, _RATIO = 0.03, 0.015, 0.004
 """Standard deviations: of modulus and thickness relative to the design, of Poisson's ratio."""
 _STEPS = np.array([-1.47, -0.6, 0.0, 0.6, 1.47])
 """Deviations of unit variance: few, so that a pad of the truth serves many cases."""
@@ -48,9 +49,13 @@ and the distance from the middle of the picture at which scale and rotation caus
 @cache
 def specified_bundle() -> Bundle:
     """The sensor as designed, with the tolerances of its gel."""
-    bundle = lit_bundle()
+    return with_tolerances(lit_bundle())
+
+
+def with_tolerances(bundle: Bundle) -> Bundle:
+    """A sensor with the tolerances within which gels are drawn."""
     tolerances = {
-        "youngs_modulus_mpa": _YOUNG * bundle.material.youngs_modulus_mpa,
+        "youngs_modulus_mpa": MODULUS_SIGMA * bundle.material.youngs_modulus_mpa,
         "thickness_mm": _THICKNESS * bundle.mesh.layers * bundle.mesh.cell_size_mm[2],
         "poissons_ratio": _RATIO,
     }
@@ -71,7 +76,7 @@ class MadeGel:
         thickness, ratio = np.round(_STEPS[rng.integers(0, len(_STEPS), 2)], 6)
         designed = lit_bundle().material.poissons_ratio
         return cls(
-            float(np.exp(rng.normal(0, _YOUNG))),
+            float(np.exp(rng.normal(0, MODULUS_SIGMA))),
             float(np.exp(_THICKNESS * thickness)),
             float(designed + _RATIO * ratio),
         )
@@ -201,7 +206,7 @@ def picture_of(motion: Callable[[Array], Array], light_gain: float) -> Picture:
     frame = shaded(
         (slope_x, slope_y),
         noise=0.0,
-        moved_mm=motion(sensor_grid().positions_mm),
+        moved_mm=moved_rims(motion, sensor_grid()),
         camera=off_centre_view(),
         light_gain=np.full(3, light_gain),
     )

@@ -7,6 +7,7 @@ projection of the disc's centre).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -58,17 +59,33 @@ def grid_of_dots(anchors: str = "odd_sized") -> MarkerGrid:
     return build_marker_grid(19, 18, 1.1, 0.45, anchors=anchors)  # type: ignore[arg-type]
 
 
-def outlines(
-    grid: MarkerGrid, camera: VirtualCamera, moved_mm: Vector | None = None, stretch: Vector = None
-) -> Vector:
-    """Rims (m, k, 2) in px of the dots; `moved_mm` (m, 2 or 3) shifts each dot on the gel."""
+def rims_mm(grid: MarkerGrid) -> Vector:
+    """(m, k, 2) places at rest of the points of the dots' rims."""
     turn = np.linspace(0, 2 * np.pi, _RIM, endpoint=False)
-    disc = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(_RIM)])
-    centre = np.zeros((len(grid), 3))
-    centre[:, :2] = grid.positions_mm
+    disc = np.column_stack([np.cos(turn), np.sin(turn)])
+    return grid.positions_mm[:, None, :] + grid.diameter_mm[:, None, None] / 2 * disc
+
+
+def moved_rims(motion: Callable[[Vector], Vector], grid: MarkerGrid) -> Vector:
+    """(m, k, 3) motion of the rims by a motion of the surface, places (n, 2) to (n, 3)."""
+    places = rims_mm(grid)
+    return motion(places.reshape(-1, 2)).reshape(*places.shape[:2], 3)
+
+
+def outlines(grid: MarkerGrid, camera: VirtualCamera, moved_mm: Vector | None = None) -> Vector:
+    """Rims (m, k, 2) in px of the dots.
+
+    Args:
+        grid: The dots.
+        camera: What sees them.
+        moved_mm: Their motion on the gel: (m, 2 or 3) of whole dots, or (m, k, 3) of the points of
+            their rims, which strains the dots.
+    """
+    flat = rims_mm(grid)
+    points = np.concatenate([flat, np.zeros((*flat.shape[:2], 1))], axis=2)
     if moved_mm is not None:
-        centre[:, : moved_mm.shape[1]] += moved_mm
-    points = centre[:, None, :] + grid.diameter_mm[:, None, None] / 2 * disc
+        moved = moved_mm if moved_mm.ndim == 3 else moved_mm[:, None, :]
+        points[..., : moved.shape[2]] += moved
     return camera.project(points.reshape(-1, 3)).reshape(len(grid), _RIM, 2)
 
 
