@@ -22,8 +22,9 @@ _LARGEST_CHANGE = 0.4
 beyond those of the strain: where small balls shear the gel until they slip it is 0.25."""
 _COVERED = 0.15
 """Of the logarithm of a dot's size against the dots around it: dirt over a part of it, whose centre
-is then off by up to half a pixel. In presses to 30 % of the thickness it is up to 0.08, by noise
-0.05."""
+is then off by up to half a pixel. By noise it is 0.05. Strain that varies from dot to dot gives up
+to 0.15 under balls and 0.4 under rings and rims, at 30 % of the thickness; the largest strain that
+the motion of the markers shows around a dot is therefore added to the limit."""
 _NEXT, _LEAST_MISSING = 8, 5
 """Neighbours of a marker one site away, and how many are missing, with all others, inside a gap.
 Gaps of single dots are wear of the print, which leaves the dots beside them whole."""
@@ -59,10 +60,14 @@ class WholeDots:
         change, whole = np.full(len(seen), np.nan), np.zeros_like(seen)
         # Blur hides a part of the strain, and strain varies between the markers: a dot has to
         # agree with one of the two only.
-        for growth, stretch in (self.changes(tracked), self.beyond_strain(tracked)):
+        expected = self._strained(tracked)
+        limits = np.empty(len(seen))
+        wk.strain_about(expected, self.rest_px2, near, limits)
+        limits += _COVERED
+        for growth, stretch in (self.changes(tracked), self._changes(tracked, expected)):
             # Comparisons with the NaN of a dot that is not seen are false: it is not whole.
             now = np.maximum(np.abs(growth - median(growth)), stretch)
-            wk.far_from_neighbours(growth, near, _COVERED, covered)
+            wk.far_from_neighbours(growth, near, limits, covered)
             whole |= (now < _LARGEST_CHANGE) & ~covered
             change = np.fmin(change, now)
         wk.beside_gap(whole, near, _NEXT, _LEAST_MISSING, _WORN, beside)
@@ -77,13 +82,17 @@ class WholeDots:
 
     def beyond_strain(self, tracked: TrackedFrame) -> tuple[Array, Array]:
         """The same over the dots at rest with the strain that the markers around them show."""
+        return self._changes(tracked, self._strained(tracked))
+
+    def _strained(self, tracked: TrackedFrame) -> Array:
+        """Second moments (n, 3) of the dots at rest with the strain of the markers around them."""
         from gelslim_force.tracking.whole_kernel import strained
 
         expected = np.empty_like(self.rest_px2)
         places, near = self.reference.positions_px, self.reference.neighbours
         motion = read_only(tracked.tracks.displacement_px)
         strained(places, motion, near, _NEXT, self.rest_px2, expected)
-        return self._changes(tracked, expected)
+        return expected
 
     def _changes(self, tracked: TrackedFrame, moments_px2: Array) -> tuple[Array, Array]:
         from gelslim_force.tracking.whole_kernel import changes

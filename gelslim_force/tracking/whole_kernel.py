@@ -21,6 +21,16 @@ _LEAST_AREA = 0.01
 
 
 @njit(**COMPILED)
+def _change(now: Any, before: Any) -> Any:
+    """Growth and stretch of second moments (3,) over others, by eigenvalues of now / before."""
+    mixed = now[0] * before[2] + now[2] * before[0] - 2 * now[1] * before[1]
+    start = before[0] * before[2] - before[1] ** 2
+    product = max((now[0] * now[2] - now[1] ** 2) / start, _LEAST_PRODUCT)
+    ratio = mixed / (2 * start) / math.sqrt(product)
+    return math.log(product) / 2, math.acosh(max(ratio, 1.0))
+
+
+@njit(**COMPILED)
 def changes(dots: Any, moments: Any, rest: Any, growth: Any, stretch: Any) -> None:
     """Write growth and stretch of the `dots` (n,) of the markers, -1 for those not seen.
 
@@ -29,13 +39,7 @@ def changes(dots: Any, moments: Any, rest: Any, growth: Any, stretch: Any) -> No
     for i in range(len(dots)):
         growth[i] = stretch[i] = math.nan
         if dots[i] >= 0:
-            now, before = moments[dots[i]], rest[i]
-            # The eigenvalues of now / before follow from determinants and the mixed product.
-            mixed = now[0] * before[2] + now[2] * before[0] - 2 * now[1] * before[1]
-            start = before[0] * before[2] - before[1] ** 2
-            product = max((now[0] * now[2] - now[1] ** 2) / start, _LEAST_PRODUCT)
-            ratio = mixed / (2 * start) / math.sqrt(product)
-            growth[i], stretch[i] = math.log(product) / 2, math.acosh(max(ratio, 1.0))
+            growth[i], stretch[i] = _change(moments[dots[i]], rest[i])
 
 
 @njit(**COMPILED)
@@ -75,15 +79,35 @@ def strained(places: Any, motion: Any, near: Any, next_to: Any, rest: Any, found
 
 
 @njit(**COMPILED)
-def far_from_neighbours(growth: Any, near: Any, limit: Any, far: Any) -> None:
+def strain_about(strained_moments: Any, rest: Any, near: Any, found: Any) -> None:
+    """Write the largest strain (n,) at each marker and its neighbours.
+
+    `strained_moments` (n, 3) are those that `strained` gave; the strain is the larger one of growth
+    and stretch.
+    """
+    count = len(rest)
+    own = np.empty(count)
+    for i in range(count):
+        growth, stretch = _change(strained_moments[i], rest[i])
+        own[i] = max(abs(growth), stretch)
+    for i in range(count):
+        found[i] = own[i]
+        for k in range(near.shape[1]):
+            if near[i, k] >= 0:
+                found[i] = max(found[i], own[near[i, k]])
+
+
+@njit(**COMPILED)
+def far_from_neighbours(growth: Any, near: Any, limits: Any, far: Any) -> None:
     """Write which dots (n,) have grown otherwise than the median of the dots around them.
 
-    Neighbours that are not seen, or not there, count as the dot itself.
+    They are those that differ by more than `limits` (n,). Neighbours that are not seen, or not
+    there, count as the dot itself.
     """
     count = near.shape[1]
     around = np.empty(count)
     for i in range(len(growth)):
-        alike = 0
+        alike, limit = 0, limits[i]
         for k in range(count):
             value = growth[near[i, k]] if near[i, k] >= 0 else math.nan
             around[k] = growth[i] if math.isnan(value) else value

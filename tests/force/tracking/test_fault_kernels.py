@@ -128,11 +128,29 @@ def test_dots_that_grow_otherwise_than_those_around() -> None:
         growth[rng.random(len(SITES)) < 0.1] = np.nan
         around = np.where(near >= 0, growth[near], np.nan)
         around = np.where(np.isnan(around), growth[:, None], around)
-        expected = np.abs(growth - np.median(around, axis=1)) > 0.15
+        limits = rng.uniform(0.1, 0.2, len(SITES))
+        expected = np.abs(growth - np.median(around, axis=1)) > limits
         found = np.empty(len(SITES), dtype=bool)
-        whole_kernel.far_from_neighbours(growth, near, 0.15, found)
+        whole_kernel.far_from_neighbours(growth, near, limits, found)
         np.testing.assert_array_equal(found, expected)
         assert 0 < expected.sum() < len(SITES) or spread < 0.1
+
+
+def test_the_strain_about_a_marker_is_the_largest_of_its_own_and_its_neighbours() -> None:
+    rng, near = np.random.default_rng(9), LATTICE.neighbours
+    rest, now = (np.empty((len(SITES), 3)) for _ in range(2))
+    own = np.empty(len(SITES))
+    for k in range(len(SITES)):
+        root, turned = np.diag(rng.uniform(2, 3, 2)), rng.normal(size=(2, 2)) * 0.2 + np.eye(2)
+        before = root @ root
+        after = turned @ before @ turned.T
+        rest[k], now[k] = (m[[0, 0, 1], [0, 1, 1]] for m in (before, after))
+        ratio = np.linalg.eigvals(np.linalg.solve(before, after)).real
+        own[k] = max(abs(np.log(ratio.prod())), abs(np.log(ratio[0] / ratio[1]))) / 2
+    found = np.empty(len(SITES))
+    whole_kernel.strain_about(now, rest, near, found)
+    expected = np.maximum(own, np.where(near >= 0, own[near], 0).max(axis=1))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_markers_beside_the_inside_of_a_gap() -> None:
