@@ -21,7 +21,7 @@ from scipy import sparse
 
 from gelslim_force.joint.light_sums import LightSums, placed_bins
 from gelslim_force.joint.light_view import LightView, SeenLight
-from gelslim_force.joint.marker_rows import MarkerRows
+from gelslim_force.joint.marker_rows import MarkerRows, apparent_mm
 from gelslim_force.joint.model_errors import at_edge, by_region, edge_nodes
 from gelslim_force.joint.moved_region import MovedRegion
 from gelslim_force.joint.node_lattice import NodeLattice
@@ -87,6 +87,7 @@ class JointEstimator:
         responses: Of markers and heights to nodal forces.
         markers: The followed markers as seen at rest.
         nodes_to_markers: (n, c) interpolation.
+        bending: (n, c) what cubic interpolation adds to it.
         marker_node: (n,) the node nearest to each marker.
         by_height: (n, 2) lateral motion that a picture shows per mm less of the marker's height.
         light: The bins of the picture; None where the markers alone are used.
@@ -107,6 +108,7 @@ class JointEstimator:
     responses: Responses
     markers: MarkerView
     nodes_to_markers: Any
+    bending: Any
     marker_node: Nodes
     by_height: Array
     light: LightView | None
@@ -256,7 +258,7 @@ class JointEstimator:
     def _marker_rows(self, frame: _Frame, near: Mask, moved_mm: Array) -> MarkerRows:
         """The markers near the contact: lateral motion by the picture and the height.
 
-        What mesh and interpolation do not resolve is a share of the motion of them all.
+        What is not resolved: a share of the motion of all, and of each marker's `bending`.
         """
         wide = self.lattice.widened(near, self.settings.marker_reach)[self.marker_node]
         model = self.nodes_to_markers @ moved_mm
@@ -266,8 +268,9 @@ class JointEstimator:
         rows = self.responses.of_markers(np.flatnonzero(near), used, self.by_height[used])
         residual = (lateral[used] - model[used, :2]).ravel()
         share = self.settings.marker_share * _size(model[used])
-        noise = np.repeat(self._noise_mm(frame)[used], 2)
-        sigma = np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2)
+        bent = apparent_mm((self.bending @ moved_mm)[used], self.by_height[used])
+        noise = np.hypot(self._noise_mm(frame)[used], self.settings.bending_share * bent)
+        sigma = np.repeat(np.sqrt(self.settings.marker_mm**2 + share**2 + noise**2), 2)
         return MarkerRows(used, rows, residual, huber(residual, sigma, _MARKER_LIMIT))
 
     def _light(self, frame: _Frame, near: Mask, moved_mm: Array, gain: float) -> LightSums | None:

@@ -19,6 +19,8 @@ Nodes = NDArray[np.intp]
 _LIMIT = 10.0
 """Standard deviations beyond which light counts linearly."""
 _WHOLLY = 0.999
+_PLACED = 3
+"""Steps of the iteration for the place at rest."""
 _GAINS = 0.3, 3.0
 
 
@@ -143,13 +145,15 @@ def placed_bins(
     """The valid bins of a frame among the nodes `near` (c,).
 
     The line of sight of a bin meets the surface where it is now; the motion (c, 3) of the nodes
-    leads from there to the place at rest.
+    leads from there to the place at rest. Slopes are those of the deformed surface.
     """
     about = lattice.widened(near, 1)[view.nearest]
     bins = np.flatnonzero(seen.shading.valid.ravel() & about)
-    rest = view.rest_mm.reshape(-1, 2)[bins]
-    moved = lattice.values_at(displacement_mm, rest)
-    places = rest + view.lean.reshape(-1, 2)[bins] * moved[:, 2:] - moved[:, :2]
+    rest, lean = view.rest_mm.reshape(-1, 2)[bins], view.lean.reshape(-1, 2)[bins]
+    places = rest
+    for _ in range(_PLACED):
+        moved = lattice.values_at(displacement_mm, places)
+        places = rest + lean * moved[:, 2:] - moved[:, :2]
     kept = lattice.on(places) & (lattice.values_at(near.astype(float), places) > _WHOLLY)
     bins, places = bins[kept], places[kept]
 
@@ -157,7 +161,7 @@ def placed_bins(
         return np.ascontiguousarray(layers.reshape(*layers.shape[:-2], -1)[..., bins])
 
     return PlacedBins(
-        lattice.slopes_at(places),
+        lattice.slopes_at(places).on_deformed(displacement_mm[:, :2]),
         of(seen.log_change),
         of(seen.noise),
         of(seen.saturated),

@@ -60,3 +60,14 @@ class MarkerRows:
         seen = float(self.weight @ np.square(self.residual)) / max(count, 1)
         gain = (spread @ self.rows.T) * np.sqrt(self.weight)
         return np.asarray(max(0.0, 1.0 - seen) * gain @ gain.T)
+
+
+def apparent_mm(moved_mm: Array, by_height: Array) -> Array:
+    """(n,) root mean square, over both axes, of the lateral motion that a picture shows.
+
+    Args:
+        moved_mm: (n, 3) motion of markers.
+        by_height: (n, 2) lateral motion that the picture shows per mm less of height.
+    """
+    seen = moved_mm[:, :2] - by_height * moved_mm[:, 2:]
+    return np.asarray(np.sqrt((seen**2).mean(axis=1)))

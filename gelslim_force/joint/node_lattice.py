@@ -10,15 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, sparse
 from scipy.spatial import cKDTree
 
 from gelslim_force.joint.morphology import widened
+from ifem_export.markers.interpolation import marker_to_node
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Nodes = NDArray[np.intp]
 _TAPS = 4
+_LEAST_AREA = 0.3
+"""Of a deformed surface over that at rest; a smaller one is an error of the estimate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,35 @@ class SlopeTaps:
         height = height_mm[self.nodes]
         by_x, by_y = (np.einsum("nt,nt->n", w, height) for w in (self.along, self.across))
         return np.column_stack([by_x, by_y])
+
+    def on_deformed(self, lateral_mm: Array) -> SlopeTaps:
+        """The slopes of the deformed surface, whose nodes have moved by (c, 2) in its plane.
+
+        With the deformation gradient F = I + ∂u/∂x of the plane, they are F⁻ᵀ times the slopes by
+        the places at rest. F is taken with a determinant of at least 0.3.
+        """
+        along, across = (self.slopes(lateral_mm[:, axis]) for axis in (0, 1))
+        xx, xy, yx, yy = 1 + along[:, :1], along[:, 1:], across[:, :1], 1 + across[:, 1:]
+        size = np.maximum(xx * yy - xy * yx, _LEAST_AREA)
+        return SlopeTaps(
+            self.nodes,
+            (yy * self.along - yx * self.across) / size,
+            (xx * self.across - xy * self.along) / size,
+        )
+
+
+def _cubic_weights(part: Array) -> Array:
+    """Weights (..., 4) of cubic convolution at fractions (...) of a cell."""
+    t = part[..., None]
+    return np.concatenate(
+        [
+            -0.5 * t + t**2 - 0.5 * t**3,
+            1 - 2.5 * t**2 + 1.5 * t**3,
+            0.5 * t + 2 * t**2 - 1.5 * t**3,
+            -0.5 * t**2 + 0.5 * t**3,
+        ],
+        axis=-1,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +143,31 @@ class NodeLattice:
         along, across = np.empty(nodes.shape), np.empty(nodes.shape)
         cubic_taps(at, self.step_mm, self.number, nodes, along, across)
         return SlopeTaps(nodes, along, across)
+
+    def interpolation(self, points_mm: Array) -> sparse.csr_array:
+        """(n, c) matrix that gives the values at points (n, 2 or 3) by those of the nodes.
+
+        It is cubic convolution where all 16 nodes are there, and linear at the edge of the lattice.
+        """
+        at = (points_mm[:, :2] - self.origin_mm) / self.step_mm
+        first = np.floor(at).astype(np.intp) - 1
+        offsets = np.arange(_TAPS)
+        rows, columns = (first[:, axis, None] + offsets for axis in (0, 1))
+        last = np.array(self.number.shape) - 1
+        nodes = self.number[
+            np.clip(rows, 0, last[0])[:, :, None], np.clip(columns, 0, last[1])[:, None, :]
+        ].reshape(len(at), -1)
+        inside = (first >= 0).all(axis=1) & (first + _TAPS - 1 <= last).all(axis=1)
+        inside &= (nodes >= 0).all(axis=1)
+        by_x, by_y = _cubic_weights(at - np.floor(at)).swapaxes(0, 1)
+        weights = (by_x[:, :, None] * by_y[:, None, :]).reshape(len(at), -1)
+        weights[~inside] = 0.0
+        row = np.repeat(np.arange(len(at)), _TAPS**2)
+        size = (len(at), len(self.place))
+        cubic = sparse.csr_array((weights.ravel(), (row, np.maximum(nodes, 0).ravel())), shape=size)
+        places = self.origin_mm + self.place * self.step_mm
+        linear = marker_to_node(places, points_mm)
+        return sparse.csr_array(cubic + sparse.diags_array((~inside).astype(float)) @ linear)
 
     def picture(self, nodes: Mask) -> Mask:
         """(nx, ny) places of nodes (c,)."""

@@ -23,6 +23,9 @@ class JointSettings:
         marker_share: What mesh and interpolation do not resolve of the motion of the markers near
             a contact, as a share of its root mean square. On a mesh of half the pitch it is 1.7 to
             3 % at presses of 3 to 20 % of the thickness.
+        bending_share: What linear interpolation between the nodes does not resolve at a marker, as
+            a share of what cubic interpolation would add. It is large where a sharp rim bends the
+            surface between two nodes.
         light_error: Standard deviation of the mean logarithmic change over 1 mm² of the coat: law
             of the light.
         light_share: What the mesh does not resolve of the change of the light, as a share of its
@@ -54,6 +57,7 @@ class JointSettings:
     friction: float = 1.2
     marker_mm: float = 0.0015
     marker_share: float = 0.02
+    bending_share: float = 0.8
     light_error: float = 0.02
     light_share: float = 0.05
     edge_share: float = 0.05

@@ -196,6 +196,7 @@ def unknown_shape(
         Responses(SurfaceCompliance(bundle), to_markers),
         view,
         to_markers,
+        lattice.interpolation(view.rest_mm) - to_markers,
         lattice.nearest_node(view.rest_mm[:, :2]),
         view.by_height(),
         seen,

@@ -47,6 +47,25 @@ def test_slopes_of_a_wave_converge_with_the_square_of_the_spacing() -> None:
     assert rate < -1.8
 
 
+def test_slopes_of_a_deformed_surface_are_those_of_the_moved_plane() -> None:
+    """Points of the plane z = a + s·(x, y) stay on it under any motion along it."""
+    found, nodes = lattice()
+    slope, gradient = np.array([0.4, -0.3]), np.array([[0.2, -0.15], [0.1, -0.25]])
+    moved = nodes @ gradient.T
+    height = 0.1 + (nodes + moved) @ slope
+    seen = found.slopes_at(inner(40)).on_deformed(moved).slopes(height)
+    np.testing.assert_allclose(seen, np.tile(slope, (40, 1)), atol=1e-12)
+
+
+def test_interpolation_is_exact_for_quadratic_values_and_linear_at_the_edge() -> None:
+    found, nodes = lattice()
+    at = inner(40)
+    for points, bent in ((at, 1.0), (np.column_stack([at[:, 0], np.full(40, Y[0] + 0.1)]), 0.0)):
+        values = nodes @ [0.2, -0.1] + bent * nodes[:, 0] ** 2
+        expected = points @ [0.2, -0.1] + bent * points[:, 0] ** 2
+        np.testing.assert_allclose(found.interpolation(points) @ values, expected, atol=1e-12)
+
+
 def test_adjacent_nodes_are_one_step_apart() -> None:
     found, points = lattice(missing=7)
     chosen = np.random.default_rng(4).choice(len(points), 40, replace=False)
