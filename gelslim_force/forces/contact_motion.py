@@ -94,11 +94,17 @@ class ContactMotion:
         return ""
 
     def _covered(self, reading: NormalReading, tracked: NDArray[np.bool_]) -> str:
-        """Why too much of a contact is not seen; empty if enough is."""
+        """Why too much of a contact is not seen; empty if enough is.
+
+        Light around a lost marker shows the gel there.
+        """
         touched = reading.touched
         if touched is None or not touched.any() or tracked.all():
             return ""
-        share = float(self._unseen.nodes(~tracked)[touched].mean())
+        unseen = self._unseen.nodes(~tracked)
+        if reading.shown is not None:
+            unseen = unseen & ~reading.shown
+        share = float(unseen[touched].mean())
         return frame_problems.COVERED.format(share) if share > _MOST_COVERED else ""
 
     def _with_hidden(self, reading: NormalReading, tracked: NDArray[np.bool_]) -> NormalReading:
