@@ -106,8 +106,11 @@ def shaded(
     dark_sides: float = 0.0,
     camera: VirtualCamera = CAMERA,
     light_gain: Vector | None = None,
+    change: Vector | None = None,
 ) -> Frame:
     """A 480 x 640 frame; without slopes, of a level surface.
+
+    `change` (480 x 640, 3) is the light over that of a level surface, in the place of slopes.
 
     With `dark_sides` each colour falls off as exp(-dark_sides · share of the way) across the gel,
     and blue is all but missing. `light_gain` (480 x 640, 3) is the exponent of the change of light
@@ -118,6 +121,7 @@ def shaded(
     image = frame.image.astype(float) * brightness
     if slopes is not None:
         change = lit(*slopes)
+    if change is not None:
         if light_gain is not None:
             change = change**light_gain
         image *= change.reshape(480, 640, 3)
