@@ -1,11 +1,13 @@
 """Do the standard deviations of forces hold? Scores over random contacts, and their curve.
 
     python bench/force_sigma.py              # 200 contacts of each mode
+    python bench/force_sigma.py --deep       # the deep contacts only; the rest is kept
     python bench/force_sigma.py --figure     # draw the figure from the data again
 
 Writes docs/data/force_sigma.json and docs/images/force_sigma.png. Contacts and the scores of each
 slice are kept in a folder, so that a run that was stopped goes on where it ended. The contacts are
-those of tests/force/sigma_cases.py.
+those of tests/force/sigma_cases.py; the deep ones, of a neo-Hookean gel, those of
+tests/force/deep_contacts.py.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ SLICE = 20
 KEPT = Path("out") / "force_sigma"
 COMPONENTS = ("F_x", "F_y", "F_z")
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57")
-SIZE_IN, DPI = (9.0, 3.6), 110
+SIZE_IN, DPI = (11.5, 3.6), 110
 
 
 def main() -> None:
@@ -40,14 +42,20 @@ def main() -> None:
     )
     parser.add_argument("--cases", type=int, default=200, help="contacts of each mode")
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
+    parser.add_argument("--deep", action="store_true", help="score the deep contacts only")
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
     options = parser.parse_args()
+    stored = options.docs / "data" / "force_sigma.json"
     if not options.figure:
-        data = {**machine(31), "cases": options.cases, "modes": scored(options)}
-        write_data("force_sigma", data, options.docs)
-    record = json.loads((options.docs / "data" / "force_sigma.json").read_text("utf-8"))
-    write_whole(options.docs / "images" / "force_sigma.png", drawn(record["modes"]))
+        if options.deep:
+            data = json.loads(stored.read_text("utf-8"))
+        else:
+            data = {**machine(31), "cases": options.cases, "modes": scored(options)}
+        write_data("force_sigma", {**data, "deep": deep_scored()}, options.docs)
+    record = json.loads(stored.read_text("utf-8"))
+    panels = {**record["modes"], "nothing given, deep": {"auto": record["deep"]["auto"]}}
+    write_whole(options.docs / "images" / "force_sigma.png", drawn(panels))
     print(table(record))
 
 
@@ -78,6 +86,20 @@ def scored(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def deep_scored() -> dict[str, Any]:
+    """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "force"))
+    from deep_contacts import COUNT
+    from deep_gate import LAWS, deep_scores, deep_summary
+
+    found = {}
+    for law in LAWS:
+        some = deep_scores(law, range(COUNT))
+        errors = {name: _short(value) for name, value in deep_summary(some).items()}
+        found[law] = {**_condition(vars(s.score) for s in some), "relative": errors}
+    return found
+
+
 def _condition(rows: Iterable[Record]) -> dict[str, Any]:
     every = list(rows)
     given = [row for row in every if row["error_n"]]
@@ -106,6 +128,7 @@ def table(record: Record) -> str:
         every = list(conditions.values())
         lines += [_row(f"{mode}, {name}", [row]) for name, row in conditions.items()]
         lines.append(_row(f"**{mode}, all**", every))
+    lines += [_row(f"nothing given, deep, gel {law}", [row]) for law, row in record["deep"].items()]
     return "\n".join(lines)
 
 
