@@ -23,7 +23,7 @@ from gelslim_force.contact.reflections import colours_oppose
 from gelslim_force.frames.upright import upright
 from gelslim_force.joint.checked_indenter import CheckedIndenter
 from gelslim_force.joint.light_calibration import LightCalibration
-from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.settings import WITNESS, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, layer_stiffness_n_mm, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.presses.gel_calibration import GelCalibration
@@ -183,7 +183,7 @@ def normal_source(
     checked = (settings or PipelineSettings()).check_indenter
     if grey or not (checked and _shows_shapes(bundle, picture, grey)):
         return named
-    return CheckedIndenter(named, unknown_shape(bundle, calibration, picture))
+    return CheckedIndenter(named, unknown_shape(bundle, calibration, picture, settings=WITNESS))
 
 
 def _is_grey(bundle: Bundle, picture: Picture | None) -> bool:

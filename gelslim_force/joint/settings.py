@@ -105,3 +105,6 @@ class JointSettings:
 MARKERS_ALONE = JointSettings(marker_mm=0.004, roughness=0.22, least_pressure=0.2, rounds=(2, 1, 1))
 """Without light: markers show the region less sharply, so that more nodes have to be removed, and
 what the region leaves open is as large as 4 µm at the markers."""
+WITNESS = JointSettings(bending_share=0.0)
+"""To confirm a named indenter. Its dent bends nowhere sharply between two nodes; that doubt would
+hide that something else touches the gel."""

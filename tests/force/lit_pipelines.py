@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 from pressed_samples import calibration, lit_bundle, reference
 
 from gelslim_force.joint.checked_indenter import CheckedIndenter
-from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.settings import WITNESS, JointSettings
 from gelslim_force.joint.unknown_shape import UnknownShape, unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import indenter_source
 
 
 @cache
-def witness() -> UnknownShape:
+def witness(settings: JointSettings = JointSettings()) -> UnknownShape:  # noqa: B008
     """Forces of an unknown shape; the drawn camera is linear."""
-    settings = JointSettings(gamma=1.0)
-    return unknown_shape(lit_bundle(), calibration(), reference().image, settings=settings)
+    linear = replace(settings, gamma=1.0)
+    return unknown_shape(lit_bundle(), calibration(), reference().image, settings=linear)
 
 
 @cache
@@ -35,4 +36,4 @@ def opened(mode: str) -> ForcePipeline:
 def checked(name: str) -> ForcePipeline:
     """A named indenter that light and markers confirm."""
     named = opened(name).normal
-    return opened("none").with_normal(CheckedIndenter(named, witness()))  # type: ignore[arg-type]
+    return opened("none").with_normal(CheckedIndenter(named, witness(WITNESS)))  # type: ignore[arg-type]
