@@ -14,13 +14,16 @@ from random_contact_scenes import Finger
 from gelslim_twin.effects.grey_values import grey_share
 from gelslim_twin.planning.plan import Plan
 
+SHADOW = 4.0
+"""What the edge of a shadow adds."""
+
 
 def test_a_lattice_errs_by_the_share_of_a_node_that_it_steps_over() -> None:
     c = circumstances(footprint=replace(ball(), steepest=lambda _d: math.inf))
     pitch_px = FIGURES.node_pitch_mm * FIGURES.px_per_mm
     by_step = {r.parameters["pixel_step"]: r.error.image_px for r in LADDER["shading"](c)}
     reach = FIGURES.thickness_mm * FIGURES.px_per_mm
-    assert by_step[2] / by_step[1] == pytest.approx((1 / pitch_px) / (1 / (8 * reach**2)))
+    assert by_step[2] / by_step[1] == pytest.approx((SHADOW / pitch_px) / (1 / (8 * reach**2)))
     assert by_step[1] < 0.01 * by_step[2] < by_step[2] < by_step[4] <= by_step[8]
     assert grey_share(c) > 0
 
