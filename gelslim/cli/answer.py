@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -98,8 +99,14 @@ def table(*texts: str, figures: Sequence[str] = (), **style: Any) -> Table:
 
 
 def say(text: str, style: str = "") -> None:
-    """Print text, wrapped at the width of the console."""
-    console().print(text, style=style or None)
+    """Print text, wrapped at the width of the console, but never within a path or another word."""
+    screen = console()
+    lines = [
+        part
+        for line in text.split("\n")
+        for part in wrap(line, screen.width, break_long_words=False, break_on_hyphens=False) or [""]
+    ]
+    screen.print("\n".join(lines), style=style or None, no_wrap=True, overflow="ignore", crop=False)
 
 
 def indented(text: str | Text, by: int) -> Padding:

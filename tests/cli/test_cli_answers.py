@@ -11,7 +11,7 @@ import pytest
 from cli_samples import MINI20, altered, too_long
 
 from gelslim.cli import main
-from gelslim.cli.answer import number, plain
+from gelslim.cli.answer import number, plain, say
 from gelslim_cad.checks import RULES, check
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec
@@ -26,6 +26,15 @@ def answered(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 
     captured = capsys.readouterr()
     assert captured.err == ""
     return json.loads(captured.out)
+
+
+def test_a_long_path_is_not_broken(capsys: pytest.CaptureFixture[str]) -> None:
+    path = "/" + "a-long-name/" * 20
+    say(f"Some words before. Wrote {path}. " + "Some words follow. " * 10)
+    lines = capsys.readouterr().out.splitlines()
+    assert f"{path}." in lines
+    assert len(lines) >= 4
+    assert max(map(len, lines)) == len(path) + 1
 
 
 def test_check_as_json_holds_every_rule(capsys: pytest.CaptureFixture[str]) -> None:
