@@ -157,7 +157,7 @@ def nearest_start(window: Window, starts: list[Array], law: SlopeLaw) -> Array:
 def settled_start(window: Window, starts: list[Array], law: SlopeLaw) -> Array:
     """The start (4,) with the smallest residual after a few steps on a part of the bins, moved."""
     part = window.thinned(_START_BINS)
-    tried = [_optimised(part, start, law, _FIRST_STEPS, _SMALL_MOVE)[:2] for start in starts]
+    tried = [_optimised(part, start, law, _FIRST_STEPS)[:2] for start in starts]
     return min(tried, key=lambda pair: pair[1])[0]
 
 
