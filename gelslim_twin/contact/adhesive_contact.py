@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import ContactError, GelState
-from gelslim_twin.contact.solver import ContactSolver, with_halved_steps
+from gelslim_twin.contact.load_steps import with_halved_steps
+from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]

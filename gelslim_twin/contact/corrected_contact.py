@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.finite_strain import FiniteStrainForce
 from gelslim_twin.contact.gel_state import ContactError, GelState
+from gelslim_twin.contact.load_steps import is_stationary
 from gelslim_twin.contact.nonlinear import NonlinearContact, unfit
-from gelslim_twin.contact.solver import Candidates, ContactSolver, is_stationary
+from gelslim_twin.contact.solver import Candidates, ContactSolver
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.finite_strain.neo_hookean import FiniteStrainError

@@ -17,7 +17,6 @@ from gelslim_force.forces.finite_strain import Anderson
 from gelslim_twin.contact.contact_forces import ContactForces
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.contact.solver import ContactSolver
-from gelslim_twin.scene.pose import Pose
 from ifem_export.compliance.convolved import ConvolvedCompliance
 
 Array = NDArray[np.float64]
@@ -85,22 +84,11 @@ class RimCorrection:
 class FineContact(ContactSolver):
     """`ContactSolver` on a `ConvolvedCompliance`: exact up to the rim of the pad."""
 
-    def step(
-        self,
-        last: GelState,
-        before: Pose | None,
-        pose: Pose,
-        offset_mm: Array | None = None,
-        start: GelState | None = None,
-        *,
-        offset_is_free: bool = False,
-    ) -> GelState:
-        """As `ContactSolver.step`. Raises ContactError and ConvergenceError."""
+    def _begin(self, last: GelState, offset_mm: Array) -> None:
         assert isinstance(self.compliance, ConvolvedCompliance)
         rtol = max(LEAST_RTOL, SHARE * self.settings.tolerance)
         self._motion = ExactMotion(self.compliance, rtol)
-        self._given = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
-        return super().step(last, before, pose, offset_mm, start, offset_is_free=offset_is_free)
+        self._given = offset_mm
 
     def _correction(self, nodes: Nodes) -> RimCorrection:
         return RimCorrection(self._motion, nodes, self._given[nodes])

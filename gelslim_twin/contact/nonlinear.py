@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from gelslim_force.forces.finite_strain import Anderson, FiniteStrainForce
 from gelslim_twin.contact.gel_body import GelBody
 from gelslim_twin.contact.gel_state import ContactError, GelState, anchor_mm
+from gelslim_twin.contact.load_steps import is_stationary, with_halved_steps
 from gelslim_twin.contact.newton_contact import NewtonContact, SolidState
-from gelslim_twin.contact.solver import ContactSolver, is_stationary, with_halved_steps
+from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
 from ifem_export.bundle.bundle import Bundle
 from ifem_export.compliance.columns import SurfaceCompliance

@@ -111,24 +111,17 @@ class SlidingContact(ContactSolver):
             yield state
         self.compliance.store()
 
-    def step(
-        self,
-        last: GelState,
-        before: Pose | None,
-        pose: Pose,
-        offset_mm: Array | None = None,
-        start: GelState | None = None,
-        *,
-        offset_is_free: bool = False,
+    def _begin(self, last: GelState, offset_mm: Array) -> None:
+        self._coefficient = self.law.coefficient(mean_slip_mm_s(last))
+
+    def _completed(
+        self, found: GelState, last: GelState, before: Pose | None, pose: Pose
     ) -> GelState:
-        """As `ContactSolver.step`."""
-        mean = mean_slip_mm_s(last)
-        self._coefficient = self.law.coefficient(mean)
-        found = super().step(last, before, pose, offset_mm, start, offset_is_free=offset_is_free)
+        """The state with the mean speed of each node's slip."""
         if not isinstance(found, AnchoredState):
             return found
         step_s = 0.0 if before is None else pose.time_s - before.time_s
-        mean = self.law.mean_after(mean, _slip_mm(found), step_s)
+        mean = self.law.mean_after(mean_slip_mm_s(last), _slip_mm(found), step_s)
         given = {f.name: getattr(found, f.name) for f in fields(AnchoredState)}
         return SlidingState(**given, slip_mm_s=np.where(found.touch > 0, mean, 0.0))
 

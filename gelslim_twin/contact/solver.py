@@ -19,9 +19,9 @@ large strain.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from gelslim_twin.contact.gel_state import (
     TouchedNodes,
     anchor_mm,
 )
+from gelslim_twin.contact.load_steps import even_steps, is_stationary, with_halved_steps
 from gelslim_twin.contact.plane_iteration import (
     Correction,
     PlaneIteration,
@@ -48,7 +49,6 @@ from ifem_export.compliance.pad_compliance import NodeCompliance, SurfaceRespons
 
 Array = NDArray[np.float64]
 Nodes = NDArray[np.intp]
-State = TypeVar("State")
 SPARE = 1.5
 """Size of a stored block over the size needed above which a smaller one is gathered."""
 CANDIDATE_SHARE = 0.2
@@ -185,20 +185,46 @@ class ContactSolver:
         touches it, at which the tool then meets it. `start` is an initial guess.
         """
         offset = np.zeros_like(self.points_mm) if offset_mm is None else offset_mm
+        self._begin(last, offset)
+        met_mm = offset[:, 2] if offset_is_free else None
+        found = self._solved(last, before, pose, offset, last if start is None else start, met_mm)
+        return self._completed(found, last, before, pose)
+
+    def _begin(self, last: GelState, offset_mm: Array) -> None:
+        """Prepare a step from the state `last`."""
+
+    def _completed(
+        self, found: GelState, last: GelState, before: Pose | None, pose: Pose
+    ) -> GelState:
+        """The state at the end of a step, with all that the solver keeps in it."""
+        return found
+
+    def _solved(
+        self,
+        last: GelState,
+        before: Pose | None,
+        pose: Pose,
+        offset: Array,
+        first: GelState,
+        met_mm: Array | None,
+    ) -> GelState:
+        """State of the step; the tool meets the surface at heights `met_mm` (c,) if they are given.
+
+        The iteration starts from the state `first`.
+        """
         targets = self.targets(last, before, pose)
         target, ahead = targets.target_mm, targets.ahead_mm
         met = ahead * [1.0, 1.0, 0.0]
-        if offset_is_free:
-            met[:, 2] = offset[:, 2]
+        if met_mm is not None:
+            met[:, 2] = met_mm
         below = self.tool.clearance_mm(pose, self.points_mm + met)
         on_tool = np.isfinite(below)
         depth = -float(np.min(below, initial=0.0))
-        first = last if start is None else start
         moved, guess = first.displacement_mm, first.force_n
         wanted = np.zeros(len(moved), dtype=bool)
         if self._is_short(last, ahead):
             wanted = last.touch > 0
-            if start is None:
+            if first is last:
                 moved = np.where((last.touch == STICK)[:, None], ahead, moved)
         for _ in range(GROWTH_STEPS):
             surface, room = self._room(pose, moved, offset, on_tool)
@@ -312,39 +338,3 @@ class ContactSolver:
         on = np.flatnonzero(balance.touch)
         touched = TouchedNodes(nodes[on], found.surface.normal[on], targets.at(nodes[on]))
         return AnchoredState(u, force, touch, report, held, touched=touched), gap
-
-
-def even_steps(before: Pose, after: Pose, count: int) -> Iterator[Pose]:
-    """`count` equal steps from `before` to `after`; the last pose is `after` itself."""
-    yield from (before.blended(after, number / count) for number in range(1, count))
-    yield after
-
-
-def is_stationary(before: Pose, pose: Pose) -> bool:
-    """Whether the tool does not move between two poses."""
-    return replace(before, time_s=pose.time_s) == pose
-
-
-def with_halved_steps(
-    step: Callable[[State, Pose, Pose], State],
-    state: State,
-    before: Pose,
-    pose: Pose,
-    halvings: int,
-) -> State:
-    """State at `pose` by one step or, where that fails, by two halves of it, recursively.
-
-    Raises ContactError with the reason of the smallest step after `halvings` halvings.
-    """
-    try:
-        return step(state, before, pose)
-    except ContactError as error:
-        if halvings == 0:
-            raise ContactError(
-                f"no convergence at t = {pose.time_s:g} s, depth {pose.depth_mm:g} mm, in the "
-                f"smallest step tried: {error}",
-                error.residual,
-            ) from error
-    middle, _ = even_steps(before, pose, 2)
-    state = with_halved_steps(step, state, before, middle, halvings - 1)
-    return with_halved_steps(step, state, middle, pose, halvings - 1)

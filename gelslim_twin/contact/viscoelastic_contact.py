@@ -29,8 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.load_steps import even_steps, with_halved_steps
 from gelslim_twin.contact.prony import PronySeries
-from gelslim_twin.contact.solver import ContactSolver, even_steps, with_halved_steps
+from gelslim_twin.contact.solver import ContactSolver
 from gelslim_twin.scene.pose import Pose
 
 Array = NDArray[np.float64]

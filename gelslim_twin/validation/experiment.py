@@ -15,8 +15,9 @@ from typing import Any, Literal
 import numpy as np
 
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact, unfit
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import Cylinder, FlatPunch, Indenter, Sphere
 from gelslim_twin.scene.pose import Pose

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from sampled import quick
 
 from gelslim_twin.contact.gel_state import ContactError
+from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import FlatPunch, Indenter, Ring, Sphere, TexturedPlane
 from gelslim_twin.scene.pose import Pose

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from contact_pads import small_pad
 
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
+from gelslim_twin.contact.load_steps import even_steps
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.scene.indenter import (
     Cone,

@@ -15,8 +15,9 @@ from random_contact_scenes import random_contact
 from gelslim_twin.contact import corrected_contact
 from gelslim_twin.contact.corrected_contact import CorrectedContact, Correction
 from gelslim_twin.contact.gel_state import ContactError, GelState
+from gelslim_twin.contact.load_steps import even_steps
 from gelslim_twin.contact.nonlinear import NonlinearContact
-from gelslim_twin.contact.solver import ContactSettings, ContactSolver, even_steps
+from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.contact import CORRECTED_RUNGS, HELD_AT, corrected_error
 from gelslim_twin.scene.indenter import Sphere
