@@ -9,7 +9,7 @@ from gelslim_cad.checks import RULES, check
 from gelslim_cad.checks.rule import Rule
 from gelslim_cad.dimensions import Dimensions, definition
 from gelslim_cad.dimensions.bend import chosen_here
-from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension, unit_of
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reader import LoadedSpec, suggestion

@@ -6,7 +6,7 @@ import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
 from gelslim_cad.dimensions.cable import LEAST_PLUG_MM, LEAST_ROOF_MM, OVER_COVER_MM
-from gelslim_cad.dimensions.fold_housing import CHANNEL_WALL_MM, LEAST_FLOOR_MM
+from gelslim_cad.dimensions.fold.housing import CHANNEL_WALL_MM, LEAST_FLOOR_MM
 from gelslim_cad.dimensions.housing import TONGUE_LEAST_MM
 from gelslim_cad.dimensions.registry import Real
 from gelslim_cad.geometry.fasteners import SCREWS

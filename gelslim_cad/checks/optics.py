@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gelslim_cad.checks.rule import Finding, rule
-from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold.fold import Fold
 from gelslim_cad.dimensions.registry import Real
 
 TOLERANCE = 1e-4

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM, cable_level_mm
+from gelslim_cad.dimensions.fold.housing import CLAMP_BAR_MM, cable_level_mm
 from gelslim_cad.dimensions.registry import Real, dimension
 from gelslim_cad.geometry.led_strips import NO_TIP
 from gelslim_cad.geometry.lookup import Lookup

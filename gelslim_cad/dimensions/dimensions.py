@@ -27,9 +27,9 @@ from gelslim_cad.dimensions import (  # noqa: F401  (registers)
     tip_light,
     view,
 )
-from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold.fold import Fold
+from gelslim_cad.dimensions.fold.solver import threads
 from gelslim_cad.dimensions.registry import REGISTRY, Dimension, identifier
-from gelslim_cad.dimensions.solver import threads
 from gelslim_cad.geometry.lookup import NamedValues
 from gelslim_cad.geometry.names import DimensionName, FloatName, IntName
 from gelslim_cad.spec import Spec

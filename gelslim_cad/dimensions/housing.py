@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from gelslim_cad.dimensions.cable import LANE_GAP_MM
-from gelslim_cad.dimensions.fold import Fold
-from gelslim_cad.dimensions.fold_housing import (
+from gelslim_cad.dimensions.fold.fold import Fold
+from gelslim_cad.dimensions.fold.housing import (
     LEDGE_GAP_MM,
     SEAT_STOP_MM,
     clamp_ends_x_mm,
     lip_front_mm,
 )
-from gelslim_cad.dimensions.fold_housing import (
+from gelslim_cad.dimensions.fold.housing import (
     clamp_front_x_mm as foremost_of_clamp_mm,
 )
 from gelslim_cad.dimensions.registry import Real, dimension

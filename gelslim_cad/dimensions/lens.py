@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gelslim_cad.dimensions.distortion import RADIAL, image_of, tangent_of
-from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold.fold import Fold
 from gelslim_cad.dimensions.registry import Real, dimension
 
 LENS = "docs/physics.md#a-camera-focused-close-up"

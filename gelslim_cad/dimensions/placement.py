@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold.fold import Fold
 from gelslim_cad.dimensions.registry import Real, dimension
 
 FOLD = "docs/physics.md#camera-and-fold"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_housing import (
+from gelslim_cad.dimensions.fold.housing import (
     CLAMP_BAR_MM,
     CLAMP_LIP_MM,
     LIP_GAP_MM,

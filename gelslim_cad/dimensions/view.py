@@ -10,10 +10,10 @@ import numpy as np
 
 from gelslim_cad.dimensions.cable import LEAST_ROOF_MM, SIDES, over_cover_mm
 from gelslim_cad.dimensions.distortion import is_fisheye
-from gelslim_cad.dimensions.fold import Fold
-from gelslim_cad.dimensions.fold_problem import NO_LIMIT_MM, FoldProblem
+from gelslim_cad.dimensions.fold.fold import Fold
+from gelslim_cad.dimensions.fold.problem import NO_LIMIT_MM, FoldProblem
+from gelslim_cad.dimensions.fold.solver import solve_fold
 from gelslim_cad.dimensions.registry import Real, dimension
-from gelslim_cad.dimensions.solver import solve_fold
 from gelslim_cad.geometry.names import Name
 
 FOLD = "docs/physics.md#camera-and-fold"

@@ -21,7 +21,7 @@ from gelslim_cad.dimensions.cable import (
     PAD_LENGTH_MM,
     STACK_RATIO,
 )
-from gelslim_cad.dimensions.fold_housing import CHANNEL_WALL_MM, CLAMP_BAR_MM
+from gelslim_cad.dimensions.fold.housing import CHANNEL_WALL_MM, CLAMP_BAR_MM
 from gelslim_cad.geometry.part import Part
 from gelslim_cad.solids.layout import Layout
 from gelslim_cad.solids.materials import CABLE, SILICONE

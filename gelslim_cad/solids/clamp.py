@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import cadquery as cq
 
 from gelslim_cad.dimensions import Dimensions
-from gelslim_cad.dimensions.fold_housing import CLAMP_BAR_MM
+from gelslim_cad.dimensions.fold.housing import CLAMP_BAR_MM
 from gelslim_cad.dimensions.housing import CLAMP_CHEEK_MM
 from gelslim_cad.dimensions.seat import LEAST_LIP_MM, POINT_MM
 from gelslim_cad.geometry.part import Part

@@ -64,7 +64,7 @@ def _distorted(lens: LensDistortion, x: Array, y: Array) -> tuple[Array, Array]:
 def image_distances_mm(built: Built, ray: Rays) -> tuple[Array, Array]:
     """Distances (n, m) along the axis of the sagittal and the tangential images of the points.
 
-    Coddington's equations at plane faces, as `fold_focus.seen_point` has them.
+    Coddington's equations at plane faces, as `fold.focus.seen_point` has them.
     """
     cos_squared = 1 / (1 + ray.slope_x**2 + ray.slope_y**2)
     sagittal = tangential = np.zeros_like(cos_squared)

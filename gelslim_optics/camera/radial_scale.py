@@ -3,7 +3,7 @@
 Both models give the distorted image r g(r²) of a ray at the tangent r = tan θ from the axis.
 Brown's polynomial (Brown 1966) is g = 1 + k1 r² + k2 r⁴ + k3 r⁶; that of Kannala and Brandt (2006),
 for wide lenses, is g = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) / r. Both are OpenCV's conventions.
-The functions use only operations that mean the same for an array and a number (`fold_search` and
+The functions use only operations that mean the same for an array and a number (`fold.search` and
 `undistort_kernel` compile them).
 """
 

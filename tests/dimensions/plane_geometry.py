@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.optimize import brentq
 
-from gelslim_cad.dimensions.fold_problem import FoldProblem
+from gelslim_cad.dimensions.fold.problem import FoldProblem
 
 
 class Problem:

@@ -10,7 +10,7 @@ from fold_samples import changed, mini20, shipped
 
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
-from gelslim_cad.dimensions.fold_wishes import EQUAL_MM
+from gelslim_cad.dimensions.fold.wishes import EQUAL_MM
 from gelslim_cad.spec import Spec
 from gelslim_core.yaml.errors import FieldError
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from plane_geometry import Layout, Problem
 
-from gelslim_cad.dimensions.fold import Fold, fold
-from gelslim_cad.dimensions.fold_grids import (
+from gelslim_cad.dimensions.fold.fold import Fold, fold
+from gelslim_cad.dimensions.fold.grids import (
     COARSE,
     LEVELS,
     LOWER,
@@ -19,8 +19,8 @@ from gelslim_cad.dimensions.fold_grids import (
     Best,
     best_of_bands,
 )
-from gelslim_cad.dimensions.fold_mirror import FLATTEST_RAD, STEEPEST_RAD
-from gelslim_cad.dimensions.fold_problem import FoldProblem
+from gelslim_cad.dimensions.fold.mirror import FLATTEST_RAD, STEEPEST_RAD
+from gelslim_cad.dimensions.fold.problem import FoldProblem
 
 COUNT = 400
 SPANS = {

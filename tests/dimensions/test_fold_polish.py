@@ -9,12 +9,12 @@ from stability.legal_specs import distorted, sample
 
 from gelslim_cad.dimensions import derive
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import Fold
-from gelslim_cad.dimensions.fold_goal import BEYOND_MM
-from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
-from gelslim_cad.dimensions.fold_problem import FoldProblem
-from gelslim_cad.dimensions.fold_wishes import EQUAL_MM
-from gelslim_cad.dimensions.small_programs import Largest, Programs, objective, solved
+from gelslim_cad.dimensions.fold.fold import Fold
+from gelslim_cad.dimensions.fold.goal import BEYOND_MM
+from gelslim_cad.dimensions.fold.grids import LOWER, UPPER
+from gelslim_cad.dimensions.fold.problem import FoldProblem
+from gelslim_cad.dimensions.fold.small_programs import Largest, Programs, objective, solved
+from gelslim_cad.dimensions.fold.wishes import EQUAL_MM
 
 WEIGHT = 1e4
 
@@ -97,7 +97,7 @@ def test_brute_force_finds_nothing_thinner(part: int, monkeypatch: pytest.Monkey
 
     Nor of 50 more whose lens distorts.
     """
-    from gelslim_cad.dimensions.fold_search import best_of_grids
+    from gelslim_cad.dimensions.fold.search import best_of_grids
 
     axes = [np.linspace(lo, hi, n)[None] for lo, hi, n in zip(LOWER, UPPER, FINE, strict=True)]
     feasible = 0

@@ -11,15 +11,17 @@ import numpy as np
 import pytest
 from fold_samples import changed, shipped
 
-from gelslim_cad.dimensions import Dimensions, derive_batch, fold_search, solver
+from gelslim_cad.dimensions import Dimensions, derive_batch
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import Fold, fold
-from gelslim_cad.dimensions.fold_goal import BEYOND_MM, INFEASIBLE_MM
-from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
-from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
-from gelslim_cad.dimensions.fold_pieces import measured_by_arrays
-from gelslim_cad.dimensions.fold_polish import LEAST, MOST
-from gelslim_cad.dimensions.fold_problem import FoldProblem
+from gelslim_cad.dimensions.fold import search as fold_search
+from gelslim_cad.dimensions.fold import solver
+from gelslim_cad.dimensions.fold.fold import Fold, fold
+from gelslim_cad.dimensions.fold.goal import BEYOND_MM, INFEASIBLE_MM
+from gelslim_cad.dimensions.fold.grids import LOWER, UPPER
+from gelslim_cad.dimensions.fold.mirror import mirror_angle_rad
+from gelslim_cad.dimensions.fold.pieces import measured_by_arrays
+from gelslim_cad.dimensions.fold.polish import LEAST, MOST
+from gelslim_cad.dimensions.fold.problem import FoldProblem
 
 SPANS = {
     "design.gel.length_mm": (8.0, 60.0),

@@ -14,12 +14,12 @@ from scipy.optimize import differential_evolution
 
 from gelslim_cad.dimensions import Dimensions, derive, derive_batch
 from gelslim_cad.dimensions import view as view_module
-from gelslim_cad.dimensions.fold import fold
-from gelslim_cad.dimensions.fold_goal import BEYOND_MM
-from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
-from gelslim_cad.dimensions.fold_mirror import FLATTEST_RAD, STEEPEST_RAD
-from gelslim_cad.dimensions.fold_problem import FoldProblem
-from gelslim_cad.dimensions.fold_wishes import EQUAL_MM
+from gelslim_cad.dimensions.fold.fold import fold
+from gelslim_cad.dimensions.fold.goal import BEYOND_MM
+from gelslim_cad.dimensions.fold.grids import LOWER, UPPER
+from gelslim_cad.dimensions.fold.mirror import FLATTEST_RAD, STEEPEST_RAD
+from gelslim_cad.dimensions.fold.problem import FoldProblem
+from gelslim_cad.dimensions.fold.wishes import EQUAL_MM
 
 SPREADS: dict[str, tuple[float, float]] = {
     "design.gel.length_mm": (12.0, 35.0),

@@ -12,7 +12,7 @@ import pytest
 from gelslim_cad.checks import Finding
 from gelslim_cad.checks.rule import RULES, rule
 from gelslim_cad.dimensions.dimensions import PATHS
-from gelslim_cad.dimensions.fold import Fold
+from gelslim_cad.dimensions.fold.fold import Fold
 from gelslim_cad.dimensions.registry import REGISTRY, UNITS, Real, dimension
 from gelslim_cad.electronics.circuit import Circuit, Circuits
 from gelslim_cad.geometry.frame_plate import Deflection

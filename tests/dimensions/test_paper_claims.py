@@ -8,7 +8,7 @@ import pytest
 from fold_samples import mini20, shipped
 
 from gelslim_cad.dimensions import derive
-from gelslim_cad.dimensions.fold_wishes import EQUAL_MM
+from gelslim_cad.dimensions.fold.wishes import EQUAL_MM
 
 ANY_BLUR = {"design.optics.blur_per_diameter": 2.0}
 AS_IN_THE_PAPER = {

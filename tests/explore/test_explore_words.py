@@ -11,7 +11,8 @@ import pytest
 from explore_samples import MINI20, mini20, space
 
 from gelslim.cli import main
-from gelslim_cad.dimensions import derive_batch, solver
+from gelslim_cad.dimensions import derive_batch
+from gelslim_cad.dimensions.fold import solver
 from gelslim_cad.explore.judge import judge
 from gelslim_cad.explore.space import ExploreError, parse_axis, shown
 from gelslim_cad.explore.study import Request, explore
@@ -87,7 +88,7 @@ def test_words_do_not_send_a_chunk_to_the_slow_search(monkeypatch: pytest.Monkey
 
 @pytest.mark.slow
 def test_designs_of_one_fold_are_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from gelslim_cad.dimensions import fold_search
+    from gelslim_cad.dimensions.fold import search as fold_search
 
     searched = []
     original = fold_search.search

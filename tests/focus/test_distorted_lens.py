@@ -16,7 +16,7 @@ from thin_lens import ThinLens
 import gelslim
 from gelslim_cad.checks import check
 from gelslim_cad.dimensions import Dimensions, derive
-from gelslim_cad.dimensions.fold_wishes import EQUAL_PX
+from gelslim_cad.dimensions.fold.wishes import EQUAL_PX
 from gelslim_force.calibration.error import CalibrationError
 from ifem_export.bundle.bundle import Bundle
 

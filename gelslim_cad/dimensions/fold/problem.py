@@ -135,7 +135,7 @@ class FoldProblem:
 def larger(a: Any, b: Any) -> Any:
     """The larger of two values.
 
-    `fold_search` compiles this and `smaller` to one comparison each. The functions of numba that
+    `search` compiles this and `smaller` to one comparison each. The functions of numba that
     replace `np.maximum` and `np.minimum` also test for NaN, which takes a fifth more time.
     """
     return np.maximum(a, b)

@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_goal import BEYOND_MM
-from gelslim_cad.dimensions.fold_grids import Best, contenders
-from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
-from gelslim_cad.dimensions.fold_pieces import DEPTHS, LENGTHS, PIXELS, Designs, Measure, scores
-from gelslim_cad.dimensions.fold_polish import Candidates, polished
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold.goal import BEYOND_MM
+from gelslim_cad.dimensions.fold.grids import Best, contenders
+from gelslim_cad.dimensions.fold.mirror import mirror_angle_rad
+from gelslim_cad.dimensions.fold.pieces import DEPTHS, LENGTHS, PIXELS, Designs, Measure, scores
+from gelslim_cad.dimensions.fold.polish import Candidates, polished
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem
 
 EQUAL_MM = 0.05
 """Fingers whose thickness (or length) differs by no more count as equal."""

@@ -16,22 +16,40 @@ from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from gelslim_cad.dimensions import (
-    fold,
-    fold_camera,
-    fold_distortion,
-    fold_focus,
-    fold_goal,
-    fold_housing,
-    fold_mirror,
-    fold_problem,
-    fold_room,
-    fold_sight,
+from gelslim_cad.dimensions.fold import (
+    camera as fold_camera,
 )
-from gelslim_cad.dimensions.fold import camera_depth_mm, depth_mm, measures
-from gelslim_cad.dimensions.fold_camera import camera, pitch_rad, smallest
-from gelslim_cad.dimensions.fold_focus import distances
-from gelslim_cad.dimensions.fold_goal import (
+from gelslim_cad.dimensions.fold import (
+    distortion as fold_distortion,
+)
+from gelslim_cad.dimensions.fold import (
+    focus as fold_focus,
+)
+from gelslim_cad.dimensions.fold import (
+    fold,
+)
+from gelslim_cad.dimensions.fold import (
+    goal as fold_goal,
+)
+from gelslim_cad.dimensions.fold import (
+    housing as fold_housing,
+)
+from gelslim_cad.dimensions.fold import (
+    mirror as fold_mirror,
+)
+from gelslim_cad.dimensions.fold import (
+    problem as fold_problem,
+)
+from gelslim_cad.dimensions.fold import (
+    room as fold_room,
+)
+from gelslim_cad.dimensions.fold import (
+    sight as fold_sight,
+)
+from gelslim_cad.dimensions.fold.camera import camera, pitch_rad, smallest
+from gelslim_cad.dimensions.fold.focus import distances
+from gelslim_cad.dimensions.fold.fold import camera_depth_mm, depth_mm, measures
+from gelslim_cad.dimensions.fold.goal import (
     FEASIBLE,
     INFEASIBLE_MM,
     besides_depth,
@@ -39,17 +57,17 @@ from gelslim_cad.dimensions.fold_goal import (
     score,
     tie_mm,
 )
-from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_of_bands
-from gelslim_cad.dimensions.fold_housing import housing_missed, tip_x_mm
-from gelslim_cad.dimensions.fold_mirror import (
+from gelslim_cad.dimensions.fold.grids import STARTS, Best, best_of_bands
+from gelslim_cad.dimensions.fold.housing import housing_missed, tip_x_mm
+from gelslim_cad.dimensions.fold.mirror import (
     mirror,
     mirror_angle_rad,
     mirror_depth_mm,
     reflected,
 )
-from gelslim_cad.dimensions.fold_pieces import MEASURED, Measure
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
-from gelslim_cad.dimensions.fold_room import (
+from gelslim_cad.dimensions.fold.pieces import MEASURED, Measure
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.room import (
     SCALE_MM,
     camera_below_window,
     camera_beside_view,
@@ -60,7 +78,7 @@ from gelslim_cad.dimensions.fold_room import (
     mirror_below_window,
     view_below_ledge,
 )
-from gelslim_cad.dimensions.fold_sight import (
+from gelslim_cad.dimensions.fold.sight import (
     field_missed,
     keystone,
     least_px,

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
-from gelslim_cad.dimensions.fold_sight import Sight
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.sight import Sight
 
 Corners = tuple[Array, Array, Array, Array, Array, Array]
 """A coordinate of the barrel's front, the housing's front and its rear: upper, lower corner."""

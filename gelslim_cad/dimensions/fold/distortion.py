@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_focus import SeenPoint
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.focus import SeenPoint
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
 from gelslim_optics.camera.radial_scale import radial_scale
 from gelslim_optics.camera.refraction_newton import choose, newton_slope
 

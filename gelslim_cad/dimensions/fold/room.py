@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_camera import Camera, distance_outside_mm, largest
-from gelslim_cad.dimensions.fold_mirror import Mirror, height_over_mm, lower_end_x_mm
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
-from gelslim_cad.dimensions.fold_sight import Sight, near_edge_x_mm
+from gelslim_cad.dimensions.fold.camera import Camera, distance_outside_mm, largest
+from gelslim_cad.dimensions.fold.mirror import Mirror, height_over_mm, lower_end_x_mm
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.sight import Sight, near_edge_x_mm
 from gelslim_optics.camera.refraction_newton import choose
 
 SCALE_MM = 10

@@ -4,9 +4,9 @@ Coordinates x (towards the tip) and z (out of the gel) of the sensor frame. A ca
 by the air angles of the two marginal rays that end on the gel's edges and by the mirror angle;
 everything else follows in closed form, exact refraction included (docs/physics.md).
 
-Every field is an array; candidates broadcast against designs. The functions of `fold_focus`,
-`fold_distortion`, `fold_sight`, `fold_mirror`, `fold_camera` and `fold_room` are written once for
-arrays and for single numbers: `fold_search` compiles them (each module's `SHARED`) to score one
+Every field is an array; candidates broadcast against designs. The functions of `focus`,
+`distortion`, `sight`, `mirror`, `camera` and `room` are written once for
+arrays and for single numbers: `search` compiles them (each module's `SHARED`) to score one
 candidate after the other.
 """
 
@@ -17,25 +17,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions import fold_room as room
-from gelslim_cad.dimensions.fold_camera import Camera, camera, largest, pitch_rad, smallest
-from gelslim_cad.dimensions.fold_focus import Distances, distances
-from gelslim_cad.dimensions.fold_goal import besides_depth, beyond_mm, score, tie_mm
-from gelslim_cad.dimensions.fold_housing import (
+from gelslim_cad.dimensions.fold import room
+from gelslim_cad.dimensions.fold.camera import Camera, camera, largest, pitch_rad, smallest
+from gelslim_cad.dimensions.fold.focus import Distances, distances
+from gelslim_cad.dimensions.fold.goal import besides_depth, beyond_mm, score, tie_mm
+from gelslim_cad.dimensions.fold.housing import (
     HousingMissed,
     finger_length_mm,
     finger_lengths_mm,
     housing_missed,
 )
-from gelslim_cad.dimensions.fold_mirror import (
+from gelslim_cad.dimensions.fold.mirror import (
     Mirror,
     mirror,
     mirror_depth_mm,
     mirror_half_width_mm,
     reflected,
 )
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
-from gelslim_cad.dimensions.fold_sight import (
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger
+from gelslim_cad.dimensions.fold.sight import (
     Sight,
     edge_scales,
     field_missed,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_distortion import (
+from gelslim_cad.dimensions.fold.distortion import (
     FAR,
     NEAR,
     Edge,
@@ -20,7 +20,7 @@ from gelslim_cad.dimensions.fold_distortion import (
     one_point,
     sides_reach,
 )
-from gelslim_cad.dimensions.fold_focus import (
+from gelslim_cad.dimensions.fold.focus import (
     Distances,
     SeenBorder,
     across_scale,
@@ -30,7 +30,7 @@ from gelslim_cad.dimensions.fold_focus import (
     image_distance_mm,
     seen_point,
 )
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
 from gelslim_optics.camera.refraction_newton import apparent_height, choose
 
 LEAST_AIR_MM = 1.0

@@ -6,7 +6,7 @@ shortest, the one with the most pixels across a marker, or a weighted sum of the
 
 from __future__ import annotations
 
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger
 from gelslim_optics.camera.refraction_newton import choose
 
 FEASIBLE = 1e-9

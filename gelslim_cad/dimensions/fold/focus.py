@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
 from gelslim_optics.camera.refraction_newton import choose
 
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.dimensions.fold import HOUSING_LIMITS, VIEW_LIMITS, measures
-from gelslim_cad.dimensions.fold_goal import besides_depth, beyond_mm, score
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold.fold import HOUSING_LIMITS, VIEW_LIMITS, measures
+from gelslim_cad.dimensions.fold.goal import besides_depth, beyond_mm, score
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem
 
 Designs = NDArray[np.intp]
 Measure = Callable[[Designs, Array], Array]

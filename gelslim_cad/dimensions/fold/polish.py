@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.dimensions.fold_goal import BEYOND_MM, FEASIBLE, LENGTH_TIE
-from gelslim_cad.dimensions.fold_grids import LOWER, UPPER
-from gelslim_cad.dimensions.fold_mirror import FLATTEST_RAD, STEEPEST_RAD
-from gelslim_cad.dimensions.fold_pieces import (
+from gelslim_cad.dimensions.fold.goal import BEYOND_MM, FEASIBLE, LENGTH_TIE
+from gelslim_cad.dimensions.fold.grids import LOWER, UPPER
+from gelslim_cad.dimensions.fold.mirror import FLATTEST_RAD, STEEPEST_RAD
+from gelslim_cad.dimensions.fold.pieces import (
     CLASHES,
     DEPTHS,
     ENVELOPE,
@@ -27,9 +27,9 @@ from gelslim_cad.dimensions.fold_pieces import (
     Pieces,
     scores,
 )
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
-from gelslim_cad.dimensions.fold_room import SCALE_MM
-from gelslim_cad.dimensions.small_programs import Largest, Programs, objective, solved
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold.room import SCALE_MM
+from gelslim_cad.dimensions.fold.small_programs import Largest, Programs, objective, solved
 
 STEPS = 40
 FIRST_RADIUS, LARGEST_RADIUS, LEAST_RADIUS = 0.03, 0.2, 1e-6

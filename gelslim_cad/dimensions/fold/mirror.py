@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem, larger, smaller
-from gelslim_cad.dimensions.fold_sight import Sight, far_edge_x_mm
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.sight import Sight, far_edge_x_mm
 
 FLATTEST_RAD = float(np.radians(12.0))
 STEEPEST_RAD = float(np.radians(50.0))

@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gelslim_cad.dimensions.fold_camera import Camera, largest, lens_front_mm
-from gelslim_cad.dimensions.fold_mirror import (
+from gelslim_cad.dimensions.fold.camera import Camera, largest, lens_front_mm
+from gelslim_cad.dimensions.fold.mirror import (
     Mirror,
     lower_end_x_mm,
     mirror_half_width_mm,
 )
-from gelslim_cad.dimensions.fold_problem import NO_LIMIT_MM, Array, FoldProblem, larger, smaller
-from gelslim_cad.dimensions.fold_sight import Sight
+from gelslim_cad.dimensions.fold.problem import NO_LIMIT_MM, Array, FoldProblem, larger, smaller
+from gelslim_cad.dimensions.fold.sight import Sight
 from gelslim_cad.dimensions.registry import Real
 from gelslim_optics.camera.refraction_newton import choose
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.dimensions.fold_goal import BEYOND_MM, INFEASIBLE_MM
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold.goal import BEYOND_MM, INFEASIBLE_MM
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem
 
 LOWER = np.array([np.radians(-12.0), 0.25, np.radians(20.0)])
 UPPER = np.array([np.radians(58.0), 1.0, np.radians(56.0)])

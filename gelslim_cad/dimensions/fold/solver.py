@@ -1,6 +1,6 @@
 """The thinnest finger that lets the camera see the gel: a deterministic search over folds.
 
-`fold_grids` says where to look. Infeasible candidates rank by how far they miss, so that slivers of
+`grids` says where to look. Infeasible candidates rank by how far they miss, so that slivers of
 feasible designs are found and a hopeless design ends at its least bad fold, which the design rules
 then report.
 """
@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_cad.dimensions.fold import Fold, fold
-from gelslim_cad.dimensions.fold_grids import STARTS, Best, best_of_bands
-from gelslim_cad.dimensions.fold_mirror import mirror_angle_rad
-from gelslim_cad.dimensions.fold_pieces import measured_by_arrays
-from gelslim_cad.dimensions.fold_problem import Array, FoldProblem
-from gelslim_cad.dimensions.fold_wishes import closest
+from gelslim_cad.dimensions.fold.fold import Fold, fold
+from gelslim_cad.dimensions.fold.grids import STARTS, Best, best_of_bands
+from gelslim_cad.dimensions.fold.mirror import mirror_angle_rad
+from gelslim_cad.dimensions.fold.pieces import measured_by_arrays
+from gelslim_cad.dimensions.fold.problem import Array, FoldProblem
+from gelslim_cad.dimensions.fold.wishes import closest
 
 CHUNK = 64
 COMPILED_FROM = 200
@@ -69,7 +69,7 @@ def solve_fold(problem: FoldProblem) -> Fold:
 def _solve_compiled(problem: FoldProblem) -> Fold:
     from concurrent.futures import ThreadPoolExecutor
 
-    from gelslim_cad.dimensions.fold_search import measured, search
+    from gelslim_cad.dimensions.fold.search import measured, search
 
     def best_of(piece: FoldProblem) -> Array:
         return closest(piece, search(piece), measured)

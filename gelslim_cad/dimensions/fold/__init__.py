@@ -1,0 +1,1 @@
+"""The fold of the line of sight: camera, mirror and gel, solved for the thinnest finger."""
