@@ -8,36 +8,36 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from gelslim.cli.commands.bench import bench
-from gelslim.cli.commands.build import build
-from gelslim.cli.commands.bundle import bundle, bundle_export, bundle_info
-from gelslim.cli.commands.calibrate import calibrate
-from gelslim.cli.commands.calibrate_gel import calibrate_gel
-from gelslim.cli.commands.calibrate_light import calibrate_light
-from gelslim.cli.commands.calibrate_look import calibrate_look
-from gelslim.cli.commands.cameras import cameras
-from gelslim.cli.commands.check import check
-from gelslim.cli.commands.derive import derive
-from gelslim.cli.commands.diff import diff
-from gelslim.cli.commands.doctor import doctor
-from gelslim.cli.commands.explain import explain
-from gelslim.cli.commands.explore import explore
-from gelslim.cli.commands.family import family
-from gelslim.cli.commands.force import force
-from gelslim.cli.commands.grippers import grippers
-from gelslim.cli.commands.light import light
-from gelslim.cli.commands.markers import markers
-from gelslim.cli.commands.new import examples, new
-from gelslim.cli.commands.optimise import optimise
-from gelslim.cli.commands.plan import plan
-from gelslim.cli.commands.schema import schema
-from gelslim.cli.commands.score import score
-from gelslim.cli.commands.simulate import simulate
-from gelslim.cli.commands.thinner import thinner
-from gelslim.cli.commands.tolerance import tolerance
-from gelslim.cli.commands.track import track
-from gelslim.cli.commands.validate import validate
-from gelslim.cli.commands.view import view
+from gelslim.cli.commands.design.cameras import cameras
+from gelslim.cli.commands.design.check import check
+from gelslim.cli.commands.design.derive import derive
+from gelslim.cli.commands.design.diff import diff
+from gelslim.cli.commands.design.explain import explain
+from gelslim.cli.commands.design.explore import explore
+from gelslim.cli.commands.design.grippers import grippers
+from gelslim.cli.commands.design.new import examples, new
+from gelslim.cli.commands.design.optimise import optimise
+from gelslim.cli.commands.design.thinner import thinner
+from gelslim.cli.commands.design.view import view
+from gelslim.cli.commands.files.build import build
+from gelslim.cli.commands.files.bundle import bundle, bundle_export, bundle_info
+from gelslim.cli.commands.files.family import family
+from gelslim.cli.commands.files.markers import markers
+from gelslim.cli.commands.measure.calibrate import calibrate
+from gelslim.cli.commands.measure.calibrate_gel import calibrate_gel
+from gelslim.cli.commands.measure.calibrate_light import calibrate_light
+from gelslim.cli.commands.measure.calibrate_look import calibrate_look
+from gelslim.cli.commands.measure.force import force
+from gelslim.cli.commands.measure.score import score
+from gelslim.cli.commands.measure.track import track
+from gelslim.cli.commands.program.bench import bench
+from gelslim.cli.commands.program.doctor import doctor
+from gelslim.cli.commands.program.schema import schema
+from gelslim.cli.commands.trial.light import light
+from gelslim.cli.commands.trial.plan import plan
+from gelslim.cli.commands.trial.simulate import simulate
+from gelslim.cli.commands.trial.tolerance import tolerance
+from gelslim.cli.commands.trial.validate import validate
 from gelslim.cli.main import carried
 from gelslim_core import __version__
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gelslim.cli.commands.simulate import _report
+from gelslim.cli.commands.trial.simulate import _report
 
 ANSWER = {
     "poses_solved": 4, "frames_drawn": 4, "frames_kept": 0, "seconds_in_all": 1.0,

@@ -134,7 +134,7 @@ def test_an_answer_keeps_the_error_asked_for(capsys: pytest.CaptureFixture[str])
 def test_extrapolated_rays_that_miss_are_told(
     finger: Dimensions, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from gelslim.cli.commands.light import _note_missed
+    from gelslim.cli.commands.trial.light import _note_missed
 
     study = study_light(finger, rays=2048, curve=False)
     half = max(half_widths(study.light))

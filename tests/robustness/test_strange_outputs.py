@@ -9,7 +9,7 @@ import pytest
 from sweep_commands import MINI20
 
 from gelslim.cli import main
-from gelslim.cli.commands.validate import PLOTS, picture_name, picture_names
+from gelslim.cli.commands.trial.validate import PLOTS, picture_name, picture_names
 from gelslim.scene_sensor import spec_bundle
 from gelslim_cad.build.folder import require_ours
 from gelslim_core.errors import OutputError

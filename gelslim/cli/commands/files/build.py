@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gelslim.cli.answer import RULE_FAILED, print_json, progress_bar, say
-from gelslim.cli.commands.check import print_problems
+from gelslim.cli.commands.design.check import print_problems
 from gelslim.cli.options import AsJson, SpecFile, out_folder
 
 if TYPE_CHECKING:

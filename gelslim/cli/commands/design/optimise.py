@@ -19,7 +19,7 @@ from gelslim.cli.answer import (
     say,
     table,
 )
-from gelslim.cli.commands.explore import Jobs, NoisePx, Rays, Scheduler, Vary
+from gelslim.cli.commands.design.explore import Jobs, NoisePx, Rays, Scheduler, Vary
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, SpecFile, out_folder
 from gelslim.cli.output import replace_file, require_own_file

@@ -10,7 +10,7 @@ import typer
 
 from gelslim.cli.answer import print_json, progress_bar, say
 from gelslim.cli.budget import PoseTime, SceneError, budgeted_scene
-from gelslim.cli.commands.plan import SceneFile
+from gelslim.cli.commands.trial.plan import SceneFile
 from gelslim.cli.options import AsJson, out_folder
 
 

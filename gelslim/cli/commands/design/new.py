@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gelslim.cli.answer import console, print_json, table
-from gelslim.cli.commands.schema import SCHEMA_FILES, schema_text
+from gelslim.cli.commands.program.schema import SCHEMA_FILES, schema_text
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson
 from gelslim.cli.output import replace_file, require_own_file

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gelslim.cli.answer import OK, RULE_FAILED, console, indented, number, print_json, say
-from gelslim.cli.commands.explore import NoisePx, Rays
+from gelslim.cli.commands.design.explore import NoisePx, Rays
 from gelslim.cli.failure import CommandError
 from gelslim.cli.options import AsJson, SpecFile
 from gelslim.cli.price_table import figure_text, per_cent, price_record

@@ -1,0 +1,1 @@
+"""Commands that design a finger, and that search for one."""

@@ -1,0 +1,1 @@
+"""Commands that calibrate a built sensor and measure with it."""

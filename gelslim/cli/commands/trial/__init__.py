@@ -1,0 +1,1 @@
+"""Commands that try a finger before it is built."""
