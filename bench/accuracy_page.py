@@ -17,16 +17,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import accuracy_text
-from accuracy_figure import drawn
-from accuracy_text import conclusion, table
 from bench_data import DOCS, write_data, write_whole
-from ladder_record import LadderRecord, records_of
-from ladders_of_camera import camera
-from ladders_of_force import force
-from ladders_of_solids import light, stiffness, tessellation
-from ladders_of_sources import sources
-from ladders_of_twin import rendering, twin
+from page import accuracy_text
+from page.accuracy_figure import drawn
+from page.accuracy_text import conclusion, table
+from page.ladder_record import LadderRecord, records_of
+from page.ladders_of_camera import camera
+from page.ladders_of_force import force
+from page.ladders_of_solids import light, stiffness, tessellation
+from page.ladders_of_sources import sources
+from page.ladders_of_twin import rendering, twin
 
 Convert = Callable[[Mapping[str, Any], Mapping[str, Any]], list[LadderRecord]]
 SOURCES: dict[str, Convert] = {

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
+from rigs.machine import machine
 
 SIZES = ((42, 42, 1), (100, 100, 4), (128, 128, 8))
 SIZE_MM = (0.5, 0.5, 0.5)

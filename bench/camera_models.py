@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
+from models.thick_lens import DISTORTION, PUPIL, SEPARATION, ThickLens, centroids_px
+from models.thin_lens import ThinLens
 from numpy.typing import NDArray
-from thick_lens import DISTORTION, PUPIL, SEPARATION, ThickLens, centroids_px
-from thin_lens import ThinLens
+from rigs.machine import machine
 
 import gelslim
 from gelslim_cad.dimensions import Dimensions, derive

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data, write_whole
-from drawn_light_table import table
-from machine import installed, machine
-from mitsuba_finger import Meshes, film_camera, finger_shapes, rendered, renderer, sheet
+from models.mitsuba_finger import Meshes, film_camera, finger_shapes, rendered, renderer, sheet
 from numpy.typing import NDArray
+from page.drawn_light_table import table
+from rigs.machine import installed, machine
 
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.optics import guide_profile, virtual_camera

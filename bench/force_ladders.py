@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import DOCS, write_data, write_whole
-from force_ladder_fields import METHODS, OPERATORS, compensation, interpolation, operators
-from force_ladder_markers import LOOKS, MISSING, SPURIOUS, detection, matching
-from force_rig import SEED, small_rig
-from machine import machine
+from rigs.force_ladder_fields import METHODS, OPERATORS, compensation, interpolation, operators
+from rigs.force_ladder_markers import LOOKS, MISSING, SPURIOUS, detection, matching
+from rigs.force_rig import SEED, small_rig
+from rigs.machine import machine
 
 Rows = list[dict[str, Any]]
 LADDERS = {

@@ -26,11 +26,11 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from force_ladder_markers import nearest_dots
-from force_rig import SEED, Rig, large_rig, shares, small_rig
-from force_trackers import tracker_chain, trackers
-from machine import machine
 from numpy.typing import NDArray
+from rigs.force_ladder_markers import nearest_dots
+from rigs.force_rig import SEED, Rig, large_rig, shares, small_rig
+from rigs.force_trackers import tracker_chain, trackers
+from rigs.machine import machine
 
 from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate

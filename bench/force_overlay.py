@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from force_rig import NORMAL_N, SHEAR_N, large_rig
 from PIL import Image
+from rigs.force_rig import NORMAL_N, SHEAR_N, large_rig
 
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.outputs.arrow_scale import scale_of_run

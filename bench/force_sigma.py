@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data, write_whole
-from machine import machine
 from numpy.typing import NDArray
+from rigs.machine import machine
 from scipy.stats import norm
 
 Array = NDArray[np.float64]

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 from bench_data import write_data
-from facets import facetted_profile
-from light_ratios import changes, earlier, ratios
-from light_rays_figure import draw
-from machine import machine
+from models.facets import facetted_profile
+from models.light_ratios import changes, earlier, ratios
+from page.light_rays_figure import draw
+from rigs.machine import machine
 
 from gelslim_cad.light.study import RAYS
 from gelslim_optics.guide.profile import Arc, Edge, GuideProfile, Segment

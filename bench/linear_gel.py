@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
 from numpy.typing import NDArray
+from rigs.machine import machine
 from threadpoolctl import threadpool_limits
 
 from gelslim_twin.contact.gel_state import GelState

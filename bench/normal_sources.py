@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from force_rig import SEED
-from machine import machine
 from numpy.typing import NDArray
+from rigs.force_rig import SEED
+from rigs.machine import machine
 
 TESTS = Path(__file__).parents[1] / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "force")]

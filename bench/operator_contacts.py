@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
 from numpy.typing import NDArray
+from rigs.machine import machine
 from stiffness_cases import gel
 
 from ifem_export.bundle.bundle import build_bundle

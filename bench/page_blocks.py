@@ -17,19 +17,21 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import drawn_light_table
 import force_sigma
-import force_tables
 import linear_gel
-import page_tables
-import planning_figure
-import tolerance_tables
 import twin_fine
 import twin_look
 import twin_skin
 import twin_steps
-import twin_tables
 from bench_data import DOCS, write_whole
+from page import (
+    drawn_light_table,
+    force_tables,
+    page_tables,
+    planning_figure,
+    tolerance_tables,
+    twin_tables,
+)
 
 ROOT = DOCS.parent
 sys.path.insert(0, str(ROOT / "tools"))

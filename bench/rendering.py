@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
 from numpy.typing import NDArray
-from sampled_dots import SampledRenderer
+from rigs.machine import machine
+from rigs.sampled_dots import SampledRenderer
 from scipy.spatial import cKDTree
 
 from gelslim_force.detection.detection import Detector

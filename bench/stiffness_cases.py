@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
 from numpy.typing import NDArray
+from rigs.machine import machine
 
 from ifem_export.elements.hex8 import hex8_stiffness
 from ifem_export.elements.material import Material

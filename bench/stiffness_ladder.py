@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import DOCS, write_data, write_whole
-from machine import machine
+from rigs.machine import machine
 
 from ifem_export.elements.hex8 import Formulation
 from ifem_export.elements.material import Material

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
-from surface_deviation import deviation_um
+from models.surface_deviation import deviation_um
+from rigs.machine import machine
 
 from gelslim_cad.build.work import VOLUME_TOLERANCE
 from gelslim_cad.dimensions import derive

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import DOCS, write_data
-from machine import machine
+from rigs.machine import machine
 
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec

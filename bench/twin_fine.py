@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
+from rigs.machine import machine
 from threadpoolctl import threadpool_limits
 
 from gelslim_twin.contact.fine_contact import FineContact

@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import DOCS, write_data, write_whole
-from machine import machine
-from twin_contact import layer_ladder, solver_ladders
-from twin_gallery import drops, effect_rows
-from twin_overhead import overhead
-from twin_rig import SPEC, KeptBench, gallery, kept_sensor
+from rigs.machine import machine
+from rigs.twin_contact import layer_ladder, solver_ladders
+from rigs.twin_gallery import drops, effect_rows
+from rigs.twin_overhead import overhead
+from rigs.twin_rig import SPEC, KeptBench, gallery, kept_sensor
 
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.sensor import TwinSensor
@@ -115,8 +115,8 @@ def keep(docs: Path | None, name: str, found: dict[str, Any]) -> None:
 
 def finish(docs: Path) -> None:
     """Figures of what has been measured, and the guide's tables."""
+    from page.twin_figures import draw_contact, draw_scenes
     from page_blocks import fill_pages
-    from twin_figures import draw_contact, draw_scenes
 
     data = held(docs)
     if "drops" in data:

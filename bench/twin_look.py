@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data, write_whole
-from machine import machine
 from numpy.typing import NDArray
+from rigs.machine import machine
 
 TESTS = Path(__file__).parents[1] / "tests"
 SEED = 3

@@ -23,12 +23,12 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import DOCS, write_data, write_whole
-from machine import machine
+from rigs.machine import machine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "twin"))
 
-from planning_cases import Case, Run, measured, prepared
-from twin_rig import gallery, kept_sensor, plan_key
+from rigs.planning_cases import Case, Run, measured, prepared
+from rigs.twin_rig import gallery, kept_sensor, plan_key
 
 from gelslim_twin.contact.gel_state import ContactError
 
@@ -148,8 +148,8 @@ def line(row: dict[str, Any]) -> str:
 
 def finish(docs: Path) -> None:
     """The figure, and the guide's table."""
+    from page.planning_figure import draw
     from page_blocks import fill_pages
-    from planning_figure import draw
 
     cases = held(docs)
     write_whole(docs / "images" / f"{NAME}.png", draw(cases))

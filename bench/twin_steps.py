@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 from bench_data import DOCS, write_data
-from machine import machine
 from numpy.typing import NDArray
+from rigs.machine import machine
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 

@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from bench_data import write_data
-from machine import machine
 from page_blocks import fill_pages
+from rigs.machine import machine
 
 ROOT = Path(__file__).parents[1]
 SPEC = "designs/gelslim2.yaml"

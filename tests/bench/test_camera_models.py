@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from bench_data import DOCS
 from camera_models import DESIGNS, Scene, calibrated, designed, errors, flat, known
-from ladders_of_camera import KNOWN
-from thick_lens import DISTORTION, ThickLens
-from thin_lens import ThinLens
+from models.thick_lens import DISTORTION, ThickLens
+from models.thin_lens import ThinLens
+from page.ladders_of_camera import KNOWN
 
 from gelslim_cad.dimensions import derive
 from gelslim_cad.spec.reader import read_spec

@@ -13,9 +13,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
-from accuracy_figure import drawn
-from accuracy_text import beating, table
-from ladder_record import LadderRecord, RungRecord
+from page.accuracy_figure import drawn
+from page.accuracy_text import beating, table
+from page.ladder_record import LadderRecord, RungRecord
 
 
 def some_ladder(kind: Any = "ladder", **changes: Any) -> LadderRecord:

@@ -19,8 +19,8 @@ sys.path.insert(0, str(ROOT / "bench"))
 
 import accuracy_page  # noqa: E402
 import stiffness_cases  # noqa: E402
-from ladder_record import LadderRecord  # noqa: E402
 from light_rays import led_scene  # noqa: E402
+from page.ladder_record import LadderRecord  # noqa: E402
 
 MACHINE = ("machine", "system", "processor", "cores", "threads", "python", "numpy", "scipy",
            "numba", "seed")  # fmt: skip
@@ -130,8 +130,8 @@ def test_light_is_traced_again() -> None:
 
 
 def test_matching_is_tried_again() -> None:
-    from force_ladder_markers import nearest_dots, rest_lattice, shot
-    from force_rig import SEED, small_rig
+    from rigs.force_ladder_markers import nearest_dots, rest_lattice, shot
+    from rigs.force_rig import SEED, small_rig
 
     from gelslim_force.tracking.matching import match
 

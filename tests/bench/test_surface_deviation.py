@@ -13,7 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 cq = pytest.importorskip("cadquery")
 
-from surface_deviation import deviation_um, lattice  # noqa: E402
+from models.surface_deviation import deviation_um, lattice  # noqa: E402
 
 from gelslim_cad.export.mesh import face_patches  # noqa: E402
 

@@ -14,8 +14,8 @@ sys.path.insert(0, str(ROOT / "tools"))
 import accuracy_page
 import gallery
 import page_blocks
-from accuracy_figure import KEY, digest
-from ladder_record import LadderRecord, records_of
+from page.accuracy_figure import KEY, digest
+from page.ladder_record import LadderRecord, records_of
 
 
 @pytest.mark.parametrize("name", page_blocks.PAGES)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 from dimensions.fold_samples import USUAL, changed, shipped
+from models.thin_lens import ThinLens
 from sampled import quick
 from test_lens_as_built import DESIGNS, calibrated, seen_at, seen_by_calibration
-from thin_lens import ThinLens
 
 import gelslim
 from gelslim_cad.checks import check

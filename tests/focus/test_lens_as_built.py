@@ -8,9 +8,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from chessboard import measured_lens
+from models.thin_lens import ThinLens
 from numpy.typing import NDArray
 from scipy.optimize import root
-from thin_lens import ThinLens
 
 import gelslim
 from gelslim_cad.dimensions import Dimensions, derive

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models.thin_lens import ThinLens
 from stability.legal_specs import Sample, sample
 from test_lens_as_built import (
     corners_are_where_the_rule_has_them,
     is_blurred_as_the_rule_says,
     seen_by_calibration,
 )
-from thin_lens import ThinLens
 
 import gelslim
 from gelslim_cad.checks import check

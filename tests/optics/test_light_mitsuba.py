@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from facets import facetted_profile
 from light_cases import N_ACRYLIC, N_GEL, finger
+from models.facets import facetted_profile
 from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 from shapely.geometry.polygon import orient

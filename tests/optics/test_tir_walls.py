@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tir_march
-from facets import facetted_profile
+from models.facets import facetted_profile
 from sampled import quick
 from tir_march import ARRIVED, LEAKED, LOST
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from facets import facetted_profile
 from light_cases import COATS, N_ACRYLIC, bend_scene, lone_bend, loop, media, slab
+from models.facets import facetted_profile
 from sampled import quick
 
 from gelslim_optics.light.result import LightResult

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models.thin_lens import ThinLens
 from numpy.typing import NDArray
 from scipy.optimize import root
-from thin_lens import ThinLens
 from tolerance_samples import NAMES, drawn, exact, spec
 
 from gelslim_cad.dimensions import Dimensions, derive

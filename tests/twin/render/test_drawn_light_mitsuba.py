@@ -14,7 +14,7 @@ pytest.importorskip(
     reason="Mitsuba 3 is absent: the drawn light was NOT checked against it (extra `mitsuba`)",
 )
 import drawn_light
-from mitsuba_finger import renderer
+from models.mitsuba_finger import renderer
 
 pytestmark = pytest.mark.slow
 SAMPLES = 1.0 if os.environ.get("DRJIT_LIBLLVM_PATH") else 0.15

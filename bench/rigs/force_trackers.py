@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from force_ladder_markers import blob_detector, nearest_dots
 from numpy.typing import NDArray
 
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.render.frame_renderer import RenderedFrame
+from rigs.force_ladder_markers import blob_detector, nearest_dots
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]

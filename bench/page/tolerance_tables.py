@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bench_data import DOCS
-from page_tables import table
+
+from page.page_tables import table
 
 Data = Mapping[str, Any]
 

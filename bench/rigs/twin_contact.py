@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from twin_rig import SCENES, turns_ms
 
 from gelslim_twin.contact.gel_state import ContactError
 from gelslim_twin.contact.solver import ContactSettings, ContactSolver
@@ -26,6 +25,7 @@ from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.mesh.pad_mesh import PadMesh
+from rigs.twin_rig import SCENES, turns_ms
 
 Array = NDArray[np.float64]
 Rows = list[dict[str, Any]]

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from twin_effects import MECHANICS, Bench
 
 from gelslim.scene_sensor import spec_bundle
 from gelslim_twin.contact.gel_state import GelState
@@ -22,8 +21,9 @@ from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, store_sensor, stored_sensor
+from rigs.twin_effects import MECHANICS, Bench
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "designs" / "gelslim2.yaml"
 SCENES = ROOT / "designs" / "scenes"
 QUICK = ("press_sphere", "release")

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from force_rig import SEED, Rig
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -20,6 +19,7 @@ from gelslim_twin.render.frame_renderer import RenderedFrame
 from gelslim_twin.render.image_sensor import SensorNoise
 from gelslim_twin.render.look import Look
 from gelslim_twin.render.shading import Shading
+from rigs.force_rig import SEED, Rig
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

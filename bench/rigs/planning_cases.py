@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 import numpy as np
 from agreement import Outcome, Trial
 from random_contact_scenes import random_contact
-from twin_rig import mechanics_key
 
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
@@ -28,6 +27,7 @@ from gelslim_twin.simulation.scene_mechanics import mechanics_of
 from gelslim_twin.simulation.scene_task import planned
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.compliance.columns import SurfaceCompliance
+from rigs.twin_rig import mechanics_key
 
 Made = TypeVar("Made")
 LONGER = 4

@@ -7,8 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from force_ladder_markers import median_ms
-from force_rig import GEL, SEED, Rig
 from numpy.typing import NDArray
 from scipy.interpolate import (
     CloughTocher2DInterpolator,
@@ -25,6 +23,8 @@ from gelslim_force.motion.surface_motion import SurfaceMotion
 from ifem_export.bundle.bundle import Bundle, build_bundle
 from ifem_export.operators.ladder import lumped, refined
 from ifem_export.operators.surface_operator import SurfaceOperator
+from rigs.force_ladder_markers import median_ms
+from rigs.force_rig import GEL, SEED, Rig
 
 Array = NDArray[np.float64]
 Interpolate = Callable[[Array], Array]

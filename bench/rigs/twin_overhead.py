@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from twin_rig import SCENES, TwinSensor
 
 from gelslim_core.files.replaced_file import json_bytes, replace_file
 from gelslim_force.outputs.canvas import encoded
@@ -35,6 +34,7 @@ from gelslim_twin.simulation.sensor import BUNDLE
 from gelslim_twin.simulation.simulate import Ledger, simulate
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
+from rigs.twin_rig import SCENES, TwinSensor
 
 SCENE = "shear_sphere"
 """Thirty poses in a linear gel with pictures: quick stages, in which overhead shows most."""

@@ -1,0 +1,1 @@
+"""What the accuracy page is made of: records of ladders, tables, figures, sentences."""
