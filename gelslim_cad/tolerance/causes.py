@@ -15,6 +15,8 @@ from gelslim_cad.geometry.lookup import Lookup
 
 Array = NDArray[np.float64]
 Distribution = Literal["uniform", "triangular", "normal"]
+Table = dict[str, list[tuple[str, str, Distribution, float]]]
+"""Name, words, distribution and spread of the causes of each group."""
 LEAST_U = 1e-12
 DEVIATION = {"uniform": 1 / np.sqrt(3), "triangular": 1 / np.sqrt(6), "normal": 1.0}
 """Standard deviation of each distribution over its spread."""
@@ -126,14 +128,27 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
     Returns:
         The causes, in a fixed order.
     """
+    table = {
+        **_of_camera(d),
+        **_of_mirror_and_guide(d),
+        **_of_lens(d),
+        **_of_gel(d),
+        **_of_light(d),
+    }
+    return tuple(
+        Cause(name, group, words, distribution, float(spread))
+        for group in GROUPS
+        for name, words, distribution, spread in table[group]
+    )
+
+
+def _of_camera(d: Lookup) -> Table:
     width, height = d["camera.module_width_mm"], d["camera.module_height_mm"]
-    glass, printed = d["mirror.length_mm"], d["manufacturing.print_tolerance_mm"]
-    flat = flatness_mm(d)
+    flat, printed = flatness_mm(d), d["manufacturing.print_tolerance_mm"]
     rests: Distribution = "triangular" if seated(d) else "uniform"
     gap = flat if seated(d) else d["clamp.play_mm"]
     seat, seat_turn = (np.degrees(2 * flat / side) for side in (height, width))
-    tilts = [np.degrees(2 * flat / side) for side in (glass, d["mirror.width_mm"])]
-    table: dict[str, list[tuple[str, str, Distribution, float]]] = {
+    return {
         "camera in its clamp": [
             ("rock_pitch_deg", "pitch", rests, d["clamp.pitch_tilt_deg"]),
             ("rock_yaw_deg", "yaw", rests, d["clamp.yaw_tilt_deg"]),
@@ -151,6 +166,18 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
             ("clamp_z_mm", "height of the clamp", "uniform", printed),
             ("body_z_mm", "height of the body", "uniform", printed),
         ],
+        "alignment": [
+            (f"align_{axis}_px", words, "uniform", d["tolerance.alignment_px"])
+            for axis, words in (("u", "across"), ("v", "along"), ("roll", "turn"))
+        ],
+    }
+
+
+def _of_mirror_and_guide(d: Lookup) -> Table:
+    printed, flat = d["manufacturing.print_tolerance_mm"], flatness_mm(d)
+    sides = (d["mirror.length_mm"], d["mirror.width_mm"])
+    tilts = [np.degrees(2 * flat / side) for side in sides]
+    return {
         "mirror angle and seat": [
             ("mirror_slope_deg", "angle along", "triangular", tilts[0]),
             ("mirror_roll_deg", "angle across", "triangular", tilts[1]),
@@ -159,6 +186,11 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
             ("mirror_glass_mm", "glass and glue", "uniform", d["tolerance.mirror_thickness_mm"]),
         ],
         "acrylic thickness": [("acrylic_mm", "of the sheet", "uniform", acrylic_mm(d))],
+    }
+
+
+def _of_lens(d: Lookup) -> Table:
+    return {
         "lens focus": [
             (
                 "extension_mm",
@@ -175,6 +207,14 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
             (f"centre_{axis}_mm", words, "normal", d["tolerance.lens_centring_mm"])
             for axis, words in (("u", "across"), ("v", "along"))
         ],
+        "calibration": [
+            ("scale_percent", "scale", "normal", d["tolerance.calibration_scale_percent"])
+        ],
+    }
+
+
+def _of_gel(d: Lookup) -> Table:
+    return {
         "gel": [
             (
                 "gel_mm",
@@ -192,13 +232,6 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
             ("print_x_mm", "place along", "uniform", d["tolerance.marker_place_mm"]),
             ("print_y_mm", "place across", "uniform", d["tolerance.marker_place_mm"]),
         ],
-        "LEDs": [
-            ("led_mm", "place", "uniform", d["design.leds.placement_tolerance_mm"]),
-            *(
-                (f"{side}_flux_percent", f"{name} flux", "uniform", d["tolerance.led_flux_percent"])
-                for side, name in zip(strip_sides(d), strip_wavelengths_nm(d), strict=True)
-            ),
-        ],
         "gel batch": [
             (
                 "modulus_percent",
@@ -208,19 +241,19 @@ def causes(d: Lookup) -> tuple[Cause, ...]:
             ),
             ("poisson", "Poisson's ratio", "normal", d["material.gel.poissons_ratio_tolerance"]),
         ],
-        "calibration": [
-            ("scale_percent", "scale", "normal", d["tolerance.calibration_scale_percent"])
-        ],
-        "alignment": [
-            (f"align_{axis}_px", words, "uniform", d["tolerance.alignment_px"])
-            for axis, words in (("u", "across"), ("v", "along"), ("roll", "turn"))
+    }
+
+
+def _of_light(d: Lookup) -> Table:
+    return {
+        "LEDs": [
+            ("led_mm", "place", "uniform", d["design.leds.placement_tolerance_mm"]),
+            *(
+                (f"{side}_flux_percent", f"{name} flux", "uniform", d["tolerance.led_flux_percent"])
+                for side, name in zip(strip_sides(d), strip_wavelengths_nm(d), strict=True)
+            ),
         ],
     }
-    return tuple(
-        Cause(name, group, words, distribution, float(spread))
-        for group, rows in table.items()
-        for name, words, distribution, spread in rows
-    )
 
 
 def seated(d: Lookup) -> bool:
