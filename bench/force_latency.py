@@ -36,6 +36,8 @@ from gelslim_core.budget.budget import Budget
 from gelslim_force.calibration.calibration import calibrate
 from gelslim_force.calibration.sensor_calibration import Calibration
 from gelslim_force.contact.normal_source import NormalSource
+from gelslim_force.joint.settings import JointSettings
+from gelslim_force.joint.unknown_shape import unknown_shape
 from gelslim_force.pipeline import ForcePipeline
 from gelslim_force.sensor import indenter_source
 from gelslim_force.settings import PipelineSettings
@@ -120,19 +122,24 @@ def all_chains(
     """The chains compared, by name."""
     known = [share * rig.press.nodes_mm[:, 2] for share in shares(CYCLE)]
     loose = PipelineSettings(budget=Budget(error=LOOSE))
+    # The rig draws grey values in proportion to the light.
+    drawn = JointSettings(gamma=1.0)
+    anything = unknown_shape(rig.bundle, calibration, frames[0], settings=drawn)
+    chain = ForcePipeline(rig.bundle, calibration, None, anything)
+    yield "any object", pipeline_chain(chain, frames, clock)
     for suffix, settings in (("", None), (f", {LOOSE:.0%}", loose)):
 
-        def chain(
+        def opened(
             settings: PipelineSettings | None = settings, normal: NormalSource | None = None
         ) -> ForcePipeline:
             return ForcePipeline(rig.bundle, calibration, settings, normal)
 
-        yield f"tangential{suffix}", pipeline_chain(chain(), frames, clock)
-        yield f"depth given{suffix}", pipeline_chain(chain(), frames, clock, known)
+        yield f"tangential{suffix}", pipeline_chain(opened(), frames, clock)
+        yield f"depth given{suffix}", pipeline_chain(opened(), frames, clock, known)
         sphere = indenter_source(
             rig.bundle, calibration, frames[0], rig.press.sphere, settings=settings
         )
-        yield f"sphere seen{suffix}", pipeline_chain(chain(normal=sphere), frames, clock)
+        yield f"sphere seen{suffix}", pipeline_chain(opened(normal=sphere), frames, clock)
     yield "paper's choices", paper_chain(rig, calibration, frames, known, clock)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 SHORT = {
+    "any object": "any object, from light and markers",
     "depth given, 25%": "depth given",
     "tangential, 25%": "tangential forces alone (`--indenter none`)",
     "sphere seen, 25%": "only the ball's size given, contact found in the picture",
@@ -14,7 +15,7 @@ CLOCKS = {"wall": "", "processor": "of the processor "}
 STAGES = {
     "track": "find and match markers",
     "drift": "drift of the camera",
-    "look": "find the contact patch",
+    "look": "find the contact",
     "normal": "normal motion",
     "displace": "compensate projection",
     "interpolate": "markers to nodes",
@@ -103,7 +104,7 @@ def tracker_table(rows: list[dict[str, Any]]) -> str:
 
 
 def short_latency(data: dict[str, Any]) -> str:
-    """Return median and 95 % quantile of a frame for the chains within 25 % and the paper's."""
+    """Return median and 95 % quantile of a frame for any object, within 25 %, and the paper's."""
     counts = list(dict.fromkeys(row["markers"] for row in data["chains"]))
     lines = [
         "| camera frame to wrench and force field, ms, median (95 %) | "

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gelslim_force.contact.indenter import Sphere
 from gelslim_optics.camera.virtual_camera import Layer, VirtualCamera, reflect_point
-from gelslim_optics.light.light_map import red_green_sides
+from gelslim_optics.light.light_map import light_arrays, red_green_sides
 from gelslim_twin.render.defocus import Defocus
 from gelslim_twin.render.frame_renderer import FrameRenderer, RenderedFrame
 from gelslim_twin.render.image_sensor import SensorNoise
@@ -37,6 +37,7 @@ GEL = Material(0.147, 0.3223, 1000.0)
 NORMAL_N, SHEAR_N = 1.0, (0.3, -0.2)
 PLACE_MM, RADIUS_MM = (1.0, -1.0), 3.0
 SEED = 20190521
+LIGHT = red_green_sides(LENGTH_MM, WIDTH_MM, decay_mm=15.0, elevation_deg=25.0)
 FRAMES_LOOK = Look(
     shading=Shading(), defocus=Defocus(0.0, 22.0, 0.5), sensor_noise=SensorNoise(2.0, seed=SEED)
 )
@@ -103,6 +104,7 @@ class Rig:
                 "kind": grid.kind,
             },
             camera=self.camera.to_record(),
+            light=light_arrays(LIGHT),
             with_stiffness=False,
             ladder=ladder,
             operator=ladder.balanced().label,
@@ -132,9 +134,8 @@ class Rig:
 
     def renderer(self, look: Look = FRAMES_LOOK) -> FrameRenderer:
         """Draws this sensor's frames."""
-        light = red_green_sides(LENGTH_MM, WIDTH_MM, decay_mm=15.0, elevation_deg=25.0)
         pad = Pad(LENGTH_MM, WIDTH_MM, CORNER_MM)
-        return FrameRenderer(self.camera, self.grid, light, pad, look)
+        return FrameRenderer(self.camera, self.grid, LIGHT, pad, look)
 
     def stream(self, count: int, look: Look = FRAMES_LOOK) -> list[RenderedFrame]:
         """Frames from rest to the full press and back, each with noise of its own; the first is
