@@ -1,6 +1,7 @@
 """Do the standard deviations of forces hold? Scores over random contacts, and their curve.
 
     python bench/force_sigma.py              # 200 contacts of each mode
+    python bench/force_sigma.py --processes 8
     python bench/force_sigma.py --deep       # the deep contacts only; the rest is kept
     python bench/force_sigma.py --figure     # draw the figure from the data again
 
@@ -17,6 +18,7 @@ import io
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +28,11 @@ from numpy.typing import NDArray
 from rigs.machine import machine
 from scipy.stats import norm
 
+from gelslim_core.jobs import Engine
+
 Array = NDArray[np.float64]
 Record = Mapping[str, Any]
-SLICE = 20
+SLICE, DEEP_SLICE = 10, 7
 KEPT = Path("out") / "force_sigma"
 COMPONENTS = ("F_x", "F_y", "F_z")
 COLOURS = ("#1f4e8c", "#c4580a", "#2d8a57")
@@ -43,6 +47,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=200, help="contacts of each mode")
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for contacts and slices")
     parser.add_argument("--deep", action="store_true", help="score the deep contacts only")
+    parser.add_argument("--processes", type=int, default=1, help="that share the contacts")
     parser.add_argument("--figure", action="store_true", help="draw the stored scores only")
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder like docs")
     options = parser.parse_args()
@@ -52,52 +57,106 @@ def main() -> None:
             data = json.loads(stored.read_text("utf-8"))
         else:
             data = {**machine(31), "cases": options.cases, "modes": scored(options)}
-        write_data("force_sigma", {**data, "deep": deep_scored()}, options.docs)
+        data["deep"] = deep_scored(options.processes)
+        write_data("force_sigma", data, options.docs)
     record = json.loads(stored.read_text("utf-8"))
     panels = {**record["modes"], "nothing given, deep": {"auto": record["deep"]["auto"]}}
     write_whole(options.docs / "images" / "force_sigma.png", drawn(panels))
     print(table(record))
 
 
+@dataclass(frozen=True)
+class Slice:
+    """Contacts that one process scores in all modes, with the folder for contacts and scores."""
+
+    seeds: range
+    kept: Path
+
+
+@dataclass(frozen=True)
+class DeepSlice:
+    """Deep contacts that one process scores with one law of the gel."""
+
+    law: str
+    seeds: range
+
+
 def scored(options: argparse.Namespace) -> dict[str, Any]:
     """Scores, median errors and deviations by mode and condition."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "force"))
+    _see_tests()
     from sigma_cases import CONDITIONS
-    from sigma_gate import MODES, scores
+    from sigma_gate import MODES
 
     options.kept.mkdir(parents=True, exist_ok=True)
+    slices = [
+        Slice(range(first, min(first + SLICE, options.cases)), options.kept)
+        for first in range(0, options.cases, SLICE)
+    ]
+    for number, _ in Engine(options.processes).run(score_slice, slices):
+        print(slices[number].seeds, flush=True)
     rows: dict[str, dict[str, list[Record]]] = {
         mode: {condition: [] for condition in CONDITIONS} for mode in MODES
     }
-    for first in range(0, options.cases, SLICE):
+    for some in slices:
         for mode in MODES:
-            path = options.kept / f"{mode.split()[0]}-{first}.json"
-            if not path.exists():
-                seeds = range(first, min(first + SLICE, options.cases))
-                some = scores(mode, seeds, options.kept)
-                plain = {name: [vars(s) for s in every] for name, every in some.items()}
-                write_whole(path, json.dumps(plain).encode("utf-8"))
-            for name, every in json.loads(path.read_text("utf-8")).items():
+            for name, every in json.loads(_path(some, mode).read_text("utf-8")).items():
                 rows[mode][name] += every
-        print(first, flush=True)
     return {
         mode: {name: _condition(every) for name, every in some.items()}
         for mode, some in rows.items()
     }
 
 
-def deep_scored() -> dict[str, Any]:
-    """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "force"))
-    from deep_contacts import COUNT
-    from deep_gate import LAWS, deep_scores, deep_summary
+def score_slice(some: Slice) -> None:
+    """Write the scores of a slice, mode by mode, where they are not kept."""
+    _see_tests()
+    from sigma_gate import MODES, scores
 
+    for mode in MODES:
+        if not _path(some, mode).exists():
+            found = scores(mode, some.seeds, some.kept)
+            plain = {name: [vars(s) for s in every] for name, every in found.items()}
+            write_whole(_path(some, mode), json.dumps(plain).encode("utf-8"))
+
+
+def _path(some: Slice, mode: str) -> Path:
+    return some.kept / f"{mode.split()[0]}-{some.seeds.start}-{some.seeds.stop}.json"
+
+
+def deep_scored(processes: int) -> dict[str, Any]:
+    """Scores and relative errors of the deep contacts by law of the gel; nothing is given."""
+    _see_tests()
+    from deep_contacts import COUNT
+    from deep_gate import LAWS, deep_summary
+
+    slices = [
+        DeepSlice(law, range(first, min(first + DEEP_SLICE, COUNT)))
+        for law in LAWS
+        for first in range(0, COUNT, DEEP_SLICE)
+    ]
+    scores = dict(Engine(processes).run(score_deep_slice, slices))
     found = {}
     for law in LAWS:
-        some = deep_scores(law, range(COUNT))
+        own = [scores[k] for k in range(len(slices)) if slices[k].law == law]
+        some = [score for part in own for score in part]
         errors = {name: _short(value) for name, value in deep_summary(some).items()}
         found[law] = {**_condition(vars(s.score) for s in some), "relative": errors}
     return found
+
+
+def score_deep_slice(some: DeepSlice) -> tuple[Any, ...]:
+    """The scores of some deep contacts."""
+    _see_tests()
+    from deep_gate import deep_scores
+
+    return deep_scores(some.law, some.seeds)
+
+
+def _see_tests() -> None:
+    """The contacts are those of the tests."""
+    folder = str(Path(__file__).parents[1] / "tests" / "force")
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
 
 
 def _condition(rows: Iterable[Record]) -> dict[str, Any]:
