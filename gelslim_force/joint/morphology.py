@@ -1,13 +1,14 @@
-"""Boolean pictures made wider and narrower by steps along rows and columns.
+"""Boolean pictures made wider and narrower by steps along rows and columns, and filled.
 
 They are those of `scipy.ndimage` with its cross-shaped element and what lies outside false, by one
-distance each instead of a pass per step.
+distance or one labelling each instead of a pass per step.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 Mask = NDArray[np.bool_]
 
@@ -32,6 +33,16 @@ def closed(picture: Mask, steps: int) -> Mask:
 def opened(picture: Mask, steps: int) -> Mask:
     """Without specks up to twice `steps` wide."""
     return widened(narrowed(picture, steps), steps)
+
+
+def filled(picture: Mask) -> Mask:
+    """Without holes: what is false remains so where it is connected to the edge of the picture."""
+    part, count = ndimage.label(~picture)
+    hole = np.ones(count + 1, dtype=bool)
+    for edge in (part[0], part[-1], part[:, 0], part[:, -1]):
+        hole[edge] = False
+    hole[0] = True
+    return np.asarray(hole[part])
 
 
 def _distance(picture: Mask, outside: bool) -> NDArray[np.int64]:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
+from scipy import sparse
 from scipy.spatial import cKDTree
 
-from gelslim_force.joint.morphology import widened
+from gelslim_force.joint.morphology import filled, widened
 from ifem_export.markers.interpolation import marker_to_node
 
 Array = NDArray[np.float64]
@@ -188,4 +188,4 @@ class NodeLattice:
         kept = at[((at >= 0) & (at < self.number.shape)).all(axis=1)]
         places = np.zeros(self.number.shape, dtype=bool)
         places[kept[:, 0], kept[:, 1]] = True
-        return np.asarray(ndimage.binary_fill_holes(places)[self.place[:, 0], self.place[:, 1]])
+        return np.asarray(filled(places)[self.place[:, 0], self.place[:, 1]])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
 from gelslim_force.contact.shading_change import ShadingChange
-from gelslim_force.joint.morphology import closed, opened
+from gelslim_force.joint.morphology import closed, filled, opened
 from gelslim_force.joint.node_lattice import NodeLattice
 
 Array = NDArray[np.float64]
@@ -53,8 +53,8 @@ def contact_nodes(
         return region
     seen = changed & shading.valid
     dent = _dent(lattice, places_mm[seen], rise[seen])
-    filled = ndimage.binary_fill_holes(closed(lattice.picture(region) | dent, 1))
-    return np.asarray(filled[lattice.place[:, 0], lattice.place[:, 1]])
+    whole = filled(closed(lattice.picture(region) | dent, 1))
+    return np.asarray(whole[lattice.place[:, 0], lattice.place[:, 1]])
 
 
 def _continued(region: Mask, hidden: Mask, lattice: NodeLattice) -> Mask:
@@ -135,8 +135,7 @@ def changed_bins(shading: ShadingChange) -> Mask:
 
 def _whole(changed: Mask) -> Mask:
     """Without gaps, such as dots, and specks."""
-    filled = ndimage.binary_fill_holes(closed(changed, _CLOSED))
-    return opened(np.asarray(filled), _OPENED)
+    return opened(filled(closed(changed, _CLOSED)), _OPENED)
 
 
 def _dent(lattice: NodeLattice, places_mm: Array, rise: Array) -> Mask:
