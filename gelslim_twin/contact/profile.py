@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelslim_twin.contact.profile_kernel import arc_heights
+from gelslim_twin.contact.profile_kernel import arc_heights, convex_heights
 from gelslim_twin.scene.indenter import (
     Cone,
     Cylinder,
@@ -31,11 +33,78 @@ RIM_MM = 0.01
 """Margin of a rim, so that rounding does not decide about rows of nodes exactly on it."""
 
 
+@dataclass(frozen=True)
+class BallProfile:
+    """The lower half of a ball."""
+
+    radius_mm: float
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Heights (n,) at points x and y (n,)."""
+        return _arc(self.radius_mm, np.hypot(x, y))
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexProfile:
+    """Lower surface of the points p with n·p <= reach for every outer normal.
+
+    Attributes:
+        normals: Unit normals (m, 3).
+        reach_mm: Reaches (m,).
+    """
+
+    normals: Array
+    reach_mm: Array
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Heights at points x and y of any shape."""
+        height = np.empty(x.shape)
+        flat = np.ravel(x), np.ravel(y), height.reshape(-1)
+        convex_heights(self.normals, self.reach_mm, RIM_MM, *flat)
+        return height
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap:
+    """Heights on an even grid, bilinear; infinite where a corner is, and beside the grid.
+
+    Attributes:
+        x_mm: Axis (nx,).
+        y_mm: Axis (ny,).
+        height_mm: Heights (nx, ny), infinite beside the shape.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    height_mm: Array
+
+    @cached_property
+    def missing(self) -> NDArray[np.bool_]:
+        """Whether (nx, ny) a point of the grid lies beside the shape."""
+        return ~np.isfinite(self.height_mm)
+
+    @cached_property
+    def known_mm(self) -> Array:
+        """Heights (nx, ny), 0 beside the shape."""
+        return np.where(self.missing, 0.0, self.height_mm)
+
+    @cached_property
+    def _share_missing(self) -> Array:
+        return self.missing.astype(float)
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Heights at points x and y of any shape."""
+        at = [(v - a[0]) / (a[1] - a[0]) for v, a in ((x, self.x_mm), (y, self.y_mm))]
+        share = map_coordinates(self._share_missing, at, order=1, cval=1.0)
+        # Rounding must not make a grid point infinite because of a neighbour outside the shape.
+        return np.where(share > NEGLIGIBLE, np.inf, map_coordinates(self.known_mm, at, order=1))
+
+
 def profile(indenter: Indenter, folder: Path, seed: int = 0) -> Profile:
     """Lower surface of a shape about its origin. Raises ValueError or OSError for a bad mesh."""
     match indenter:
         case Sphere():
-            return lambda x, y: _arc(indenter.radius_mm, np.hypot(x, y))
+            return BallProfile(indenter.radius_mm)
         case Cylinder():
             half = indenter.length_mm / 2 + RIM_MM
             return _turned(
@@ -162,7 +231,7 @@ def mesh_profile(corners: Array, resolution_mm: float) -> tuple[Profile, Array]:
             f"a height map of {count[0]} x {count[1]} cells is no good; change resolution_mm"
         )
     x, y = (np.linspace(-h, h, n) for h, n in zip(half, count, strict=True))
-    return _interpolated(x, y, _lowest(corners - origin, x, y)), origin
+    return HeightMap(x, y, _lowest(corners - origin, x, y)), origin
 
 
 def lowest_middle(corners: Array) -> Array:
@@ -209,17 +278,3 @@ def _lowest(corners: Array, x: Array, y: Array) -> Array:
     height = np.full((len(x), len(y)), np.inf)
     lower_heights(np.ascontiguousarray(corners), x, y, height)
     return height
-
-
-def _interpolated(x: Array, y: Array, height: Array) -> Profile:
-    """Bilinear; infinite where a corner is, and beside the grid."""
-    missing = ~np.isfinite(height)
-    known = np.where(missing, 0.0, height)
-
-    def profile(px: Array, py: Array) -> Array:
-        at = [(px - x[0]) / (x[1] - x[0]), (py - y[0]) / (y[1] - y[0])]
-        share = map_coordinates(missing.astype(float), at, order=1, cval=1.0)
-        # Rounding must not make a grid point infinite because of a neighbour outside the shape.
-        return np.where(share > NEGLIGIBLE, np.inf, map_coordinates(known, at, order=1))
-
-    return profile

@@ -23,11 +23,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _LEFT_OUT = 1e-4
-_LARGEST_PX = 8.0
+LARGEST_PX = 8.0
+"""Largest standard deviation of a blur."""
 _TABLE = 321
 _LEVELS = 6
 _NODES = 49
-_SUNKEN_MM = 0.5
+SUNKEN_MM = 0.5
+"""Depth of the second height of a `BlurField`."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Defocus:
     def sigma_px(self, field: BlurField, points_mm: Array, scale_px_per_mm: Array) -> Array:
         """Standard deviation (n,) in px at points (n, 3) where the picture has that scale (n,)."""
         spread = field.at(points_mm[:, 0], points_mm[:, 1], points_mm[:, 2]) * scale_px_per_mm / 4
-        sigma: Array = np.minimum(np.sqrt(self.still_px**2 + spread**2), _LARGEST_PX)
+        sigma: Array = np.minimum(np.sqrt(self.still_px**2 + spread**2), LARGEST_PX)
         return sigma
 
     def soften(
@@ -67,7 +69,7 @@ class Defocus:
 
         x, y = sight.rest_mm[..., 0], sight.rest_mm[..., 1]
         spread = field.at(x, y, 0.0) / sight.pixel_mm() / 4
-        variance = np.minimum(self.still_px**2 + spread**2, _LARGEST_PX**2)
+        variance = np.minimum(self.still_px**2 + spread**2, LARGEST_PX**2)
         levels = np.linspace(variance.min(), variance.max(), _LEVELS)
         if np.ptp(levels) < 1e-3:
             levels = levels[:1]
@@ -101,14 +103,14 @@ class BlurField:
         if aperture_mm == 0:
             sharp = HeightGrid(x, y, np.zeros((_NODES, _NODES)))
             return cls(sharp, sharp)
-        maps = [blur_map(camera, x, y, aperture_mm, focus_mm, z) for z in (0.0, -_SUNKEN_MM)]
+        maps = [blur_map(camera, x, y, aperture_mm, focus_mm, z) for z in (0.0, -SUNKEN_MM)]
         return cls(HeightGrid(x, y, maps[0]), HeightGrid(x, y, maps[1]))
 
     def at(self, x_mm: Array, y_mm: Array, z_mm: Array | float) -> Array:
         """Blur diameter in mm at points of any shape."""
         level = self.level(x_mm, y_mm)
         change = self.sunken(x_mm, y_mm) - level if np.any(z_mm) else 0.0
-        blur: Array = np.maximum(level - np.asarray(z_mm) / _SUNKEN_MM * change, 0.0)
+        blur: Array = np.maximum(level - np.asarray(z_mm) / SUNKEN_MM * change, 0.0)
         return blur
 
 

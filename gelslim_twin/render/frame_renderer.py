@@ -44,7 +44,8 @@ class RenderedFrame:
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 _NONE = np.zeros((0, 0, 0), dtype=np.float32)
-_CURVE_STEPS = 16
+CURVE_STEPS = 16
+"""Steps of the response curve per grey value."""
 _STRIP = 48
 
 
@@ -100,7 +101,7 @@ class FrameRenderer:
                 self.camera, (self.pad.length_mm, self.pad.width_mm), light
             )
         if self.look.defocus is not None:
-            light = self.look.defocus.soften(self._blur_field, self.sight, light)
+            light = self.look.defocus.soften(self.blur_field, self.sight, light)
         return light
 
     @cached_property
@@ -109,7 +110,8 @@ class FrameRenderer:
         return np.ascontiguousarray(self.still.transpose(2, 0, 1))
 
     @cached_property
-    def _blur_field(self) -> BlurField:
+    def blur_field(self) -> BlurField:
+        """Blur of the lens over the pad, where the look has defocus."""
         from gelslim_twin.render.defocus import BlurField
 
         assert self.look.defocus is not None
@@ -117,7 +119,8 @@ class FrameRenderer:
         return BlurField.of(self.camera, lens.aperture_mm, lens.focus_mm, pad)
 
     @cached_property
-    def _glare(self) -> Image:
+    def glare(self) -> Image:
+        """Grey values (h, w, 3) that neither slope nor ink changes; empty where there are none."""
         seen = _NONE if self.photographed is None else self.photographed.glare_dn
         if self.look.specular is not None:
             spots = self.look.specular.glare(self.still.shape[:2], self.light.colour)
@@ -125,17 +128,30 @@ class FrameRenderer:
         return seen * np.float32(self._scale)
 
     @cached_property
-    def _shading_sight(self) -> Sight | None:
+    def shading_sight(self) -> Sight | None:
+        """Rays of the lattice on which shading is computed; None without shading."""
         shading = self.look.shading
         return None if shading is None else Sight.of(self.camera, shading.pixel_step)
 
     @cached_property
-    def _curve(self) -> NDArray[np.uint8]:
+    def curve(self) -> NDArray[np.uint8]:
+        """Response at steps of 1/16 of a grey value; empty for the straight one."""
         exposure = self.look.exposure
         if exposure is None or exposure.gamma == 1:
             return np.zeros(0, dtype=np.uint8)
-        share = np.arange(255 * _CURVE_STEPS + 1) / (255 * _CURVE_STEPS)
+        share = np.arange(255 * CURVE_STEPS + 1) / (255 * CURVE_STEPS)
         return np.rint(255 * share ** (1 / exposure.gamma)).astype(np.uint8)
+
+    @property
+    def colour(self) -> NDArray[np.float32]:
+        """Grey values (k, 3) of unit irradiance of each source."""
+        return (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
+
+    @property
+    def contrast(self) -> NDArray[np.float32]:
+        """Share (3,) of the light that ink absorbs, in each channel."""
+        share = 1.0 if self.photographed is None else self.photographed.ink_share
+        return np.full(3, self.look.contrast * np.asarray(share), dtype=np.float32)
 
     @property
     def _scale(self) -> float:
@@ -160,7 +176,7 @@ class FrameRenderer:
         start, now = self._outlines(surface, before, step_s)
         middle = now if start is now else (start + now) / 2
         centres, area = centroids_px(middle)
-        drawn = self.dots.present & (area * self._orientation > 0)
+        drawn = self.dots.present & (area * self.orientation > 0)
         ink = self._ink(start, now, drawn, np.abs(area), surface)
         return RenderedFrame(
             image=self._picture(ink, surface, number),
@@ -182,18 +198,16 @@ class FrameRenderer:
 
         gain, step = _NONE, 1
         if self.look.shading is not None and surface is not None and surface.moves:
-            assert self._shading_sight is not None
+            assert self.shading_sight is not None
             rest_mm = None if self.top is None else self.top.nodes_mm(surface)
-            gain = self.look.shading.gain(self._shading_sight, surface, self.light, rest_mm)
+            gain = self.look.shading.gain(self.shading_sight, surface, self.light, rest_mm)
             if self.top is not None:
                 gain = 1 + (gain - 1) * self._on_pad
             step = self.look.shading.pixel_step
-        colour = (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
-        share = 1.0 if self.photographed is None else self.photographed.ink_share
-        contrast = np.full(3, self.look.contrast * np.asarray(share), dtype=np.float32)
+        colour, contrast = self.colour, self.contrast
 
         def write(top: int, out: Image) -> None:
-            compose(self._planes, gain, step, ink, contrast, colour, self._glare, top, out)
+            compose(self._planes, gain, step, ink, contrast, colour, self.glare, top, out)
 
         return write
 
@@ -214,7 +228,7 @@ class FrameRenderer:
                 noise.add(rows, gain, grain[top : top + _STRIP])
             elif noise is not None:
                 noise.apply(rows, gain, number, top * width)
-            develop(rows.reshape(-1), self._curve, image[top : top + _STRIP].reshape(-1))
+            develop(rows.reshape(-1), self.curve, image[top : top + _STRIP].reshape(-1))
         if self.mono:
             image = np.ascontiguousarray(image[..., 0])
         return image if self.look.compression is None else self.look.compression.apply(image)
@@ -236,8 +250,8 @@ class FrameRenderer:
     @cached_property
     def _on_pad(self) -> Image:
         """Share (rows, columns, 1) of pad at each ray: the frame around it is not crowned."""
-        assert self._shading_sight is not None
-        places = self._shading_sight.rest_mm
+        assert self.shading_sight is not None
+        places = self.shading_sight.rest_mm
         beyond = self.pad.beyond_mm(places[..., 0], places[..., 1])
         return np.clip(1 - beyond, 0.0, 1.0).astype(np.float32)[..., None]
 
@@ -248,7 +262,7 @@ class FrameRenderer:
         return outlines_px(self.camera, self.dots, rest)
 
     @cached_property
-    def _orientation(self) -> float:
+    def orientation(self) -> float:
         """Sign of an outline's area on the undeformed gel; a dot seen from behind has the other."""
         return float(np.sign(np.median(centroids_px(self._rest_outlines)[1])))
 
@@ -284,7 +298,7 @@ class FrameRenderer:
             points[:, :2] = self.dots.centres_mm
             if surface is not None:
                 points += surface.at(self.dots.centres_mm)
-            taps, reach = kernel_taps(self.look.defocus.sigma_px(self._blur_field, points, scale))
+            taps, reach = kernel_taps(self.look.defocus.sigma_px(self.blur_field, points, scale))
         ink = np.zeros((self.camera.image_height_px, self.camera.image_width_px), dtype=np.float32)
         draw_dots(start, now, drawn, poses, taps, reach, self.dots.opacity, ink)
         return ink

@@ -80,8 +80,7 @@ def outlines_px(
     to a relative error of the order `corners`⁻⁴. Raises ValueError for dots that the camera
     cannot project.
     """
-    turn = 2 * np.pi / corners
-    rim = dots.rim_mm(rim_points, float(np.sqrt(turn / np.sin(turn)))).reshape(-1, 2)
+    rim = dots.rim_mm(rim_points, rim_scale(corners)).reshape(-1, 2)
     points = surface.at(rim)
     points[:, :2] += rim
     projected = camera.project(points).reshape(len(dots), rim_points, 2)
@@ -90,7 +89,7 @@ def outlines_px(
     from gelslim_twin.render.dot_kernel import expand
 
     out = np.empty((len(dots), corners, 2))
-    expand(projected, _series(rim_points, corners), out)
+    expand(projected, series(rim_points, corners), out)
     return out
 
 
@@ -103,8 +102,14 @@ def centroids_px(outlines: Array) -> tuple[Array, Array]:
     return centres, area
 
 
+def rim_scale(corners: int) -> float:
+    """Scale of the rim of a disc at which a polygon of `corners` has the disc's area."""
+    turn = 2 * np.pi / corners
+    return float(np.sqrt(turn / np.sin(turn)))
+
+
 @cache
-def _series(points: int, corners: int) -> Array:
+def series(points: int, corners: int) -> Array:
     """Weights (corners, points) of trigonometric interpolation for an even number of points."""
     apart = (
         2 * np.pi * (np.arange(corners)[:, None] / corners - np.arange(points)[None, :] / points)

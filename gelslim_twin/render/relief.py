@@ -35,18 +35,18 @@ class Relief:
     light: LightMap
 
     @cached_property
-    def _sums(self) -> Array:
+    def sums(self) -> Array:
         """Bins of direction (k, py, px, b, 3) at each place, the brightest first."""
         sums = self.light.light_fans.sums
         order = np.argsort(-sums[..., 0], axis=-1, kind="stable")
         return np.take_along_axis(sums, order[..., None], axis=3)
 
     @cached_property
-    def _bins(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Array]:
+    def bins(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], Array]:
         """Count of bins that are not dark, and of each bin what `relief_light` asks for."""
         from gelslim_twin.render.relief_kernel import TOWARDS
 
-        sums = self._sums
+        sums = self.sums
         count = (sums[..., 0] > _FAINT).sum(axis=-1)
         rise = sums[..., 0] / np.maximum(np.hypot(sums[..., 1], sums[..., 2]), 1e-12)
         unit = TOWARDS / np.hypot(*TOWARDS.T)[:, None]
@@ -86,16 +86,16 @@ class Relief:
         height = np.ascontiguousarray(height[::stride, ::stride])
         step, fans = stride * state.step_mm, self.light.light_fans
         factor = np.empty((*height.shape, self.light.sources))
-        fall = _fall(self.light, tuple(state.origin_mm), tuple(step), height.shape)
+        fall = fall_of_light(self.light, tuple(state.origin_mm), tuple(step), height.shape)
         relief_light(
-            height, state.origin_mm, step, self._sums, *self._bins, fall, BIN_WIDTH,
+            height, state.origin_mm, step, self.sums, *self.bins, fall, BIN_WIDTH,
             np.array(fans.lower_mm), np.array(fans.upper_mm), factor,
         )  # fmt: skip
         return factor, state.origin_mm, step
 
 
 @lru_cache(maxsize=4)
-def _fall(
+def fall_of_light(
     light: LightMap,
     origin_mm: tuple[float, float],
     step_mm: tuple[float, float],
@@ -109,3 +109,9 @@ def _fall(
     along = light.at(x + _PROBE_MM, y) - light.at(x - _PROBE_MM, y)
     across = light.at(x, y + _PROBE_MM) - light.at(x, y - _PROBE_MM)
     return np.stack([along, across], axis=-1) / (2 * _PROBE_MM * dark[..., None])
+
+
+@lru_cache(maxsize=8)
+def relief_of(light: LightMap) -> Relief:
+    """The relief of a light, kept for the next picture."""
+    return Relief(light)

@@ -10,14 +10,13 @@ not depend on the shape.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelslim_optics.light.light_fans import STEEPEST
-from gelslim_twin.render.relief import Relief
+from gelslim_twin.render.relief import relief_of
 from gelslim_twin.render.surroundings import Sight
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from gelslim_twin.render.surface_state import SurfaceState
 
 Array = NDArray[np.float64]
-_ROUNDS, _NEAR_MM = 8, 1e-3
+ROUNDS, NEAR_MM = 8, 1e-3
 """Limits of the iteration for the intersection of a ray with the deformed surface."""
 
 
@@ -53,7 +52,7 @@ class Shading:
         slopes, met = np.zeros((len(rest), 2)), np.empty((len(rest), 2))
         seen_slopes(
             state.padded_mm, state.origin_mm, state.step_mm,
-            rest, sight.slope.reshape(-1, 2), _ROUNDS, _NEAR_MM, slopes, met,
+            rest, sight.slope.reshape(-1, 2), ROUNDS, NEAR_MM, slopes, met,
         )  # fmt: skip
         gain = np.empty((len(rest), light.sources), dtype=np.float32)
         fans = light.light_fans
@@ -62,11 +61,6 @@ class Shading:
             0.0, gain,
         )  # fmt: skip
         if self.relief:
-            apply_relief(met, *_relief_of(light).on(state, rest_mm), gain)
+            apply_relief(met, *relief_of(light).on(state, rest_mm), gain)
         gain += np.float32(self.ambient_share) * (1 - gain)
         return gain.reshape(*sight.rest_mm.shape[:2], light.sources)
-
-
-@lru_cache(maxsize=8)
-def _relief_of(light: LightMap) -> Relief:
-    return Relief(light)

@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+BEYOND_CELLS = 5
+"""A ray sees a level surface where its way from the middle, in half cells, is above the number of
+nodes and this."""
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -89,8 +92,8 @@ def seen_slopes(
     for n in range(rest.shape[0]):
         x, y = rest[n, 0], rest[n, 1]
         if (
-            abs(2 * (x - origin[0]) / step[0] - nx + 1) > nx + 5
-            or abs(2 * (y - origin[1]) / step[1] - ny + 1) > ny + 5
+            abs(2 * (x - origin[0]) / step[0] - nx + 1) > nx + BEYOND_CELLS
+            or abs(2 * (y - origin[1]) / step[1] - ny + 1) > ny + BEYOND_CELLS
         ):
             slopes[n, 0] = slopes[n, 1] = 0.0
             met[n, 0], met[n, 1] = x, y

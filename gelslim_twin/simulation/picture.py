@@ -49,18 +49,19 @@ class Viewer:
         return self.sensor.camera_record if self.look is None else self.look.camera
 
     @cached_property
-    def _to_markers(self) -> Any:
+    def to_markers(self) -> Any:
         """(m, c) from the surface nodes to the markers."""
         return marker_to_node(self.sensor.points_mm, self.sensor.grid.positions_mm)
 
     @cached_property
-    def _rest_mm(self) -> Array:
-        heights = self._to_markers @ self.sensor.points_mm[:, 2]
+    def rest_mm(self) -> Array:
+        """The dots' centres (m, 3) at rest."""
+        heights = self.to_markers @ self.sensor.points_mm[:, 2]
         return np.column_stack([self.sensor.grid.positions_mm, heights])
 
     def markers_px(self, state: GelState) -> Array:
         """Images (m, 2) of the dots' centres."""
-        return self.camera.project(self._rest_mm + self._to_markers @ state.displacement_mm)
+        return self.camera.project(self.rest_mm + self.to_markers @ state.displacement_mm)
 
     @cached_property
     def renderer(self) -> FrameRenderer:

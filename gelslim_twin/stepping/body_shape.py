@@ -9,8 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.contact.profile import RIM_MM, Profile, mesh_profile, profile
-from gelslim_twin.contact.profile_kernel import convex_heights
+from gelslim_twin.contact.profile import ConvexProfile, Profile, mesh_profile, profile
 from gelslim_twin.contact.undercut import Undercut, undercut_of
 from gelslim_twin.scene.indenter import Indenter, MeshFile, Sphere
 from gelslim_twin.stepping.step_error import StepError
@@ -84,21 +83,8 @@ class BoxShape:
         lowest = -float(np.abs(turn[2]) @ half)
         normals = np.concatenate([turn.T, -turn.T])
         reach = np.concatenate([half, half]) - normals[:, 2] * lowest
-        surface = _convex_profile(normals, reach)
+        surface = ConvexProfile(np.ascontiguousarray(normals), reach)
         return LowerSide(((surface, (0.0, 0.0), 0.0),), np.array([0.0, 0.0, lowest]))
-
-
-def _convex_profile(normals: Array, reach: Array) -> Profile:
-    """Lower surface of the points p with n·p <= reach for every outer normal (m, 3)."""
-    normals = np.ascontiguousarray(normals)
-
-    def surface(x: Array, y: Array) -> Array:
-        height = np.empty(x.shape)
-        flat = np.ravel(x), np.ravel(y), height.reshape(-1)
-        convex_heights(normals, reach, RIM_MM, *flat)
-        return height
-
-    return surface
 
 
 @dataclass(frozen=True, eq=False)

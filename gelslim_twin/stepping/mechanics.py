@@ -61,6 +61,23 @@ class SolvedStep:
     excess: float = 0.0
 
 
+@dataclass(frozen=True)
+class Overlap:
+    """What of a tool is below the undeformed surface.
+
+    Attributes:
+        nodes: Surface nodes that it covers.
+        depth_mm: The largest depth.
+        depths_mm: Sum of the depths at the nodes.
+        span_mm: The larger of the extents of these nodes along x and y.
+    """
+
+    nodes: int
+    depth_mm: float
+    depths_mm: float
+    span_mm: float
+
+
 @dataclass(eq=False)
 class StepMechanics:
     """Solves single steps on one sensor. Twins of the same sensor share it.
@@ -87,6 +104,11 @@ class StepMechanics:
     def points_mm(self) -> Array:
         """Surface nodes (c, 3) at rest."""
         return self._solver.points_mm
+
+    @property
+    def tolerance(self) -> float:
+        """Tolerance of the contact with a linear gel."""
+        return self._solver.settings.tolerance
 
     @property
     def geometry(self) -> Geometry:
@@ -131,16 +153,10 @@ class StepMechanics:
         contact = self._estimate(placement.tool, placement.pose)
         if contact is None:
             return self.rest
-        most = DEEPEST_SHARE * self.thickness_mm
-        if contact.depth_mm > most:
-            raise StepError(
-                f"body {placement.name} goes {contact.depth_mm:.3g} mm deep into a gel of "
-                f"{self.thickness_mm:g} mm, the limit is {most:.3g} mm; take shorter time steps, "
-                "or stop the body before"
-            )
+        self.require_shallow(placement.name, contact.depth_mm)
         low, high = self.points_mm.min(axis=0), self.points_mm.max(axis=0)
         placement.require_no_undercut((high[0] - low[0], high[1] - low[1]), high[2])
-        large_strain = self._needs_large_strain(contact)
+        large_strain = self.needs_large_strain(contact)
         large_strain &= placement.layer is None
         solver = self._nonlinear.solver if large_strain else self._solver_with(placement.layer)
         solver.tool = placement.tool
@@ -196,7 +212,17 @@ class StepMechanics:
             return self._nonlinear.compliance(solved.gel, nodes)
         return self._solver_with(layer).compliance.block(nodes).astype(float)
 
-    def _needs_large_strain(self, contact: ContactEstimate) -> bool:
+    def require_shallow(self, name: str, depth_mm: float) -> None:
+        """Raise StepError for a body that goes deeper than the gel allows."""
+        most = DEEPEST_SHARE * self.thickness_mm
+        if depth_mm > most:
+            raise StepError(
+                f"body {name} goes {depth_mm:.3g} mm deep into a gel of {self.thickness_mm:g} mm, "
+                f"the limit is {most:.3g} mm; take shorter time steps, or stop the body before"
+            )
+
+    def needs_large_strain(self, contact: ContactEstimate) -> bool:
+        """Whether the neo-Hookean law is to be solved for a contact."""
         use = self.effects["nonlinearity"].use
         if use != "auto":
             return use == "on"
@@ -213,20 +239,26 @@ class StepMechanics:
         into = below < 0
         if not into.any():
             return None
-        area = self._cell_mm2 * float(into.sum())
-        volume = -self._cell_mm2 * float(below[into].sum())
-        span = np.ptp(points[into, :2], axis=0) + np.sqrt(self._cell_mm2)
-        width = area / float(span.max())
+        span = np.ptp(points[into, :2], axis=0)
+        return self.estimate(
+            Overlap(int(into.sum()), -float(below.min()), -float(below[into].sum()), float(span.max()))
+        )
+
+    def estimate(self, overlap: Overlap) -> ContactEstimate:
+        """The contact of a tool that overlaps the undeformed gel."""
+        area = self._cell_mm2 * overlap.nodes
+        volume = self._cell_mm2 * overlap.depths_mm
+        span = overlap.span_mm + float(np.sqrt(self._cell_mm2))
         material = self.compliance.bundle.material
         return contact_estimate(
             Footprint(
                 lambda d: area,
                 lambda d: volume,
-                lambda d: float(span.max()) / 2,
+                lambda d: span / 2,
                 lambda d: np.inf,
-                lambda d: width,
+                lambda d: area / span,
             ),
-            -float(below.min()),
+            overlap.depth_mm,
             self.thickness_mm,
             material.youngs_modulus_mpa,
             material.poissons_ratio,

@@ -54,18 +54,25 @@ class Placement:
             top_mm: Height of the highest point of the undeformed gel.
         """
         for name, side, pose in zip(self.names, self.sides, members_of(self.pose), strict=True):
-            met = None if side.undercut is None else side.undercut.below(pose, pad_mm, top_mm)
-            if met is not None:
-                raise StepError(
-                    f"body {name}: the gel meets an undercut, hidden from below by other parts: "
-                    f"{met}; turn the body, press less deep, or fill the gap in the mesh"
-                )
+            require_no_undercut(name, side, pose, pad_mm, top_mm)
 
     def owners(self, places_mm: Array) -> NDArray[np.intp]:
         """Numbers (n,) of the bodies that points (n, 3) of the deformed surface belong to."""
         if isinstance(self.tool, ToolGroup):
             return np.asarray(self.bodies, dtype=np.intp)[self.tool.owners(self.pose, places_mm)]
         return np.full(len(places_mm), self.bodies[0], dtype=np.intp)
+
+
+def require_no_undercut(
+    name: str, side: Side, pose: Pose, pad_mm: tuple[float, float], top_mm: float
+) -> None:
+    """The same for one body, by its name, its side and the pose of that side."""
+    met = None if side.undercut is None else side.undercut.below(pose, pad_mm, top_mm)
+    if met is not None:
+        raise StepError(
+            f"body {name}: the gel meets an undercut, hidden from below by other parts: {met}; "
+            "turn the body, press less deep, or fill the gap in the mesh"
+        )
 
 
 def placed(

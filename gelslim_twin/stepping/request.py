@@ -78,6 +78,12 @@ class Request:
         """The observables that a camera sees."""
         return tuple(name for name in self.observe if name in ("markers", "image"))
 
+    def require_seen(self, what: str) -> None:
+        """Raise StepError unless `markers` or `image`, whichever is asked for, are observed."""
+        if what not in self.observe and "image" not in self.observe:
+            seen = ", ".join(f'"{name}"' for name in (*self.observe, what))
+            raise StepError(f"{what} are not observed by this twin; make it with observe=({seen})")
+
 
 def _require_known(where: str, name: object) -> None:
     if name not in OBSERVABLES:

@@ -47,6 +47,38 @@ def rigid_motions(poses: ArrayLike, bodies: int) -> Array:
     return np.stack([_motion(number, one) for number, one in enumerate(given)])
 
 
+def batch_motions(poses: ArrayLike, bodies: int) -> tuple[Array, dict[int, StepError]]:
+    """Read the poses of bodies in n contacts as rigid motions.
+
+    Args:
+        poses: Matrices (n, k, 4, 4), or positions in mm and unit quaternions (n, k, 7); for a
+            single body also (n, 4, 4) or (n, 7).
+        bodies: The number k of bodies.
+
+    Returns:
+        The motions (n, k, 4, 4), and by number the error of each contact whose pose is not finite
+        or not rigid; the motions of these hold NaN.
+
+    Raises:
+        StepError: The shape is another.
+    """
+    given = _numbers(poses)
+    if bodies == 1 and given.shape[1:] in ((4, 4), (7,)):
+        given = given[:, None]
+    if given.shape[1:] not in ((bodies, 7), (bodies, 4, 4)):
+        raise StepError(
+            f"poses of shape {given.shape} for many contacts of {bodies} bodies, the first number "
+            f"being that of the contacts; {FORMS}"
+        )
+    motions, errors = np.full((len(given), bodies, 4, 4), np.nan), {}
+    for number, one in enumerate(given):
+        try:
+            motions[number] = [_motion(body, pose) for body, pose in enumerate(one)]
+        except StepError as error:
+            errors[number] = error
+    return motions, errors
+
+
 def _motion(number: int, given: Array) -> Array:
     if not np.isfinite(given).all():
         raise StepError(f"pose of body {number} holds a number that is not finite: {given}")

@@ -15,7 +15,6 @@ from gelslim_twin.contact.gel_state import AnchoredState, GelState
 from gelslim_twin.stepping.mechanics import SolvedStep, StepMechanics
 from gelslim_twin.stepping.placement import Placement
 from gelslim_twin.stepping.request import Request
-from gelslim_twin.stepping.step_error import StepError
 
 if TYPE_CHECKING:
     from gelslim_twin.render.frame_renderer import RenderedFrame
@@ -139,13 +138,13 @@ class Step:
     @cached_property
     def markers_px(self) -> Array:
         """Images (m, 2) of the dots' centres. Raises StepError unless they are observed."""
-        self._require_seen("markers")
+        self.request.require_seen("markers")
         return self.view().markers_px(self.gel)
 
     @cached_property
     def frame(self) -> RenderedFrame:
         """The picture with the dots drawn in it. Raises StepError unless images are observed."""
-        self._require_seen("image")
+        self.request.require_seen("image")
         return self.view().frame(self.gel, self.before, self.number, self.step_s)
 
     def image(self) -> NDArray[np.uint8]:
@@ -154,8 +153,3 @@ class Step:
         Raises StepError unless images are observed.
         """
         return self.frame.image
-
-    def _require_seen(self, what: str) -> None:
-        if what not in self.request.observe and "image" not in self.request.observe:
-            seen = ", ".join(f'"{name}"' for name in (*self.request.observe, what))
-            raise StepError(f"{what} are not observed by this twin; make it with observe=({seen})")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from gelslim_twin.scene.built_look import BuiltLook, read_look
 from gelslim_twin.scene.scene import Scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.sensor import TwinSensor
+from gelslim_twin.stepping.batch_solver import BatchSolver
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.mechanics import SolvedStep, StepMechanics
 from gelslim_twin.stepping.pictures import pad_size_mm, stepped_scene, stepped_viewer
@@ -25,6 +26,7 @@ from gelslim_twin.stepping.request import Request
 from gelslim_twin.stepping.rigid_motion import rigid_motions
 from gelslim_twin.stepping.state import TwinState
 from gelslim_twin.stepping.step import Step
+from gelslim_twin.stepping.step_batch import StepBatch
 from gelslim_twin.stepping.step_error import StepError
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -57,6 +59,11 @@ class _Sensor:
     def view(self) -> Viewer:
         """The viewer, made at the first call."""
         return self.viewer
+
+    @cached_property
+    def batches(self) -> BatchSolver:
+        """Solves many contacts."""
+        return BatchSolver(self.mechanics, self.view)
 
 
 class Twin:
@@ -257,6 +264,34 @@ class Twin:
             mechanics=self._shared.mechanics,
             view=self._shared.view,
         )
+
+    def batch(
+        self,
+        poses: ArrayLike,
+        *,
+        backend: Literal["numpy", "torch"] = "numpy",
+        device: str = "cpu",
+        precision: Literal["double", "single"] = "double",
+    ) -> StepBatch:
+        """Solve many contacts, each from the untouched gel. The state of the twin stays.
+
+        Args:
+            poses: Rigid motions of the k bodies in each of n contacts: (n, k, 4, 4) or (n, k, 7)
+                as for `step`; for a single body also (n, 4, 4) or (n, 7).
+            backend: "numpy" solves one contact after the other, as `step` does after `reset`.
+                "torch" solves contacts without friction on a linear gel side by side.
+            device: Device of PyTorch: "cpu" or "cuda".
+            precision: Precision of PyTorch's forces, displacements and pictures.
+
+        Returns:
+            The contacts. A pose that cannot be solved is in its `errors`; the others are whole.
+
+        Raises:
+            StepError: There is no body, the shape of the poses is another, the gel relaxes, or the
+                backend does not solve contacts of this twin.
+            MissingLibraryError: PyTorch is not installed.
+        """
+        return self._shared.batches.solved(self._bodies, poses, backend, device, precision)
 
     def _solved(self, motions: Array, placement: Placement | None) -> SolvedStep:
         last, mechanics = self._state, self._shared.mechanics

@@ -1,0 +1,1 @@
+"""Many contacts of one sensor at once, with PyTorch on a processor or a graphics card."""
