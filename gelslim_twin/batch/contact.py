@@ -31,8 +31,8 @@ from gelslim_twin.contact.tool import Tool
 from ifem_export.compliance.columns import SurfaceCompliance
 
 Array = NDArray[np.float64]
-SINGLE_GAP_MM = 2e-6
-"""Smallest gap that displacements in single precision show."""
+SINGLE_GAP = 3e-6
+"""Smallest gap over the depth that displacements in single precision show."""
 BLOCK_COPIES = 9
 """Numbers per pair of candidates in the largest array."""
 FIELD_NUMBERS = 12
@@ -348,8 +348,7 @@ class BatchedContact:
     def _gap_tolerance_mm(self, deepest: Tensor) -> Tensor:
         """As `gap_tolerance_mm`, for depths (b,)."""
         share, least = gap_tolerance_mm(self.tolerance, 1.0), gap_tolerance_mm(0.0, 0.0)
-        least = least if self.engine.exact else SINGLE_GAP_MM
-        return (share * deepest).clamp(min=least)
+        return (max(share, 0.0 if self.engine.exact else SINGLE_GAP) * deepest).clamp(min=least)
 
 
 def _padded(wanted: Tensor) -> tuple[Tensor, Tensor]:

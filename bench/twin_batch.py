@@ -1,0 +1,249 @@
+"""Time and error of many contacts at once: one by one in NumPy, side by side in PyTorch.
+
+    python bench/twin_batch.py                      # writes docs/data/twin_batch.json
+    python bench/twin_batch.py --quick              # fewer contacts, printed only
+    python bench/twin_batch.py --bundle FOLDER --out FILE    # without CAD; writes FILE alone
+
+Bodies press the sensor of designs/gelslim2.yaml at random places, up to half a millimetre deep. A
+time is the clock's of the second of two calls, from poses to arrays on the host, over the number of
+contacts. The error is that of the same contacts one by one. Without PyTorch or a graphics card
+these rows are left out. The file is written again after each row.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_data import DOCS, write_whole
+from numpy.typing import NDArray
+from rigs.machine import machine
+from threadpoolctl import threadpool_limits
+
+from gelslim_core.optional_library import installed
+from gelslim_twin.stepping.body import Body
+from gelslim_twin.stepping.step_batch import StepBatch
+from gelslim_twin.stepping.twin import Twin
+
+Array = NDArray[np.float64]
+SEED, FRICTION = 7, 0.6
+LINEAR = {"nonlinearity": "off"}
+PLACES_MM, DEPTHS_MM = 8.0, (0.05, 0.5)
+BODIES = (
+    ("ball, radius 4 mm", Body.sphere(4.0), 4.0),
+    ("box, 6 x 6 mm", Body.box(6.0, 6.0, 6.0), 3.0),
+)
+TRUTH = 64
+"""Contacts whose error is measured."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to compute a batch, and numbers of contacts and of pictures to compute."""
+
+    name: str
+    options: Mapping[str, str]
+    contacts: tuple[int, ...]
+    pictures: tuple[int, ...]
+
+
+def ways(quick: bool) -> Iterator[Way]:
+    """All that this machine has."""
+    few = (1, 16) if quick else (1, 8, 64)
+    yield Way("NumPy, one by one", {"backend": "numpy"}, few, few[:-1])
+    if not installed("torch"):
+        return
+    import torch
+
+    many = (16,) if quick else (1, 8, 64, 512)
+    shown = (4,) if quick else (8,)
+    for precision in ("double", "single"):
+        options = {"backend": "torch", "device": "cpu", "precision": precision}
+        yield Way(f"PyTorch, {torch.get_num_threads()} thread, {precision}", options, many, shown)
+    if torch.cuda.is_available():
+        card = torch.cuda.get_device_name()
+        for precision in ("double", "single"):
+            options = {"backend": "torch", "device": "cuda", "precision": precision}
+            sizes = (16,) if quick else (1, 64, 512, 4096)
+            yield Way(f"PyTorch, {card}, {precision}", options, sizes, (4,) if quick else (64, 256))
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer contacts, printed only")
+    parser.add_argument("--bundle", type=Path, help="bundle of the sensor; no CAD is needed then")
+    parser.add_argument("--out", type=Path, help="file to write, instead of docs/data")
+    parser.add_argument("--threads", type=int, default=1, help="threads of PyTorch")
+    parser.add_argument("--docs", type=Path, help="folder like docs to write in")
+    asked = parser.parse_args()
+    path = asked.out or (asked.docs or DOCS) / "data" / "twin_batch.json"
+    keeps = bool(asked.out or asked.docs) or not asked.quick
+    data: dict[str, Any] = {**machine(SEED), "rows": [], "friction": []}
+    if installed("torch"):
+        import torch
+
+        torch.set_num_threads(asked.threads)
+        data["torch"] = torch.__version__
+        data["card"] = torch.cuda.get_device_name() if torch.cuda.is_available() else None
+
+    def keep() -> None:
+        if keeps:
+            write_whole(path, (json.dumps(data, indent=1) + "\n").encode())
+
+    with tempfile.TemporaryDirectory() as place, threadpool_limits(1, "blas"):
+        bundle = asked.bundle or made_bundle(Path(place))
+        for row in rows(bundle, Path(place), asked.quick):
+            print(json.dumps(row), flush=True)
+            data["rows"].append(row)
+            keep()
+        for row in friction(bundle, Path(place), 16 if asked.quick else TRUTH):
+            print(json.dumps(row), flush=True)
+            data["friction"].append(row)
+            keep()
+    print(table(data))
+
+
+def made_bundle(place: Path) -> Path:
+    """The bundle of designs/gelslim2.yaml."""
+    import gelslim
+
+    spec = DOCS.parent / "designs" / "gelslim2.yaml"
+    gelslim.write_bundle(place / "bundle", gelslim.make_bundle(spec, measure=False).bundle)
+    return place / "bundle"
+
+
+def contacts(count: int, height_mm: float) -> Array:
+    """Rigid motions (count, 4, 4) of a body whose lowest point is `height_mm` below its origin."""
+    rng = np.random.default_rng(SEED)
+    found = np.tile(np.eye(4), (count, 1, 1))
+    found[:, :2, 3] = rng.uniform(-PLACES_MM, PLACES_MM, (count, 2))
+    found[:, 2, 3] = height_mm - rng.uniform(*DEPTHS_MM, count)
+    return found
+
+
+def opened(bundle: Path, place: Path, body: Body, friction: float = 0.0) -> Twin:
+    """A twin with its compliance computed."""
+    observe = ("force", "markers", "image")
+    twin = Twin(bundle, observe, friction=friction, effects=LINEAR, keep=place)
+    twin.prepare()
+    twin.add(body)
+    return twin
+
+
+def rows(bundle: Path, place: Path, quick: bool) -> Iterator[dict[str, Any]]:
+    """Time and error of each body, way and number of contacts."""
+    for name, body, height in BODIES:
+        twin = opened(bundle, place, body)
+        truth = twin.batch(contacts(TRUTH, height)).require_solved()
+        seen = truth.images(range(4))
+        for way in ways(quick):
+            for count in way.contacts:
+                poses = contacts(max(count, TRUTH), height)[:count]
+                yield {"body": name, "way": way.name, **timed(twin, poses, way, truth)}
+            for count in way.pictures:
+                batch = twin.batch(contacts(count, height), **way.options)
+                yield {"body": name, "way": way.name, **drawn(batch, count, seen)}
+
+
+def timed(twin: Twin, poses: Array, way: Way, truth: StepBatch) -> dict[str, Any]:
+    """Contacts alone, and with markers."""
+    batch, contact_s = second(lambda: twin.batch(poses, **way.options).require_solved())
+    _, both_s = second(lambda: twin.batch(poses, **way.options).markers_px)
+    count = min(len(poses), len(truth))
+    known, found = (one.force_n[:count] for one in (truth, batch))
+    sizes = np.linalg.norm(known, axis=(1, 2))
+    wrench = np.abs(batch.wrench[:count] - truth.wrench[:count]).max(axis=1)
+    return {
+        "contacts": len(poses),
+        "nodes": float((batch.touch > 0).sum(axis=1).mean()),
+        "contact_ms": 1e3 * contact_s / len(poses),
+        "with_markers_ms": 1e3 * both_s / len(poses),
+        "one_by_one": int(batch.one_by_one.sum()),
+        "force_error": float((np.linalg.norm(found - known, axis=(1, 2)) / sizes).max()),
+        "wrench_error": float((wrench / np.abs(truth.wrench[:count]).max(axis=1)).max()),
+        "marker_error_px": float(np.abs(batch.markers_px[:count] - truth.markers_px[:count]).max()),
+    }
+
+
+def drawn(batch: StepBatch, count: int, seen: NDArray[np.uint8]) -> dict[str, Any]:
+    """Pictures."""
+    images, seconds = second(batch.images)
+    same = images[: len(seen)].astype(int) - seen[: len(images)]
+    return {
+        "pictures": count,
+        "picture_ms": 1e3 * seconds / count,
+        "values_that_differ": float((same != 0).mean()),
+        "largest_difference_dn": int(np.abs(same).max()),
+    }
+
+
+def friction(bundle: Path, place: Path, count: int) -> Iterator[dict[str, Any]]:
+    """Contacts with friction, one by one."""
+    for name, body, height in BODIES:
+        twin, poses = opened(bundle, place, body, FRICTION), contacts(count, height)
+        batch, seconds = second(lambda twin=twin, poses=poses: twin.batch(poses).require_solved())
+        yield {
+            "body": name,
+            "contacts": count,
+            "nodes": float((batch.touch > 0).sum(axis=1).mean()),
+            "contact_ms": 1e3 * seconds / count,
+        }
+
+
+def second(call: Callable[[], Any]) -> tuple[Any, float]:
+    """The result, and the seconds of the second call."""
+    call()
+    begun = time.perf_counter()
+    found = call()
+    return found, time.perf_counter() - begun
+
+
+def table(data: Mapping[str, Any]) -> str:
+    """The table of docs/twin_steps.md."""
+    lines = [
+        "| body | backend | contacts | a contact, ms | with markers, ms | force error | dots, px |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for row in data["rows"]:
+        if "contacts" in row:
+            lines.append(
+                f"| {row['body']} | {row['way']} | {row['contacts']:,} | {row['contact_ms']:.3g} "
+                f"| {row['with_markers_ms']:.3g} | {row['force_error']:.1e} "
+                f"| {row['marker_error_px']:.0e} |"
+            )
+    lines += [
+        "",
+        "| body | backend | pictures | a picture, ms | grey values that differ | by |",
+        "|---|---|---:|---:|---:|---:|",
+    ]
+    for row in data["rows"]:
+        if "pictures" in row:
+            lines.append(
+                f"| {row['body']} | {row['way']} | {row['pictures']} | {row['picture_ms']:.3g} "
+                f"| {row['values_that_differ']:.1e} | {row['largest_difference_dn']} |"
+            )
+    lines += ["", *(friction_line(row) for row in data["friction"])]
+    lines.append(f"Clock time, one thread of {data['processor']}.")
+    return "\n".join(lines)
+
+
+def friction_line(row: Mapping[str, Any]) -> str:
+    """A contact with friction."""
+    return (
+        f"With friction {FRICTION:g} a contact of the {row['body']}, takes "
+        f"{row['contact_ms']:.3g} ms in NumPy."
+    )
+
+
+if __name__ == "__main__":
+    main()
