@@ -19,6 +19,7 @@ from typing import Any
 
 import force_sigma
 import linear_gel
+import twin_batch
 import twin_fine
 import twin_look
 import twin_skin
@@ -82,7 +83,10 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-look": _from("twin_look", twin_look.table),
         "drawn-light": _from("drawn_light", drawn_light_table.table),
     },
-    "docs/twin_steps.md": {"steps": _from("twin_steps", twin_steps.table)},
+    "docs/twin_steps.md": {
+        "steps": _from("twin_steps", twin_steps.table),
+        "batch": twin_batch.page_table,
+    },
     "docs/stiffness.md": {
         "operators": _from("stiffness_ladder", page_tables.operators),
         "contacts": _from("operator_contacts", page_tables.contacts),

@@ -48,6 +48,7 @@ STEPS = (
     Step("twin_ladders"),
     Step("twin_planning"),
     Step("twin_steps"),
+    Step("twin_batch"),
     Step("twin_fine"),
     Step("twin_skin"),
     Step("linear_gel"),

@@ -5,9 +5,10 @@
     python bench/twin_batch.py --bundle FOLDER --out FILE    # without CAD; writes FILE alone
 
 Bodies press the sensor of designs/gelslim2.yaml at random places, up to half a millimetre deep. A
-time is the clock's of the second of two calls, from poses to arrays on the host, over the number of
-contacts. The error is that of the same contacts one by one. Without PyTorch or a graphics card
-these rows are left out. The file is written again after each row.
+time is that of the second of two calls, from poses to arrays on the host, over the number of
+contacts: of the processor where one thread computes, of the clock for a graphics card. The error is
+that of the same contacts one by one. Without PyTorch or a card their rows are left out. A way that
+fails leaves a row with its reason. The file is written again after each row.
 """
 
 from __future__ import annotations
@@ -52,27 +53,27 @@ class Way:
     options: Mapping[str, str]
     contacts: tuple[int, ...]
     pictures: tuple[int, ...]
+    clock: Callable[[], float] = time.process_time
 
 
 def ways(quick: bool) -> Iterator[Way]:
     """All that this machine has."""
     few = (1, 16) if quick else (1, 8, 64)
-    yield Way("NumPy, one by one", {"backend": "numpy"}, few, few[:-1])
+    yield Way("NumPy, one by one", {"backend": "numpy"}, few, (4,) if quick else (8,))
     if not installed("torch"):
         return
     import torch
 
-    many = (16,) if quick else (1, 8, 64, 512)
-    shown = (4,) if quick else (8,)
+    card = torch.cuda.get_device_name() if torch.cuda.is_available() else ""
+    for precision in ("double", "single") if card else ():
+        options = {"backend": "torch", "device": "cuda", "precision": precision}
+        sizes = (1, 16) if quick else (1, 8, 64, 512, 4096)
+        shown = (4,) if quick else (8, 64, 256)
+        yield Way(f"PyTorch, {card}, {precision}", options, sizes, shown, time.perf_counter)
+    many = (16,) if quick else (64,) if card else (1, 8, 64, 512)
     for precision in ("double", "single"):
         options = {"backend": "torch", "device": "cpu", "precision": precision}
-        yield Way(f"PyTorch, {torch.get_num_threads()} thread, {precision}", options, many, shown)
-    if torch.cuda.is_available():
-        card = torch.cuda.get_device_name()
-        for precision in ("double", "single"):
-            options = {"backend": "torch", "device": "cuda", "precision": precision}
-            sizes = (16,) if quick else (1, 64, 512, 4096)
-            yield Way(f"PyTorch, {card}, {precision}", options, sizes, (4,) if quick else (64, 256))
+        yield Way(f"PyTorch, one thread, {precision}", options, many, (4,) if quick else (8,))
 
 
 def main() -> None:
@@ -83,7 +84,6 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer contacts, printed only")
     parser.add_argument("--bundle", type=Path, help="bundle of the sensor; no CAD is needed then")
     parser.add_argument("--out", type=Path, help="file to write, instead of docs/data")
-    parser.add_argument("--threads", type=int, default=1, help="threads of PyTorch")
     parser.add_argument("--docs", type=Path, help="folder like docs to write in")
     asked = parser.parse_args()
     path = asked.out or (asked.docs or DOCS) / "data" / "twin_batch.json"
@@ -92,7 +92,7 @@ def main() -> None:
     if installed("torch"):
         import torch
 
-        torch.set_num_threads(asked.threads)
+        torch.set_num_threads(1)
         data["torch"] = torch.__version__
         data["card"] = torch.cuda.get_device_name() if torch.cuda.is_available() else None
 
@@ -106,7 +106,7 @@ def main() -> None:
             print(json.dumps(row), flush=True)
             data["rows"].append(row)
             keep()
-        for row in friction(bundle, Path(place), 16 if asked.quick else TRUTH):
+        for row in frictional(bundle, Path(place), 16 if asked.quick else TRUTH):
             print(json.dumps(row), flush=True)
             data["friction"].append(row)
             keep()
@@ -124,10 +124,10 @@ def made_bundle(place: Path) -> Path:
 
 def contacts(count: int, height_mm: float) -> Array:
     """Rigid motions (count, 4, 4) of a body whose lowest point is `height_mm` below its origin."""
-    rng = np.random.default_rng(SEED)
+    share = np.random.default_rng(SEED).random((count, 3))
     found = np.tile(np.eye(4), (count, 1, 1))
-    found[:, :2, 3] = rng.uniform(-PLACES_MM, PLACES_MM, (count, 2))
-    found[:, 2, 3] = height_mm - rng.uniform(*DEPTHS_MM, count)
+    found[:, :2, 3] = PLACES_MM * (2 * share[:, :2] - 1)
+    found[:, 2, 3] = height_mm - DEPTHS_MM[0] - np.ptp(DEPTHS_MM) * share[:, 2]
     return found
 
 
@@ -147,102 +147,116 @@ def rows(bundle: Path, place: Path, quick: bool) -> Iterator[dict[str, Any]]:
         truth = twin.batch(contacts(TRUTH, height)).require_solved()
         seen = truth.images(range(4))
         for way in ways(quick):
-            for count in way.contacts:
-                poses = contacts(max(count, TRUTH), height)[:count]
-                yield {"body": name, "way": way.name, **timed(twin, poses, way, truth)}
-            for count in way.pictures:
-                batch = twin.batch(contacts(count, height), **way.options)
-                yield {"body": name, "way": way.name, **drawn(batch, count, seen)}
+            head = {"body": name, "way": way.name}
+            try:
+                for count in way.contacts:
+                    yield {**head, **timed(twin, contacts(count, height), way, truth)}
+                for count in way.pictures:
+                    batch = twin.batch(contacts(count, height), **way.options)
+                    yield {**head, **drawn(batch, way, seen)}
+            except Exception as error:  # so that the other ways are still measured
+                yield {**head, "failed": f"{type(error).__name__}: {error}"}
 
 
 def timed(twin: Twin, poses: Array, way: Way, truth: StepBatch) -> dict[str, Any]:
     """Contacts alone, and with markers."""
-    batch, contact_s = second(lambda: twin.batch(poses, **way.options).require_solved())
-    _, both_s = second(lambda: twin.batch(poses, **way.options).markers_px)
+    batch, contact_s = second(lambda: twin.batch(poses, **way.options).require_solved(), way.clock)
+    _, both_s = second(lambda: twin.batch(poses, **way.options).markers_px, way.clock)
     count = min(len(poses), len(truth))
     known, found = (one.force_n[:count] for one in (truth, batch))
-    sizes = np.linalg.norm(known, axis=(1, 2))
+    errors = np.linalg.norm(found - known, axis=(1, 2)) / np.linalg.norm(known, axis=(1, 2))
     wrench = np.abs(batch.wrench[:count] - truth.wrench[:count]).max(axis=1)
+    wrench /= np.abs(truth.wrench[:count]).max(axis=1)
+    dots = np.abs(batch.markers_px[:count] - truth.markers_px[:count])
     return {
         "contacts": len(poses),
         "nodes": float((batch.touch > 0).sum(axis=1).mean()),
         "contact_ms": 1e3 * contact_s / len(poses),
         "with_markers_ms": 1e3 * both_s / len(poses),
         "one_by_one": int(batch.one_by_one.sum()),
-        "force_error": float((np.linalg.norm(found - known, axis=(1, 2)) / sizes).max()),
-        "wrench_error": float((wrench / np.abs(truth.wrench[:count]).max(axis=1)).max()),
-        "marker_error_px": float(np.abs(batch.markers_px[:count] - truth.markers_px[:count]).max()),
+        "median_force_error": float(np.median(errors)),
+        "force_error": float(errors.max()),
+        "wrench_error": float(wrench.max()),
+        "marker_error_px": float(dots.max()),
     }
 
 
-def drawn(batch: StepBatch, count: int, seen: NDArray[np.uint8]) -> dict[str, Any]:
+def drawn(batch: StepBatch, way: Way, seen: NDArray[np.uint8]) -> dict[str, Any]:
     """Pictures."""
-    images, seconds = second(batch.images)
-    same = images[: len(seen)].astype(int) - seen[: len(images)]
+    images, seconds = second(batch.images, way.clock)
+    apart = images[: len(seen)].astype(int) - seen[: len(images)]
     return {
-        "pictures": count,
-        "picture_ms": 1e3 * seconds / count,
-        "values_that_differ": float((same != 0).mean()),
-        "largest_difference_dn": int(np.abs(same).max()),
+        "pictures": len(images),
+        "picture_ms": 1e3 * seconds / len(images),
+        "values_that_differ": float((apart != 0).mean()),
+        "largest_difference": int(np.abs(apart).max()),
     }
 
 
-def friction(bundle: Path, place: Path, count: int) -> Iterator[dict[str, Any]]:
-    """Contacts with friction, one by one."""
+def frictional(bundle: Path, place: Path, count: int) -> Iterator[dict[str, Any]]:
+    """The solution of contacts with friction, one by one and in a trial side by side."""
+    from rigs.batched_friction import friction_rows
+
+    devices = []
+    if installed("torch"):
+        import torch
+
+        devices = ["cpu", "cuda"] if torch.cuda.is_available() else ["cpu"]
     for name, body, height in BODIES:
         twin, poses = opened(bundle, place, body, FRICTION), contacts(count, height)
-        batch, seconds = second(lambda twin=twin, poses=poses: twin.batch(poses).require_solved())
-        yield {
-            "body": name,
-            "contacts": count,
-            "nodes": float((batch.touch > 0).sum(axis=1).mean()),
-            "contact_ms": 1e3 * seconds / count,
-        }
+        _, seconds = second(lambda twin=twin, poses=poses: twin.batch(poses), time.process_time)
+        whole = {"whole_contact_ms": 1e3 * seconds / count}
+        for row in friction_rows(twin, name, poses, FRICTION, devices):
+            yield {**row, **whole}
 
 
-def second(call: Callable[[], Any]) -> tuple[Any, float]:
+def second(call: Callable[[], Any], clock: Callable[[], float]) -> tuple[Any, float]:
     """The result, and the seconds of the second call."""
     call()
-    begun = time.perf_counter()
+    begun = clock()
     found = call()
-    return found, time.perf_counter() - begun
+    return found, clock() - begun
+
+
+def page_table() -> str:
+    """The tables of docs/twin_steps.md: of a processor, and of a machine with a graphics card."""
+    known = [DOCS / "data" / f"{name}.json" for name in ("twin_batch", "twin_batch_card")]
+    return "\n\n".join(table(json.loads(path.read_bytes())) for path in known if path.is_file())
 
 
 def table(data: Mapping[str, Any]) -> str:
-    """The table of docs/twin_steps.md."""
+    """Contacts, pictures and friction of one machine."""
+    contacts = [row for row in data["rows"] if "contacts" in row]
+    pictures = [row for row in data["rows"] if "pictures" in row]
+    where = data["processor"] + (f" and {data['card']}" if data.get("card") else "")
     lines = [
-        "| body | backend | contacts | a contact, ms | with markers, ms | force error | dots, px |",
+        f"| {where} | body | contacts | a contact, ms | with markers, ms | error of forces "
+        "| of dots, px |",
         "|---|---|---:|---:|---:|---:|---:|",
-    ]
-    for row in data["rows"]:
-        if "contacts" in row:
-            lines.append(
-                f"| {row['body']} | {row['way']} | {row['contacts']:,} | {row['contact_ms']:.3g} "
-                f"| {row['with_markers_ms']:.3g} | {row['force_error']:.1e} "
-                f"| {row['marker_error_px']:.0e} |"
-            )
-    lines += [
+        *(
+            f"| {row['way']} | {row['body']} | {row['contacts']:,} | {row['contact_ms']:.3g} "
+            f"| {row['with_markers_ms']:.3g} | {row['force_error']:.0e} "
+            f"| {row['marker_error_px']:.0e} |"
+            for row in contacts
+        ),
         "",
-        "| body | backend | pictures | a picture, ms | grey values that differ | by |",
+        f"| {where} | body | pictures | a picture, ms | grey values that differ | by |",
         "|---|---|---:|---:|---:|---:|",
+        *(
+            f"| {row['way']} | {row['body']} | {row['pictures']} | {row['picture_ms']:.3g} "
+            f"| {row['values_that_differ']:.0e} | {row['largest_difference']} |"
+            for row in pictures
+        ),
+        "",
+        f"| friction {FRICTION:g} | body | nodes | forces alone, ms | error of forces |",
+        "|---|---|---:|---:|---:|",
+        *(
+            f"| {row['way']} | {row['body']} | {row['nodes']:.0f} | {row['ms']:.2g} "
+            f"| {row['force_error']:.0e} |"
+            for row in data["friction"]
+        ),
     ]
-    for row in data["rows"]:
-        if "pictures" in row:
-            lines.append(
-                f"| {row['body']} | {row['way']} | {row['pictures']} | {row['picture_ms']:.3g} "
-                f"| {row['values_that_differ']:.1e} | {row['largest_difference_dn']} |"
-            )
-    lines += ["", *(friction_line(row) for row in data["friction"])]
-    lines.append(f"Clock time, one thread of {data['processor']}.")
     return "\n".join(lines)
-
-
-def friction_line(row: Mapping[str, Any]) -> str:
-    """A contact with friction."""
-    return (
-        f"With friction {FRICTION:g} a contact of the {row['body']}, takes "
-        f"{row['contact_ms']:.3g} ms in NumPy."
-    )
 
 
 if __name__ == "__main__":

@@ -49,8 +49,9 @@ def lcp_forces(engine: Engine, normal: Tensor, height: Tensor, guess: Tensor) ->
         left = (~found & ~given_up).nonzero()[:, 0]
         if len(left) == 0:
             break
+        own = normal if len(left) == len(normal) else normal[left]
         push, wrong, lost = _pivoted(
-            engine, normal[left], room[left], reachable[left], active[left], narrow[left], rounding
+            engine, own, room[left], reachable[left], active[left], narrow[left], rounding
         )
         count = wrong.sum(dim=1)
         # Rounding has made a matrix indefinite: such a pose has no solution here.

@@ -14,8 +14,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.batch.candidates import CandidateCompliance, padded
 from gelslim_twin.batch.complementarity import lcp_forces
 from gelslim_twin.batch.engine import Engine, Tensor
+from gelslim_twin.batch.fields import FIELD_NUMBERS, Overlaps, SolvedContacts, memory_parts
 from gelslim_twin.batch.planes import PlacedTool, Planes
 from gelslim_twin.contact.contact_forces import SLIP
 from gelslim_twin.contact.plane_iteration import (
@@ -33,57 +35,6 @@ from ifem_export.compliance.columns import SurfaceCompliance
 Array = NDArray[np.float64]
 SINGLE_GAP = 3e-6
 """Smallest gap over the depth that displacements in single precision show."""
-BLOCK_COPIES = 9
-"""Numbers per pair of candidates in the largest array."""
-FIELD_NUMBERS = 12
-"""Numbers per surface node in the largest array."""
-
-
-@dataclass(frozen=True, eq=False)
-class Overlaps:
-    """What of a tool is below the undeformed surface, at n poses.
-
-    Attributes:
-        nodes: Surface nodes (n,) that it covers.
-        depth_mm: The largest depth (n,).
-        depths_mm: Sum (n,) of the depths at the nodes.
-        span_mm: The larger (n,) of the extents of these nodes along x and y.
-        candidates: About how many nodes (n,) the solver takes into account.
-    """
-
-    nodes: NDArray[np.intp]
-    depth_mm: Array
-    depths_mm: Array
-    span_mm: Array
-    candidates: NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class SolvedContacts:
-    """Fields of n poses over the c surface nodes.
-
-    Attributes:
-        force_n: Nodal forces (n, c, 3).
-        displacement_mm: Displacements (n, c, 3).
-        touch: Contact status (n, c), values of `ContactStatus`.
-        solved: Whether (n,) the pose converged; the fields of the others are 0.
-    """
-
-    force_n: Array
-    displacement_mm: Array
-    touch: NDArray[np.int8]
-    solved: NDArray[np.bool_]
-
-    @classmethod
-    def none(cls, poses: int, nodes: int) -> SolvedContacts:
-        """Poses without contact."""
-        fields = (np.zeros((poses, nodes, 3)) for _ in range(2))
-        return cls(*fields, np.zeros((poses, nodes), np.int8), np.ones(poses, bool))
-
-    def put(self, at: NDArray[np.intp], part: SolvedContacts) -> None:
-        """Set the poses `at` (k,)."""
-        self.force_n[at], self.displacement_mm[at] = part.force_n, part.displacement_mm
-        self.touch[at], self.solved[at] = part.touch, part.solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +126,7 @@ class BatchedContact:
         """
         found = SolvedContacts.none(len(origins_mm), self.compliance.nodes)
         order = np.argsort(candidates, kind="stable")
-        for part in _parts(candidates[order], self.compliance.nodes, self.engine.most_bytes):
+        for part in memory_parts(candidates[order], self.compliance.nodes, self.engine.most_bytes):
             at = order[part]
             placed = PlacedTool(
                 self.engine, tool, self.engine.double(origins_mm[at]), self.engine.double(turns[at])
@@ -185,7 +136,7 @@ class BatchedContact:
 
     def _solved(self, tool: PlacedTool) -> SolvedContacts:
         torch, engine = self.engine.torch, self.engine
-        poses, nodes = len(tool.origin_mm), self.compliance.nodes
+        poses = len(tool.origin_mm)
         points = self.points_mm.expand(poses, -1, -1)
         below = tool.clearance_mm(points)
         on_tool, depth = below.isfinite(), -below.amin(dim=1).clamp(max=0.0)
@@ -205,7 +156,7 @@ class BatchedContact:
             if len(left) == 0:
                 break
             wanted[left] |= room < CANDIDATE_SHARE * deepest[:, None]
-            places, real = _padded(wanted[left])
+            places, real = padded(wanted[left])
             balance, u = self._balanced(
                 some, planes.at(places), places, real, moved[left], pressed[left], deepest
             )
@@ -255,8 +206,7 @@ class BatchedContact:
         """The balance at the candidates `places` (b, m), and the displacement (b, c, 3)."""
         engine, index = self.engine, places[..., None].expand(-1, -1, 3)
         points = self.points_mm[places]
-        dofs = (3 * places[..., None] + engine.torch.arange(3, device=engine.device)).flatten(1)
-        block = self._table[dofs[:, :, None], dofs[:, None, :]]
+        block = CandidateCompliance(engine, self._table, places)
         start, active = moved.gather(1, index), pressed.gather(1, places) & real
         if self.geometry == "rest":
             room = planes.gap_mm(points).masked_fill(~real, np.inf)
@@ -271,7 +221,7 @@ class BatchedContact:
         tool: PlacedTool,
         planes: Planes,
         points: Tensor,
-        block: Tensor,
+        block: CandidateCompliance,
         real: Tensor,
         start: Tensor,
         active: Tensor,
@@ -292,9 +242,7 @@ class BatchedContact:
             rest, can = points[left], real[left]
             room = planes.gap_mm(rest + u) + (planes.normal * u).sum(dim=-1)
             room = room.masked_fill(~can, np.inf)
-            own, new, balanced = self._forces(
-                block if len(left) == len(block) else block[left], planes.normal, room, active
-            )
+            own, new, balanced = self._forces(block, planes.normal, room, active)
             used, planes = planes, tool.surface(rest + new, planes)
             gap = planes.gap_mm(rest + new)
             active = own < 0
@@ -309,7 +257,7 @@ class BatchedContact:
                 break
             before, u = u[on], new[on]
             if not bool(on.all()):
-                left, tool, active = left[on], tool.of(on), active[on]
+                left, tool, active, block = left[on], tool.of(on), active[on], block.of(on)
                 planes, used = planes.of(on), used.of(on)
             if turn >= DAMPED_FROM:
                 # Damping, because a node at an edge jumps from one flank to the other and back.
@@ -319,15 +267,12 @@ class BatchedContact:
         return Balance(push, last_normal, last_gap, found)
 
     def _forces(
-        self, block: Tensor, normal: Tensor, room: Tensor, active: Tensor
+        self, block: CandidateCompliance, normal: Tensor, room: Tensor, active: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Normal forces (b, m), motion (b, m, 3) under them, and whether (b,) they were found."""
-        b, m = room.shape
-        along, own = block.view(b, 3 * m, m, 3), normal.to(block.dtype)
-        across = sum(along[..., k] * own[:, None, :, k] for k in range(3))
-        among = sum(across.view(b, m, 3, m)[:, :, k] * own[..., k, None] for k in range(3))
+        across, among = block.along(normal)
         pushes = lcp_forces(self.engine, among, room, active)
-        motion = (across @ pushes.force[..., None]).view(b, m, 3)
+        motion = (across @ pushes.force[..., None]).view(normal.shape)
         return pushes.force.double(), motion.double(), pushes.found
 
     def _motion(self, places: Tensor, force: Tensor) -> Tensor:
@@ -349,22 +294,3 @@ class BatchedContact:
         """As `gap_tolerance_mm`, for depths (b,)."""
         share, least = gap_tolerance_mm(self.tolerance, 1.0), gap_tolerance_mm(0.0, 0.0)
         return (max(share, 0.0 if self.engine.exact else SINGLE_GAP) * deepest).clamp(min=least)
-
-
-def _padded(wanted: Tensor) -> tuple[Tensor, Tensor]:
-    """Numbers (b, m) of the wanted nodes (b, c), in order, and whether each is one of them."""
-    most = int(wanted.sum(dim=1).amax())
-    places = (~wanted).byte().argsort(dim=1, stable=True)[:, :most]
-    return places, wanted.gather(1, places)
-
-
-def _parts(candidates: NDArray[np.intp], nodes: int, most_bytes: int) -> list[slice]:
-    """Parts of poses, in order of their candidates, whose arrays fit into memory."""
-    found, first = [], 0
-    for last in range(1, len(candidates) + 1):
-        more = int(candidates[last]) if last < len(candidates) else 0
-        size = 8 * (last + 1 - first) * max(BLOCK_COPIES * more**2, FIELD_NUMBERS * nodes)
-        if last == len(candidates) or size > most_bytes:
-            found.append(slice(first, last))
-            first = last
-    return found

@@ -55,7 +55,9 @@ def covered(engine: Engine, outlines: Tensor, spare: int) -> Windows:
         top = torch.minimum(torch.maximum(ya, row), yb)
         bottom = torch.maximum(torch.minimum(yb, row + 1), top)
         at = xa + lean * (top - ya), torch.where(bottom >= yb, xb, xa + lean * (bottom - ya))
-        _add_row(engine, acc, size, row, torch.minimum(*at), torch.maximum(*at), sign * (bottom - top))
+        _add_row(
+            engine, acc, size, row, torch.minimum(*at), torch.maximum(*at), sign * (bottom - top)
+        )
         row = row + 1
     cover = acc.view(-1, size, size).cumsum(dim=2)
     return Windows(cover, first.flip(1).long())

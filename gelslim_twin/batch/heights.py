@@ -102,7 +102,7 @@ def _map(grid: HeightMap, engine: Engine) -> Heights:
             cells.append(cell)
             parts.append(place - cell)
         (i, j), (u, v) = cells, parts
-        share = height = 0.0
+        share, height = engine.torch.zeros_like(x), engine.torch.zeros_like(x)
         for a, p in ((0, 1 - u), (1, u)):
             for b, q in ((0, 1 - v), (1, v)):
                 weight = p * q

@@ -132,10 +132,11 @@ class BatchedShading:
         """Light (b, ny, nx, k) of every few nodes over that of their slopes alone."""
         torch, stride = self.engine.torch, self._stride(surfaces)
         height = surfaces.displacement_mm[:, ::stride, ::stride, 2]
-        step = tuple(stride * s for s in surfaces.step_mm)
+        step = stride * surfaces.step_mm[0], stride * surfaces.step_mm[1]
         horizon = horizons(self.engine, height, step)
         slope_y, slope_x = _central(height, 1, step[1]), _central(height, 2, step[0])
-        bins = self._bins(surfaces.origin_mm, step, tuple(height.shape[1:]))
+        _, rows, columns = height.shape
+        bins = self._bins(surfaces.origin_mm, step, (rows, columns))
         alone = found = torch.full_like(height[..., None], 1e-12)
         z = height[..., None, None]
         for corner in bins.corners:
@@ -144,20 +145,22 @@ class BatchedShading:
             light = (light - slope_y[..., None, None] * fan[..., 2]).clamp(min=0.0) * corner.share
             alone = alone + light.sum(dim=-1)
             light = light * (1.0 - z * corner.drift).clamp(0.0, MOST)
-            hidden = horizon.flatten(1, 2).gather(
-                2, corner.side.flatten(0, 1).flatten(1).expand(len(height), -1, -1)
-            ).view(len(height), *corner.side.shape)
+            hidden = (
+                horizon.flatten(1, 2)
+                .gather(2, corner.side.flatten(0, 1).flatten(1).expand(len(height), -1, -1))
+                .view(len(height), *corner.side.shape)
+            )
             clear = (0.5 + (corner.rise - hidden) / BIN_WIDTH).clamp(0.0, 1.0)
             found = found + (light * torch.where(hidden > 0.0, clear, 1.0)).sum(dim=-1)
         level = (height.abs() < SMALLEST_MM) & ~horizon.any(dim=-1)
         return torch.where(level[..., None], 1.0, found / alone)
 
     def _bins(
-        self, origin: tuple[float, float], step: tuple[float, ...], shape: tuple[int, ...]
+        self, origin: tuple[float, float], step: tuple[float, float], shape: tuple[int, int]
     ) -> FanBins:
         key = origin, step, shape
         if key not in self._kept:
-            self._kept[key] = FanBins.of(self.engine, self.light, *key)
+            self._kept[key] = FanBins.of(self.engine, self.light, origin, step, shape)
         return self._kept[key]
 
     @cached_property
@@ -217,9 +220,16 @@ class FanBins:
             side = direction[:, j, i].movedim(0, 1).unflatten(0, shape)
             whole = fan[..., 0].clamp(min=1e-300)
             moved = (fall[..., None, :] * fan[..., 1:]).sum(dim=-1) / whole
-            real = [a.to(engine.real) for a in (fan, share.view(*shape, 1, 1), rise)]
-            total = torch.where(fan[..., 0] > 0, drift + moved, 0.0).to(engine.real)
-            corners.append(FanCorner(*real, side, total))
+            total = torch.where(fan[..., 0] > 0, drift + moved, 0.0)
+            corners.append(
+                FanCorner(
+                    fan=fan.to(engine.real),
+                    share=share.view(*shape, 1, 1).to(engine.real),
+                    rise=rise.to(engine.real),
+                    side=side,
+                    drift=total.to(engine.real),
+                )
+            )
         return cls(tuple(corners))
 
 

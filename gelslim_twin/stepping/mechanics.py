@@ -241,7 +241,9 @@ class StepMechanics:
             return None
         span = np.ptp(points[into, :2], axis=0)
         return self.estimate(
-            Overlap(int(into.sum()), -float(below.min()), -float(below[into].sum()), float(span.max()))
+            Overlap(
+                int(into.sum()), -float(below.min()), -float(below[into].sum()), float(span.max())
+            )
         )
 
     def estimate(self, overlap: Overlap) -> ContactEstimate:

@@ -105,14 +105,14 @@ def _solve_side(
             float(overlaps.span_mm[at]),
         )
         together[at] = _is_linear(problem, body, side, frames[at], int(numbers[at]), overlap)
-    at = np.flatnonzero(together)
-    found = contact.solve(side.tool, origins[at], turns[at], overlaps.candidates[at])
-    done = numbers[at[found.solved]]
+    left = np.flatnonzero(together)
+    found = contact.solve(side.tool, origins[left], turns[left], overlaps.candidates[left])
+    done, touch = numbers[left[found.solved]], found.touch[found.solved]
     problem.force_n[done] = found.force_n[found.solved]
     problem.displacement_mm[done] = found.displacement_mm[found.solved]
-    problem.touch[done] = found.touch[found.solved]
-    problem.excess[done[~found.touch[found.solved].any(axis=1)]] = 0.0
-    for number in numbers[at[~found.solved]]:
+    problem.touch[done] = touch
+    problem.excess[done[~touch.any(axis=1)]] = 0.0
+    for number in numbers[left[~found.solved]]:
         problem.solve_singly(int(number))
 
 

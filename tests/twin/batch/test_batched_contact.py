@@ -93,7 +93,9 @@ def test_the_laws_of_contact_hold_on_another_compliance(
         np.testing.assert_allclose((exact @ force.ravel()).reshape(-1, 3), moved, atol=2e-6)
 
 
-def test_nodes_in_contact_lie_on_a_ball_that_they_follow(pads: dict[float, Path], device: str) -> None:
+def test_nodes_in_contact_lie_on_a_ball_that_they_follow(
+    pads: dict[float, Path], device: str
+) -> None:
     """At 0.32 nodes meet the ball where they have moved: by its equation, at 0.2 % of the depth."""
     twin = linear_twin(pads[0.32])
     twin.add(Body.sphere(5.0))

@@ -109,7 +109,7 @@ def test_markers_and_pictures_are_those_of_single_ones(
     """With shading, defocus, noise, dirt, glare, a response curve and faults of the print."""
     effects = {
         **LINEAR,
-        **{name: "on" for name in ("dirt", "defocus", "specular", "sensor_noise", "marker_print")},
+        **dict.fromkeys(("dirt", "defocus", "specular", "sensor_noise", "marker_print"), "on"),
         "exposure": {"use": "on", "gamma": 1.4, "gain": 1.3},
     }
     twin = Twin(seen_pad, ("force", "image"), {"image": 0.05}, effects=effects, seed=2)
