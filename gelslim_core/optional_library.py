@@ -42,6 +42,7 @@ EXTRAS = (
     Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
     Extra("sim", ("mujoco",), "examples/mujoco_grasp.py, in which a physics engine steps the twin"),
+    Extra("torch", ("torch",), 'Twin.batch with backend="torch": many contacts at once'),
 )  # fmt: skip
 
 

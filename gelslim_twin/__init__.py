@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from gelslim_twin.stepping.body import Body
     from gelslim_twin.stepping.state import TwinState
     from gelslim_twin.stepping.step import Step
+    from gelslim_twin.stepping.step_batch import StepBatch
     from gelslim_twin.stepping.step_error import StepError
     from gelslim_twin.stepping.twin import Twin
     from gelslim_twin.validation.score import Validation
@@ -48,6 +49,7 @@ __all__ = [
     "SimulationError",
     "SimulationJob",
     "Step",
+    "StepBatch",
     "StepError",
     "Twin",
     "TwinSensor",

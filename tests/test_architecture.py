@@ -52,8 +52,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "built_sensor", "sensor", "run",
     ),
     "gelslim_twin": (
-        "effects", "scene", "planning", "contact", "render", "appearance", "simulation", "stepping",
-        "validation",
+        "effects", "scene", "planning", "contact", "render", "appearance", "simulation", "batch",
+        "stepping", "validation",
     ),
     "gelslim_cad": (
         "spec", "gel", "markers", "pictures", "geometry", "light", "electronics", "dimensions",

@@ -149,5 +149,5 @@ def friction_rows(
            **one_by_one(problems, friction, time.process_time)}  # fmt: skip
     for device in devices:
         clock = time.perf_counter if device == "cuda" else time.process_time
-        yield {**row, "way": f"PyTorch, {device}, side by side",
+        yield {**row, "way": f"trial in PyTorch, {device}",
                **side_by_side(problems, friction, device, clock)}  # fmt: skip

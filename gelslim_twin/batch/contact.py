@@ -113,26 +113,32 @@ class BatchedContact:
         return tuple(map(engine.numpy, (into.sum(dim=1), depth, depths, span, candidates)))
 
     def solve(
-        self, tool: Tool, origins_mm: Array, turns: Array, candidates: NDArray[np.intp]
-    ) -> SolvedContacts:
-        """Solve n poses of a tool.
+        self,
+        tool: Tool,
+        origins_mm: Array,
+        turns: Array,
+        candidates: NDArray[np.intp],
+        into: SolvedContacts,
+        numbers: NDArray[np.intp],
+    ) -> None:
+        """Solve m poses of a tool.
 
         Args:
             tool: The tool.
-            origins_mm: Its origin (n, 3) at each pose.
-            turns: Its rotation (n, 3, 3).
-            candidates: About how many nodes (n,) may be in contact, by which the poses are
+            origins_mm: Its origin (m, 3) at each pose.
+            turns: Its rotation (m, 3, 3).
+            candidates: About how many nodes (m,) may be in contact, by which the poses are
                 divided into parts that fit into memory.
+            into: Where the fields are written.
+            numbers: The numbers (m,) of the poses there.
         """
-        found = SolvedContacts.none(len(origins_mm), self.compliance.nodes)
         order = np.argsort(candidates, kind="stable")
         for part in memory_parts(candidates[order], self.compliance.nodes, self.engine.most_bytes):
             at = order[part]
             placed = PlacedTool(
                 self.engine, tool, self.engine.double(origins_mm[at]), self.engine.double(turns[at])
             )
-            found.put(at, self._solved(placed))
-        return found
+            into.put(numbers[at], self._solved(placed))
 
     def _solved(self, tool: PlacedTool) -> SolvedContacts:
         torch, engine = self.engine.torch, self.engine

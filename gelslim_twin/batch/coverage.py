@@ -86,15 +86,13 @@ def _add_row(
         before = mean
 
 
-def blurred(engine: Engine, windows: Windows, taps: Tensor, reach: Tensor) -> Windows:
-    """Windows of dots behind even kernels: halves `taps` (d, t), centre first, of `reach` (d,)."""
+def blurred(engine: Engine, windows: Windows, taps: Tensor) -> Windows:
+    """Windows of dots behind even kernels, given by their halves `taps` (d, t), centre first."""
     torch, size = engine.torch, windows.cover.shape[1]
     ring = torch.arange(size, device=engine.device)
     apart = (ring[:, None] - ring).abs()
-    held = taps.masked_fill(torch.arange(taps.shape[1], device=engine.device) > reach[:, None], 0.0)
-    if size > taps.shape[1]:
-        held = torch.nn.functional.pad(held, (0, size - taps.shape[1]))
-    kernel = held.to(engine.real)[:, apart.flatten()].view(-1, size, size)
+    held = torch.nn.functional.pad(taps, (0, max(0, size - taps.shape[1]))).to(engine.real)
+    kernel = held[:, apart.flatten()].view(-1, size, size)
     return Windows(kernel @ windows.cover @ kernel, windows.first)
 
 

@@ -12,7 +12,7 @@ from gelslim_twin.batch.coverage import blurred, covered, drawn
 from gelslim_twin.batch.engine import Engine, Tensor
 from gelslim_twin.batch.projection import BatchedCamera
 from gelslim_twin.batch.surfaces import BatchedSurfaces
-from gelslim_twin.render.defocus import LARGEST_PX, SUNKEN_MM, kernel_taps
+from gelslim_twin.render.defocus import LARGEST_PX, LEFT_OUT, SUNKEN_MM, TABLE, kernel_table
 from gelslim_twin.render.frame_renderer import FrameRenderer
 from gelslim_twin.render.printed_dots import CORNERS, RIM_POINTS, rim_scale, series
 
@@ -59,14 +59,12 @@ class BatchedDots:
         weight = (self._weight * seen).flatten()
         area = doubled.abs() / 2
         sigma = self._sigma_px(surfaces, area)
-        spare = 0
-        if sigma is not None:
-            taps, reach = kernel_taps(engine.numpy(sigma.flatten()))
-            spare = int(reach.max(initial=0))
-        windows = covered(engine, outlines.flatten(0, 1), spare)
-        if sigma is not None:
-            reaches = engine.torch.as_tensor(reach, device=engine.device)
-            windows = blurred(engine, windows, engine.double(taps), reaches)
+        if sigma is None:
+            windows = covered(engine, outlines.flatten(0, 1), 0)
+        else:
+            taps = self._taps(sigma.flatten())
+            windows = covered(engine, outlines.flatten(0, 1), taps.shape[1] - 1)
+            windows = blurred(engine, windows, taps)
         size = self.camera.camera.image_height_px, self.camera.camera.image_width_px
         return drawn(engine, windows, weight, poses, size)
 
@@ -91,6 +89,23 @@ class BatchedDots:
         sunken = self._grid(field.sunken, places)
         blur = (level - moved[..., 2] / SUNKEN_MM * (sunken - level)).clamp(min=0.0)
         return (lens.still_px**2 + (blur * scale / 4) ** 2).sqrt().clamp(max=LARGEST_PX)
+
+    def _taps(self, sigma: Tensor) -> Tensor:
+        """Half kernels (n, t) of the blurs (n,), centre first, as `kernel_taps`."""
+        torch, most = self.engine.torch, float(sigma.amax())
+        if most == 0:
+            return torch.ones_like(sigma)[:, None]
+        most = np.ceil(2 * most) / 2
+        table = self.engine.double(kernel_table(float(most)))
+        place = sigma**2 / most**2 * (TABLE - 1)
+        low = place.long().clamp(max=TABLE - 2)
+        part = (place - low)[:, None]
+        taps = (1 - part) * table[low] + part * table[low + 1]
+        inside = 2 * torch.nn.functional.pad(taps[:, 1:], (1, 0)).cumsum(dim=1)
+        reach = ((1 - taps[:, :1] - inside > LEFT_OUT).sum(dim=1) * (sigma > 0))[:, None]
+        taps = taps.masked_fill(torch.arange(taps.shape[1], device=sigma.device) > reach, 0.0)
+        taps = taps[:, : int(reach.amax()) + 1]
+        return taps / (taps[:, :1] + 2 * taps[:, 1:].sum(dim=1, keepdim=True))
 
     def _grid(self, grid: HeightGrid, places: Tensor) -> Tensor:
         """Values of an even grid at places (..., 2), as `HeightGrid`."""

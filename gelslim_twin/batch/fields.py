@@ -41,19 +41,13 @@ class SolvedContacts:
         force_n: Nodal forces (n, c, 3).
         displacement_mm: Displacements (n, c, 3).
         touch: Contact status (n, c), values of `ContactStatus`.
-        solved: Whether (n,) the pose converged; the fields of the others are 0.
+        solved: Whether (n,) the pose converged; the fields of one that did not are 0.
     """
 
     force_n: Array
     displacement_mm: Array
     touch: NDArray[np.int8]
     solved: NDArray[np.bool_]
-
-    @classmethod
-    def none(cls, poses: int, nodes: int) -> SolvedContacts:
-        """Poses without contact."""
-        force, moved = np.zeros((poses, nodes, 3)), np.zeros((poses, nodes, 3))
-        return cls(force, moved, np.zeros((poses, nodes), np.int8), np.ones(poses, bool))
 
     def put(self, at: NDArray[np.intp], part: SolvedContacts) -> None:
         """Set the poses `at` (k,)."""

@@ -22,10 +22,12 @@ if TYPE_CHECKING:
     from gelslim_twin.render.surroundings import Sight
 
 Array = NDArray[np.float64]
-_LEFT_OUT = 1e-4
+LEFT_OUT = 1e-4
+"""Weight at which a kernel is truncated."""
 LARGEST_PX = 8.0
 """Largest standard deviation of a blur."""
-_TABLE = 321
+TABLE = 321
+"""Variances of a table of kernels."""
 _LEVELS = 6
 _NODES = 49
 SUNKEN_MM = 0.5
@@ -125,24 +127,24 @@ def kernel_taps(sigma_px: Array) -> tuple[Array, NDArray[np.int64]]:
     if most == 0:
         return np.ones((len(sigma), 1)), np.zeros(len(sigma), dtype=np.int64)
     most = np.ceil(2 * most) / 2
-    table = _kernels(float(most))
+    table = kernel_table(float(most))
     reach = table.shape[1] - 1
-    place = sigma**2 / most**2 * (_TABLE - 1)
-    low = np.minimum(place.astype(int), _TABLE - 2)
+    place = sigma**2 / most**2 * (TABLE - 1)
+    low = np.minimum(place.astype(int), TABLE - 2)
     part = (place - low)[:, None]
     taps = (1 - part) * table[low] + part * table[low + 1]
     beyond = 1 - taps[:, :1] - 2 * np.cumsum(np.pad(taps[:, 1:], ((0, 0), (1, 0))), axis=1)
-    reaches = np.where(sigma > 0, (beyond > _LEFT_OUT).sum(axis=1), 0)
+    reaches = np.where(sigma > 0, (beyond > LEFT_OUT).sum(axis=1), 0)
     taps[np.arange(reach + 1)[None, :] > reaches[:, None]] = 0.0
     taps /= taps[:, :1] + 2 * taps[:, 1:].sum(axis=1, keepdims=True)
     return taps, reaches.astype(np.int64)
 
 
 @cache
-def _kernels(most_px: float) -> Array:
+def kernel_table(most_px: float) -> Array:
     """Half kernels (table, t) at equal steps of variance up to `most_px`²."""
     from scipy.special import ive
 
     reach = int(np.ceil(3.9 * most_px)) + 1
-    variance = np.linspace(0.0, most_px**2, _TABLE)
+    variance = np.linspace(0.0, most_px**2, TABLE)
     return np.asarray(ive(np.arange(reach + 1)[None, :], variance[:, None]))

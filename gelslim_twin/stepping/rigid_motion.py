@@ -71,12 +71,25 @@ def batch_motions(poses: ArrayLike, bodies: int) -> tuple[Array, dict[int, StepE
             f"being that of the contacts; {FORMS}"
         )
     motions, errors = np.full((len(given), bodies, 4, 4), np.nan), {}
-    for number, one in enumerate(given):
+    plain = np.zeros(len(given), dtype=bool)
+    if given.ndim == 4:
+        plain = _are_motions(given)
+        motions[plain] = given[plain]
+    for number in np.flatnonzero(~plain):
         try:
-            motions[number] = [_motion(body, pose) for body, pose in enumerate(one)]
+            motions[number] = [_motion(body, pose) for body, pose in enumerate(given[number])]
         except StepError as error:
-            errors[number] = error
+            errors[int(number)] = error
     return motions, errors
+
+
+def _are_motions(matrices: Array) -> NDArray[np.bool_]:
+    """Whether (n,) all matrices (n, k, 4, 4) are rigid motions."""
+    turn = np.where(np.isfinite(matrices), matrices, 0.0)[..., :3, :3]
+    bent = np.abs(np.swapaxes(turn, 2, 3) @ turn - np.eye(3)).max(axis=(2, 3))
+    last = np.abs(matrices[..., 3, :] - [0.0, 0.0, 0.0, 1.0]).max(axis=2)
+    rigid = (bent <= NOT_RIGID) & (np.linalg.det(turn) > 0) & (last <= NOT_RIGID)
+    return np.asarray((rigid & np.isfinite(matrices).all(axis=(2, 3))).all(axis=1))
 
 
 def _motion(number: int, given: Array) -> Array:

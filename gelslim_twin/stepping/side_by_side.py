@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gelslim_twin.batch.fields import SolvedContacts
 from gelslim_twin.stepping.batch_problem import BatchProblem
 from gelslim_twin.stepping.body import Body, Side
 from gelslim_twin.stepping.mechanics import Overlap, StepMechanics
@@ -106,13 +107,11 @@ def _solve_side(
         )
         together[at] = _is_linear(problem, body, side, frames[at], int(numbers[at]), overlap)
     left = np.flatnonzero(together)
-    found = contact.solve(side.tool, origins[left], turns[left], overlaps.candidates[left])
-    done, touch = numbers[left[found.solved]], found.touch[found.solved]
-    problem.force_n[done] = found.force_n[found.solved]
-    problem.displacement_mm[done] = found.displacement_mm[found.solved]
-    problem.touch[done] = touch
-    problem.excess[done[~touch.any(axis=1)]] = 0.0
-    for number in numbers[left[~found.solved]]:
+    own, solved = numbers[left], np.zeros(len(problem.motions), dtype=bool)
+    into = SolvedContacts(problem.force_n, problem.displacement_mm, problem.touch, solved)
+    contact.solve(side.tool, origins[left], turns[left], overlaps.candidates[left], into, own)
+    problem.excess[own[~problem.touch[own].any(axis=1)]] = 0.0
+    for number in own[~solved[own]]:
         problem.solve_singly(int(number))
 
 
