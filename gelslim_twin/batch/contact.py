@@ -44,13 +44,11 @@ class Balance:
     Attributes:
         push: Normal forces (b, m), none above 0.
         normal: Normals (b, m, 3) of the planes that they act against.
-        gap_mm: Gaps (b, m) to the tool.
         found: Whether (b,) it converged.
     """
 
     push: Tensor
     normal: Tensor
-    gap_mm: Tensor
     found: Tensor
 
 
@@ -216,8 +214,8 @@ class BatchedContact:
         start, active = moved.gather(1, index), pressed.gather(1, places) & real
         if self.geometry == "rest":
             room = planes.gap_mm(points).masked_fill(~real, np.inf)
-            push, motion, found = self._forces(block, planes.normal, room, active)
-            balance = Balance(push, planes.normal, planes.gap_mm(points + motion), found)
+            push, _, found = self._forces(block, planes.normal, room, active)
+            balance = Balance(push, planes.normal, found)
         else:
             balance = self._followed(tool, planes, points, block, real, start, active, deepest)
         return balance, self._motion(places, balance.push[..., None] * balance.normal)
@@ -241,7 +239,7 @@ class BatchedContact:
         narrow = self._gap_tolerance_mm(deepest)
         edge = (min(self.tolerance, EDGE) * deepest).clamp(min=EDGE_MM)
         push = torch.zeros_like(active, dtype=torch.float64)
-        last_normal, last_gap = torch.zeros_like(points), torch.zeros_like(push)
+        normal = torch.zeros_like(points)
         found = torch.zeros_like(active[:, 0])
         left, u = torch.arange(len(points), device=self.engine.device), start
         for turn in range(GEOMETRY_STEPS):
@@ -256,8 +254,7 @@ class BatchedContact:
             slack = narrow[left] if turn < EDGES_FROM else torch.maximum(narrow, edge)[left]
             done = balanced & (off.amax(dim=1) <= slack)
             at = left[done]
-            push[at], last_normal[at], last_gap[at] = own[done], used.normal[done], gap[done]
-            found[at] = True
+            push[at], normal[at], found[at] = own[done], used.normal[done], True
             on = ~done & balanced
             if not bool(on.any()):
                 break
@@ -270,7 +267,7 @@ class BatchedContact:
                 mixed = planes.turned(used, 1 / (turn - DAMPED_FROM + 2))
                 u = before + 0.5 * (u - before)
                 planes = Planes(tool.surface(points[left] + u, mixed).met_mm, mixed.normal)
-        return Balance(push, last_normal, last_gap, found)
+        return Balance(push, normal, found)
 
     def _forces(
         self, block: CandidateCompliance, normal: Tensor, room: Tensor, active: Tensor

@@ -17,7 +17,7 @@ from ifem_export.operators.single_thread import single_threaded
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class BatchProblem:
     """Contacts to be solved, each from the untouched gel, and what was found of them so far.
 
@@ -41,16 +41,12 @@ class BatchProblem:
 
     def __post_init__(self) -> None:
         n, nodes = len(self.motions), len(self.mechanics.points_mm)
-        fields = {
-            "force_n": np.zeros((n, nodes, 3)),
-            "displacement_mm": np.zeros((n, nodes, 3)),
-            "touch": np.zeros((n, nodes), dtype=np.int8),
-            "large_strain": np.zeros(n, dtype=bool),
-            "excess": np.zeros(n),
-            "one_by_one": np.zeros(n, dtype=bool),
-        }
-        for name, value in fields.items():
-            object.__setattr__(self, name, value)
+        self.force_n = np.zeros((n, nodes, 3))
+        self.displacement_mm = np.zeros((n, nodes, 3))
+        self.touch = np.zeros((n, nodes), dtype=np.int8)
+        self.large_strain = np.zeros(n, dtype=bool)
+        self.excess = np.zeros(n)
+        self.one_by_one = np.zeros(n, dtype=bool)
 
     @property
     def top_mm(self) -> float:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from batch_rig import contacts
+from batch_rig import apart, contacts
 from render_rig import CAMERA
+from sim_rig import write_sensor
 from stepping_rig import LINEAR, at
 
 from gelslim_optics.camera.lens_distortion import LensDistortion
@@ -23,6 +24,10 @@ from gelslim_twin.render.surface_state import NodeLattice
 from gelslim_twin.render.surroundings import Sight
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.twin import Twin
+from ifem_export.markers.grid import build_marker_grid
+from ifem_export.mesh.crown import Paraboloid
+from ifem_export.mesh.outline import RoundedRectangle
+from ifem_export.mesh.pad_mesh import build_pad_mesh
 
 LENSES = (
     None,
@@ -67,7 +72,6 @@ def test_covered_area_and_centroid_are_those_of_the_outlines(engine: Any) -> Non
     assert ink.min() >= -1e-12
     for axis, coordinate in ((0, ink.sum(axis=1)), (1, ink.sum(axis=2))):
         middle = (coordinate * np.arange(64)).sum(axis=1) / np.abs(area)
-        np.testing.assert_allclose(middle[7], centroid[7, axis], atol=0.05)
         assert np.abs(middle - centroid[:, axis]).max() < 0.05
 
 
@@ -102,7 +106,7 @@ def test_shaded_light_is_that_of_single_pictures(engine: Any, light: LightMap) -
         np.testing.assert_allclose(one, known, rtol=0, atol=2e-6)
 
 
-@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("precision", ["double", pytest.param("single", marks=pytest.mark.slow)])
 def test_markers_and_pictures_are_those_of_single_ones(
     seen_pad: Path, engine: Any, precision: Any
 ) -> None:
@@ -124,12 +128,31 @@ def test_markers_and_pictures_are_those_of_single_ones(
     np.testing.assert_allclose(
         found.markers_px, known.markers_px, rtol=0, atol=1e-9 if exact else 2e-5
     )
-    apart = found.images().astype(int) - known.images()
-    assert np.abs(apart).max() <= 1
-    assert (apart != 0).mean() < (1e-4 if exact else 1e-3)
+    off = found.images().astype(int) - known.images()
+    assert np.abs(off).max() <= 1
+    assert (off != 0).mean() < (1e-4 if exact else 1e-3)
     np.testing.assert_array_equal(found.images([1])[0], found.images()[1])
 
 
+@pytest.mark.slow
+def test_a_crowned_gel(engine: Any, tmp_path: Path) -> None:
+    """Contacts and markers side by side, pictures one by one."""
+    mesh, _ = build_pad_mesh(
+        RoundedRectangle(14.0, 12.0, 1.0), 2.0, cells=(14, 12, 3), crown=Paraboloid(0.4, 8.0)
+    )
+    write_sensor(tmp_path, mesh, build_marker_grid(11, 9, 1.1, 0.5, anchors="odd_sized"))
+    twin = Twin(tmp_path, ("force", "image"), {"image": 0.5}, effects=LINEAR)
+    assert np.ptp(twin.points_mm[:, 2]) > 0.3
+    twin.add(Body.sphere(4.0))
+    poses = contacts(6, 4.0, reach_mm=2.5)
+    known, found = twin.batch(poses), twin.batch(poses, backend="torch")
+    assert not found.one_by_one.any()
+    assert apart(known, found).max() < 1e-9
+    np.testing.assert_allclose(found.markers_px, known.markers_px, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(found.images([1]), known.images([1]))
+
+
+@pytest.mark.slow
 def test_correlated_noise_is_drawn_one_by_one(seen_pad: Path, engine: Any) -> None:
     effects = {**LINEAR, "sensor_noise": {"use": "on", "grain_px": 0.8}}
     twin = Twin(seen_pad, ("image",), {"image": 0.5}, effects=effects)
