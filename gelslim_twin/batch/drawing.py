@@ -17,8 +17,8 @@ from gelslim_twin.render.surface_state import NodeLattice
 from gelslim_twin.simulation.picture import Viewer
 
 Array = NDArray[np.float64]
-CPU_PICTURES, CUDA_PICTURES = 4, 64
-"""Pictures that are drawn at once."""
+PIXEL_BYTES = 200
+"""Memory per pixel of a picture, over that of the largest array of a batch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,8 @@ class BatchedDrawing:
         """Pictures (k, h, w, 3) or (k, h, w); the noise is that of a step of the next number."""
         if self._frames is None or len(numbers) == 0:
             return SingleDrawing(self.view).images(displacement_mm, numbers)
-        count = CPU_PICTURES if self.engine.device.type == "cpu" else CUDA_PICTURES
+        pixels = self.view().camera.image_height_px * self.view().camera.image_width_px
+        count = max(1, self.engine.most_bytes // (PIXEL_BYTES * pixels))
         found = [
             self._frames.pictures(displacement_mm[k : k + count], numbers[k : k + count])
             for k in range(0, len(numbers), count)

@@ -17,8 +17,9 @@ from gelslim_core.optional_library import load
 Tensor = Any
 """A tensor of PyTorch."""
 PRECISIONS = ("double", "single")
-CPU_BYTES, CUDA_BYTES = 256_000_000, 4_000_000_000
-"""Memory of the largest array of a part of a batch."""
+CPU_BYTES, CARD_SHARE = 256_000_000, 16
+"""Memory of the largest array of a part of a batch: on a processor, and as one part in so many of
+the memory of a graphics card."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,10 @@ class Engine:
     @property
     def most_bytes(self) -> int:
         """Memory of the largest array of a part of a batch."""
-        return CPU_BYTES if self.device.type == "cpu" else CUDA_BYTES
+        if self.device.type == "cpu":
+            return CPU_BYTES
+        card = self.torch.cuda.get_device_properties(self.device)
+        return int(card.total_memory) // CARD_SHARE
 
     def double(self, values: ArrayLike) -> Tensor:
         """A tensor in double precision on the device."""
