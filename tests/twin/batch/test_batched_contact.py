@@ -12,6 +12,7 @@ from batch_rig import apart, contacts
 from contact_pads import dense_compliance, small_pad, violations
 from stepping_rig import at, ball_facets, box_facets, linear_twin, pad_folder, turned, write_stl
 
+from gelslim_twin.batch import engine as engine_module
 from gelslim_twin.batch.complementarity import lcp_forces
 from gelslim_twin.scene.indenter import Cone, Sphere
 from gelslim_twin.stepping.body import Body
@@ -181,6 +182,18 @@ def test_large_strain_is_solved_one_by_one(pads: dict[float, Path], engine: Any)
     np.testing.assert_array_equal(both.large_strain, [False, True])
     np.testing.assert_array_equal(both.one_by_one, [False, True])
     np.testing.assert_array_equal(both.force_n[1], deep.batch(press).force_n[1])
+
+
+def test_parts_that_fit_into_memory_do_not_change_the_forces(
+    pads: dict[float, Path], engine: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One pose a part, whatever the number of candidates of the others."""
+    twin = linear_twin(pads[0.32])
+    twin.add(Body.box(3.0, 2.0, 3.0))
+    poses = contacts(6, 1.5, tilt_deg=2.0)
+    whole = twin.batch(poses, backend="torch")
+    monkeypatch.setattr(engine_module, "CPU_BYTES", 1)
+    assert apart(whole, twin.batch(poses, backend="torch")).max() < 1e-12
 
 
 def test_failed_poses_have_the_errors_of_steps(
