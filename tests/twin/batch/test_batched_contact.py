@@ -14,7 +14,7 @@ from stepping_rig import at, ball_facets, box_facets, linear_twin, pad_folder, t
 
 from gelslim_twin.batch import engine as engine_module
 from gelslim_twin.batch.complementarity import lcp_forces
-from gelslim_twin.scene.indenter import Cone, Sphere
+from gelslim_twin.scene.indenter import Cone, Ring, Sphere, TexturedPlane
 from gelslim_twin.stepping.body import Body
 from gelslim_twin.stepping.step_error import StepError
 from gelslim_twin.stepping.twin import Twin
@@ -42,6 +42,30 @@ def bodies(folder: Path) -> list[tuple[Body, float, float]]:
                              Cone(shape="cone", included_angle_deg=120, tip_radius_mm=0.2)),
          0.0, 8.0),
     ]  # fmt: skip
+
+
+def reliefs() -> list[Body]:
+    """Ridges that nodes slide off, and a ring whose wall they meet from a ball within it."""
+    ridges = TexturedPlane(
+        shape="textured_plane", texture="ridges", pitch_mm=1.2, relief_mm=0.3, length_mm=6,
+        width_mm=6,
+    )  # fmt: skip
+    ring = Ring(shape="ring", inner_radius_mm=1.5, outer_radius_mm=2.2)
+    ball = Sphere(shape="sphere", radius_mm=6.0, raised_mm=0.07)
+    return [Body.from_indenters(ridges), Body.from_indenters(ring, ball)]
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_nodes_that_leave_a_tool_and_meet_its_walls(
+    pads: dict[float, Path], engine: Any, number: int
+) -> None:
+    """They keep their planes as in single steps, and nodes beside the first candidates join."""
+    twin = linear_twin(pads[0.32])
+    twin.add(reliefs()[number])
+    poses = contacts(10, 0.0, tilt_deg=2.0 - number, depths_mm=(0.1, 0.6))
+    known, found = twin.batch(poses), twin.batch(poses, backend="torch")
+    assert apart(known.require_solved(), found).max() < 1e-9
+    np.testing.assert_array_equal(found.touch, known.touch)
 
 
 @pytest.mark.parametrize("poisson", [0.32, 0.45])
