@@ -68,6 +68,16 @@ def test_nodes_that_leave_a_tool_and_meet_its_walls(
     np.testing.assert_array_equal(found.touch, known.touch)
 
 
+def test_nodes_that_slip_off_an_edge(pads: dict[float, Path], engine: Any) -> None:
+    """Contacts, out of 150 drawn at random, whose forces would change without the kept planes."""
+    twin = linear_twin(pads[0.32])
+    twin.add(Body.box(3.0, 2.0, 3.0))
+    poses = contacts(150, 1.5, tilt_deg=6.0, depths_mm=(0.2, 0.8))[[1, 12, 20, 45, 63]]
+    known, found = twin.batch(poses), twin.batch(poses, backend="torch")
+    assert not found.one_by_one.any()
+    assert apart(known.require_solved(), found).max() < 1e-9
+
+
 @pytest.mark.parametrize("poisson", [0.32, 0.45])
 def test_contacts_are_those_of_single_steps(
     pads: dict[float, Path], poisson: float, device: str, tmp_path: Path
