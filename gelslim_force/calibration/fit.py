@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from gelslim_force.calibration.camera_deviation import PARAMETERS, CameraTolerance, deviated_camera
+from gelslim_force.motion.printed_dots import disc_rims_mm, rim_centroids
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 
 Array = NDArray[np.float64]
@@ -28,7 +29,6 @@ _STEP = 1e-4
 _BOUND = 12.0
 _ROUNDS = 3
 _LEAST_DOTS = 12
-_DISC_CORNERS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,8 +230,7 @@ def centroid_offset_px(
 
     Perspective and refraction shrink the far half of a disc more than the near half. The
     difference is proportional to the square of the diameter: about 0.01 px for a dot of 0.5 mm at
-    20 px/mm, and alike for all dots. A disc is replaced by a 12-gon with the same second moments,
-    so that the error is of fourth order in the diameter.
+    20 px/mm, and alike for all dots.
 
     Args:
         camera: The camera.
@@ -241,22 +240,9 @@ def centroid_offset_px(
     Raises:
         ValueError: An array has another shape, or a point has no image.
     """
-    centres = np.asarray(centres_mm, dtype=float)
-    if centres.ndim != 2 or centres.shape[1] != 2:
-        raise ValueError(f"disc centres {centres.shape}: must be (n, 2)")
-    count = len(centres)
-    radius = np.broadcast_to(np.asarray(diameter_mm, dtype=float) / 2, (count,))
-    # Second moment of a regular N-gon: area R² (2 + cos 2π/N) / 12; of a disc: area R² / 4.
-    outer = radius * np.sqrt(3.0 / (2.0 + np.cos(2.0 * np.pi / _DISC_CORNERS)))
-    turn = np.linspace(0.0, 2.0 * np.pi, _DISC_CORNERS, endpoint=False)
-    points = np.zeros((count, _DISC_CORNERS + 1, 3))
-    points[:, :, :2] = centres[:, None, :]
-    points[:, 1:, 0] += outer[:, None] * np.cos(turn)
-    points[:, 1:, 1] += outer[:, None] * np.sin(turn)
-    image = camera.project(points.reshape(-1, 3)).reshape(count, _DISC_CORNERS + 1, 2)
-    rim = image[:, 1:] - image[:, :1]
-    following = np.roll(rim, -1, axis=1)
-    cross = rim[..., 0] * following[..., 1] - following[..., 0] * rim[..., 1]
-    moment = ((rim + following) * cross[..., None]).sum(axis=1)
-    offset: NDArray[np.float64] = moment / (3.0 * cross.sum(axis=1)[:, None])
-    return offset
+    rims = disc_rims_mm(centres_mm, diameter_mm)
+    count, around, _ = rims.shape
+    points = np.zeros((count, around + 1, 3))
+    points[:, 0, :2], points[:, 1:, :2] = centres_mm, rims
+    image = camera.project(points.reshape(-1, 3)).reshape(count, around + 1, 2)
+    return rim_centroids(image[:, 1:]) - image[:, 0]
