@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from gelslim_force.forces.estimator import surface_share_mm2
 from gelslim_force.motion.marker_motion import MarkerView
+from gelslim_force.motion.printed_dots import PrintedDots
 from gelslim_force.presses.ball_on_layer import BallOnLayer
+from gelslim_force.presses.radial_motion import RadialMotion
 from gelslim_force.presses.seen_press import PressView, SeenPress
 from gelslim_force.settings import PipelineSettings
 from ifem_export.markers.interpolation import marker_to_node
@@ -22,6 +24,8 @@ _REACH = 4.0
 """Distance beyond the rim, in thicknesses, up to which markers count."""
 _STEPS = (1e-3, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3)
 """Of ln thickness, Poisson's ratio, ln ball, ln contact, x and y for finite differences."""
+_SMALL_MM = 1e-4
+"""Motion for the derivative of a dot's place in the picture."""
 _RADIAL, _FRICTION_STEP = (2, 6), 0.01
 """Parts of the friction that are radial, see `_fields`, and their step."""
 GEL, LOCAL = 3, 3
@@ -36,7 +40,7 @@ class Expected:
         log_force: Logarithm of the force over Young's modulus.
         rim_mm: Radius of the patch as seen: the rim moves outwards with the gel, and with friction.
         depth_mm: Of the ball.
-        markers_px: (m, 2) displacement of the near markers in the picture.
+        markers_px: (m, 2) displacement in the picture of the centroids of the near markers' dots.
     """
 
     log_force: float
@@ -65,6 +69,8 @@ class Linearised:
 class PressModel:
     """The model of one press, near the place where it is seen.
 
+    The gel strains the printed dots: what shows is the centroid of each strained dot.
+
     Friction between ball and gel is not known: it adds tangential tractions that are the pressure
     times 1, x, y and a cubic term, whose sizes are free within `FRICTION`. The two radial ones also
     change the force and the depth of the contact.
@@ -89,9 +95,7 @@ class PressModel:
         away = np.hypot(*(rest[:, :2] - seen.patch.centre_mm).T)
         reach = seen.patch.size_mm + _REACH * view.thickness_mm
         self.near = np.flatnonzero((away < reach) & np.isfinite(seen.markers_px).all(axis=1))
-        self._rest = rest[self.near]
-        self._camera = view.markers.camera
-        self._rest_px = self._camera.project(self._rest)
+        self._dots = PrintedDots(view.markers.camera, rest[self.near], view.diameter_mm[self.near])
         self.friction_px, self.friction_rim_mm = self._friction(view, young_mpa)
 
     @property
@@ -120,17 +124,14 @@ class PressModel:
             float(gel[1]),
             (float(friction[_RADIAL[0]]), float(friction[_RADIAL[1]])),
         )
-        offset = self._rest[:, :2] - local[1:]
-        away = np.hypot(*offset.T)
-        outward, height = contact.motion(np.append(away, contact.contact_mm))
-        unit = offset / np.maximum(away, 1e-9)[:, None]
-        moved = self._rest + np.column_stack([unit * outward[:-1, None], height[:-1]])
-        rim = contact.contact_mm + float(outward[-1]) + float(self.friction_rim_mm @ friction)
+        offset = self._dots.rims_mm[..., :2] - local[1:]
+        motion = RadialMotion.of(contact, float(np.hypot(offset[..., 0], offset[..., 1]).max()))
+        moved = motion.rim_outward_mm + float(self.friction_rim_mm @ friction)
         return Expected(
             float(np.log(contact.force_n_per_mpa)),
-            rim,
+            contact.contact_mm + moved,
             contact.depth_mm,
-            self._camera.project(moved) - self._rest_px + self.friction_px @ friction,
+            self._dots.shift_px(motion.at(offset)) + self.friction_px @ friction,
         )
 
     def linearised(self, gel: Array, local: Array, friction: Array) -> Linearised:
@@ -166,9 +167,7 @@ class PressModel:
         moved = [
             operator.displacement(np.column_stack([part, np.zeros(len(points))])) for part in force
         ]
-        to_markers = marker_to_node(points, self._rest)
-        jacobian = self._camera.jacobian(self._rest)
-        lateral = [np.einsum("mij,mj->mi", jacobian, (to_markers @ m)[:, :2]) for m in moved]
+        lateral = [self._seen(points, m) for m in moved]
         turn = np.linspace(0, 2 * np.pi, _RIM_POINTS, endpoint=False)
         unit = np.column_stack([np.cos(turn), np.sin(turn)])
         to_rim = marker_to_node(points, patch.centre_mm + patch.size_mm * unit)
@@ -177,6 +176,14 @@ class PressModel:
         # The contact itself has the radial parts, in closed form.
         by_marker[..., _RADIAL], by_rim[list(_RADIAL)] = 0.0, 0.0
         return by_marker, by_rim
+
+    def _seen(self, points_mm: Array, motion_mm: Array) -> Array:
+        """(m, 2) displacement of the dots by a small lateral motion (c, 3) of surface nodes."""
+        rims = self._dots.rims_mm
+        moved = marker_to_node(points_mm, rims.reshape(-1, 3)) @ motion_mm
+        moved[:, 2] = 0.0
+        small = _SMALL_MM / max(float(np.abs(moved).max()), 1e-12)
+        return self._dots.shift_px(small * moved.reshape(rims.shape)) / small
 
 
 def _fields(offset: Array) -> Array:

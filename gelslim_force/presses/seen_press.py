@@ -59,6 +59,7 @@ class PressView:
         bundle: As given.
         calibration: As given.
         markers: The followed markers as seen at rest.
+        diameter_mm: (n,) of their dots as printed.
         ball_mm: As given.
         thickness_mm: Of the gel as designed.
 
@@ -88,6 +89,7 @@ class PressView:
         self._reference = upright(reference, calibration.camera)
         followed = calibration.reference
         self.markers = MarkerView(calibration.camera, followed.positions_px)
+        self.diameter_mm = calibration.grid.diameter_mm[followed.markers]
         radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
         self._radius_px = radius_px[np.searchsorted(calibration.markers, followed.markers)]
         self._surface_mm = np.asarray(bundle.mesh.surface_mm)
