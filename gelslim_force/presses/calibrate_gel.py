@@ -22,6 +22,7 @@ from gelslim_force.presses.gel_fit import (
 from gelslim_force.presses.load_table import Load
 from gelslim_force.presses.press_error import PressError
 from gelslim_force.presses.press_model import PressModel
+from gelslim_force.presses.press_rows import LAW_SIGMA as PRESS_SIGMA
 from gelslim_force.presses.press_trends import press_trends
 from gelslim_force.presses.seen_press import PressView
 from ifem_export.operators.single_thread import single_threaded
@@ -112,7 +113,9 @@ def _calibration(
     moved_px: Mapping[str, float],
     ratio_known: bool,
 ) -> GelCalibration:
-    covariance = found.covariance[:3, :3] + np.diag([*np.square(LAW_SIGMA), 0.0])
+    trends = press_trends(found.presses, _stated_sigma(found.presses))
+    by_trends = np.diag([trends.modulus_sigma**2, 0.0, 0.0])
+    covariance = found.covariance[:3, :3] + np.diag([*np.square(LAW_SIGMA), 0.0]) + by_trends
     if not ratio_known:
         covariance[2] = covariance[:, 2] = 0.0
     gel, thickness = bundle.material, designed_thickness_mm(bundle)
@@ -132,7 +135,6 @@ def _calibration(
         tuple(_press_record(press) for press in found.presses),
     )
     sigma = _residual_sigma(found.presses)
-    trends = press_trends(found.presses, sigma)
     lines = (*_diagnosis(made), *trends.lines(), *_returned(moved_px))
     return GelCalibration(
         **{name: getattr(made, name) for name in made.__dataclass_fields__
@@ -140,6 +142,12 @@ def _calibration(
         diagnosis=lines,
         warnings=_warnings(made, view, found, sigma, moved_px),
     )  # fmt: skip
+
+
+def _stated_sigma(presses: Sequence[FittedPress]) -> Array:
+    """(n,) relative standard deviation of the residual forces, by the loads and by the law."""
+    loads = np.array([press.load.sigma_n / press.load.load_n for press in presses])
+    return np.hypot(loads, PRESS_SIGMA)
 
 
 def _residual_sigma(presses: Sequence[FittedPress]) -> Array:

@@ -31,7 +31,7 @@ def gel_report_html(found: GelCalibration) -> str:
         f"<h1>Gel calibration</h1>{warnings}<ul>{lines}</ul>"
         f"<h2>Force against patch</h2>{scatter_svg(_force_against_patch(found))}"
         "<p>Points: loads with their standard deviation. Line: the fitted gel.</p>"
-        f"<h2>Residual force in the order of the table</h2>{scatter_svg(_residuals(found))}"
+        f"<h2>Residual force of each press</h2>{scatter_svg(_residuals(found))}"
         f"<h2>Presses</h2>{_press_table(found)}"
         f"<h2>Built and designed</h2>{_value_table(found)}</body></html>\n"
     )
@@ -64,13 +64,17 @@ def _force_against_patch(found: GelCalibration) -> Scatter:
 
 
 def _residuals(found: GelCalibration) -> Scatter:
+    """Over time where the table gives it for all presses, otherwise in the order of the table."""
+    times = [press["time_s"] for press in found.presses]
+    timed = all(time is not None for time in times)
+    at = [float(time) for time in times] if timed else [k + 1.0 for k in range(len(times))]
     return Scatter(
-        [float(k + 1) for k in range(len(found.presses))],
+        at,
         [100 * float(press["residual_share"]) for press in found.presses],
         [100 * press["load_sigma_n"] / press["load_n"] for press in found.presses],
-        "press",
+        "time, s" if timed else "press, in the order of the table",
         "load less fitted force, %",
-        [(0.5, 0.0), (len(found.presses) + 0.5, 0.0)],
+        [(min(at), 0.0), (max(at), 0.0)],
     )
 
 

@@ -135,7 +135,7 @@ def test_another_ball_is_refused_with_its_size() -> None:
 
 
 @pytest.mark.slow
-def test_creep_rest_and_a_wrong_line_are_told() -> None:
+def test_creep_hysteresis_rest_and_a_wrong_line_are_told() -> None:
     built = Built()
     pictures, loads = presses(built, 6, np.array([0.1, 0.2, 0.3, 0.45, 0.6, 0.8]))
     fading = [replace(load, load_n=load.load_n * (1 - 0.06 * k), sigma_n=0.002, time_s=60.0 * k)
@@ -145,14 +145,26 @@ def test_creep_rest_and_a_wrong_line_are_told() -> None:
     sensor = ball_bundle(), ball_calibration(), rest_picture(), pictures
     found = calibrate_gel(*sensor, [*fading, rest], 12.0)
     told = " ".join(found.diagnosis)
-    assert "over time: -" in told
+    assert "(creep" in told
     assert "rest.png" in told
+    # The gel has become softer by a third during the series: the modulus is that of its middle.
+    assert 0.05 < np.sqrt(found.covariance[0, 0]) < 0.15
+    assert abs(errors(found, built)[0]) < 2 * np.sqrt(found.covariance[0, 0])
+    page = gel_report_html(found)
+    assert "time, s" in page
+    assert all(f"{press['residual_n']:+.4f}" in page for press in found.presses)
     wrong = [replace(load, load_n=2 * load.load_n) if k == 2 else load
              for k, load in enumerate(loads)]  # fmt: skip
     found = calibrate_gel(*sensor, wrong, 12.0)
     assert any("press2.png" in line for line in found.warnings)
     own = errors(found, built)
     assert (np.abs(own) < 3 * np.sqrt(np.diag(found.covariance)[:2])).all()
+    # Up to the largest load and down again, where the gel pushes back with 10 % less.
+    shares = ((0, 1.0), (2, 1.0), (4, 1.0), (5, 1.0), (3, 0.9), (1, 0.9))
+    there_and_back = [replace(loads[k], load_n=loads[k].load_n * share, sigma_n=0.002)
+                      for k, share in shares]  # fmt: skip
+    found = calibrate_gel(*sensor, there_and_back, 12.0)
+    assert any("(hysteresis)" in line for line in found.diagnosis)
 
 
 def test_too_few_presses_and_missing_pictures() -> None:
