@@ -59,7 +59,7 @@ class PressView:
         bundle: As given.
         calibration: As given.
         markers: The followed markers as seen at rest.
-        diameter_mm: (n,) of their dots as printed.
+        diameter_mm: (n,) of their dots as built, by their areas in the reference: ink spreads.
         ball_mm: As given.
         thickness_mm: Of the gel as designed.
 
@@ -89,9 +89,10 @@ class PressView:
         self._reference = upright(reference, calibration.camera)
         followed = calibration.reference
         self.markers = MarkerView(calibration.camera, followed.positions_px)
-        self.diameter_mm = calibration.grid.diameter_mm[followed.markers]
-        radius_px = 2 * np.sqrt(np.abs(calibration.dots.moments_px2).max(axis=1))
-        self._radius_px = radius_px[np.searchsorted(calibration.markers, followed.markers)]
+        dots = calibration.dots.take(np.searchsorted(calibration.markers, followed.markers))
+        area_mm2 = dots.area_px * np.abs(np.linalg.det(self.markers.mm_per_px))
+        self.diameter_mm = np.sqrt(4 / np.pi * area_mm2)
+        self._radius_px = 2 * np.sqrt(np.abs(dots.moments_px2).max(axis=1))
         self._surface_mm = np.asarray(bundle.mesh.surface_mm)
         self._finder()
 
