@@ -93,8 +93,8 @@ class PressTrends:
             )
         if self.modulus_sigma:
             told.append(
-                f"The modulus depends on this: ± {self.modulus_sigma:.1%} of it enters its "
-                "standard deviation."
+                f"Young's modulus is the mean over this: its standard deviation contains "
+                f"{self.modulus_sigma:.1%} for it."
             )
         return tuple(told)
 
