@@ -160,14 +160,16 @@ def normal_source(
     bundle, calibration = sensor.bundle, sensor.calibration
     picture = calibration.picture if reference is None else reference
     grey = _is_grey(bundle, picture)
-    if indenter == NO_INDENTER or (indenter is None and not _shows_shapes(bundle, picture, grey)):
+    # Nobody can trace the light of an imported sensor.
+    alone = grey or (bundle.imported is not None and not bundle.light)
+    if indenter == NO_INDENTER or (indenter is None and not _shows_shapes(bundle, picture, alone)):
         return None
-    if grey and indenter in (None, UNKNOWN):
+    if alone and indenter in (None, UNKNOWN):
         if light is not None:
             raise SensorError(
                 "light_calibration",
-                "the pictures of this sensor are grey, and the markers alone are used: leave the "
-                "calibration of the light out",
+                "the pictures of this sensor are grey or its light is not traced, and the markers "
+                "alone are used: leave the calibration of the light out",
             )
         return unknown_source(bundle, calibration, None, settings, more=sensor.more)
     if picture is None:
@@ -193,10 +195,10 @@ def _is_grey(bundle: Bundle, picture: Picture | None) -> bool:
     return picture.ndim == 2 or bool((picture == picture[..., :1]).all())
 
 
-def _shows_shapes(bundle: Bundle, picture: Picture | None, grey: bool) -> bool:
-    """Whether forces of objects of unknown shape can be found in the pictures of a sensor."""
+def _shows_shapes(bundle: Bundle, picture: Picture | None, alone: bool) -> bool:
+    """Whether forces of objects of unknown shape can be found, be it by the markers `alone`."""
     small = len(bundle.mesh.surface) <= _MOST_NODES
-    return small and (grey or (picture is not None and bool(bundle.light)))
+    return small and (alone or (picture is not None and bool(bundle.light)))
 
 
 def indenter_source(

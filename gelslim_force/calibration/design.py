@@ -48,7 +48,8 @@ def bundle_grid(bundle: Bundle) -> MarkerGrid:
 
     A bundle lists dots only. Pitch and extent of the lattice follow from their positions, and the
     sites that are omitted on purpose are those without a dot inside the convex hull of the dots.
-    Raises IfemError if the bundle has no markers, or if they form no square lattice.
+    The lattice of an imported sensor is as the bundle states it.
+    Raises IfemError if the bundle has no markers, or if they form no lattice.
     """
     field = bundle.markers
     if field is None:
@@ -61,10 +62,15 @@ def bundle_grid(bundle: Bundle) -> MarkerGrid:
         )
     positions = np.asarray(field.positions_mm, dtype=float)[:, :2]
     sites = np.column_stack([field.arrays["row"], field.arrays["column"]]).astype(np.int64)
-    pitch = _pitch_mm(positions, sites)
-    # The lattice is centred on the origin: site 0 is (count - 1) / 2 pitches below it.
-    counts = 2 * np.mean(sites - positions / pitch, axis=0) + 1
-    rows, columns = (int(n) for n in np.rint(counts))
+    frame = None if bundle.imported is None else bundle.imported.lattice
+    if frame is None:
+        pitch = _pitch_mm(positions, sites)
+        # The lattice is centred on the origin: site 0 is (count - 1) / 2 pitches below it.
+        counts = 2 * np.mean(sites - positions / pitch, axis=0) + 1
+        rows, columns = (int(n) for n in np.rint(counts))
+    else:
+        pitch = float(np.mean(frame.pitches_mm))
+        rows, columns = (int(n) + 1 for n in sites.max(axis=0))
     try:
         return MarkerGrid(
             positions_mm=positions,
@@ -75,6 +81,7 @@ def bundle_grid(bundle: Bundle) -> MarkerGrid:
             pitch_mm=pitch,
             lattice_shape=(rows, columns),
             omitted=_omitted_sites(sites, (rows, columns)),
+            frame=frame,
         )
     except ValueError as error:
         raise IfemError(f"the markers of the bundle are not a printed lattice: {error}") from error

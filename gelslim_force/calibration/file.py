@@ -22,6 +22,7 @@ from gelslim_force.detection.detections import Detections
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from ifem_export.markers.grid import MarkerGrid
+from ifem_export.markers.lattice_frame import LatticeFrame
 
 FORMAT = "gelslim-calibration/1"
 _GRID = ("positions_mm", "row", "column", "diameter_mm", "kind", "pitch_mm", "lattice_shape",
@@ -41,7 +42,7 @@ def calibration_record(calibration: Calibration) -> dict[str, Any]:
         "diagnosis": list(c.diagnosis),
         "warnings": list(c.warnings),
         "detector": dataclasses.asdict(c.detector),
-        "grid": {name: _plain(getattr(c.grid, name)) for name in _GRID},
+        "grid": _grid_record(c.grid),
         "markers": c.markers.tolist(),
         "dots": {name: _plain(getattr(c.dots, name)) for name in _DOTS},
         "residual_px": c.residual_px.tolist(),
@@ -71,6 +72,7 @@ def calibration_of(record: Mapping[str, Any]) -> Calibration:
             pitch_mm=float(grid["pitch_mm"]),
             lattice_shape=(int(grid["lattice_shape"][0]), int(grid["lattice_shape"][1])),
             omitted=_integers(grid["omitted"]).reshape(-1, 2),
+            frame=None if grid.get("frame") is None else LatticeFrame.from_record(grid["frame"]),
         ),
         markers=_integers(record["markers"]),
         dots=Detections(
@@ -130,6 +132,12 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         )
 
     return read_json_record(place, calibration_of, refused)
+
+
+def _grid_record(grid: MarkerGrid) -> dict[str, Any]:
+    """The lattice; `frame` is left out where it is square and centred."""
+    record = {name: _plain(getattr(grid, name)) for name in _GRID}
+    return record if grid.frame is None else {**record, "frame": grid.frame.to_record()}
 
 
 def _deviation_record(deviation: BuiltDeviation) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from scipy import sparse
 
 from gelslim_core.budget.budget import Budget
 from ifem_export.assembly.assembly import mesh_stiffness
+from ifem_export.bundle.imported import Imported
 from ifem_export.elements.hex8 import Formulation, hex8_stiffness
 from ifem_export.elements.material import Material
 from ifem_export.elements.skin import Skin
@@ -75,6 +76,7 @@ class Bundle:
             None; see `adjoint`.
         skin: Coat and fabric on the gel; None where the gel counts as bare. The operators of the
             surface are those of the bare gel.
+        imported: What is known of a sensor that was not generated; None for a generated one.
     """
 
     mesh: PadMesh
@@ -93,6 +95,7 @@ class Bundle:
     light: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     stored_adjoint: NDArray[np.float64] | None = None
     skin: Skin | None = None
+    imported: Imported | None = None
 
     def surface_operator(
         self,
@@ -205,6 +208,7 @@ def build_bundle(
     tolerances: Mapping[str, float] | None = None,
     light: Mapping[str, ArrayLike] | None = None,
     skin: Skin | None = None,
+    imported: Imported | None = None,
 ) -> Bundle:
     """Make the bundle of one sensor.
 
@@ -223,6 +227,7 @@ def build_bundle(
         tolerances: Standard deviations of material and thickness by name.
         light: Arrays of the light on the untouched gel by name.
         skin: Coat and fabric on the gel.
+        imported: What is known of a sensor that was not generated.
 
     Returns:
         The bundle.
@@ -250,6 +255,7 @@ def build_bundle(
         tolerances=_plain_json(tolerances or {}),
         light={name: np.asarray(values) for name, values in (light or {}).items()},
         skin=skin,
+        imported=imported,
     )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ifem_export.bundle.bundle import Bundle, SelfTest
+from ifem_export.bundle.imported import Imported
 from ifem_export.bundle.manifest import ADJOINT_VERSION, MANIFEST, REBUILD
 from ifem_export.elements.material import Material
 from ifem_export.elements.skin import Skin
@@ -122,6 +123,7 @@ def bundle_from(
         light={name: take(f"light_{name}") for name in manifest.get("light") or ()},
         stored_adjoint=_adjoint_from(manifest, take, len(mesh.surface)),
         skin=_skin_from(manifest),
+        imported=_imported_from(manifest),
     )
 
 
@@ -134,6 +136,18 @@ def _skin_from(manifest: dict[str, Any]) -> Skin | None:
         return Skin.from_record(record)
     except (KeyError, TypeError, IfemError) as error:
         raise BundleError(MANIFEST, f"section 'skin' is malformed ({error})", REBUILD) from error
+
+
+def _imported_from(manifest: dict[str, Any]) -> Imported | None:
+    """Where the knowledge of an imported sensor comes from; None for a generated one."""
+    record = manifest.get("imported")
+    if record is None:
+        return None
+    try:
+        return Imported.from_record(record)
+    except (KeyError, TypeError, ValueError, IfemError) as error:
+        reason = f"section 'imported' is malformed ({error})"
+        raise BundleError(MANIFEST, reason, "import the sensor again") from error
 
 
 def _adjoint_from(

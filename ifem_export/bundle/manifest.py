@@ -114,6 +114,8 @@ def describe(bundle: Bundle, arrays: dict[str, dict[str, Any]]) -> dict[str, Any
     }
     if bundle.skin is not None:
         manifest["skin"] = bundle.skin.to_record()
+    if bundle.imported is not None:
+        manifest["imported"] = bundle.imported.to_record()
     return {**manifest, _SEAL: _seal(manifest)}
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ifem_export.errors import MarkerGridError
 from ifem_export.markers.anchors import choose_anchor_sites
+from ifem_export.markers.lattice_frame import LatticeFrame
 
 Anchors = Literal["odd_sized", "omitted", "none"]
 """How anchors are marked: by a larger dot, by a site without a dot, or no anchors."""
@@ -22,7 +23,7 @@ _LATTICE_TOLERANCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class MarkerGrid:
-    """Dots on a square lattice centred on the origin of the sensor frame.
+    """Dots on a lattice, by default a square one centred on the origin of the sensor frame.
 
     x points along the finger to the tip and increases with the row, y points across it and
     increases with the column. Markers are in row-major order, and the index of a marker is its
@@ -34,10 +35,13 @@ class MarkerGrid:
         column: (m,) lattice column, 0 at the smallest y.
         diameter_mm: (m,) dot diameters.
         kind: (m,) `REGULAR` or `ANCHOR_LARGE`.
-        pitch_mm: Distance of neighbouring rows and of neighbouring columns.
+        pitch_mm: Distance of neighbouring rows and of neighbouring columns; their mean for a
+            lattice that is not square.
         lattice_shape: (rows, columns) of the complete lattice, clipped dots included.
         omitted: (k, 2) sites (row, column) left without a dot as anchors; clipped sites are not
             listed.
+        frame: Steps and middle of a lattice that is not square, turned or not centred; None for a
+            square one on the origin.
 
     Raises:
         MarkerGridError: Arrays disagree in length, a marker is off its lattice site, a site is
@@ -52,6 +56,7 @@ class MarkerGrid:
     pitch_mm: float
     lattice_shape: tuple[int, int]
     omitted: NDArray[np.int64]
+    frame: LatticeFrame | None = None
 
     def __post_init__(self) -> None:
         shape = (int(self.lattice_shape[0]), int(self.lattice_shape[1]))
@@ -101,15 +106,18 @@ class MarkerGrid:
         diagonal = np.concatenate(
             [(size[1:, 1:] + size[:-1, :-1]).ravel(), (size[1:, :-1] + size[:-1, 1:]).ravel()]
         )
-        gaps = np.concatenate(
-            [self.pitch_mm - sums / 2, self.pitch_mm * np.sqrt(2.0) - diagonal / 2]
-        )
+        frame = self.frame or LatticeFrame.square(self.pitch_mm)
+        pitch, across = min(frame.pitches_mm), min(frame.diagonals_mm)
+        gaps = np.concatenate([pitch - sums / 2, across - diagonal / 2])
         gaps = gaps[np.isfinite(gaps)]
         return float(gaps.min()) if len(gaps) else float("inf")
 
     def sites_mm(self, sites: ArrayLike) -> NDArray[np.float64]:
         """Positions (k, 2) in the sensor frame of lattice sites (k, 2)."""
-        return _lattice_mm(np.asarray(sites, dtype=np.int64), self.lattice_shape, self.pitch_mm)
+        whole = np.asarray(sites, dtype=np.int64)
+        if self.frame is not None:
+            return self.frame.places_mm(whole, self.lattice_shape)
+        return _lattice_mm(whole, self.lattice_shape, self.pitch_mm)
 
     def clipped(self, contains: Callable[[NDArray[np.float64]], ArrayLike]) -> MarkerGrid:
         """The grid without the dots that cross an outline.
@@ -145,6 +153,7 @@ class MarkerGrid:
             pitch_mm=self.pitch_mm,
             lattice_shape=self.lattice_shape,
             omitted=self.omitted[known],
+            frame=self.frame,
         )
 
 
@@ -316,7 +325,7 @@ def _check_arrays(grid: MarkerGrid) -> None:
     _require(
         np.all(offset_mm <= _LATTICE_TOLERANCE * grid.pitch_mm),
         "positions_mm",
-        f"marker grid: a marker lies {offset_mm.max():.4g} mm off its lattice site; "
-        "positions are (row, column) times the pitch, centred on the origin",
+        f"marker grid: a marker lies {offset_mm.max():.4g} mm off its lattice site; positions are "
+        "(row, column) times the pitch, centred on the origin, or as the frame says",
         float(offset_mm.max()),
     )

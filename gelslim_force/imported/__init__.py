@@ -1,0 +1,1 @@
+"""A bundle for a marker sensor that was not generated here: its description and its picture."""
