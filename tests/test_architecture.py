@@ -48,7 +48,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",
-        "forces", "joint", "dot_tracking", "outputs", "scoring", "settings", "presses", "pipeline",
+        "forces", "joint", "dot_tracking", "imported", "outputs", "scoring", "settings", "presses", "pipeline",
         "built_sensor", "sensor", "run",
     ),
     "gelslim_twin": (

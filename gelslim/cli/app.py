@@ -28,6 +28,7 @@ from gelslim.cli.commands.measure.calibrate_gel import calibrate_gel
 from gelslim.cli.commands.measure.calibrate_light import calibrate_light
 from gelslim.cli.commands.measure.calibrate_look import calibrate_look
 from gelslim.cli.commands.measure.force import force
+from gelslim.cli.commands.measure.import_sensor import import_sensor
 from gelslim.cli.commands.measure.score import score
 from gelslim.cli.commands.measure.track import track
 from gelslim.cli.commands.program.bench import bench
@@ -57,6 +58,7 @@ COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
     "Try it before it is built": (tolerance, light, plan, simulate, validate),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),
     "Measure with it": (
+        import_sensor,
         calibrate,
         calibrate_gel,
         calibrate_light,

@@ -276,6 +276,7 @@ def answer_json(
             "last_sigma": None if wrench is None else plain(wrench.standard_deviation),
             "stages_ms": summary.median_ms(),
             "pictures": pictures,
+            "missing": list(_missing(pipeline)),
         }
     )
 
@@ -302,5 +303,13 @@ def report(folder: Path, pipeline: ForcePipeline, summary: RunSummary, pictures:
         total = times.pop("total")
         stages = ", ".join(f"{name} {value:.1f}" for name, value in times.items())
         say(f"Median {total:.1f} ms per frame ({stages}).")
+    for line in _missing(pipeline):
+        say(f"Not known of this sensor: {line}", style="yellow")
     say(f"Run in {folder}/" + (f", {len(pictures)} pictures in {folder}/pictures/" if pictures
                                else ""))  # fmt: skip
+
+
+def _missing(pipeline: ForcePipeline) -> tuple[str, ...]:
+    """What is not known of an imported sensor; empty for a generated one."""
+    imported = pipeline.bundle.imported
+    return () if imported is None else imported.missing

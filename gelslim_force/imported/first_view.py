@@ -42,13 +42,13 @@ _KNOWN_BEND = {"k1": 0.02, "k2": 0.01}
 """Standard deviations of a distortion that the dots have shown, at half a diagonal."""
 _UNKNOWN_BEND = {"k1": 0.05, "k2": 0.002}
 _UNKNOWN_LENS = {"tangential": 0.004, "principal_share": 0.02}
-_FOCAL_SIGMA_PERCENT = {"picture": 5.0, "assumed": 30.0}
+_FOCAL_SIGMA_PERCENT = {"picture": 10.0, "assumed": 30.0}
 """Standard deviations of a focal length that is not given. One that the convergence tells is more
-uncertain than the noise of the dots makes it: a print that is warped, or a curved gel, converges
-too."""
-_HELD_PERCENT = 1.0
-"""Within which an assumed focal length is held in the fit, which could only use it to explain the
-warp of the print."""
+uncertain than the noise of the dots makes it: a print that is warped, a curved gel, and plates that
+are not known change it too."""
+_HELD_PERCENT = 0.5
+"""Within which the focal length is held in the fit where no windows are given. The fit would only
+use it to explain what it cannot: refraction in plates that it does not know, a warped print."""
 _MEASURED_LENS = {"focal_percent": 0.2, "k1": 0.003, "k2": 0.01, "tangential": 0.001,
                   "principal_share": 0.002}  # fmt: skip
 
@@ -82,6 +82,7 @@ class FirstView:
         sites: (k, 2) row and column of each dot of the reference, rows along x.
         frame: Lattice of these sites on the gel.
         origin: Where the focal length comes from.
+        focal_sigma_percent: Standard deviation of the focal length, unless that of the fit is more.
     """
 
     camera: VirtualCamera
@@ -89,11 +90,7 @@ class FirstView:
     sites: Sites
     frame: LatticeFrame
     origin: FocalOrigin
-
-    @property
-    def focal_sigma_percent(self) -> float:
-        """Least standard deviation of the focal length."""
-        return _FOCAL_SIGMA_PERCENT.get(self.origin, 0.0)
+    focal_sigma_percent: float
 
 
 def first_view(
@@ -153,8 +150,9 @@ def _by_pinhole(
     )
     sites, frame = _on_gel(dots, camera.backproject(dots.positions_px)[:, :2])
     bend = _bend_tolerance(lens, _UNKNOWN_BEND, lens.focal_px, size_px)
-    tolerance = CameraTolerance(**{**lens.tolerance, **bend})
-    return FirstView(camera, tolerance, sites, frame, lens.origin)
+    held, sigma = _held(asked, lens, lens.origin)
+    tolerance = CameraTolerance(**{**lens.tolerance, **bend, **held})
+    return FirstView(camera, tolerance, sites, frame, lens.origin, sigma)
 
 
 def _by_lattice(
@@ -186,10 +184,20 @@ def _by_lattice(
         principal_offset_px=lens.principal_offset_px,
         lens=distortion,
     )
-    held = {"focal_percent": _HELD_PERCENT} if origin == "assumed" else {}
+    held, sigma = _held(asked, lens, origin)
     bend = _bend_tolerance(lens, _KNOWN_BEND, focal, size_px)
     tolerance = CameraTolerance(**_FREE_POSE, **{**lens.tolerance, **bend, **held})
-    return FirstView(camera, tolerance, sites, frame, origin)
+    return FirstView(camera, tolerance, sites, frame, origin, sigma)
+
+
+def _held(
+    asked: SensorDescription, lens: LensKnowledge, origin: FocalOrigin
+) -> tuple[dict[str, float], float]:
+    """Tolerance of the focal length in the fit where it differs, and its standard deviation, %."""
+    sigma = _FOCAL_SIGMA_PERCENT.get(origin, lens.tolerance["focal_percent"])
+    if asked.windows and origin != "assumed":
+        return {}, 0.0 if origin == "given" else sigma
+    return {"focal_percent": min(_HELD_PERCENT, sigma)}, sigma
 
 
 def gel_corners_mm(asked: SensorDescription) -> list[tuple[float, float]]:

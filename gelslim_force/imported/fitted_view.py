@@ -8,7 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_force.calibration.built_deviation import BuiltDeviation, built_deviation
+from gelslim_force.calibration.built_deviation import (
+    BuiltDeviation,
+    apparent_motion_per_mm,
+    built_deviation,
+)
 from gelslim_force.calibration.camera_deviation import PARAMETERS
 from gelslim_force.calibration.checks import MOST_RESIDUAL_PITCH
 from gelslim_force.calibration.fit import CameraFit, fit_camera
@@ -18,6 +22,7 @@ from gelslim_force.imported.description import PointPair, SensorDescription
 from gelslim_force.imported.error import ImportSensorError
 from gelslim_force.imported.first_view import FirstView
 from gelslim_force.imported.marker_lattice import Sites, lattice_shape, moved_frame
+from gelslim_optics.camera.refraction import Layer
 from gelslim_optics.camera.virtual_camera import VirtualCamera
 from ifem_export.markers.lattice_frame import LatticeFrame
 
@@ -25,6 +30,8 @@ Array = NDArray[np.float64]
 _FOCAL = PARAMETERS.index("focal_percent")
 _ROUNDS_BY_POINTS = 3
 _LEAST_DOTS = 20
+_USUAL_WINDOW = Layer(3.0, 1.5)
+"""Plate between camera and gel that counts as possible where none is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +48,8 @@ class FittedView:
         diameter_mm: Median diameter of the dots.
         residuals: What remains of the lattice's fit, on the gel.
         points_px: Root mean square distance of the given points from their images; NaN without.
+        window_lean: What an unknown plate changes of the apparent lateral motion of markers per mm
+            of depth, root mean square; 0 where the plates are given.
     """
 
     fit: CameraFit
@@ -52,6 +61,7 @@ class FittedView:
     diameter_mm: float
     residuals: ResidualField
     points_px: float
+    window_lean: float = 0.0
 
     @property
     def camera(self) -> VirtualCamera:
@@ -74,6 +84,7 @@ class FittedView:
             shift_mm=0.0,
             scale_percent=0.0,
             moved_px=0.0,
+            lean_sigma_mm_per_mm=float(np.hypot(told.lean_sigma_mm_per_mm, self.window_lean)),
         )
 
 
@@ -126,7 +137,33 @@ def fitted_view(
     rest = fit.camera.points_along(slopes, np.zeros(len(seen)))[:, :2]
     pitch = float(np.mean(frame.pitches_mm))
     residuals = split_residuals(places[fit.used], (rest - places)[fit.used], pitch)
-    return FittedView(fit, whole, sites, frame, shape, rest, diameter, residuals, off)
+    lean = 0.0 if asked.windows else _window_lean(fit, first, places, diameter, seen)
+    return FittedView(fit, whole, sites, frame, shape, rest, diameter, residuals, off, lean)
+
+
+def _window_lean(
+    fit: CameraFit, first: FirstView, places_mm: Array, diameter_mm: float, seen_px: Array
+) -> float:
+    """What a plate that is not given changes of the apparent motion per mm of depth.
+
+    The camera is fitted again behind a usual plate; where that fails nothing is added.
+    """
+    camera, plate = fit.camera, _USUAL_WINDOW
+    nearer = plate.thickness_mm * (1 - 1 / plate.index)
+    behind = dataclasses.replace(
+        camera,
+        layers=(plate, *camera.layers),
+        window_bottom_z_mm=camera.window_bottom_z_mm - plate.thickness_mm,
+        position_mm=camera.position_mm - np.array([0.0, 0.0, nearer]),
+    )
+    flat = np.column_stack([places_mm, np.zeros(len(places_mm))])
+    sizes = np.full(len(places_mm), diameter_mm)
+    try:
+        other = fit_camera(behind, places_mm, sizes, seen_px, first.tolerance, fit.used)
+        change = apparent_motion_per_mm(other.camera, flat) - apparent_motion_per_mm(camera, flat)
+    except ValueError:
+        return 0.0
+    return float(np.sqrt(np.mean(change**2)))
 
 
 def _diameter_mm(camera: VirtualCamera, places_mm: Array, area_px: Array) -> float:

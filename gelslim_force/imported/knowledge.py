@@ -169,9 +169,9 @@ def _missing(
     gel = asked.gel
     share = tolerances(asked)["youngs_modulus_mpa"] / gel.youngs_modulus_mpa
     lines = [
-        "The light is not traced: no normal force is found from it. Without more knowledge forces "
-        "are tangential; `--indenter unknown` finds them from the markers alone, `--indenter "
-        "sphere:R` and depth maps give more."
+        "The light is not traced: no normal force is found from it. Forces are found from the "
+        "markers alone; a known indenter (`--indenter sphere:R`) and depth maps are stronger "
+        "knowledge."
     ]
     if "gel.youngs_modulus_mpa" in defaulted or share > 0.15:
         lines.append(

@@ -32,22 +32,22 @@ def gel_outline(gel: Gel) -> RoundedRectangle:
 
 
 def cell_size_mm(gel: Gel, pitches_mm: tuple[float, float]) -> tuple[float, float]:
-    """Size of the cells along x and y, whole parts of the distances of the dots where possible.
+    """Size of the cells along x and y, whole parts of the distances of the dots.
 
     Two cells for each dot, or more where the gel is thin; fewer where there would be too many.
     """
-    sides = (gel.length_mm, gel.width_mm)
     wanted = min(min(pitches_mm) / _CELLS_PER_PITCH, gel.thickness_mm / _CELLS_PER_THICKNESS)
-    least = math.sqrt(sides[0] * sides[1] / MOST_NODES)
-    x, y = (_part(pitch, max(wanted, least)) for pitch in pitches_mm)
+    least = math.sqrt(gel.length_mm * gel.width_mm / MOST_NODES)
+    x, y = (_part(pitch, wanted, least) for pitch in pitches_mm)
     return x, y
 
 
-def _part(pitch_mm: float, wanted_mm: float) -> float:
-    """The largest whole part of a pitch up to a length; the length where the pitch is less."""
-    if pitch_mm < wanted_mm:
-        return wanted_mm
-    return pitch_mm / math.ceil(pitch_mm / wanted_mm - 1e-9)
+def _part(pitch_mm: float, wanted_mm: float, least_mm: float) -> float:
+    """The largest whole part of a pitch up to a length, but none below the least length."""
+    if pitch_mm < least_mm:
+        return least_mm
+    cells = math.ceil(pitch_mm / wanted_mm - 1e-9)
+    return pitch_mm / min(cells, math.floor(pitch_mm / least_mm))
 
 
 def pad_mesh(gel: Gel, grid: MarkerGrid) -> PadMesh:

@@ -173,6 +173,9 @@ def _describe(path: Path, found: dict[str, Any]) -> None:
         mark = ", chosen" if label == ladder.get("operator") else ""
         print(f"  operator   {label}: {_shown_errors(rung)}, "
               f"{shown_ms(rung['milliseconds'])}{mark}")  # fmt: skip
+    for kind in ("given", "measured", "assumed", "missing"):
+        for line in (found.get("imported") or {}).get(kind, ()):
+            say(f"  {kind:<10} {line}")
     verdict = found["verification"]
     if verdict["ok"]:
         print("  verified   all hashes, values and the self-test pair")
