@@ -13,6 +13,7 @@ from gelslim_force.calibration.error import CalibrationError
 from gelslim_force.frames.frame import FrameSourceError
 from gelslim_force.frames.frame_array import read_frame_array
 from gelslim_force.frames.picture import PICTURE_ENDINGS, PictureError, read_picture
+from gelslim_force.frames.sample_file import is_sample
 
 MOST_PICTURES = 100
 """Most pictures that are averaged: a tenth of the noise remains."""
@@ -48,7 +49,7 @@ def read_reference(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 def _pictures(file: Path) -> list[NDArray[np.uint8]]:
     """The pictures of one file."""
     try:
-        if file.suffix.lower() != ".npy":
+        if file.suffix.lower() != ".npy" or is_sample(file):
             return [read_picture(file)]
         frames = islice(read_frame_array(file), MOST_PICTURES)
         return [frame.image for frame in frames if frame.image is not None]

@@ -18,6 +18,7 @@ import numpy as np
 from gelslim_core import optional_library
 from gelslim_core.errors import GelslimError
 from gelslim_force.frames.frame import Frame, FrameSource, FrameSourceError, Picture, size_problem
+from gelslim_force.frames.sample_file import is_sample, read_sample, sample_picture
 
 PICTURE_ENDINGS = (
     ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm", ".webp", ".npy",
@@ -35,12 +36,15 @@ class PictureError(GelslimError, ValueError):
 def read_picture(path: Path) -> Picture:
     """Return the picture, (h, w) or (h, w, 3) uint8 in the order red, green, blue.
 
-    Of 16-bit pictures the upper 8 bits are kept, and alpha is dropped. The orientation in a
+    A NumPy file holds an array, or a sample of a public data set with its picture. Of 16-bit
+    pictures the upper 8 bits are kept, and alpha is dropped. The orientation in a
     camera's EXIF data is ignored, because the pixels of a sensor do not turn. Raises PictureError
     if the file holds no complete picture, MissingLibraryError without Pillow.
     """
     try:
         if path.suffix.lower() == ".npy":
+            if is_sample(path):
+                return as_picture(sample_picture(read_sample(path)))
             return as_picture(np.load(path, allow_pickle=False))
         data = path.read_bytes()
     except (OSError, ValueError, EOFError) as error:

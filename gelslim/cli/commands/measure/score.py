@@ -32,7 +32,8 @@ def score(
         typer.Argument(
             metavar="LABELS",
             help="CSV file whose first line names frame, picture, stamp_s or time_s, and some of "
-            "fx_n, fy_n, fz_n, tx_nmm, ty_nmm, tz_nmm.",
+            "fx_n, fy_n, fz_n, tx_nmm, ty_nmm, tz_nmm; a folder with such a forces.csv; or labels "
+            "as of the data sets FEATS (folder of .npy) and FeelAnyForce (.csv).",
         ),
     ],
     by: Annotated[
@@ -71,13 +72,14 @@ def score(
     error over deviation should be 1, and 95 % of the frames within 1.96 deviations. A
     force-torque sensor, a scale or a simulation gives the labels.
     """
-    from gelslim_force.scoring.force_labels import SignedAxes, read_labels
+    from gelslim_force.scoring.force_labels import SignedAxes
+    from gelslim_force.scoring.label_files import read_label_files
     from gelslim_force.scoring.run_score import score_run
     from gelslim_force.scoring.score_figure import score_figure
 
     if figure is not None:
         require_own_file(figure, b"gelslim", "figure of gelslim")
-    turned = read_labels(labels, _key(by)).turned(SignedAxes.parse(axes), _place(origin_mm))
+    turned = read_label_files(labels, _key(by)).turned(SignedAxes.parse(axes), _place(origin_mm))
     found = score_run(run, turned, delay_s)
     if figure is not None:
         replace_file(figure, score_figure(found))
