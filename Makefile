@@ -57,8 +57,10 @@ bench-quick: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-dev
 	$(BIN)/gelslim schema -o docs/gelslim-spec-1.schema.json
 	$(BIN)/gelslim schema --scene -o docs/gelslim-scene-1.schema.json
+	$(BIN)/gelslim schema --sensor -o docs/gelslim-sensor-1.schema.json
 	$(BIN)/gelslim schema --markdown -o docs/spec_reference.md
 	$(BIN)/gelslim schema --scene --markdown -o docs/scene_reference.md
+	$(BIN)/gelslim schema --sensor --markdown -o docs/sensor_reference.md
 	$(BIN)/python bench/accuracy_page.py
 	$(BIN)/python tools/sensitivities.py
 	$(BIN)/python bench/page_blocks.py

@@ -48,8 +48,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_force": (
         "frames", "detection", "lattice", "contact", "motion", "tracking", "calibration",
-        "forces", "joint", "dot_tracking", "imported", "outputs", "scoring", "settings", "presses", "pipeline",
-        "built_sensor", "sensor", "run",
+        "forces", "joint", "dot_tracking", "imported", "outputs", "scoring", "settings", "presses",
+        "pipeline", "built_sensor", "sensor", "run",
     ),
     "gelslim_twin": (
         "effects", "scene", "planning", "contact", "render", "appearance", "simulation", "batch",

@@ -138,7 +138,8 @@ def _words(shape: Shape) -> list[str]:
     if shape.choices:
         words.append(", ".join(f"`{_yaml(choice)}`" for choice in shape.choices))
     if shape.item and not shape.item.models:
-        words.append(f"list of {' or '.join(_words(shape.item))}".replace("number", "numbers"))
+        inner = " or ".join(_words(shape.item)).replace("list of", "lists of")
+        words.append(f"list of {re.sub('number(?!s)', 'numbers', inner)}")
     return words
 
 

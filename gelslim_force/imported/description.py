@@ -33,7 +33,10 @@ class Gel(Block):
         default=0.2, gt=0, le=20, description="Young's modulus; forces are proportional to it"
     )
     youngs_modulus_tolerance_ratio: float = Field(
-        default=0.5, ge=0, le=1, description="Standard deviation of Young's modulus, as a part of it"
+        default=0.5,
+        ge=0,
+        le=1,
+        description="Standard deviation of Young's modulus, as a part of it",
     )
     poissons_ratio: float = Field(default=0.48, ge=0, lt=0.5, description="Poisson's ratio")
     poissons_ratio_tolerance: float = Field(
@@ -72,7 +75,9 @@ class Markers(Block):
             raise FieldError("pitch_across_mm", "is that along y", "give pitch_mm along x too")
         sizes = self.diameters_px
         if sizes is not None and not 1 <= sizes[0] < sizes[1] <= 400:
-            raise FieldError("diameters_px", "must be two sizes, 1 <= smallest < largest <= 400", "")
+            raise FieldError(
+                "diameters_px", "must be two sizes, 1 <= smallest < largest <= 400", ""
+            )
         return self
 
 

@@ -169,7 +169,8 @@ def _by_lattice(
         assert lens.focal_px is not None
         ideal = _undistorted_px(lens, dots.positions_px, size_px)
         matrix, distortion = fit_homography(places, ideal), lens.distortion
-        focal, origin = lens.focal_px, lens.origin
+        focal: float = lens.focal_px
+        origin: FocalOrigin = lens.origin
     else:
         corners = np.array(gel_corners_mm(asked))
         bent = bent_homography(places, dots.positions_px, size_px, corners)
@@ -259,7 +260,7 @@ def _bend_tolerance(
 
 def _undistorted_px(lens: LensKnowledge, seen_px: Array, size_px: tuple[int, int]) -> Array:
     """Dots (k, 2) where an ideal lens would show them."""
-    if lens.distortion is None:
+    if lens.distortion is None or lens.focal_px is None:
         return seen_px
     middle = (np.array(size_px) - 1) / 2 + np.array(lens.principal_offset_px)
     flat = lens.distortion.undistort((seen_px - middle) / lens.focal_px)
@@ -303,7 +304,7 @@ def _on_gel(dots: ReferenceLattice, places_mm: Array) -> tuple[Sites, LatticeFra
 def _steps_px(by_site: Array, sites: Sites) -> Array:
     """Steps (2, 2) of rows and columns in the picture at the middle of the lattice."""
     middle = sites.mean(axis=0)
-    ends = np.array([[*middle, 1.0], [*(middle + [1, 0]), 1.0], [*(middle + [0, 1]), 1.0]])
+    ends = np.column_stack([middle + np.array([[0, 0], [1, 0], [0, 1]]), np.ones(3)])
     image = ends @ by_site.T
     image = image[:, :2] / image[:, 2:]
     return image[1:] - image[0]

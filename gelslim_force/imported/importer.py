@@ -108,9 +108,7 @@ def import_sensor(
 
 def _dots(picture: NDArray[np.uint8], asked: SensorDescription) -> DotsAtRest:
     sizes = asked.markers.diameters_px
-    settings = (
-        None if sizes is None else DetectorSettings.for_diameters(np.array(sizes), "double")
-    )
+    settings = None if sizes is None else DetectorSettings.for_diameters(np.array(sizes), "double")
     try:
         return dots_at_rest(picture, settings)
     except (LatticeError, ValueError) as error:

@@ -127,8 +127,12 @@ def _measured(
     if np.isfinite(view.points_px):
         lines.append(f"The given points are seen {view.points_px:.1f} px off (root mean square).")
     focal = with_sigma(camera.focal_px, camera.focal_px * fit.sigma[6] / 100).removeprefix("+")
-    source = {"picture": "told by how the picture converges", "given": "as given, refined",
-              "measured": "as measured", "assumed": "hardly told by the picture"}[origin]  # fmt: skip
+    source = {
+        "picture": "told by how the picture converges",
+        "given": "as given",
+        "measured": "as measured",
+        "assumed": "which the picture hardly tells",
+    }[origin]
     lines.append(
         f"The focal length is {focal} px, {source}. The camera sees the middle of the gel from "
         f"{_angle_deg(view):.0f}° off its normal, over {camera.air_height_mm:.0f} mm of air. "
@@ -142,7 +146,9 @@ def _pitch_line(asked: SensorDescription, grid: MarkerGrid) -> str:
     along, across = grid.frame.pitches_mm
     x, y = grid.frame.row_step_mm
     turn = np.degrees(np.arctan2(y, x))
-    line = f"The dots are {along:.3f} mm apart along x and {across:.3f} along y, turned by {turn:.1f}°"
+    line = (
+        f"The dots are {along:.3f} mm apart along x and {across:.3f} along y, turned by {turn:.1f}°"
+    )
     pitch = asked.markers.pitch_mm
     return line + ("." if pitch is None else f"; {pitch:g} mm are given.")
 

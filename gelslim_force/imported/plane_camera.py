@@ -82,7 +82,7 @@ def camera_of_homography(
         The camera; its image axes are left-handed where the picture is mirrored.
 
     Raises:
-        ValueError: The camera would be within or above the layers, or the homography shows no plane.
+        ValueError: The camera would be within or above the layers.
     """
     centred = _centred(matrix, size_px, principal_offset_px)
     scaled = centred / np.array([focal_px, focal_px, 1.0])[:, None]

@@ -1,13 +1,33 @@
-"""A description of a sensor to start from, and the schema of such files."""
+"""A description of a sensor to start from; schema and reference page of such files."""
 
 from __future__ import annotations
 
 from gelslim_core.yaml.reader import load_bytes
+from gelslim_core.yaml.schema import reference_markdown
 from gelslim_core.yaml.schema import schema_text as model_schema
 from gelslim_force.imported.description import FORMAT, SensorDescription
 
 SCHEMA_FILE = "gelslim-sensor-1.schema.json"
 """Usual name of the schema's file."""
+RULES = (
+    ("gel", "corner_radius_mm is at most half the shorter side"),
+    ("markers", "pitch_mm is given unless view has points, a homography or a pinhole"),
+    ("markers", "pitch_across_mm needs pitch_mm; diameters_px are smallest and largest"),
+    ("view", "at most one of points, homography and pinhole; gel_middle_px with none of them"),
+    ("view", "points are at least four, and not on one line"),
+    ("lens", "at most one of focal_px, field_of_view_deg and intrinsics; a pinhole needs one"),
+)
+"""Rules between fields, by their block."""
+_HEAD = """\
+# Sensor reference
+
+Every field of the description of a sensor that was not generated here, for `gelslim import-sensor`, with unit, default
+and range. [Other sensors](other_sensors.md) is the guide. `gelslim schema --sensor --markdown` prints this page.
+"""
+_BETWEEN = """
+## Rules between fields
+
+"""
 _TEXT = """\
 ## A marker sensor that was not generated here. All sizes in the unit that ends the name.
 ## What is not given takes its default, shown behind "# ", and the import says what it assumed;
@@ -67,3 +87,9 @@ def starter_text(name: str) -> str:
 def schema_text() -> str:
     """The JSON Schema of descriptions."""
     return model_schema(SensorDescription, FORMAT)
+
+
+def reference_text() -> str:
+    """The page with every field in Markdown, the same for the same program."""
+    rules = "".join(f"- `{block}`: {rule}.\n" for block, rule in RULES)
+    return f"{_HEAD}\n{reference_markdown(SensorDescription)}{_BETWEEN}{rules}"

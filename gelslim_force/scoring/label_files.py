@@ -55,7 +55,9 @@ def read_label_files(path: str | os.PathLike[str], key: Key | None = None) -> Fo
     place = Path(path)
     if not place.is_dir():
         head, rows = read_csv_table(place, _FORM, LabelError)
-        return _tactile_labels(place, rows, key) if _TACTILE <= set(head) else read_labels(path, key)
+        return (
+            _tactile_labels(place, rows, key) if set(head) >= _TACTILE else read_labels(path, key)
+        )
     table = place / TABLE
     if table.is_file():
         return _folder_labels(place, table, key)

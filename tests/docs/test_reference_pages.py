@@ -11,11 +11,17 @@ from gelslim.cli import main
 from gelslim_cad.spec import Spec
 from gelslim_cad.spec.reference import reference_text as spec_page
 from gelslim_core.yaml.fields import Field, field_table
+from gelslim_force.imported.description import SensorDescription
+from gelslim_force.imported.starter import reference_text as sensor_page
 from gelslim_twin.scene.reader import reference_text as scene_page
 from gelslim_twin.scene.scene import Scene
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"spec_reference.md": (spec_page, Spec), "scene_reference.md": (scene_page, Scene)}
+PAGES = {
+    "spec_reference.md": (spec_page, Spec),
+    "scene_reference.md": (scene_page, Scene),
+    "sensor_reference.md": (sensor_page, SensorDescription),
+}
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -24,7 +30,7 @@ def test_committed_page_is_what_the_schema_says(name: str) -> None:
     assert (DOCS / name).read_text("utf-8") == made, "run: make docs"
 
 
-@pytest.mark.parametrize(("page", "options"), [("spec", []), ("scene", ["--scene"])])
+@pytest.mark.parametrize(("page", "options"), [("spec", []), ("scene", ["--scene"]), ("sensor", ["--sensor"])])
 def test_the_command_line_prints_the_page(
     page: str, options: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

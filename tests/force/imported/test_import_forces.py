@@ -69,9 +69,7 @@ def test_what_is_written_is_read_again(sensor: ImportedSensor, rest: Frame, tmp_
     np.testing.assert_array_equal(sensor.calibration.rest_mm, made.calibration.rest_mm)
 
 
-def test_the_motion_of_the_markers_is_that_of_the_gel(
-    sensor: ImportedSensor, rest: Frame
-) -> None:
+def test_the_motion_of_the_markers_is_that_of_the_gel(sensor: ImportedSensor, rest: Frame) -> None:
     """Tangential motion: what the picture shows of a motion in the plane."""
     tangential = open_sensor(sensor.bundle, calibration=sensor.calibration, indenter="none")
     grid = sensor_grid()
@@ -80,7 +78,9 @@ def test_the_motion_of_the_markers_is_that_of_the_gel(
     from camera_rig import off_centre_view
     from synthetic import render
 
-    result = tangential.process(render(grid, off_centre_view(), Look(noise=2.0, seed=7), true).image)
+    result = tangential.process(
+        render(grid, off_centre_view(), Look(noise=2.0, seed=7), true).image
+    )
     assert result.marker_displacement_mm is not None
     markers = tangential.calibration.reference.markers
     places = sensor.calibration.grid.positions_mm[markers]

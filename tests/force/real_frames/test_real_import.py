@@ -108,9 +108,7 @@ def test_gelslim3_at_rest_is_not_touched(pipeline: ForcePipeline) -> None:
 
 def test_gelslim2_is_imported() -> None:
     """Over a mirror, 44 degrees off the gel's normal by how much the picture converges."""
-    made = real(
-        "gelslim2/reference.png", (30.0, 30.0, 3.0), 1.1, x_points="down", mirrored=True
-    )
+    made = real("gelslim2/reference.png", (30.0, 30.0, 3.0), 1.1, x_points="down", mirrored=True)
     assert len(made.calibration) >= 500
     assert made.calibration.grid.lattice_shape == (25, 25)
     assert off_lattice_px(made) < 1.2

@@ -79,7 +79,7 @@ def test_a_table_of_pictures_and_forces(tmp_path: Path) -> None:
         "tactile,depth,FT\n"
         "records/ball/tactile/174.png,records/ball/depth/174.npy,0.5 -0.25 -3.0 0.1 0.2 0.3\n"
         "records/ball/tactile/175.png,records/ball/depth/175.npy,\n"
-        "records/ball/tactile/176.png,records/ball/depth/176.npy,\"[0.0, 1.0, -2.0, 0, 0, 0]\"\n"
+        'records/ball/tactile/176.png,records/ball/depth/176.npy,"[0.0, 1.0, -2.0, 0, 0, 0]"\n'
     )
     labels = read_label_files(table)
     assert labels.at == ("174.png", "176.png")

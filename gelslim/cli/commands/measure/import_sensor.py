@@ -1,4 +1,4 @@
-"""`gelslim import-sensor`: bundle and calibration of a marker sensor that was not generated here."""
+"""`gelslim import-sensor`: bundle and calibration of a sensor that was not generated here."""
 
 from __future__ import annotations
 
@@ -120,9 +120,7 @@ def _start(target: Path) -> int:
     return 0
 
 
-def _description(
-    source: Path, given: dict[str, Any]
-) -> tuple[Loaded[SensorDescription], Path]:
+def _description(source: Path, given: dict[str, Any]) -> tuple[Loaded[SensorDescription], Path]:
     """The description, and the folder to which its paths are relative."""
     from gelslim_core.yaml.reader import load_bytes
     from gelslim_force.imported.description import FORMAT, SensorDescription, read_description

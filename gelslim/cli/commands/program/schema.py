@@ -1,4 +1,4 @@
-"""`gelslim schema`: the JSON Schema of specs or scenes, or a reference page of it."""
+"""`gelslim schema`: the JSON Schema of specs, scenes or sensors, or a reference page of it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gelslim.cli.failure import CommandError
 from gelslim.cli.output import replace_file, require_own_file
 
 SCHEMA_FILES = {False: "gelslim-spec-1.schema.json", True: "gelslim-scene-1.schema.json"}
@@ -21,6 +22,10 @@ def schema(
     scene: Annotated[
         bool, typer.Option("--scene", help="Print the schema of contact scenes instead of specs.")
     ] = False,
+    sensor: Annotated[
+        bool,
+        typer.Option("--sensor", help="Print the schema of descriptions for import-sensor."),
+    ] = False,
     markdown: Annotated[
         bool,
         typer.Option("--markdown", help="Print a page for reading, with every field in tables."),
@@ -30,7 +35,12 @@ def schema(
 
     Editors use it to check and to complete the YAML.
     """
-    text = _page(scene) if markdown else schema_text(scene)
+    if scene and sensor:
+        raise CommandError("give --scene or --sensor, not both")
+    if sensor:
+        text = _sensor_text(markdown)
+    else:
+        text = _page(scene) if markdown else schema_text(scene)
     if out is None:
         print(text, end="")
         return 0
@@ -41,6 +51,12 @@ def schema(
     use = "" if markdown else f' Name it in the first line of a file beside it: "{line}"'
     print(f"Wrote {out}.{use}")
     return 0
+
+
+def _sensor_text(markdown: bool) -> str:
+    from gelslim_force.imported import starter
+
+    return starter.reference_text() if markdown else starter.schema_text()
 
 
 def schema_text(scene: bool) -> str:
