@@ -40,6 +40,20 @@ SMALLER = (
     ("designs/*.yaml", "designs/mini20.yaml designs/thin.yaml"),
 )
 """The same work, less of it."""
+EDITED = (
+    (
+        "gelslim import-sensor my_sensor.yaml",
+        "sed -i 's/length_mm: 24 /length_mm: 28 /; s/width_mm: 18 /width_mm: 28 /;"
+        "s/thickness_mm: 3$/thickness_mm: 2/; s/pitch_mm: 1.5 /pitch_mm: 1.0 /;"
+        "s/# x_points: right/x_points: down/; s/# mirrored: false/mirrored: true/' my_sensor.yaml"
+        " && gelslim import-sensor my_sensor.yaml",
+    ),
+    (
+        "gelslim score out/press labels --axes -x,-y,z",
+        "gelslim score out/press out/frames/truth.csv",
+    ),
+)
+"""What the reader fills in before a line, and labels that there are."""
 ELSEWHERE = ("--scheduler", "--install-completion", "gelslim view")
 """Needs a cluster, a shell of one's own, or goes on until it is interrupted."""
 PRESS = """\
@@ -118,7 +132,7 @@ def _press_ball(folder: Path) -> None:
 
 
 def lessened(line: str) -> str:
-    for long, short in SMALLER:
+    for long, short in (*SMALLER, *EDITED):
         line = line.replace(long, short)
     return line
 

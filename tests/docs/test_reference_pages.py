@@ -30,7 +30,9 @@ def test_committed_page_is_what_the_schema_says(name: str) -> None:
     assert (DOCS / name).read_text("utf-8") == made, "run: make docs"
 
 
-@pytest.mark.parametrize(("page", "options"), [("spec", []), ("scene", ["--scene"]), ("sensor", ["--sensor"])])
+@pytest.mark.parametrize(
+    ("page", "options"), [("spec", []), ("scene", ["--scene"]), ("sensor", ["--sensor"])]
+)
 def test_the_command_line_prints_the_page(
     page: str, options: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

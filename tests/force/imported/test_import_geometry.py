@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sampled
 from camera_rig import finger_view, off_centre_view
 from imported_samples import imported, off_places_mm
 from numpy.typing import NDArray
@@ -81,7 +80,8 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("way", sampled.quick(WAYS, lambda way: way == "pitch and lens"))
+@pytest.mark.slow
+@pytest.mark.parametrize("way", WAYS)
 def test_places_follow_from_the_pitch(way: str, tmp_path: Path) -> None:
     camera, grid = off_centre_view(), grid_of_dots()
     drawn = render(grid, camera, dataclasses.replace(LOOK, missing=0.03, dirt=8))
@@ -183,7 +183,7 @@ def test_two_pitches_and_dots_beyond_the_rim(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "field"),
     [
-        ({"markers": {"pitch_mm": 3.0}}, "gel"),
+        pytest.param({"markers": {"pitch_mm": 3.0}}, "gel", marks=pytest.mark.slow),
         ({"view": {"points": [{"gel_mm": [float(k), float(k)], "picture_px": [float(k), 2.0 * k]}
                               for k in range(4)]}}, "view"),
         ({"markers": {"diameters_px": [100.0, 200.0]}}, "view.reference"),
