@@ -21,8 +21,11 @@ RULES = (
 _HEAD = """\
 # Sensor reference
 
-Every field of the description of a sensor that was not generated here, for `gelslim import-sensor`, with unit, default
-and range. [Other sensors](other_sensors.md) is the guide. `gelslim schema --sensor --markdown` prints this page.
+<!-- Made by `make docs` from the schema; do not edit by hand. -->
+
+Every field of the description of a sensor that was not generated here (`format: gelslim-sensor/1`).
+[Other sensors](other_sensors.md) is the guide. `gelslim schema --sensor` prints the JSON Schema,
+which is also in [gelslim-sensor-1.schema.json](gelslim-sensor-1.schema.json).
 """
 _BETWEEN = """
 ## Rules between fields

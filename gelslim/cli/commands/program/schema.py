@@ -37,10 +37,7 @@ def schema(
     """
     if scene and sensor:
         raise CommandError("give --scene or --sensor, not both")
-    if sensor:
-        text = _sensor_text(markdown)
-    else:
-        text = _page(scene) if markdown else schema_text(scene)
+    text = _text(scene, sensor, markdown)
     if out is None:
         print(text, end="")
         return 0
@@ -53,7 +50,9 @@ def schema(
     return 0
 
 
-def _sensor_text(markdown: bool) -> str:
+def _text(scene: bool, sensor: bool, markdown: bool) -> str:
+    if not sensor:
+        return _page(scene) if markdown else schema_text(scene)
     from gelslim_force.imported import starter
 
     return starter.reference_text() if markdown else starter.schema_text()
