@@ -111,6 +111,31 @@ def test_a_lens_with_distortion(k1: float, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_lens_that_was_measured(tmp_path: Path) -> None:
+    """Its intrinsics stand in a file of ROS, beside the description."""
+    camera, grid = off_centre_view(), grid_of_dots("none")
+    camera = dataclasses.replace(camera, lens=LensDistortion(k1=-0.25, k2=0.05))
+    (x, y), f = camera.principal_px, camera.focal_px
+    (tmp_path / "lens.yaml").write_text(
+        "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\n"
+        f"camera_matrix: {{rows: 3, cols: 3, data: [{f}, 0, {x}, 0, {f}, {y}, 0, 0, 1]}}\n"
+        "distortion_coefficients: {rows: 1, cols: 5, data: [-0.25, 0.05, 0, 0, 0]}\n"
+    )
+    drawn = render(grid, camera, LOOK)
+    lens = {"intrinsics": "lens.yaml"}
+    made = imported(drawn.image, tmp_path, lens=lens, windows=WINDOW)
+    off = off_places_mm(made, drawn.centres_px, grid)
+    assert np.sqrt(np.mean(off**2)) < 0.003
+    error = lean_error(made, camera, true_places(made, drawn.centres_px, grid))
+    assert error < 2 * made.calibration.deviation.lean_sigma_mm_per_mm
+    assert made.calibration.deviation.lean_sigma_mm_per_mm < 0.003
+    small = drawn.image[::2, ::2].copy()
+    with pytest.raises(ImportSensorError) as refused:
+        imported(small, tmp_path, lens=lens)
+    assert refused.value.field == "lens"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt_deg", [0.0, 8.0, 15.0, 30.0])
 @pytest.mark.parametrize("lens", [None, FOCAL])
 def test_the_uncertainty_of_depth_holds(
