@@ -1,22 +1,23 @@
 """What planning saves: the planner's choice against everything on, in the gallery and at random.
 
     python bench/twin_planning.py                        # all that is not measured yet
+    python bench/twin_planning.py --again                # all, anew
+    python bench/twin_planning.py --processes 16         # the same on 16 processes
     python bench/twin_planning.py --scene tilt           # one scene of the gallery anew
     python bench/twin_planning.py --seeds 2000 2010      # random scenes of these seeds anew
     python bench/twin_planning.py --quick                # two scenes and four seeds; printed only
 
 The scenes of the gallery have their own tolerance, a loose one of 10 % and a tight one of 1 %; the
 random scenes of the tests have four times as many poses and a tolerance drawn from 0.5 to 20 %.
-Tolerances are of the largest force, and of the depth in pixels. Each case is written to docs/data
-as it is done, so that a stop loses one only. Set OMP_NUM_THREADS=1.
+Tolerances are of the largest force, and of the depth in pixels. Times are of the processor, so that
+processes beside each other do not count. The rows of a scene are written to docs/data when it is
+done, so that a stop loses those only that are under way. Set OMP_NUM_THREADS=1.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
-import random
 import sys
 import tempfile
 from pathlib import Path
@@ -27,15 +28,13 @@ from rigs.machine import machine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "twin"))
 
-from rigs.planning_cases import Case, Run, measured, prepared
-from rigs.twin_rig import gallery, kept_sensor, plan_key
+from rigs.planning_tasks import Task, perform, warm
+from rigs.twin_rig import QUICK, SCENES, kept_sensor
 
-from gelslim_twin.contact.gel_state import ContactError
+from gelslim_core.jobs import Engine
 
 NAME = "twin_planning"
-LEVELS = {"own": None, "loose": 0.1, "tight": 0.01}
 SEEDS = range(2000, 2100)
-LOWEST, HIGHEST = 0.005, 0.2
 
 
 def main() -> None:
@@ -44,75 +43,49 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--quick", action="store_true", help="few cases, printed only")
+    parser.add_argument("--again", action="store_true", help="measure all, not what is missing")
     parser.add_argument("--docs", type=Path, help="folder to write data/ and images/ in")
     parser.add_argument("--scene", nargs="+", help="of the gallery")
     parser.add_argument("--seeds", nargs=2, type=int, help="of random scenes: from, and up to")
+    parser.add_argument("--processes", type=int, default=1, help="how many work beside each other")
+    parser.add_argument(
+        "--sensor", type=Path, help="folder that keeps the sensor of the gallery for a later call"
+    )
     options = parser.parse_args()
     docs = options.docs or (None if options.quick else DOCS)
-    asked = options.scene or options.seeds
-    done = {} if options.quick else held(docs)
+    done = {} if options.quick or options.again else held(docs)
     with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        if options.scene or not asked:
-            of_gallery(folder, options.scene, options.quick, done, docs)
-        seeds = range(*options.seeds) if options.seeds else SEEDS
-        if options.seeds or not asked:
-            for seed in list(seeds)[:4] if options.quick else seeds:
-                if options.seeds or f"seed {seed}" not in done:
-                    keep(docs, done, f"seed {seed}", at_random(seed, folder))
+        tasks = asked(options, place, done)
+        if any(task.scene for task in tasks):
+            kept_sensor(Path(tasks[0].sensor))
+        if options.processes > 1:
+            warm(place)
+        measured: dict[str, Any] = {}
+        for number, rows in Engine(options.processes).run(perform, tasks):
+            for name in tasks[number].names:
+                measured[name] = rows[name]
+                print(f"{name:22s} {line(rows[name])}", flush=True)
+            if docs is not None:
+                keep(docs, measured)
     if docs is not None:
         finish(docs)
 
 
-def of_gallery(
-    folder: Path, names: list[str] | None, quick: bool, done: dict[str, Any], docs: Path | None
-) -> None:
-    """Every scene at its three tolerances; everything on is carried out once for equal rungs."""
-    scenes = [s for s in gallery(quick) if not names or s.scene.name in names]
-    missing = [
-        s for s in scenes if names or any(f"{s.scene.name} {level}" not in done for level in LEVELS)
-    ]
-    sensor = kept_sensor(folder) if missing else None
-    for loaded in missing:
-        assert sensor is not None
-        case = Case.of_gallery(loaded, sensor, folder)
-        prepared(case)
-        carried: dict[str, Run] = {}
-        for name, level in LEVELS.items():
-            at = case if level is None else relative(case, carried, level)
-            row = measured(at, level, everything(at, carried), with_needless=False)
-            keep(docs, done, f"{loaded.scene.name} {name}", {"scene": loaded.scene.name, **row})
-
-
-def at_random(seed: int, folder: Path) -> dict[str, Any]:
-    """A random scene at a random tolerance."""
-    rng = random.Random(seed)
-    level = math.exp(rng.uniform(math.log(LOWEST), math.log(HIGHEST)))
-    carried: dict[str, Run] = {}
-    try:
-        case = Case.of_seed(seed, folder)
-        prepared(case)
-        at = relative(case, carried, level)
-        return {"seed": seed, **measured(at, level, everything(at, carried))}
-    except ContactError as error:
-        return {"seed": seed, "level": level, "refused": str(error)}
-
-
-def everything(case: Case, carried: dict[str, Run]) -> Run:
-    """Everything on, carried out once for equal rungs."""
-    key = plan_key(case.whole)
-    if key not in carried:
-        carried[key] = case.run(case.whole)
-    return carried[key]
-
-
-def relative(case: Case, carried: dict[str, Run], level: float) -> Case:
-    """The case with a tolerance relative to its largest force and to its depth in pixels."""
-    states = everything(case, carried).outcome.states
-    force = max(float((s.force_n.sum(axis=0) ** 2).sum() ** 0.5) for s in states)
-    c = case.trial.asked.circumstances
-    depth_px = c.motion.depth_mm * c.sensor.px_per_mm
-    return case.with_tolerance(max(level * force, 1e-9), max(level * depth_px, 1e-9))
+def asked(options: argparse.Namespace, place: str, done: dict[str, Any]) -> list[Task]:
+    """The tasks of a call, those of the gallery first because they take longest."""
+    sensor = str(options.sensor or Path(place) / "sensor")
+    scenes = options.scene or sorted(path.stem for path in SCENES.glob("*.yaml"))
+    seeds = range(*options.seeds) if options.seeds else SEEDS
+    if options.quick:
+        scenes, seeds = options.scene or QUICK, options.seeds and seeds or list(seeds)[:4]
+    every = []
+    if options.scene or not options.seeds:
+        every += [Task(place, scene=name, sensor=sensor) for name in scenes]
+    if options.seeds or not options.scene:
+        every += [Task(place, seed=seed, sensor=sensor) for seed in seeds]
+    if options.scene or options.seeds:
+        return every
+    return [task for task in every if not all(name in done for name in task.names)]
 
 
 def held(docs: Path | None) -> dict[str, Any]:
@@ -123,15 +96,11 @@ def held(docs: Path | None) -> dict[str, Any]:
     return dict(json.loads(path.read_text(encoding="utf-8"))["cases"])
 
 
-def keep(docs: Path | None, done: dict[str, Any], name: str, row: dict[str, Any]) -> None:
-    """Print a row and write it with the others."""
-    done[name] = row
-    print(f"{name:22s} {line(row)}", flush=True)
-    if docs is not None:
-        # What another process has measured meanwhile is kept.
-        done |= {**held(docs), name: row}
-        ordered = {key: done[key] for key in sorted(done)}
-        write_data(NAME, {**machine(), "seed": "of each scene", "cases": ordered}, docs)
+def keep(docs: Path, measured: dict[str, Any]) -> None:
+    """Write rows with those that are there already, also those of another process."""
+    cases = {**held(docs), **measured}
+    ordered = {name: cases[name] for name in sorted(cases)}
+    write_data(NAME, {**machine(), "seed": "of each scene", "cases": ordered}, docs)
 
 
 def line(row: dict[str, Any]) -> str:
