@@ -77,7 +77,7 @@ def asked(options: argparse.Namespace, place: str, done: dict[str, Any]) -> list
     scenes = options.scene or sorted(path.stem for path in SCENES.glob("*.yaml"))
     seeds = range(*options.seeds) if options.seeds else SEEDS
     if options.quick:
-        scenes, seeds = options.scene or QUICK, options.seeds and seeds or list(seeds)[:4]
+        scenes, seeds = options.scene or QUICK, (options.seeds and seeds) or list(seeds)[:4]
     every = []
     if options.scene or not options.seeds:
         every += [Task(place, scene=name, sensor=sensor) for name in scenes]

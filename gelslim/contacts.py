@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from gelslim_twin.planning.plan import Plan
     from gelslim_twin.planning.planner import Question
     from gelslim_twin.scene.reader import LoadedScene
+    from gelslim_twin.simulation.sensor import TwinSensor
     from gelslim_twin.validation.score import Validation
     from ifem_export.compliance.columns import SurfaceCompliance
 
@@ -54,14 +56,25 @@ def plan(scene: SceneLike, budget: Budget | None = None) -> Plan:
         InputError: The scene or its sensor has faults.
         BudgetError: No plan keeps the budget.
     """
-    from gelslim.scene_sensor import require_within_gel, sensor_figures
+    from gelslim.scene_sensor import require_within_gel, scene_bundle, sensor_figures
     from gelslim_twin.planning.question import question
-    from gelslim_twin.simulation.scene_task import planned
+    from gelslim_twin.simulation.scene_task import planned, viewer_of
+    from gelslim_twin.simulation.sensor import TwinSensor
 
     loaded, _ = with_budget(scene_of(scene), budget)
     figures = sensor_figures(loaded)
     require_within_gel(loaded, figures.thickness_mm)
-    return planned(loaded, question(loaded, figures), lambda: _compliance(loaded))
+
+    @cache
+    def sensor() -> TwinSensor:
+        return TwinSensor(scene_bundle(loaded))
+
+    return planned(
+        loaded,
+        question(loaded, figures),
+        lambda: _compliance(loaded),
+        None if loaded.look is not None else lambda made: viewer_of(loaded, sensor(), made),
+    )
 
 
 def simulate(
@@ -204,7 +217,7 @@ def _solved_question(loaded: LoadedScene, figures: SensorFigures, error: float) 
     from dataclasses import replace
 
     from gelslim_twin.planning.planner import make_plan
-    from gelslim_twin.planning.probing import effects_to_probe, probe_ms
+    from gelslim_twin.planning.probing import PROBED, effects_to_probe, probe_ms
     from gelslim_twin.planning.question import question
     from gelslim_twin.planning.tolerance_ladder import tolerance_at
     from gelslim_twin.simulation.probe import probed
@@ -217,7 +230,7 @@ def _solved_question(loaded: LoadedScene, figures: SensorFigures, error: float) 
     allowed = tolerance_at(solved, error)
     bounded = replace(asked, force_n=allowed.force_n, image_px=allowed.image_px)
     plan = make_plan(bounded)
-    effects = effects_to_probe(bounded, plan)
+    effects = tuple(name for name in effects_to_probe(bounded, plan) if name in PROBED)
     if not effects:
         return solved
     return probed(asked, loaded, compliance, effects, probe_ms(bounded, plan, effects))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,7 +24,7 @@ from gelslim_twin.planning.planner import make_plan
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
-from gelslim_twin.simulation.scene_task import planned
+from gelslim_twin.simulation.scene_task import planned, viewer_of
 from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor
 from ifem_export.compliance.columns import SurfaceCompliance
 from rigs.twin_rig import mechanics_key
@@ -96,7 +96,8 @@ class Case:
 
     def chosen(self, pad: SurfaceCompliance) -> Plan:
         """The planner's choice, with a probe where it pays."""
-        return planned(self.trial.loaded, self.trial.asked, lambda: pad)
+        viewer = partial(viewer_of, self.trial.loaded, self.trial.sensor)
+        return planned(self.trial.loaded, self.trial.asked, lambda: pad, viewer)
 
     def run(self, plan: Plan, pad: SurfaceCompliance | None = None) -> Run:
         """Solve all poses, and draw some pictures where they are observed. Raises ContactError.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeVar
 
@@ -172,6 +172,8 @@ class Probed:
         sizes: By effect, the error of leaving it out as found at these poses, times a safety
             factor for the other poses. Effects that were not probed are absent.
         milliseconds: Declared time of the probe.
+        coarsest: By effect, the error of its coarsest rung as found at a hard pose, times a safety
+            factor; finer rungs err no more.
     """
 
     normal_n: float
@@ -179,6 +181,7 @@ class Probed:
     moved_mm: float
     sizes: Mapping[str, Bound]
     milliseconds: float = 0.0
+    coarsest: Mapping[str, Bound] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, field
 from typing import Any
@@ -73,6 +74,18 @@ def optics(px: float) -> Bound:
 def picture(px: float) -> Bound:
     """An error in grey values, as the equivalent shift of an edge."""
     return Bound(image_px=px)
+
+
+DIGITS = 3
+"""Significant digits of what a probe finds: the last bits depend on the machine."""
+
+
+def rounded_up(value: float) -> float:
+    """The value rounded up to `DIGITS` significant digits."""
+    if value <= 0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(value)) - DIGITS + 1)
+    return float(f"{math.ceil(value / unit) * unit:.{DIGITS}g}")
 
 
 @dataclass(frozen=True)

@@ -67,17 +67,25 @@ def missed_share(c: Circumstances, pixel_step: int) -> float:
     return grey_share(c) * missed
 
 
+PIXEL_STEPS = (8, 4, 2, 1)
+
+
 def shading_ladder(c: Circumstances) -> tuple[Rung, ...]:
-    """A value every few pixels, interpolated between them."""
-    size = c.sensor.frame_px / 307200
+    """A value every few pixels, interpolated between them.
+
+    A probe may have found how far dots are shifted by the coarsest lattice.
+    """
+    size, most = c.sensor.frame_px / 307200, math.inf
+    if c.probed is not None and "shading" in c.probed.coarsest:
+        most = c.probed.coarsest["shading"].image_px
     return tuple(
         Rung(
             f"every {p} px",
-            picture(shift_px(c, missed_share(c, p))),
+            picture(min(most, shift_px(c, missed_share(c, p)))),
             (0.6 + 40 / p**2) * size,
             {"pixel_step": p},
         )
-        for p in (8, 4, 2, 1)
+        for p in PIXEL_STEPS
     )
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,14 @@ class FrameRenderer:
     top: DomedTop | None = None
     mono: bool = False
     photographed: PhotographedGel | None = None
+    _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+    """What does not depend on all effects, shared with the renderers of `with_look`."""
+
+    def with_look(self, look: Look) -> FrameRenderer:
+        """The same sensor with other effects; what does not depend on these is computed once."""
+        other = replace(self, look=look)
+        object.__setattr__(other, "_kept", self._kept)
+        return other
 
     @cached_property
     def dots(self) -> PrintedDots:
@@ -87,15 +95,30 @@ class FrameRenderer:
     @cached_property
     def sight(self) -> Sight:
         """The ray of every pixel."""
-        return Sight.of(self.camera)
+        found: Sight = self._once("sight", lambda: Sight.of(self.camera))
+        return found
+
+    def _once(self, key: Any, make: Callable[[], Any]) -> Any:
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
 
     @cached_property
     def still(self) -> Image:
         """Irradiance (h, w, k) seen by each pixel at rest, without dots, with dirt and defocus."""
         if self.photographed is not None:
             return self.photographed.irradiance
+        blemished = (self.look.dirt, self.look.defocus)
+        found: Image = self._once(blemished, self._with_dirt_and_defocus)
+        return found
+
+    def _clean(self) -> Image:
+        """Irradiance (h, w, k) seen by each pixel at rest of a clean gel in focus."""
         seen = None if self.top is None else self.top.seen_mm(self.sight)
-        light = still_irradiance(self.camera, self.sight, self.light, self.pad, seen)
+        return still_irradiance(self.camera, self.sight, self.light, self.pad, seen)
+
+    def _with_dirt_and_defocus(self) -> Image:
+        light: Image = self._once("clean", self._clean)
         if self.look.dirt is not None:
             light = self.look.dirt.apply(
                 self.camera, (self.pad.length_mm, self.pad.width_mm), light
@@ -107,7 +130,9 @@ class FrameRenderer:
     @cached_property
     def _planes(self) -> Image:
         """`still` as (k, h, w)."""
-        return np.ascontiguousarray(self.still.transpose(2, 0, 1))
+        key = ("planes", self.look.dirt, self.look.defocus)
+        found: Image = self._once(key, lambda: np.ascontiguousarray(self.still.transpose(2, 0, 1)))
+        return found
 
     @cached_property
     def blur_field(self) -> BlurField:
@@ -116,22 +141,31 @@ class FrameRenderer:
 
         assert self.look.defocus is not None
         lens, pad = self.look.defocus, (self.pad.length_mm, self.pad.width_mm)
-        return BlurField.of(self.camera, lens.aperture_mm, lens.focus_mm, pad)
+        of_lens = (self.camera, lens.aperture_mm, lens.focus_mm, pad)
+        found: BlurField = self._once(("blur", lens), lambda: BlurField.of(*of_lens))
+        return found
 
     @cached_property
     def glare(self) -> Image:
         """Grey values (h, w, 3) that neither slope nor ink changes; empty where there are none."""
         seen = _NONE if self.photographed is None else self.photographed.glare_dn
         if self.look.specular is not None:
-            spots = self.look.specular.glare(self.still.shape[:2], self.light.colour)
+            spots = self._once(self.look.specular, self._spots)
             seen = seen + spots if seen.size and spots.size else spots if spots.size else seen
         return seen * np.float32(self._scale)
+
+    def _spots(self) -> Image:
+        assert self.look.specular is not None
+        return self.look.specular.glare(self.still.shape[:2], self.light.colour)
 
     @cached_property
     def shading_sight(self) -> Sight | None:
         """Rays of the lattice on which shading is computed; None without shading."""
-        shading = self.look.shading
-        return None if shading is None else Sight.of(self.camera, shading.pixel_step)
+        if self.look.shading is None:
+            return None
+        step = self.look.shading.pixel_step
+        found: Sight = self._once(("sight", step), lambda: Sight.of(self.camera, step))
+        return found
 
     @cached_property
     def curve(self) -> NDArray[np.uint8]:

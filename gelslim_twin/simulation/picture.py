@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -49,15 +50,26 @@ class Viewer:
         return self.sensor.camera_record if self.look is None else self.look.camera
 
     @cached_property
+    def _printed_mm(self) -> Array:
+        """Centres (m, 2) of the dots as printed, with the faults of the plan."""
+        if "marker_print" not in self.plan.order:
+            return self.sensor.grid.positions_mm
+        from gelslim_twin.render.printed_dots import PrintedDots
+
+        faults = self._look.marker_print
+        assert faults is not None
+        return faults.apply(PrintedDots.nominal(self.sensor.grid)).centres_mm
+
+    @cached_property
     def to_markers(self) -> Any:
         """(m, c) from the surface nodes to the markers."""
-        return marker_to_node(self.sensor.points_mm, self.sensor.grid.positions_mm)
+        return marker_to_node(self.sensor.points_mm, self._printed_mm)
 
     @cached_property
     def rest_mm(self) -> Array:
         """The dots' centres (m, 3) at rest."""
         heights = self.to_markers @ self.sensor.points_mm[:, 2]
-        return np.column_stack([self.sensor.grid.positions_mm, heights])
+        return np.column_stack([self._printed_mm, heights])
 
     def markers_px(self, state: GelState) -> Array:
         """Images (m, 2) of the dots' centres."""
@@ -66,11 +78,14 @@ class Viewer:
     @cached_property
     def renderer(self) -> FrameRenderer:
         """Draws frames."""
-        scene = self.scene
-        effects = plan_look(self.plan, scene.effects.parameters(), self._camera_record, scene.seed)
         if self.look is not None:
-            return _built_renderer(self.sensor, self.camera, self.look, effects)
-        return sensor_renderer(self.sensor, self.camera, effects, scene.seed)
+            return _built_renderer(self.sensor, self.camera, self.look, self._look)
+        return sensor_renderer(self.sensor, self.camera, self._look, self.scene.seed)
+
+    @cached_property
+    def _look(self) -> Look:
+        scene = self.scene
+        return plan_look(self.plan, scene.effects.parameters(), self._camera_record, scene.seed)
 
     @cached_property
     def surface(self) -> Callable[[GelState], SurfaceState]:
@@ -104,7 +119,17 @@ def _built_renderer(
 def sensor_renderer(
     sensor: TwinSensor, camera: VirtualCamera, look: Look, seed: int
 ) -> FrameRenderer:
-    """The renderer of a sensor's pad with a mottled coat and the vignetting of a small lens."""
+    """The renderer of a sensor's pad with a mottled coat and the vignetting of a small lens.
+
+    Renderers of one sensor, camera and seed share what does not depend on the look.
+    """
+    record = json.dumps(camera.to_record(), sort_keys=True)
+    return _bare_renderer(sensor, record, seed).with_look(look)
+
+
+@lru_cache(maxsize=2)
+def _bare_renderer(sensor: TwinSensor, camera_record: str, seed: int) -> FrameRenderer:
+    from gelslim_optics.camera.virtual_camera import VirtualCamera
     from gelslim_twin.render.frame_renderer import FrameRenderer
     from gelslim_twin.render.surface_state import DomedTop
     from gelslim_twin.render.surroundings import Pad
@@ -112,5 +137,6 @@ def sensor_renderer(
     pad = Pad(
         *sensor.size_mm, sensor.corner_radius_mm, mottle=MOTTLE, vignetting=VIGNETTING, seed=seed
     )
+    camera = VirtualCamera.from_record(json.loads(camera_record))
     top = DomedTop.of_nodes(sensor.points_mm)
-    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, look, top, sensor.mono)
+    return FrameRenderer(camera, sensor.grid, sensor.light(), pad, Look(), top, sensor.mono)

@@ -9,12 +9,13 @@ one correction leaves out.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelslim_twin.contact.corrected_contact import (
     Correction,
@@ -28,11 +29,12 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import MotionFigures, Probed
 from gelslim_twin.effects.contact import RIM_NODES, RIM_PLACES
-from gelslim_twin.effects.effect import Bound, geometry
+from gelslim_twin.effects.effect import Bound, geometry, rounded_up
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.planning.probing import probed_poses
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
+from gelslim_twin.simulation.picture_probe import PictureSizes
 from ifem_export.compliance.columns import SurfaceCompliance
 from ifem_export.markers.interpolation import marker_to_node
 from ifem_export.operators.single_thread import single_threaded
@@ -43,8 +45,6 @@ FORCE_SAFETY, FRICTION_SAFETY, PLACES_SAFETY = 1.25, 2.0, 2.0
 """Factors on what is found of forces, for large strain and for friction, and of displacements.
 They cover the poses between: in 66 random scenes the size over the whole path was up to 1.18 times
 (forces, large strain), 1.8 times (forces, friction) and 1.8 times (displacements) what is found."""
-DIGITS = 3
-"""Significant digits of what is found, rounded up: the last bits depend on the machine."""
 
 
 @single_threaded
@@ -54,6 +54,7 @@ def probed(
     compliance: SurfaceCompliance,
     effects: Sequence[str] = (),
     milliseconds: float = 0.0,
+    pictured: Callable[[GelState], PictureSizes] | None = None,
 ) -> Question:
     """The question with the force of the scene, and the sizes of `effects`, solved.
 
@@ -63,6 +64,7 @@ def probed(
         compliance: Compliance of the pad, which keeps the columns that it computes.
         effects: Which of `probing.PROBED` to size.
         milliseconds: Declared time of the probe.
+        pictured: What the picture of a state shows of effects on its grey values.
 
     Returns:
         The question, unchanged where the contact of a pose is not solved. An effect whose size is
@@ -72,14 +74,17 @@ def probed(
     probe = _Probe(asked, compliance, tool)
     if not probe.touches(loaded.poses):
         # Nodes, not areas, meet the tool: it passes between them or beside the pad.
-        here, none = asked.circumstances, Probed(0.0, 0.0, 0.0, {}, milliseconds)
+        seen = _seen(pictured, GelState.at_rest(len(probe.points_mm)))
+        here = asked.circumstances
+        none = Probed(0.0, 0.0, 0.0, seen.sizes, milliseconds, seen.coarsest)
         apart = replace(here, motion=MotionFigures(here.motion.poses), probed=none)
         return replace(asked, circumstances=apart)
     try:
         steps = probe.steps(loaded)
     except ContactError:
         return asked
-    sizes = dict[str, Bound]()
+    seen = _seen(pictured, _hardest(steps)[0].state)
+    sizes = {**seen.sizes}
     if "friction" in effects and (free := probe.frictionless(steps)):
         held = [step.state for step in steps]
         sizes["friction"] = probe.largest(held, free, FRICTION_SAFETY)
@@ -91,15 +96,20 @@ def probed(
             sizes["nonlinearity"] = sizes["nonlinearity"].plus(rim)
     forces = [step.state.force_n.sum(axis=0) for step in steps]
     found = Probed(
-        _rounded_up(max(-float(force[2]) for force in forces)),
-        _rounded_up(max(float(np.linalg.norm(force)) for force in forces)),
-        _rounded_up(max(float(np.abs(step.state.displacement_mm).max()) for step in steps)),
+        rounded_up(max(-float(force[2]) for force in forces)),
+        rounded_up(max(float(np.linalg.norm(force)) for force in forces)),
+        rounded_up(max(float(np.abs(step.state.displacement_mm).max()) for step in steps)),
         sizes,
         milliseconds,
+        seen.coarsest,
     )
     if found.normal_n <= 0:
         return asked
     return replace(asked, circumstances=replace(asked.circumstances, probed=found))
+
+
+def _seen(pictured: Callable[[GelState], PictureSizes] | None, state: GelState) -> PictureSizes:
+    return PictureSizes({}, {}) if pictured is None else pictured(state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +131,12 @@ class _Probe:
 
     def touches(self, poses: Sequence[Pose]) -> bool:
         """Whether any node of the undeformed surface is below the tool at one of these poses."""
-        points = np.asarray(self.compliance.bundle.mesh.surface_mm)
-        return any((self.tool.clearance_mm(pose, points) < 0).any() for pose in poses)
+        return any((self.tool.clearance_mm(pose, self.points_mm) < 0).any() for pose in poses)
+
+    @property
+    def points_mm(self) -> NDArray[np.float64]:
+        """Nodes of the undeformed surface."""
+        return np.asarray(self.compliance.bundle.mesh.surface_mm)
 
     def frictionless(self, steps: Sequence[LinearStep]) -> list[GelState]:
         """The contact at the same poses without friction; empty where it is not found."""
@@ -164,7 +178,7 @@ class _Probe:
             if (touched := int((s.touch > 0).sum()))
         ]
         px = RIM_PLACES * self.depth_mm * self.asked.circumstances.sensor.px_per_mm
-        return geometry(_rounded_up(px), _rounded_up(max(shares, default=0.0)))
+        return geometry(rounded_up(px), rounded_up(max(shares, default=0.0)))
 
     @cached_property
     def _to_markers(self) -> Any:
@@ -192,7 +206,7 @@ class _Probe:
                 shift = np.linalg.norm(self._to_markers @ moved, axis=1)
                 dots = max(dots, scale * float(shift.max()))
         found = (force * force_safety, *(p * PLACES_SAFETY for p in (places, dots, dots)))
-        return Bound(*(_rounded_up(value) for value in found))
+        return Bound(*(rounded_up(value) for value in found))
 
 
 def _hardest(steps: Sequence[LinearStep]) -> list[LinearStep]:
@@ -202,11 +216,3 @@ def _hardest(steps: Sequence[LinearStep]) -> list[LinearStep]:
     whole = max(order, key=lambda k: float(np.linalg.norm(forces[k])))
     aside = max(order, key=lambda k: math.hypot(forces[k][0], forces[k][1]))
     return [steps[k] for k in sorted({whole, aside})]
-
-
-def _rounded_up(value: float) -> float:
-    """The value rounded up to `DIGITS` significant digits."""
-    if value <= 0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(value)) - DIGITS + 1)
-    return float(f"{math.ceil(value / unit) * unit:.{DIGITS}g}")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question
-from gelslim_twin.planning.probing import effects_to_probe, probe_ms
+from gelslim_twin.planning.probing import PICTURED, effects_to_probe, probe_ms
 from gelslim_twin.planning.question import (
     bundle_figures,
     plan_asked,
@@ -25,6 +25,7 @@ from gelslim_twin.simulation.sensor import BUNDLE, TwinSensor, stored_sensor
 from gelslim_twin.simulation.simulate import SimulationJob, simulate
 
 if TYPE_CHECKING:
+    from gelslim_twin.simulation.picture import Viewer
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 
@@ -84,7 +85,12 @@ def job_of(loaded: LoadedScene, sensor: TwinSensor, folder: Path) -> SimulationJ
         return pad_compliance(sensor, folder, skin=skin)
 
     asked = question(loaded, bundle_figures(folder / BUNDLE))
-    plan = planned(loaded, asked, compliance if can_be_probed(sensor) else None)
+    plan = planned(
+        loaded,
+        asked,
+        compliance if can_be_probed(sensor) else None,
+        None if loaded.look is not None else partial(viewer_of, loaded, sensor),
+    )
     require_compatible(loaded, sensor, plan)
     for choice in plan.included:
         if choice.effect == "nonlinearity":
@@ -190,8 +196,18 @@ def require_no_undercut(loaded: LoadedScene, sensor: TwinSensor) -> None:
                 )
 
 
+def viewer_of(loaded: LoadedScene, sensor: TwinSensor, plan: Plan) -> Viewer:
+    """How a sensor as designed is seen by a plan."""
+    from gelslim_twin.simulation.picture import Viewer
+
+    return Viewer(sensor, plan, loaded.scene)
+
+
 def planned(
-    loaded: LoadedScene, asked: Question, compliance: Callable[[], PadCompliance] | None
+    loaded: LoadedScene,
+    asked: Question,
+    compliance: Callable[[], PadCompliance] | None,
+    viewer: Callable[[Plan], Viewer] | None = None,
 ) -> Plan:
     """Plan a scene; where it pays, a probe finds the sizes of effects before.
 
@@ -200,6 +216,7 @@ def planned(
         asked: The scene as the planner takes it, without a probe.
         compliance: Gives the compliance of the pad, called only for a probe; None for a pad that
             is not probed.
+        viewer: How the sensor is seen by a plan, for the probe of pictures; None for none.
 
     Returns:
         The plan.
@@ -208,7 +225,9 @@ def planned(
         InputError: As `plan_scene`.
     """
     plan = plan_asked(loaded, asked)
-    effects = effects_to_probe(asked, plan)
+    effects = () if compliance is None else effects_to_probe(asked, plan)
+    if viewer is None:
+        effects = tuple(name for name in effects if name not in PICTURED)
     if not effects or compliance is None:
         return plan
     from gelslim_twin.simulation.probe import probed
@@ -216,5 +235,10 @@ def planned(
 
     pad = compliance()
     assert isinstance(pad, SurfaceCompliance), "a probe takes a table of columns"
+    pictured = None
+    if viewer is not None and (seen := [name for name in effects if name in PICTURED]):
+        from gelslim_twin.simulation.picture_probe import PictureProbe
+
+        pictured = partial(PictureProbe(plan, viewer, plan.poses).found, effects=seen)
     spent_ms = probe_ms(asked, plan, effects)
-    return plan_asked(loaded, probed(asked, loaded, pad, effects, spent_ms))
+    return plan_asked(loaded, probed(asked, loaded, pad, effects, spent_ms, pictured))

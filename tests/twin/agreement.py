@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.effect import OBSERVABLES, Bound
+from gelslim_twin.effects.grey_values import MotionBlurParameters
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import Question, make_plan
@@ -24,7 +25,7 @@ from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene, read_scene
 from gelslim_twin.simulation.picture import Viewer
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
-from gelslim_twin.simulation.scene_task import planned
+from gelslim_twin.simulation.scene_task import planned, viewer_of
 from gelslim_twin.simulation.sensor import TwinSensor
 from ifem_export.bundle.files import load_bundle
 from ifem_export.compliance.columns import SurfaceCompliance
@@ -99,7 +100,8 @@ class Trial:
 
     def probed(self) -> Plan:
         """As the planner decides, with a probe where it pays."""
-        return planned(self.loaded, self.asked, lambda: self.compliance)
+        viewer = partial(viewer_of, self.loaded, self.sensor)
+        return planned(self.loaded, self.asked, lambda: self.compliance, viewer)
 
     def _planned(self, use: Mapping[str, str]) -> Plan:
         c = self.asked.circumstances
@@ -152,8 +154,20 @@ class Trial:
             )
         if "image" in observe:
             at = int(np.argmax([np.abs(a.force_n).sum() for a, _ in pairs]))
-            found["image"] = seen_apart_px(one, other, {at, len(pairs) - 1})
+            frames = {at, self._fastest(one), len(pairs) - 1}
+            found["image"] = seen_apart_px(one, other, frames)
         return found
+
+    def _fastest(self, one: Outcome) -> int:
+        """The frame during which a node moves farthest, when motion blur is largest."""
+        c = self.asked.circumstances
+        shutter_s = c.given("motion_blur", MotionBlurParameters).shutter_ms / 1000
+        moved = [0.0]
+        for at in range(1, len(one.states)):
+            way = one.states[at].displacement_mm - one.states[at - 1].displacement_mm
+            open_share = min(1.0, shutter_s / one.step_s(at))
+            moved.append(open_share * float(np.linalg.norm(way, axis=1).max()))
+        return int(np.argmax(moved))
 
 
 def seen_apart_px(one: Outcome, other: Outcome, frames: set[int]) -> float:
