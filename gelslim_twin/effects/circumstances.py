@@ -174,6 +174,7 @@ class Probed:
         milliseconds: Declared time of the probe.
         coarsest: By effect, the error of its coarsest rung as found at a hard pose, times a safety
             factor; finer rungs err no more.
+        dot_mm_s: Largest speed of a dot, times a safety factor; infinite where it was not probed.
     """
 
     normal_n: float
@@ -182,6 +183,7 @@ class Probed:
     sizes: Mapping[str, Bound]
     milliseconds: float = 0.0
     coarsest: Mapping[str, Bound] = field(default_factory=dict)
+    dot_mm_s: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -185,13 +185,17 @@ class MotionBlurParameters(EffectParameters):
 
 def smear_px(c: Circumstances) -> float:
     """How far a dot moves while the shutter is open."""
-    open_s = c.given("motion_blur", MotionBlurParameters).shutter_ms / 1000
-    return c.motion.speed_mm_s * open_s * c.sensor.px_per_mm
+    dot_mm_s = math.inf if c.probed is None else c.probed.dot_mm_s
+    return min(c.motion.speed_mm_s, dot_mm_s) * _shutter_s(c) * c.sensor.px_per_mm
+
+
+def _shutter_s(c: Circumstances) -> float:
+    return c.given("motion_blur", MotionBlurParameters).shutter_ms / 1000
 
 
 def motion_blur_bound(c: Circumstances) -> Bound:
-    """Half the smear: how far the middle of the smeared dot lags behind."""
-    return picture(smear_px(c) / 2)
+    """Half the smear at the tool's speed: how far the middle of the smeared dot lags behind."""
+    return picture(c.motion.speed_mm_s * _shutter_s(c) * c.sensor.px_per_mm / 2)
 
 
 def motion_blur_ladder(c: Circumstances) -> tuple[Rung, ...]:

@@ -7,6 +7,7 @@ effect is needed and the run is so long that the probe is a small part of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from gelslim_twin.effects.circumstances import Circumstances
@@ -14,26 +15,29 @@ from gelslim_twin.effects.contact import convergence_ms, correction_ms
 from gelslim_twin.effects.effect import Rung
 from gelslim_twin.effects.grey_values import shading_ladder
 from gelslim_twin.effects.registry import EFFECTS
-from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.planning.planner import Question
 from gelslim_twin.scene.pose import Pose
 
-PROBED = ("friction", "nonlinearity")
-"""Effects whose size a probe finds."""
+MOTION_BLUR = "motion_blur"
+PROBED = ("friction", "nonlinearity", MOTION_BLUR)
+"""Effects whose size a probe finds by solving poses."""
 NOISE = "sensor_noise"
 SHADING = "shading"
 PICTURED = (SHADING, "defocus", NOISE, "exposure", "specular", "dirt")
 """Effects of the picture that a probe draws: they change grey values, and a picture is evaluated by
 its dots. Of shading it finds the error of its coarsest rung and not the size, because the light is
 read from the picture too."""
-FIND_MS = 1.5
-"""Time of finding 575 dots near where they are expected."""
+FIND_MS = 8.0
+"""Time of finding the dots of a picture of 640 x 480 pixels."""
 MOST_SHARE = 0.05
 """Largest time of a probe over that of the run with large strain solved to convergence, both as
-declared."""
+declared; and of what it draws over that of the pictures of the run."""
 MOST_POSES, STRAIGHT_POSES = 12, 4
 """Poses of the path that a probe solves on a linear gel, and those of a straight press, of which
 the deepest is the hardest."""
+FASTEST_POSES = 2
+"""Further poses for the speed of the dots."""
 
 
 def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
@@ -54,17 +58,24 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
         converged_ms["nonlinearity"] = convergence_ms(question.circumstances)
     most_ms = MOST_SHARE * sum(converged_ms.values()) * plan.poses
     # Friction takes a second path; large strain alone saves most of the time.
-    for effects in (wanted, tuple(name for name in wanted if name == "nonlinearity"), ()):
-        pictured = _pictured(question, plan, effects, most_ms)
-        if (effects or pictured) and probe_ms(question, plan, effects) <= most_ms:
-            return effects + pictured
-    return ()
+    large_strain = tuple(name for name in wanted if name == "nonlinearity")
+    blurred = tuple(name for name in wanted if name == MOTION_BLUR)
+    solved = next(
+        (
+            effects
+            for effects in (wanted, large_strain + blurred, large_strain, blurred)
+            if effects and probe_ms(question, plan, effects) <= most_ms
+        ),
+        (),
+    )
+    return solved + _pictured(question, plan, solved)
 
 
-def _pictured(
-    question: Question, plan: Plan, effects: tuple[str, ...], most_ms: float
-) -> tuple[str, ...]:
-    """The effects of the picture that a probe of `effects` may size besides, the slowest first."""
+def _pictured(question: Question, plan: Plan, solved: tuple[str, ...]) -> tuple[str, ...]:
+    """The effects that a probe draws, the slowest first, within its share of the pictures."""
+    most_ms = MOST_SHARE * plan.poses * sum(c.predicted_ms for c in plan.included if _is_seen(c))
+    if not solved:
+        most_ms -= probe_ms(question, plan, ())
     wanted = [
         c
         for c in plan.included
@@ -73,9 +84,14 @@ def _pictured(
     ]
     found: tuple[str, ...] = ()
     for choice in sorted(wanted, key=lambda c: -c.predicted_ms):
-        if probe_ms(question, plan, (*effects, *found, choice.effect)) <= most_ms:
+        if _pictures_ms(question, plan, (*found, choice.effect)) <= most_ms:
             found = (*found, choice.effect)
     return found
+
+
+def _is_seen(choice: Choice) -> bool:
+    """Whether an effect makes a picture or changes it."""
+    return choice.effect in {e.name for e in EFFECTS if "image" in (*e.provides, *e.refines)}
 
 
 def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
@@ -84,7 +100,8 @@ def probe_ms(question: Question, plan: Plan, effects: Sequence[str]) -> float:
     linear_ms = chosen["normal_contact"] + chosen.get("friction", 0.0)
     paths = 2 if "friction" in effects else 1
     straight = question.circumstances.motion.is_straight
-    poses = min(STRAIGHT_POSES if straight else MOST_POSES, plan.poses)
+    poses = STRAIGHT_POSES if straight else MOST_POSES
+    poses = min(poses + (FASTEST_POSES if MOTION_BLUR in effects else 0), plan.poses)
     # A correction of the hardest pose, or of two; setting up the law takes as long as one.
     laws = 0 if "nonlinearity" not in effects else 2 if straight else 3
     solving_ms = poses * paths * linear_ms + laws * correction_ms(question.circumstances)
@@ -96,14 +113,13 @@ def _pictures_ms(question: Question, plan: Plan, effects: Sequence[str]) -> floa
     drawn = [name for name in effects if name in PICTURED]
     if not drawn:
         return 0.0
-    seen = {e.name for e in EFFECTS if "image" in (*e.provides, *e.refines)} - {SHADING}
-    each_ms = sum(c.predicted_ms for c in plan.included if c.effect in seen)
-    each_ms += FIND_MS * question.circumstances.sensor.markers / 575
+    each_ms = sum(c.predicted_ms for c in plan.included if _is_seen(c) and c.effect != SHADING)
+    each_ms += FIND_MS * question.circumstances.sensor.frame_px / 307200
     if SHADING not in plan.order:
         return (len(drawn) + 1) * each_ms
-    coarse_ms = coarsest_shading(question.circumstances).milliseconds
-    finer_ms = plan.choice(SHADING).predicted_ms - coarse_ms if SHADING in drawn else 0.0
-    return (len(drawn) + 1) * (each_ms + coarse_ms) + finer_ms
+    rungs = shading_ladder(question.circumstances)
+    finer_ms = rungs[-1].milliseconds - rungs[0].milliseconds if SHADING in drawn else 0.0
+    return (len(drawn) + 1) * (each_ms + rungs[0].milliseconds) + finer_ms
 
 
 def coarsest_shading(circumstances: Circumstances) -> Rung:
@@ -111,13 +127,18 @@ def coarsest_shading(circumstances: Circumstances) -> Rung:
     return shading_ladder(circumstances)[0]
 
 
-def probed_poses(poses: Sequence[Pose], is_straight: bool = False) -> tuple[Pose, ...]:
+def probed_poses(
+    poses: Sequence[Pose], is_straight: bool = False, reach_mm: float | None = None
+) -> tuple[Pose, ...]:
     """A few poses of a path, in order: its extremes, its end, and others evenly between.
 
     Extremes are the deepest pose, the one farthest aside from where the deepest is, and those of
-    the largest twist and tilt.
+    the largest twist and tilt. With `reach_mm`, the distance from the axis of the tool to the rim
+    of the contact, the two poses between which the tool is fastest are among them.
     """
     most = STRAIGHT_POSES if is_straight else MOST_POSES
+    fastest = set[int]() if reach_mm is None else _fastest(poses, reach_mm)
+    most += len(fastest)
     if len(poses) <= most:
         return tuple(poses)
     every = range(len(poses))
@@ -133,8 +154,31 @@ def probed_poses(poses: Sequence[Pose], is_straight: bool = False) -> tuple[Pose
         max(every, key=aside),
         max(every, key=lambda k: abs(poses[k].twist_deg - still.twist_deg)),
         max(every, key=lambda k: abs(poses[k].tilt_x_deg) + abs(poses[k].tilt_y_deg)),
+        *fastest,
     }
     # The pose that lies farthest from those kept comes next.
     while len(kept) < most:
         kept.add(max(every, key=lambda k: min(abs(k - other) for other in kept)))
     return tuple(poses[k] for k in sorted(kept))
+
+
+def _fastest(poses: Sequence[Pose], reach_mm: float) -> set[int]:
+    """The two poses between which the tool in contact moves fastest."""
+
+    def speed(k: int) -> float:
+        a, b = poses[k - 1], poses[k]
+        if max(a.depth_mm, b.depth_mm) <= 0:
+            return 0.0
+        turns = (
+            b.twist_deg - a.twist_deg,
+            b.tilt_x_deg - a.tilt_x_deg,
+            b.tilt_y_deg - a.tilt_y_deg,
+        )
+        turned_mm = reach_mm * math.radians(sum(map(abs, turns)))
+        way_mm = math.dist((a.x_mm, a.y_mm, a.depth_mm), (b.x_mm, b.y_mm, b.depth_mm))
+        return (way_mm + turned_mm) / (b.time_s - a.time_s)
+
+    if len(poses) < 2:
+        return set()
+    last = max(range(1, len(poses)), key=speed)
+    return {last - 1, last}

@@ -1,8 +1,8 @@
 """The probe of the picture: one pose drawn with and without each effect on its grey values.
 
 A picture is evaluated by its dots, so that the size of an effect is the largest shift of a dot that
-the force pipeline's detector finds, times a safety factor. A dot that it finds in one of the two
-pictures only says that the effect decides more than a shift; then the bound stays.
+the force pipeline's detector finds, times a safety factor. Where more than a few dots are found in
+one of the two pictures only, the effect decides more than a shift, and the bound stays.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from gelslim_force.detection.detection import Detector
-from gelslim_force.detection.detections import Detections
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.dot_positions import RARE
@@ -32,6 +31,10 @@ if TYPE_CHECKING:
 
 SAFETY = 2.0
 """Factor on the largest shift of a dot at the pose that is drawn, for the other poses."""
+LOST_SHARE = 5e-3
+"""Share of the dots that may be found in one of two pictures only, as behind spots."""
+MATCH_PX = 3.0
+"""Distance from a dot within which a detection is that of the dot."""
 NOT_DRAWN = frozenset({"motion_blur", "compression", NOISE})
 """Effects that the pictures of a probe leave out: each frame has its own noise, and one state shows
 no motion."""
@@ -72,10 +75,9 @@ class PictureProbe:
         sizes, coarsest = dict[str, Bound](), dict[str, Bound]()
         for name in effects:
             if name == SHADING:
-                px = dots.shift_px(self._drawn(state, self.plan, NOT_DRAWN))
+                px = dots.shift_px(self._drawn(state, self._shaded(PIXEL_STEPS[-1]), NOT_DRAWN))
                 if px is not None:
-                    missed = picture(rounded_up(SAFETY * px))
-                    coarsest[name] = missed.plus(self.plan.choice(SHADING).error)
+                    coarsest[name] = picture(rounded_up(SAFETY * px))
                 continue
             other = NOT_DRAWN - {name} if name == NOISE else NOT_DRAWN | {name}
             px = dots.shift_px(self._drawn(state, self._coarse, other))
@@ -84,10 +86,13 @@ class PictureProbe:
                 sizes[name] = picture(rounded_up(SAFETY * px))
         return PictureSizes(sizes, coarsest)
 
-    @cached_property
+    @property
     def _coarse(self) -> Plan:
-        """The plan with the coarsest rung of shading, which hardly moves a dot."""
-        step = tuple(sorted({"pixel_step": PIXEL_STEPS[0]}.items()))
+        """The plan with the coarsest rung of shading, with which all but that is drawn."""
+        return self._shaded(PIXEL_STEPS[0])
+
+    def _shaded(self, pixel_step: int) -> Plan:
+        step = (("pixel_step", pixel_step),)
         choices = tuple(
             replace(c, rung_parameters=step) if c.effect == SHADING and c.included else c
             for c in self.plan.choices
@@ -110,35 +115,44 @@ class PictureProbe:
 
 @dataclass(frozen=True, eq=False)
 class _Dots:
-    """The dots of a picture, which are looked for in others."""
+    """The dots that a detector finds in a picture, to be compared with those of others."""
 
     detector: Detector
-    starts_px: NDArray[np.float64]
-    moments_px2: NDArray[np.float64]
-    detections: Detections
+    found_px: NDArray[np.float64]
+    """The detection next to each dot that is drawn."""
+    is_found: NDArray[np.bool_]
 
     @classmethod
     def of(cls, frame: RenderedFrame) -> _Dots | None:
-        """The dots of a frame that a detector may find; None where none is drawn."""
-        sizes, starts = frame.diameter_px[frame.drawn], frame.centres_px[frame.drawn]
-        if len(sizes) == 0:
+        """The dots of a frame; None where none is drawn."""
+        if not frame.drawn.any():
             return None
-        round_px2 = sizes**2 / 16
-        moments = np.column_stack([round_px2, 0 * sizes, round_px2])
+        sizes = frame.diameter_px[frame.drawn]
         detector = Detector(DetectorSettings.for_diameters(sizes))
-        found = detector.detect_near(frame.image, starts, moments, compare=False)
-        return cls(detector, starts, moments, found)
+        return cls(detector, *_found(detector, frame))
 
     @property
     def count(self) -> int:
         """Number of dots."""
-        return len(self.starts_px)
+        return len(self.is_found)
 
     def shift_px(self, other: RenderedFrame) -> float | None:
-        """Largest shift of a dot in another picture; None where a dot is found in one only."""
-        mine, at = self.detections, (self.starts_px, self.moments_px2)
-        its = self.detector.detect_near(other.image, *at, compare=False)
-        if (mine.found != its.found).any():
+        """Largest shift of a dot in another picture; None where many are found in one only."""
+        found_px, is_found = _found(self.detector, other)
+        if is_found.shape != self.is_found.shape:
             return None
-        apart = np.linalg.norm(mine.centres_px - its.centres_px, axis=1)
-        return float(apart[mine.found].max(initial=0.0))
+        if (is_found != self.is_found).sum() > LOST_SHARE * self.count:
+            return None
+        apart = np.linalg.norm(found_px - self.found_px, axis=1)
+        return float(apart[is_found & self.is_found].max(initial=0.0))
+
+
+def _found(
+    detector: Detector, frame: RenderedFrame
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The detection next to each drawn dot (m, 2), and whether (m,) it is the dot's."""
+    dots_px, centres_px = detector.detect(frame.image).centres_px, frame.centres_px[frame.drawn]
+    if len(dots_px) == 0:
+        return centres_px, np.zeros(len(centres_px), dtype=bool)
+    apart, nearest = cKDTree(dots_px).query(centres_px)
+    return dots_px[nearest], apart < MATCH_PX

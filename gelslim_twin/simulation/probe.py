@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,10 @@ from gelslim_twin.contact.solver import ContactSettings, ContactSolver
 from gelslim_twin.contact.tool import Tool
 from gelslim_twin.effects.circumstances import MotionFigures, Probed
 from gelslim_twin.effects.contact import RIM_NODES, RIM_PLACES
-from gelslim_twin.effects.effect import Bound, geometry, rounded_up
+from gelslim_twin.effects.effect import Bound, geometry, picture, rounded_up
+from gelslim_twin.effects.grey_values import MotionBlurParameters
 from gelslim_twin.planning.planner import Question
-from gelslim_twin.planning.probing import probed_poses
+from gelslim_twin.planning.probing import MOTION_BLUR, probed_poses
 from gelslim_twin.scene.pose import Pose
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.picture_probe import PictureSizes
@@ -80,7 +82,7 @@ def probed(
         apart = replace(here, motion=MotionFigures(here.motion.poses), probed=none)
         return replace(asked, circumstances=apart)
     try:
-        steps = probe.steps(loaded)
+        steps = probe.steps(loaded, MOTION_BLUR in effects)
     except ContactError:
         return asked
     seen = _seen(pictured, _hardest(steps)[0].state)
@@ -94,6 +96,10 @@ def probed(
         if probe.has_sliding_walls:
             rim = probe.rim(linear)
             sizes["nonlinearity"] = sizes["nonlinearity"].plus(rim)
+    dot_mm_s = math.inf
+    if MOTION_BLUR in effects:
+        dot_mm_s = probe.dot_mm_s(steps)
+        sizes[MOTION_BLUR] = probe.smear(dot_mm_s)
     forces = [step.state.force_n.sum(axis=0) for step in steps]
     found = Probed(
         rounded_up(max(-float(force[2]) for force in forces)),
@@ -102,6 +108,7 @@ def probed(
         sizes,
         milliseconds,
         seen.coarsest,
+        dot_mm_s,
     )
     if found.normal_n <= 0:
         return asked
@@ -123,10 +130,14 @@ class _Probe:
     def _solver(self, friction: float) -> ContactSolver:
         return ContactSolver(self.compliance, self.tool, ContactSettings(TOLERANCE, friction))
 
-    def steps(self, loaded: LoadedScene) -> list[LinearStep]:
-        """The linear contact, with the friction of the scene, at the poses of the probe."""
+    def steps(self, loaded: LoadedScene, with_fastest: bool = False) -> list[LinearStep]:
+        """The linear contact, with the friction of the scene, at the poses of the probe.
+
+        The two poses between which the tool is fastest are among them where that is asked for.
+        """
         c = self.asked.circumstances
-        poses = probed_poses(loaded.poses, c.motion.is_straight)
+        reach_mm = c.footprint.reach_mm(c.contact.depth_mm) if with_fastest else None
+        poses = probed_poses(loaded.poses, c.motion.is_straight, reach_mm)
         return list(linear_steps(self._solver(c.friction), poses))
 
     def touches(self, poses: Sequence[Pose]) -> bool:
@@ -158,6 +169,23 @@ class _Probe:
             except ContactError:
                 return []
         return found
+
+    def dot_mm_s(self, steps: Sequence[LinearStep]) -> float:
+        """Largest speed of a dot between two of these poses, with the safety factor."""
+        if self._to_markers is None:
+            return math.inf
+        speeds = [0.0]
+        for one, other in pairwise(steps):
+            moved = self._to_markers @ (other.state.displacement_mm - one.state.displacement_mm)
+            way_mm = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+            speeds.append(way_mm / (other.pose.time_s - one.pose.time_s))
+        return rounded_up(PLACES_SAFETY * max(speeds))
+
+    def smear(self, dot_mm_s: float) -> Bound:
+        """Size of motion blur at a speed of the dots: how far a smeared dot lags behind."""
+        c = self.asked.circumstances
+        open_s = c.given(MOTION_BLUR, MotionBlurParameters).shutter_ms / 1000
+        return picture(rounded_up(dot_mm_s * open_s * c.sensor.px_per_mm / 2))
 
     @property
     def depth_mm(self) -> float:
