@@ -21,6 +21,7 @@ from gelslim_twin.contact.gel_state import GelState
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.planner import make_plan
+from gelslim_twin.planning.probing import SHADING
 from gelslim_twin.planning.question import bundle_figures, question
 from gelslim_twin.scene.reader import LoadedScene
 from gelslim_twin.simulation.scene_mechanics import mechanics_of
@@ -195,7 +196,9 @@ def measured(
     kept, needless = optional(plan), []
     for name in kept if with_needless else ():
         less = case.outcome(without(plan, name))
-        if max(case.used(less, every.outcome).values()) <= 1.0:
+        if max(case.used(less, every.outcome).values()) > 1.0:
+            continue
+        if name != SHADING or case.trial.light_apart_px(run.outcome, less) <= asked.image_px:
             needless.append(name)
     return {
         "level": level,

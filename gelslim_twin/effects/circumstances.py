@@ -162,6 +162,19 @@ class MotionFigures:
 
 
 @dataclass(frozen=True)
+class PictureSizes:
+    """What a probe finds in pictures, with its safety factor.
+
+    Attributes:
+        sizes: By effect, the error of leaving it out.
+        coarsest: By effect, the error of its coarsest rung.
+    """
+
+    sizes: Mapping[str, Bound]
+    coarsest: Mapping[str, Bound]
+
+
+@dataclass(frozen=True)
 class Probed:
     """What solving the hardest poses of a scene found, before it is planned.
 
@@ -234,6 +247,11 @@ class Circumstances:
     def has_walls(self) -> bool:
         """Whether a wall of the tool reaches into the gel."""
         return math.isinf(self.footprint.steepest(self.contact.depth_mm))
+
+    @property
+    def has_sliding_walls(self) -> bool:
+        """Whether a wall of the tool moves over nodes of the gel."""
+        return not self.motion.is_straight and self.has_walls
 
     @property
     def normal_n(self) -> float:

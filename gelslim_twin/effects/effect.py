@@ -80,12 +80,12 @@ DIGITS = 3
 """Significant digits of what a probe finds: the last bits depend on the machine."""
 
 
-def rounded_up(value: float) -> float:
-    """The value rounded up to `DIGITS` significant digits."""
-    if value <= 0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(value)) - DIGITS + 1)
-    return float(f"{math.ceil(value / unit) * unit:.{DIGITS}g}")
+def rounded_up(value: float, digits: int = DIGITS) -> float:
+    """The value rounded up to significant digits; an infinite one stays."""
+    if value <= 0 or math.isinf(value):
+        return max(0.0, value)
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return float(f"{math.ceil(value / unit) * unit:.{digits}g}")
 
 
 @dataclass(frozen=True)

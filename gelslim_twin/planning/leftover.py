@@ -2,7 +2,8 @@
 
 Equal shares are safe and wasteful, because most effects err by much less than their share. Where
 the sum of the errors allows it, an effect takes a cheaper rung or is left out after all, the
-largest saving of time first.
+largest saving of time first. An effect that takes hardly any time is left out last, since what is
+not needed is not kept.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import replace
 from gelslim_twin.planning.plan import Choice
 
 LEAST_SAVING = 0.01
-"""Smallest saving, over the time of the plan, for which tolerance is used up."""
+"""Smallest saving, over the time of the plan, for which an effect takes a cheaper rung."""
 
 
 def with_leftover_spent(
@@ -36,12 +37,13 @@ def with_leftover_spent(
     while True:
         whole_ms = sum(choice.predicted_ms for choice in found.values())
         room = {o: most - _total(found, o) for o, most in allowed.items()}
-        best, best_ms = None, LEAST_SAVING * whole_ms
+        best, best_ms = None, 0.0
         for name, others in cheaper.items():
             now = found[name]
             for other in others:
                 saved_ms = now.predicted_ms - other.predicted_ms
-                if saved_ms > best_ms and _fits(now, other, room):
+                least_ms = LEAST_SAVING * whole_ms if other.included else 0.0
+                if saved_ms > max(best_ms, least_ms) and _fits(now, other, room):
                     best, best_ms = other, saved_ms
         if best is None:
             return found

@@ -20,8 +20,11 @@ from gelslim_twin.planning.planner import Question
 from gelslim_twin.scene.pose import Pose
 
 MOTION_BLUR = "motion_blur"
-PROBED = ("friction", "nonlinearity", MOTION_BLUR)
+PROBED = ("friction", "nonlinearity", "relaxation", MOTION_BLUR)
 """Effects whose size a probe finds by solving poses."""
+LEFT_OUT = ((), ("friction",), ("friction", MOTION_BLUR), ("friction", "nonlinearity"))
+"""Effects that a probe leaves out until it pays, one set after the other: friction takes a second
+path, and large strain saves most of the time but takes corrections."""
 NOISE = "sensor_noise"
 SHADING = "shading"
 PICTURED = (SHADING, "defocus", NOISE, "exposure", "specular", "dirt")
@@ -51,20 +54,20 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
         c.effect
         for c in plan.included
         if c.effect in PROBED and question.circumstances.parameters[c.effect].use == "auto"
+        # A dot jumps where a wall passes it, in a step that a probe may miss.
+        if c.effect != MOTION_BLUR or not question.circumstances.has_sliding_walls
     )
     ms = {c.effect: c.predicted_ms for c in plan.included}
     converged_ms = dict(ms)
     if "nonlinearity" in ms:
         converged_ms["nonlinearity"] = convergence_ms(question.circumstances)
     most_ms = MOST_SHARE * sum(converged_ms.values()) * plan.poses
-    # Friction takes a second path; large strain alone saves most of the time.
-    large_strain = tuple(name for name in wanted if name == "nonlinearity")
-    blurred = tuple(name for name in wanted if name == MOTION_BLUR)
     solved = next(
         (
             effects
-            for effects in (wanted, large_strain + blurred, large_strain, blurred)
-            if effects and probe_ms(question, plan, effects) <= most_ms
+            for left in LEFT_OUT
+            if (effects := tuple(name for name in wanted if name not in left))
+            and probe_ms(question, plan, effects) <= most_ms
         ),
         (),
     )

@@ -8,7 +8,7 @@ one of the two pictures only, the effect decides more than a shift, and the boun
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.effects.circumstances import PictureSizes
 from gelslim_twin.effects.dot_positions import RARE
 from gelslim_twin.effects.effect import Bound, picture, rounded_up
 from gelslim_twin.effects.grey_values import PIXEL_STEPS
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 SAFETY = 2.0
 """Factor on the largest shift of a dot at the pose that is drawn, for the other poses."""
+PICTURE_DIGITS = 2
+"""Significant digits of what is found: one pixel that is rounded otherwise moves a dot."""
 LOST_SHARE = 5e-3
 """Share of the dots that may be found in one of two pictures only, as behind spots."""
 MATCH_PX = 3.0
@@ -38,19 +41,6 @@ MATCH_PX = 3.0
 NOT_DRAWN = frozenset({"motion_blur", "compression", NOISE})
 """Effects that the pictures of a probe leave out: each frame has its own noise, and one state shows
 no motion."""
-
-
-@dataclass(frozen=True)
-class PictureSizes:
-    """What a probe finds in pictures, with its safety factor.
-
-    Attributes:
-        sizes: By effect, the error of leaving it out.
-        coarsest: By effect, the error of its coarsest rung.
-    """
-
-    sizes: Mapping[str, Bound]
-    coarsest: Mapping[str, Bound]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +67,13 @@ class PictureProbe:
             if name == SHADING:
                 px = dots.shift_px(self._drawn(state, self._shaded(PIXEL_STEPS[-1]), NOT_DRAWN))
                 if px is not None:
-                    coarsest[name] = picture(rounded_up(SAFETY * px))
+                    coarsest[name] = picture(rounded_up(SAFETY * px, PICTURE_DIGITS))
                 continue
             other = NOT_DRAWN - {name} if name == NOISE else NOT_DRAWN | {name}
             px = dots.shift_px(self._drawn(state, self._coarse, other))
             if px is not None:
                 px *= self._rare(dots.count) if name == NOISE else 1.0
-                sizes[name] = picture(rounded_up(SAFETY * px))
+                sizes[name] = picture(rounded_up(SAFETY * px, PICTURE_DIGITS))
         return PictureSizes(sizes, coarsest)
 
     @property

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from gelslim_force.detection.detection import Detector
 from gelslim_force.detection.settings import DetectorSettings
 from gelslim_twin.contact.gel_state import GelState
+from gelslim_twin.effects.dot_contrast import shift_px
 from gelslim_twin.effects.effect import OBSERVABLES, Bound
 from gelslim_twin.effects.grey_values import MotionBlurParameters
 from gelslim_twin.effects.registry import EFFECTS
@@ -168,6 +169,26 @@ class Trial:
             open_share = min(1.0, shutter_s / one.step_s(at))
             moved.append(open_share * float(np.linalg.norm(way, axis=1).max()))
         return int(np.argmax(moved))
+
+    def light_apart_px(self, one: Outcome, other: Outcome) -> float:
+        """The largest change of the light on the gel, as the shift of a dot's edge.
+
+        It is how shading is judged, since the light is read from a picture beside the dots: the
+        change of the sum of the channels, without ink, relative to the light.
+        """
+        at = int(np.argmax([np.abs(s.force_n).sum() for s in one.states]))
+        sums = [_light(run, at) for run in (one, other)]
+        lit = sums[0] > 0.05 * np.median(sums[0])
+        share = float((np.abs(sums[1] - sums[0])[lit] / sums[0][lit]).max(initial=0.0))
+        return shift_px(self.asked.circumstances, share)
+
+
+def _light(run: Outcome, at: int) -> Array:
+    """Sums of the channels (h, w) of a picture without dots and noise."""
+    renderer = run.viewer.renderer
+    bare = np.zeros((renderer.camera.image_height_px, renderer.camera.image_width_px), np.float32)
+    values: Array = renderer.values(bare, run.viewer.surface(run.states[at])).sum(axis=2)
+    return values
 
 
 def seen_apart_px(one: Outcome, other: Outcome, frames: set[int]) -> float:

@@ -1,0 +1,178 @@
+"""The probe of the picture: what it finds holds at every pose, and what it costs is small."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agreement import Outcome, Trial, seen_apart_px
+from random_contact_scenes import random_contact
+from scene_samples import GALLERY, SENSOR
+
+from gelslim_twin.contact.gel_state import ContactError
+from gelslim_twin.effects.effect import OBSERVABLES, rounded_up
+from gelslim_twin.planning.plan import Plan
+from gelslim_twin.planning.planner import make_plan
+from gelslim_twin.planning.probing import (
+    MOST_SHARE,
+    MOTION_BLUR,
+    NOISE,
+    PICTURED,
+    SHADING,
+    effects_to_probe,
+    probe_ms,
+)
+from gelslim_twin.planning.question import question
+from gelslim_twin.render.look import Look
+from gelslim_twin.scene.reader import read_scene
+from gelslim_twin.simulation.picture import Viewer
+from gelslim_twin.simulation.picture_probe import NOT_DRAWN, PictureProbe
+from gelslim_twin.simulation.probe import probed
+from gelslim_twin.simulation.scene_task import viewer_of
+
+
+def long_trial(seed: int, folder: Path) -> Trial:
+    """A random scene with four times the poses."""
+    finger, values = random_contact(seed)
+    for move in values["motion"]["waypoints"]:
+        move["steps"] *= 4
+    return Trial.of(finger, values, folder)
+
+
+def without(plan: Plan, *effects: str) -> Plan:
+    return replace(plan, order=tuple(name for name in plan.order if name not in effects))
+
+
+def at_small_strain(one: Trial) -> Outcome:
+    """Everything on but large strain, what frames differ by at random, and compression."""
+    return one.carried_out(without(one.full(), "nonlinearity", "compression"))
+
+
+def sized(one: Trial, run: Outcome, effects: tuple[str, ...]) -> dict[str, float]:
+    """Sizes in px by a probe of the pose with the largest force."""
+    hardest = max(run.states, key=lambda s: float(np.linalg.norm(s.force_n.sum(axis=0))))
+    viewer = partial(viewer_of, one.loaded, one.sensor)
+    found = PictureProbe(run.plan, viewer, len(run.states)).found(hardest, effects)
+    return {name: bound.image_px for name, bound in found.sizes.items()}
+
+
+def shifts_px(one: Trial, run: Outcome, effect: str, frames: set[int]) -> float:
+    """Largest shift of a detected dot by an effect, in frames without noise and motion."""
+    still = without(run.plan, *({*NOT_DRAWN} - {effect}))
+    pair = [one.carried_out(p, run.states) for p in (still, without(still, effect))]
+    return seen_apart_px(pair[0], pair[1], frames)
+
+
+def check_sizes(one: Trial, frames: int) -> int:
+    """Sizes against shifts at many poses; the number of sizes that were found."""
+    run = at_small_strain(one)
+    effects = tuple(e for e in PICTURED if e in run.plan.order and e != SHADING)
+    sizes = sized(one, run, effects)
+    chosen = {int(k) for k in np.linspace(0, len(run.states) - 1, frames)}
+    for effect, size in sizes.items():
+        assert shifts_px(one, run, effect, chosen) <= size, effect
+    return len(sizes)
+
+
+def test_sizes_of_grey_values_hold_at_other_poses(tmp_path: Path) -> None:
+    """Defocus, exposure, dirt, spots and noise of a scene, and far below the bounds of grey."""
+    one = long_trial(2031, tmp_path)
+    assert check_sizes(one, 3) == 5
+    run = at_small_strain(one)
+    assert sized(one, run, ("exposure",))["exposure"] < 0.1 * one.bound("exposure").image_px
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2013, 2016, 2019, 2022, 2028, 2037, 2038, *range(3100, 3110)])
+def test_sizes_of_grey_values_hold_in_random_scenes(tmp_path: Path, seed: int) -> None:
+    """In 2028 and 2038 the detector finds a dot beside dirt at two places, by where it starts."""
+    one = long_trial(seed, tmp_path)
+    try:
+        check_sizes(one, 7)
+    except ContactError as error:
+        pytest.skip(f"nothing to compare: {error}")
+
+
+RELAXED = (3001, 3003, 3005, 3010, 3019, 3033, 3034, 3050, 3056, 3064)
+"""3033 and 3056 needed a factor of 1.8 on the force that relaxes between the poses of a probe."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", RELAXED)
+def test_the_force_that_relaxes_and_the_speed_of_dots_hold_on_the_path(
+    tmp_path: Path, seed: int
+) -> None:
+    one = long_trial(seed, tmp_path)
+    off = one.carried_out(without(one.full(), "nonlinearity", "relaxation"))
+    on = one.carried_out(without(one.full(), "nonlinearity"))
+    asked = replace(one.asked, observe=OBSERVABLES)
+    effects = ("relaxation", MOTION_BLUR)
+    found = probed(asked, one.loaded, one.compliance, effects).circumstances.probed
+    assert found is not None
+    lost = max(
+        float(np.linalg.norm((a.force_n - b.force_n).sum(axis=0)))
+        for a, b in zip(on.states, off.states, strict=True)
+    )
+    assert 0 < lost <= found.sizes["relaxation"].force_n
+    if asked.circumstances.has_sliding_walls:
+        # A dot jumps where a wall passes it, so that motion blur keeps its bound.
+        assert MOTION_BLUR not in effects_to_probe(asked, make_plan(asked))
+        return
+    scale = asked.circumstances.sensor.px_per_mm
+    for k in range(1, len(on.states)):
+        moved = np.linalg.norm(on.dots_px(k) - on.dots_px(k - 1), axis=1).max()
+        assert moved / on.step_s(k) <= found.dot_mm_s * scale
+
+
+def test_a_probe_draws_within_its_share_of_the_pictures() -> None:
+    for path in GALLERY:
+        asked = question(read_scene(path), SENSOR)
+        plan = make_plan(asked)
+        effects = effects_to_probe(asked, plan)
+        solved = tuple(name for name in effects if name not in PICTURED)
+        drawn_ms = probe_ms(asked, plan, effects) - probe_ms(asked, plan, solved)
+        if len(effects) > len(solved):
+            pictures = ("drawing", "marker_print", "defocus", "specular", "exposure", "dirt")
+            pictures += (SHADING, NOISE, MOTION_BLUR, "refraction", "lens_distortion")
+            seen_ms = sum(c.predicted_ms for c in plan.included if c.effect in pictures)
+            assert drawn_ms <= MOST_SHARE * plan.poses * seen_ms
+        if "image" not in asked.observe:
+            assert effects == solved
+
+
+def test_renderers_that_share_draw_what_those_alone_draw(tmp_path: Path) -> None:
+    """Rays, light, blur and spots are shared; a renderer of its own gives the same bytes."""
+    one = long_trial(2031, tmp_path)
+    viewer = Viewer(one.sensor, one.full(), one.loaded.scene)
+    shared = viewer.renderer
+    looks = [shared.look, Look(), replace(shared.look, defocus=None, specular=None)]
+    for look in (*looks, shared.look):
+        alone = replace(shared, look=look)
+        assert alone._kept is not shared._kept
+        pictures = [r.frame(number=3).image for r in (shared.with_look(look), alone)]
+        assert np.array_equal(*pictures)
+
+
+def test_markers_are_seen_where_they_are_printed(tmp_path: Path) -> None:
+    """A print whose dots are displaced: the centres of the dots drawn on the gel at rest."""
+    finger, values = random_contact(2031)
+    values["effects"]["marker_print"] = {"jitter_mm": 0.05}
+    one = Trial.of(finger, values, tmp_path)
+    run = one.carried_out(without(one.full(), "motion_blur"))
+    state = replace(run.states[0], displacement_mm=0 * run.states[0].displacement_mm)
+    drawn = run.viewer.frame(state, None, 0, 0.0)
+    seen = run.viewer.markers_px(state)
+    # A disc's image has its centroid beside the image of the centre, by hundredths of a pixel.
+    assert np.abs(seen - drawn.centres_px).max() < 0.05
+    design = one.carried_out(without(run.plan, "marker_print"), run.states)
+    assert np.linalg.norm(seen - design.viewer.markers_px(state), axis=1).max() > 1.0
+
+
+def test_values_are_rounded_up() -> None:
+    assert rounded_up(0.012301) == 0.0124
+    assert rounded_up(0.0121, 1) == 0.02
+    assert rounded_up(0.0) == 0.0
+    assert rounded_up(float("inf")) == float("inf")
