@@ -35,7 +35,10 @@ FIND_MS = 8.0
 """Time of finding the dots of a picture of 640 x 480 pixels."""
 MOST_SHARE = 0.05
 """Largest time of a probe over that of the run with large strain solved to convergence, both as
-declared; and of what it draws over that of the pictures of the run."""
+declared."""
+USUAL_STRAIN = 0.5
+"""Share of the declared time of large strain that counts for the pictures of a probe: small
+contacts converge faster."""
 MOST_POSES, STRAIGHT_POSES = 12, 4
 """Poses of the path that a probe solves on a linear gel, and those of a straight press, of which
 the deepest is the hardest."""
@@ -57,11 +60,7 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
         # A dot jumps where a wall passes it, in a step that a probe may miss.
         if c.effect != MOTION_BLUR or not question.circumstances.has_sliding_walls
     )
-    ms = {c.effect: c.predicted_ms for c in plan.included}
-    converged_ms = dict(ms)
-    if "nonlinearity" in ms:
-        converged_ms["nonlinearity"] = convergence_ms(question.circumstances)
-    most_ms = MOST_SHARE * sum(converged_ms.values()) * plan.poses
+    most_ms = MOST_SHARE * _run_ms(question, plan, 1.0)
     solved = next(
         (
             effects
@@ -75,10 +74,8 @@ def effects_to_probe(question: Question, plan: Plan) -> tuple[str, ...]:
 
 
 def _pictured(question: Question, plan: Plan, solved: tuple[str, ...]) -> tuple[str, ...]:
-    """The effects that a probe draws, the slowest first, within its share of the pictures."""
-    most_ms = MOST_SHARE * plan.poses * sum(c.predicted_ms for c in plan.included if _is_seen(c))
-    if not solved:
-        most_ms -= probe_ms(question, plan, ())
+    """The effects that a probe draws, the slowest first, within its share of the run."""
+    most_ms = MOST_SHARE * _run_ms(question, plan, USUAL_STRAIN) - probe_ms(question, plan, solved)
     wanted = [
         c
         for c in plan.included
@@ -90,6 +87,14 @@ def _pictured(question: Question, plan: Plan, solved: tuple[str, ...]) -> tuple[
         if _pictures_ms(question, plan, (*found, choice.effect)) <= most_ms:
             found = (*found, choice.effect)
     return found
+
+
+def _run_ms(question: Question, plan: Plan, strained: float) -> float:
+    """Declared time of the run with large strain solved to convergence, which counts by a share."""
+    ms = {c.effect: c.predicted_ms for c in plan.included}
+    if "nonlinearity" in ms:
+        ms["nonlinearity"] = strained * convergence_ms(question.circumstances)
+    return sum(ms.values()) * plan.poses
 
 
 def _is_seen(choice: Choice) -> bool:
