@@ -144,15 +144,23 @@ def _cell(row: dict[str, Any]) -> str:
 
 
 def _summary(what: str, rows: list[dict[str, Any]]) -> str:
-    above = sum(used(r) > 1 for r in rows)
+    above, doubtful = (
+        sum(v > 1 for v in values)
+        for values in ([used(r) for r in rows], [r.get("with_doubtful", used(r)) for r in rows])
+    )
     judged = [r for r in rows if r["needless"] is not None]
     kept, needless = (sum(r["kept"] for r in judged), sum(len(r["needless"]) for r in judged))
     spare = f"; {needless} of {kept} effects are kept without need" if judged else ""
     ratios = sorted(ratio(r) for r in rows)
     probed = [r for r in rows if r["probed"]]
     share = median(r["planning_ms"] / r["whole_ms"] for r in probed) if probed else 0.0
+    more = (
+        f" ({doubtful} with the dots whose centres the detector calls doubtful)"
+        if doubtful > above
+        else ""
+    )
     return (
-        f"{what}: {above} of {len(rows)} are above the tolerance; the median uses "
+        f"{what}: {above} of {len(rows)} are above the tolerance{more}; the median uses "
         f"{median(used(r) for r in rows):.0%} of it and takes {median(ratios):.2f} of the time of "
         f"everything on, the quickest tenth at most {ratios[len(ratios) // 10]:.2f}{spare}. "
         f"Planning with a probe ({len(probed)} of {len(rows)}) takes {share:.1%} of the time of "

@@ -193,6 +193,10 @@ def measured(
     plan, planning_ms = spent(lambda: case.chosen(pad))
     run = case.run(plan, pad)
     used = case.used(run.outcome, every.outcome)
+    doubtful = 0.0
+    if "image" in asked.observe:
+        pair = (every.outcome, run.outcome, ("image",))
+        doubtful = case.trial.differences(*pair, doubtful=True)["image"] / asked.image_px
     kept, needless = optional(plan), []
     for name in kept if with_needless else ():
         less = case.outcome(without(plan, name))
@@ -213,6 +217,7 @@ def measured(
         "ms": run.ms,
         "planning_ms": planning_ms,
         "used": used,
+        "with_doubtful": max(doubtful, *used.values()),
         "promised": {o: plan.error(o) / asked.tolerance(o) for o in asked.observe},
         "over": [o for o, _ in plan.over_tolerance],
         "kept": len(kept),

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
     from gelslim_twin.render.frame_renderer import RenderedFrame
     from gelslim_twin.simulation.picture import Viewer
 
-SAFETY = 2.0
-"""Factor on the largest shift of a dot at the pose that is drawn, for the other poses."""
+SAFETY, FLOOR_PX = 3.0, 0.01
+"""Factor on the largest shift of a dot at the pose that is drawn, for the other poses, and what is
+added to it. In 17 random scenes 2.7 was needed, or 2.3 with this addition, which a change of a few
+pixels by one grey value may make."""
 PICTURE_DIGITS = 2
 """Significant digits of what is found: one pixel that is rounded otherwise moves a dot."""
 LOST_SHARE = 5e-3
@@ -67,13 +69,13 @@ class PictureProbe:
             if name == SHADING:
                 px = dots.shift_px(self._drawn(state, self._shaded(PIXEL_STEPS[-1]), NOT_DRAWN))
                 if px is not None:
-                    coarsest[name] = picture(rounded_up(SAFETY * px, PICTURE_DIGITS))
+                    coarsest[name] = _with_safety(px)
                 continue
             other = NOT_DRAWN - {name} if name == NOISE else NOT_DRAWN | {name}
             px = dots.shift_px(self._drawn(state, self._coarse, other))
             if px is not None:
                 px *= self._rare(dots.count) if name == NOISE else 1.0
-                sizes[name] = picture(rounded_up(SAFETY * px, PICTURE_DIGITS))
+                sizes[name] = _with_safety(px)
         return PictureSizes(sizes, coarsest)
 
     @property
@@ -101,6 +103,10 @@ class PictureProbe:
     def _drawn(self, state: GelState, plan: Plan, without: frozenset[str]) -> RenderedFrame:
         kept = tuple(name for name in plan.order if name not in without)
         return self.viewer(replace(plan, order=kept)).frame(state, None, 0, 0.0)
+
+
+def _with_safety(px: float) -> Bound:
+    return picture(rounded_up(SAFETY * px + FLOOR_PX, PICTURE_DIGITS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +146,9 @@ class _Dots:
 def _found(
     detector: Detector, frame: RenderedFrame
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The detection next to each drawn dot (m, 2), and whether (m,) it is the dot's."""
-    dots_px, centres_px = detector.detect(frame.image).centres_px, frame.centres_px[frame.drawn]
-    if len(dots_px) == 0:
+    """The detection next to each drawn dot (m, 2), and whether (m,) it is the dot's for sure."""
+    dots, centres_px = detector.detect(frame.image), frame.centres_px[frame.drawn]
+    if len(dots.centres_px) == 0:
         return centres_px, np.zeros(len(centres_px), dtype=bool)
-    apart, nearest = cKDTree(dots_px).query(centres_px)
-    return dots_px[nearest], apart < MATCH_PX
+    apart, nearest = cKDTree(dots.centres_px).query(centres_px)
+    return dots.centres_px[nearest], (apart < MATCH_PX) & dots.trustworthy[nearest]

@@ -133,9 +133,12 @@ class Trial:
         return next(e for e in EFFECTS if e.name == effect).bound(c)
 
     def differences(
-        self, one: Outcome, other: Outcome, observe: tuple[str, ...]
+        self, one: Outcome, other: Outcome, observe: tuple[str, ...], doubtful: bool = False
     ) -> dict[str, float]:
-        """Largest differences over the poses in each observable, in N or px."""
+        """Largest differences over the poses in each observable, in N or px.
+
+        Of pictures, dots whose centres the detector calls doubtful count with `doubtful` only.
+        """
         scale = self.asked.circumstances.sensor.px_per_mm
         pairs = list(zip(one.states, other.states, strict=True))
         found: dict[str, float] = {}
@@ -156,7 +159,7 @@ class Trial:
         if "image" in observe:
             at = int(np.argmax([np.abs(a.force_n).sum() for a, _ in pairs]))
             frames = {at, self._fastest(one), len(pairs) - 1}
-            found["image"] = seen_apart_px(one, other, frames)
+            found["image"] = seen_apart_px(one, other, frames, doubtful)
         return found
 
     def _fastest(self, one: Outcome) -> int:
@@ -191,8 +194,12 @@ def _light(run: Outcome, at: int) -> Array:
     return values
 
 
-def seen_apart_px(one: Outcome, other: Outcome, frames: set[int]) -> float:
-    """How far the dots that a detector finds in both pictures lie apart at most."""
+def seen_apart_px(one: Outcome, other: Outcome, frames: set[int], doubtful: bool = False) -> float:
+    """How far the dots that a detector finds in both pictures lie apart at most.
+
+    A centre that the detector itself calls doubtful, such as that of a dot over a wall of the tool,
+    differs by what decides it and not by what moves it.
+    """
     worst = 0.0
     for at in sorted(frames):
         found: list[Array] = []
@@ -204,12 +211,12 @@ def seen_apart_px(one: Outcome, other: Outcome, frames: set[int]) -> float:
             if not drawn.any():
                 return worst
             settings = DetectorSettings.for_diameters(p.diameter_px[drawn])
-            dots = Detector(settings).detect(p.image).centres_px
-            if not len(dots):
+            dots = Detector(settings).detect(p.image)
+            if not len(dots.centres_px):
                 return worst
-            apart, nearest = cKDTree(dots).query(p.centres_px)
-            good = drawn & (apart < MATCH_PX)
-            found.append(dots[nearest])
+            apart, nearest = cKDTree(dots.centres_px).query(p.centres_px)
+            good = drawn & (apart < MATCH_PX) & (doubtful | dots.trustworthy[nearest])
+            found.append(dots.centres_px[nearest])
         assert good is not None
         if good.any():
             worst = max(worst, float(np.linalg.norm(found[0] - found[1], axis=1)[good].max()))
