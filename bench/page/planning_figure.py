@@ -50,7 +50,7 @@ def _draw_gallery(panel: Any, scenes: dict[str, Rows]) -> None:
 def _draw_all(panel: Any, cases: Rows) -> None:
     kinds = {level: f" {level}" for level in LEVELS}
     for level, ending in kinds.items():
-        rows = [r for name, r in cases.items() if name.endswith(ending)]
+        rows = [r for name, r in cases.items() if name.endswith(ending) and "used" in r]
         panel.scatter(*_points(rows), s=28, color=COLOURS[level], zorder=3)
     rows = [r for name, r in cases.items() if name.startswith("seed") and "used" in r]
     panel.scatter(*_points(rows), s=18, facecolors="none", edgecolors="#555555", zorder=2,
@@ -76,7 +76,7 @@ def gallery(cases: Rows) -> dict[str, Rows]:
     """The rows of the gallery by scene, and by tolerance."""
     found: dict[str, Rows] = {}
     for name, row in cases.items():
-        if "scene" in row:
+        if "scene" in row and "used" in row:
             found.setdefault(row["scene"], {})[name.rpartition(" ")[2]] = row
     return found
 
@@ -144,10 +144,8 @@ def _cell(row: dict[str, Any]) -> str:
 
 
 def _summary(what: str, rows: list[dict[str, Any]]) -> str:
-    above, doubtful = (
-        sum(v > 1 for v in values)
-        for values in ([used(r) for r in rows], [r.get("with_doubtful", used(r)) for r in rows])
-    )
+    above = sum(used(r) > 1 for r in rows)
+    doubtful = sum(r.get("with_doubtful", used(r)) > 1 for r in rows)
     judged = [r for r in rows if r["needless"] is not None]
     kept, needless = (sum(r["kept"] for r in judged), sum(len(r["needless"]) for r in judged))
     spare = f"; {needless} of {kept} effects are kept without need" if judged else ""

@@ -152,6 +152,12 @@ def optional(plan: Plan) -> tuple[str, ...]:
     return tuple(name for name in plan.order if name not in provides)
 
 
+def _promised(plan: Plan, observable: str) -> float:
+    """Sum of the errors of all effects but compression, which neither plan includes."""
+    counted = [c for c in plan.choices if c.shares and c.effect != "compression"]
+    return sum(c.error.of(observable) for c in counted)
+
+
 def _observed(plan: Plan, observe: tuple[str, ...]) -> Plan:
     """The plan without effects on which nothing observed depends."""
     seen = {"force", "displacement"}
@@ -218,7 +224,7 @@ def measured(
         "planning_ms": planning_ms,
         "used": used,
         "with_doubtful": max(doubtful, *used.values()),
-        "promised": {o: plan.error(o) / asked.tolerance(o) for o in asked.observe},
+        "promised": {o: _promised(plan, o) / asked.tolerance(o) for o in asked.observe},
         "over": [o for o, _ in plan.over_tolerance],
         "kept": len(kept),
         "needless": needless if with_needless else None,
