@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scene_samples import ROOT
 
 from gelslim_cad.dimensions import derive
 from gelslim_cad.geometry.optics import camera_record
@@ -23,6 +22,7 @@ from ifem_export.elements.material import Material
 from ifem_export.mesh.outline import RoundedRectangle
 from ifem_export.mesh.pad_mesh import build_pad_mesh
 
+ROOT = Path(__file__).parents[2]
 Values = dict[str, Any]
 KINDS = ("sphere", "cylinder", "ring", "flat_punch", "wedge", "cone", "textured_plane", "stl")
 LENS = {"k1": -0.12, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.0}
