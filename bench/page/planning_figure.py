@@ -124,7 +124,7 @@ def table(data: dict[str, Any]) -> str:
         "\n".join(lines),
         _summary("The gallery at its three tolerances", shown),
     ]
-    refused = sum("refused" in r for r in cases.values())
+    refused = sum("refused" in r and "seed" in r for r in cases.values())
     if done:
         what = f"{len(done)} random scenes at random tolerances from 0.5 to 20 %"
         texts.append(_summary(what, done) + (f" {refused} more are refused." if refused else ""))
