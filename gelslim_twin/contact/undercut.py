@@ -7,8 +7,9 @@ facets are counted from below: an undercut is where the vertical enters the mesh
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,16 @@ def undercut_of_file(shape: MeshFile, folder: Path) -> Undercut | None:
 
     Raises ValueError for a file that is no mesh, OSError for one that cannot be read.
     """
+    state = os.stat(folder / shape.file)
+    return _undercut_of_file(shape, folder, state.st_mtime_ns, state.st_size)
+
+
+# The samples of a data set have the same meshes.
+@lru_cache(maxsize=64)
+def _undercut_of_file(
+    shape: MeshFile, folder: Path, changed_ns: int, size: int
+) -> Undercut | None:
+    """Of a file, which is read again when its time or size has changed."""
     corners = facets_down(shape, folder)
     hidden = undercut_of(corners - lowest_middle(corners))
     if hidden is None:

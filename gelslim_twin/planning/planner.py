@@ -247,6 +247,11 @@ def _rung(ladder: Sequence[Rung], shares: dict[str, float]) -> Rung:
     return ladder[min(range(len(ladder)), key=lambda k: (errors[k], totals[k]))]
 
 
+def application_order(effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Names of effects in the order in which they are applied."""
+    return tuple(effect.name for effect in _ordered(effects))
+
+
 def _ordered(effects: Sequence[Effect]) -> list[Effect]:
     """Topological order: providers, their refinements, their users; `after` is respected.
 

@@ -65,6 +65,7 @@ class FrameRenderer:
         top: The outer surface at rest where it is crowned; None for a flat one.
         mono: Whether the camera sees brightness alone, by the first response of `light`.
         photographed: The untouched gel as a built sensor sees it; None draws it from the design.
+        light_gain: Factor on the light of each source; empty for 1.
     """
 
     camera: VirtualCamera
@@ -75,18 +76,23 @@ class FrameRenderer:
     top: DomedTop | None = None
     mono: bool = False
     photographed: PhotographedGel | None = None
+    light_gain: tuple[float, ...] = ()
     _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
     """What does not depend on all effects, shared with the renderers of `with_look`."""
 
-    def with_look(self, look: Look) -> FrameRenderer:
-        """The same sensor with other effects; what does not depend on these is computed once."""
-        other = replace(self, look=look)
+    def with_look(self, look: Look, light_gain: tuple[float, ...] = ()) -> FrameRenderer:
+        """The same sensor with other effects and lamps; what does not depend on these is kept."""
+        other = replace(self, look=look, light_gain=light_gain)
         object.__setattr__(other, "_kept", self._kept)
         return other
 
     @cached_property
     def dots(self) -> PrintedDots:
         """The dots as printed, with the faults of the print."""
+        found: PrintedDots = self._once(("dots", self.look.marker_print), self._printed)
+        return found
+
+    def _printed(self) -> PrintedDots:
         seen = self.photographed
         printed = PrintedDots.nominal(self.grid) if seen is None else seen.dots
         faults = self.look.marker_print
@@ -179,7 +185,8 @@ class FrameRenderer:
     @property
     def colour(self) -> NDArray[np.float32]:
         """Grey values (k, 3) of unit irradiance of each source."""
-        return (self.light.colour * self.look.level_dn * self._scale).astype(np.float32)
+        gain = np.array(self.light_gain or [1.0])[:, None]
+        return (self.light.colour * gain * self.look.level_dn * self._scale).astype(np.float32)
 
     @property
     def contrast(self) -> NDArray[np.float32]:

@@ -14,6 +14,7 @@ MAX_POSES = 20_000
 Lateral = Annotated[float, Field(ge=-100, le=100)]
 Shearing = Annotated[float, Field(ge=-5, le=5)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
+Tilting = Annotated[float, Field(ge=-45, le=45)]
 
 
 class Timed(Block):
@@ -94,11 +95,19 @@ Waypoint = Annotated[
 ]
 
 
+START = ("start_x_mm", "start_y_mm", "start_twist_deg", "start_tilt_x_deg", "start_tilt_y_deg")
+
+
 class Motion(Block):
     """Motion of the tool by waypoints, from a start where it just touches, or by a table."""
 
     start_x_mm: Lateral = Field(default=0.0, description="Position of the start, along the finger")
     start_y_mm: Lateral = Field(default=0.0, description="Position of the start, across the finger")
+    start_twist_deg: Angle = Field(
+        default=0.0, description="Turn about the normal of the gel at the start"
+    )
+    start_tilt_x_deg: Tilting = Field(default=0.0, description="Tilt about x at the start")
+    start_tilt_y_deg: Tilting = Field(default=0.0, description="Tilt about y at the start")
     waypoints: tuple[Waypoint, ...] | None = Field(
         default=None, min_length=1, max_length=500, description="Movements, one after the other"
     )
@@ -119,9 +128,9 @@ class Motion(Block):
                 "has neither waypoints nor csv",
                 "add `waypoints:` with a line `- move: press` below",
             )
-        if self.csv is not None and (self.start_x_mm or self.start_y_mm):
-            name = "start_x_mm" if self.start_x_mm else "start_y_mm"
-            raise FieldError(name, "the table gives the place itself", "delete the line")
+        given = [name for name in START if getattr(self, name)]
+        if self.csv is not None and given:
+            raise FieldError(given[0], "the table gives the place itself", "delete the line")
         count = 1 + sum(w.steps for w in self.waypoints or ())
         if count > MAX_POSES:
             raise FieldError(

@@ -54,7 +54,13 @@ def poses(motion: Motion) -> tuple[Pose, ...]:
     """
     if motion.waypoints is None:
         raise ValueError("this motion is a table: read it with read_pose_table")
-    pose = Pose(x_mm=motion.start_x_mm, y_mm=motion.start_y_mm)
+    pose = Pose(
+        x_mm=motion.start_x_mm,
+        y_mm=motion.start_y_mm,
+        twist_deg=motion.start_twist_deg,
+        tilt_x_deg=motion.start_tilt_x_deg,
+        tilt_y_deg=motion.start_tilt_y_deg,
+    )
     found, raised = [pose], 0.0
     for waypoint in motion.waypoints:
         found += between(pose, waypoint, raised)

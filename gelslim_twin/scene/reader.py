@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,11 @@ from gelslim_core.yaml.reader import Loaded, read_model
 from gelslim_core.yaml.schema import reference_markdown, schema_text
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.mesh_file import KINDS, footprint_mm
+from gelslim_twin.scene.motion import Motion
 from gelslim_twin.scene.pose import Pose, poses
 from gelslim_twin.scene.pose_table import LIMITS, read_pose_table
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
-from gelslim_twin.scene.variation import varied
+from gelslim_twin.scene.draw import Drawn, NamedTool, drawn, drawn_scene, tools_of
 
 if TYPE_CHECKING:
     from gelslim_twin.scene.built_look import BuiltLook
@@ -52,25 +54,58 @@ class LoadedScene(Loaded[Scene]):
         """The spec or bundle of the sensor."""
         return self.folder / (self.scene.sensor.spec or self.scene.sensor.bundle or "")
 
+    @cached_property
+    def tools(self) -> tuple[NamedTool, ...]:
+        """The tools of the data set that this scene describes.
+
+        Raises `InputError` on the line of `vary.tool_meshes` for a folder without meshes.
+        """
+        try:
+            return tools_of(self.scene, self.folder)
+        except (ValueError, OSError) as error:
+            meshes = self.scene.vary.tool_meshes
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            raise self.problem(
+                "vary.tool_meshes.folder",
+                None if meshes is None else shown(meshes.folder),
+                (reason or type(error).__name__).lower() if isinstance(error, OSError) else reason,
+                "name a folder of meshes, relative to the scene's file",
+            ) from None
+
     def numbered(self, number: int) -> LoadedScene:
         """Scene `number` of the data set that this scene's `vary` describes.
 
         Raises `InputError` on the line of `vary` where a value drawn leaves the scene's limits.
         """
         try:
-            scene = varied(self.scene, number)
+            return self.with_drawn(drawn(self.scene, number, len(self.tools)))
+        except InputError:
+            raise
+        except ValueError as error:
+            raise self.problem("vary", None, str(error), "count from 0") from None
+
+    def with_drawn(self, what: Drawn) -> LoadedScene:
+        """The scene of one sample. Raises as `numbered`."""
+        try:
+            scene = drawn_scene(self.scene, what, self.tools)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(str(part) for part in first["loc"])
-            message = f"scene {number}: {where} = {first['input']}: {first['msg'].lower()}"
+            message = f"scene {what.number}: {where} = {first['input']}: {first['msg'].lower()}"
             raise self.problem("vary", None, message, "narrow the ranges") from None
         except ValueError as error:
             message, _, remedy = str(error).partition("; ")
             raise self.problem("vary", None, message, remedy or "correct it") from None
-        moved = self.poses if scene.motion.csv is not None else poses(scene.motion)
-        found = replace(self, model=scene, poses=moved)
+        found = replace(self, model=scene, poses=self._poses_of(scene.motion))
         found.require_upright()
         return found
+
+    def _poses_of(self, motion: Motion) -> tuple[Pose, ...]:
+        if motion.csv is None:
+            return poses(motion)
+        if motion == self.scene.motion:
+            return self.poses
+        return read_pose_table(self.folder / motion.csv)
 
     def with_tolerance(self, force_n: float, image_px: float) -> LoadedScene:
         """The same scene with another tolerance."""
@@ -170,6 +205,12 @@ RULES = (
         "vary",
         "the first value of a range is at most the second; factors of depth and size are above 0",
     ),
+    (
+        "vary",
+        "a range is `[lowest, highest]`, even, or has the name of its distribution third: "
+        "`log_uniform`, or `normal` with its mean midway and two standard deviations to each end",
+    ),
+    ("vary.split", "the shares of validation and test add up to less than 1"),
 )
 """What no single field can tell: block, rule. The reader enforces each."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +76,11 @@ class Viewer:
         return self.camera.project(self.rest_mm + self.to_markers @ state.displacement_mm)
 
     @cached_property
+    def rest_px(self) -> Array:
+        """Images (m, 2) of the dots' centres on the untouched gel."""
+        return self.camera.project(self._rest_mm)
+
+    @cached_property
     def renderer(self) -> FrameRenderer:
         """Draws frames."""
         if self.look is not None:
@@ -86,6 +91,27 @@ class Viewer:
     def _look(self) -> Look:
         scene = self.scene
         return plan_look(self.plan, scene.effects.parameters(), self._camera_record, scene.seed)
+
+    def adjusted(self, scene: Scene, light_gain: tuple[float, ...] = ()) -> Viewer:
+        """The same sensor, which sees another scene with its own ink, exposure and noise.
+
+        What is computed once per sensor is kept, and so are its print and its blemishes.
+
+        Args:
+            scene: Its effects on print, shading, dirt, defocus and reflections are those of this
+                one; its seed is that of the noise.
+            light_gain: Factor on the light of each source; empty for 1.
+        """
+        found = replace(self, scene=scene)
+        look = plan_look(
+            self.plan, scene.effects.parameters(), self._camera_record, self.scene.seed
+        )
+        if look.sensor_noise is not None:
+            look = replace(look, sensor_noise=replace(look.sensor_noise, seed=scene.seed))
+        found.__dict__["renderer"] = self.renderer.with_look(look, light_gain)
+        for name in ("camera", "_to_markers", "_rest_mm", "surface"):
+            found.__dict__[name] = getattr(self, name)
+        return found
 
     @cached_property
     def surface(self) -> Callable[[GelState], SurfaceState]:

@@ -15,6 +15,7 @@ from gelslim_twin.simulation.simulate import Mechanics
 
 if TYPE_CHECKING:
     from gelslim_twin.contact.prony import PronySeries
+    from gelslim_twin.contact.tool import Tool
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 CONTACTS = {
@@ -53,16 +54,16 @@ def pad_compliance(
     return ConvolvedCompliance(sensor.bundle, membranes)
 
 
-def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> Mechanics:
+def mechanics_of(
+    loaded: LoadedScene, plan: Plan, compliance: PadCompliance, tool: Tool | None = None
+) -> Mechanics:
     """The mechanical model of a planned scene on a pad.
 
-    Only modules of effects in the plan are imported. Raises ValueError or OSError for a mesh
+    `tool` is that of the scene, where it is made already. Only modules of effects in the plan are imported. Raises ValueError or OSError for a mesh
     that cannot be read.
     """
     chosen = {choice.effect: choice for choice in plan.included}
     solver = import_module(chosen["normal_contact"].implementation)
-    from gelslim_twin.contact.tool import Tool
-
     tolerance, friction = _tolerance(chosen["normal_contact"]), 0.0
     if "friction" in chosen:
         tolerance = min(tolerance, _tolerance(chosen["friction"]))
@@ -70,7 +71,10 @@ def mechanics_of(loaded: LoadedScene, plan: Plan, compliance: PadCompliance) -> 
         skin = compliance.bundle.skin
         friction = contact_friction(loaded.scene.contact, None if skin is None else skin.friction)
     settings = solver.ContactSettings(tolerance, friction)
-    tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
+    if tool is None:
+        from gelslim_twin.contact.tool import Tool
+
+        tool = Tool.of(loaded.scene.indenters, loaded.folder, loaded.scene.seed)
     contact: Any
     if "sliding_friction" in chosen:
         contact = _sliding_contact(loaded, chosen["sliding_friction"], compliance, tool, settings)
