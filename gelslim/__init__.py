@@ -12,7 +12,8 @@ from gelslim_core import __version__
 from gelslim_core.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from gelslim.contacts import plan, simulate, validate
+    from gelslim.contacts import data_set, plan, simulate, validate
+    from gelslim.data_sets import merge_data_sets, verify_data_set
     from gelslim.design import build, check, derive, make_bundle
     from gelslim.examples import examples
     from gelslim_cad.tolerance.asked import read_spec
@@ -39,10 +40,12 @@ __all__ = [
     "build",
     "calibrate",
     "check",
+    "data_set",
     "derive",
     "examples",
     "load_bundle",
     "make_bundle",
+    "merge_data_sets",
     "open_frames",
     "open_sensor",
     "plan",
@@ -50,6 +53,7 @@ __all__ = [
     "read_spec",
     "simulate",
     "validate",
+    "verify_data_set",
     "write_bundle",
 ]
 

@@ -97,15 +97,16 @@ def simulate(
         scene: The result of `read_scene`, or the path of a YAML file.
         out: Folder of the results; `out/NAME` by default.
         budget: Error and time allowed; replaces the tolerance of the scene.
-        count: Number of scenes of the data set that the scene's `vary` block describes; None for
-            the scene itself.
+        count: Number of samples of the data set that the scene's `vary` block describes, with all
+            their frames, as by `data_set`; None for the scene itself.
         jobs: Number of processes for a data set.
         scheduler: Address of a Dask scheduler, in place of processes.
         overwrite: Replace another simulation in the folder.
         progress: Called as the work goes on.
 
     Returns:
-        The folder, counts of scenes, poses and frames, and the largest residuals of the solver.
+        The folder, counts of scenes, poses and frames, and the largest residuals of the solver; of
+        a data set what `data_set` returns.
 
     Raises:
         InputError: The scene or its sensor has faults.
@@ -113,9 +114,22 @@ def simulate(
         SimulationError: The folder holds something else or cannot be written.
         ContactError: A contact was not solved.
     """
+    from gelslim.data_sets import sensor_folder
     from gelslim.scene_sensor import require_within_gel, scene_bundle
     from gelslim_twin.simulation.sensor import TwinSensor, store_sensor
 
+    if count is not None:
+        return data_set(
+            scene,
+            out,
+            budget,
+            count=count,
+            frames="all",
+            jobs=jobs,
+            scheduler=scheduler,
+            overwrite=overwrite,
+            progress=progress,
+        )
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
     if progress:
@@ -125,10 +139,76 @@ def simulate(
     require_within_gel(loaded, mesh.layers * mesh.cell_size_mm[2])
     with contextlib.suppress(FileNotFoundError):
         folder.stat()  # A name that is too long is refused before anything is written.
-    store_sensor(sensor, _sensor_folder(folder))
-    if count is None:
-        return _one(loaded, folder, overwrite, progress)
-    return _data_set(loaded, folder, count, (jobs, scheduler), overwrite, progress)
+    store_sensor(sensor, sensor_folder(folder))
+    return _one(loaded, folder, overwrite, progress)
+
+
+def data_set(
+    scene: SceneLike,
+    out: str | os.PathLike[str] | None = None,
+    budget: Budget | None = None,
+    *,
+    count: int,
+    file_format: str = "folder",
+    pictures: str = "png",
+    quality: int = 95,
+    frames: str = "last",
+    jobs: int = 1,
+    scheduler: str = "",
+    frames_per_shard: int | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Make a data set of the contacts that the `vary` block of a scene describes.
+
+    Every sample depends on the seed of the scene and on its number only. A data set that was
+    interrupted continues where it stopped, and one that is complete grows to a larger count.
+
+    Args:
+        scene: The result of `read_scene`, or the path of a YAML file.
+        out: Folder of the data set; `out/NAME` by default.
+        budget: Error and time allowed; replaces the tolerance of the scene.
+        count: Number of samples.
+        file_format: `folder`, `webdataset`, `zarr` or `lerobot`.
+        pictures: `png`, `webp` or `jpeg`.
+        quality: 1 to 100 of WebP and JPEG; WebP is lossless at 100.
+        frames: `last`, `all` or `every:K`.
+        jobs: Number of processes.
+        scheduler: Address of a Dask scheduler, in place of processes.
+        frames_per_shard: Frames that are written together, at most; 1024 by default.
+        overwrite: Replace another data set in the folder.
+        progress: Called as the work goes on.
+
+    Returns:
+        The folder, and what its `dataset.json` says: counts, splits, shapes of the arrays.
+
+    Raises:
+        InputError: The scene or its sensor has faults, or draws nothing although several samples
+            are asked for.
+        BudgetError: No plan keeps the budget.
+        DataSetError: The folder holds something else, or the format has no such pictures.
+    """
+    from gelslim.data_sets import prepared_data_set
+    from gelslim_core.jobs import Engine
+    from gelslim_twin.datasets.data_set import make_data_set
+
+    loaded, _ = with_budget(scene_of(scene), budget)
+    folder = Path("out") / loaded.scene.name if out is None else Path(out)
+    job = prepared_data_set(
+        loaded,
+        folder,
+        count=count,
+        file_format=file_format,
+        pictures=pictures,
+        quality=quality,
+        frames=frames,
+        frames_per_shard=frames_per_shard,
+        progress=progress,
+    )
+    answer = make_data_set(
+        job, count, Engine(jobs, scheduler), overwrite=overwrite, progress=progress
+    )
+    return {"folder": str(folder), **answer}
 
 
 def validate(
@@ -263,64 +343,19 @@ def machine_paces(figures: SensorFigures) -> Mapping[str, float]:
     return read_times(twin_key(figures))
 
 
-def _sensor_folder(folder: Path) -> Path:
-    """Return the folder of the sensor of a simulation, where the next one finds it."""
-    return folder.parent / ".sensor" if folder.parent != folder else folder / ".sensor"
-
-
 def _one(
     loaded: LoadedScene, folder: Path, overwrite: bool, progress: Progress | None
 ) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
+    from gelslim.data_sets import sensor_folder
     from gelslim_twin.simulation.scene_task import job_of
     from gelslim_twin.simulation.sensor import stored_sensor
     from gelslim_twin.simulation.simulate import simulate as simulated
 
-    place = _sensor_folder(folder)
+    place = sensor_folder(folder)
     # As in the workers of a data set, where several threads are slower than one.
     with threadpool_limits(limits=1, user_api="blas"):
         job = job_of(loaded, stored_sensor(place), place)
         ledger = simulated(job, folder, overwrite=overwrite, progress=progress)
     return {"folder": str(folder), "scenes": 1, "poses": len(loaded.poses), **ledger.to_record()}
-
-
-def _data_set(
-    loaded: LoadedScene,
-    folder: Path,
-    count: int,
-    engine: tuple[int, str],
-    overwrite: bool,
-    progress: Progress | None,
-) -> dict[str, Any]:
-    from gelslim_core.jobs import Engine
-    from gelslim_twin.simulation.scene_task import SceneTask, perform
-
-    for number in range(count):
-        loaded.numbered(number)
-    allowed = loaded.scene.tolerance
-    tasks = [
-        SceneTask(
-            str(Path(loaded.path).resolve()),
-            str(_sensor_folder(folder).resolve()),
-            str((folder / f"scene_{number:05d}").resolve()),
-            number,
-            overwrite,
-            (allowed.force_n, allowed.image_px),
-        )
-        for number in range(count)
-    ]
-    done: list[dict[str, Any]] = []
-    for _, result in Engine(*engine).run(perform, tasks):
-        done.append(result)
-        if progress:
-            progress("scenes", len(done), count)
-    worst: dict[str, float] = {}
-    for result in done:
-        for name, value in result["solver_worst"].items():
-            worst[name] = max(worst.get(name, 0.0), value)
-    counts = {
-        name: sum(result[name] for result in done)
-        for name in ("poses_solved", "frames_drawn", "frames_kept")
-    }
-    return {"folder": str(folder), "scenes": count, **counts, "solver_worst": worst}

@@ -37,10 +37,15 @@ EXTRAS = (
     ),
     Extra("view", ("pyvista",), "pictures of the finger in the report and in family"),
     Extra("vision", ("cv2", "PIL"), "videos, cameras and image files for force and simulate"),
-    Extra("record", ("pyarrow", "mcap", "mcap_ros2"), "Parquet tables and ROS 2 recordings"),
+    Extra(
+        "record",
+        ("pyarrow", "mcap", "mcap_ros2"),
+        "Parquet tables, data sets for learning, ROS 2 recordings",
+    ),
     Extra("rerun", ("rerun",), "force --rerun: recordings for the Rerun viewer"),
     Extra("cluster", ("distributed",), "explore --scheduler: designs on a Dask cluster"),
     Extra("export", ("safetensors",), "bundle-export to safetensors"),
+    Extra("zarr", ("zarr",), "dataset --format zarr: data sets as Zarr arrays"),
     Extra("sim", ("mujoco",), "examples/mujoco_grasp.py, in which a physics engine steps the twin"),
     Extra("torch", ("torch",), 'Twin.batch with backend="torch": many contacts at once'),
 )  # fmt: skip

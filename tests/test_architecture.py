@@ -53,7 +53,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     ),
     "gelslim_twin": (
         "effects", "scene", "planning", "contact", "render", "appearance", "simulation", "batch",
-        "stepping", "validation",
+        "datasets", "stepping", "validation",
     ),
     "gelslim_cad": (
         "spec", "gel", "markers", "pictures", "geometry", "light", "electronics", "dimensions",
@@ -62,7 +62,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "tolerance", "robot", "build", "live", "compare", "explore", "family",
     ),
     "gelslim": (
-        "ending", "examples", "scene_sensor", "design", "contacts", "doctor", "cli", "__main__",
+        "ending", "examples", "scene_sensor", "design", "data_sets", "contacts", "doctor", "cli",
+        "__main__",
     ),
 }  # fmt: skip
 """The rooms of each package from the ground up: a room imports only those before it."""

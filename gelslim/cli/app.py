@@ -34,6 +34,7 @@ from gelslim.cli.commands.measure.track import track
 from gelslim.cli.commands.program.bench import bench
 from gelslim.cli.commands.program.doctor import doctor
 from gelslim.cli.commands.program.schema import schema
+from gelslim.cli.commands.trial.dataset import dataset, dataset_merge, dataset_verify
 from gelslim.cli.commands.trial.light import light
 from gelslim.cli.commands.trial.plan import plan
 from gelslim.cli.commands.trial.simulate import simulate
@@ -56,6 +57,7 @@ COMMANDS: Mapping[str, tuple[Callable[..., int], ...]] = {
     ),
     "Search for one": (thinner, explore, optimise),
     "Try it before it is built": (tolerance, light, plan, simulate, validate),
+    "Learn from it": (dataset, dataset_verify, dataset_merge),
     "Make its files": (build, family, markers, bundle, bundle_info, bundle_export),
     "Measure with it": (
         import_sensor,

@@ -125,9 +125,7 @@ def undercut_of_file(shape: MeshFile, folder: Path) -> Undercut | None:
 
 # The samples of a data set have the same meshes.
 @lru_cache(maxsize=64)
-def _undercut_of_file(
-    shape: MeshFile, folder: Path, changed_ns: int, size: int
-) -> Undercut | None:
+def _undercut_of_file(shape: MeshFile, folder: Path, changed_ns: int, size: int) -> Undercut | None:
     """Of a file, which is read again when its time or size has changed."""
     corners = facets_down(shape, folder)
     hidden = undercut_of(corners - lowest_middle(corners))

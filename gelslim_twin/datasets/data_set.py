@@ -44,8 +44,11 @@ from gelslim_twin.datasets.sample import SPLITS
 from gelslim_twin.datasets.sensor_files import SENSORS, write_sensors
 from gelslim_twin.datasets.shard_task import WORK, ShardTask, moved, perform
 from gelslim_twin.datasets.splits import shards
+from gelslim_twin.planning.plan import Plan
 from gelslim_twin.scene.pose import frame_times
 
+HERE = Engine()
+"""This process."""
 MANIFEST, PLAN = "dataset.json", "plan.json"
 Progress = Callable[[str, int, int], None]
 
@@ -53,7 +56,7 @@ Progress = Callable[[str, int, int], None]
 def make_data_set(
     job: DataSetJob,
     count: int,
-    engine: Engine = Engine(),
+    engine: Engine = HERE,
     *,
     overwrite: bool = False,
     progress: Progress | None = None,
@@ -111,7 +114,7 @@ def _made(
     _remove_surplus(folder, wanted)
     write_index(folder, [s.name for s in wanted])
     _complete_format(job, wanted, about)
-    answer = {**about, "state": "complete", **_counted(folder, wanted)}
+    answer = {**about, **counted(folder, wanted)}
     replace_file(folder / MANIFEST, json_bytes(answer))
     return answer
 
@@ -231,21 +234,29 @@ def description(job: DataSetJob, count: int) -> dict[str, Any]:
         },
         "sensors": len(job.sensors),
         "effects": list(plan.order),
-        "over_tolerance": {
-            observable: {"error": error, "tolerance": _tolerance(job, observable)}
-            for observable, error in plan.over_tolerance
-        },
+        "over_tolerance": over_tolerance(plan),
         "labels": dict(MEANING),
         "scene": json.loads(scene.model_dump_json(exclude_unset=True)),
     }
 
 
-def _tolerance(job: DataSetJob, observable: str) -> float:
-    plan = job.plan
-    return plan.force_n if observable == "force" else plan.image_px
+def over_tolerance(plan: Plan) -> dict[str, Any]:
+    """Observables whose errors may exceed the tolerance in the hardest sample.
+
+    For each the sum of the bounds, the tolerance, and the effects with the largest bounds.
+    """
+    found: dict[str, Any] = {}
+    for observable, error in plan.over_tolerance:
+        worst = sorted(plan.choices, key=lambda c: -c.error.of(observable))
+        found[observable] = {
+            "error": error,
+            "tolerance": plan.force_n if observable == "force" else plan.image_px,
+            "largest": [c.effect for c in worst[:2] if c.error.of(observable) > 0],
+        }
+    return found
 
 
-def _counted(folder: Path, wanted: Sequence[Shard]) -> dict[str, Any]:
+def counted(folder: Path, wanted: Sequence[Shard]) -> dict[str, Any]:
     """Counts over all shards, reasons of failures, and the size of the files."""
     splits: dict[str, Counter[str]] = {split: Counter() for split in SPLITS}
     reasons: Counter[str] = Counter()
@@ -261,6 +272,7 @@ def _counted(folder: Path, wanted: Sequence[Shard]) -> dict[str, Any]:
         total_bytes += sum(file.bytes for file in record.files.values())
         arrays = arrays or _shapes(record)
     return {
+        "state": "complete",
         "samples": sum(c["samples"] for c in splits.values()),
         "frames": sum(c["frames"] for c in splits.values()),
         "failed": sum(reasons.values()),

@@ -1,7 +1,7 @@
 """The format `folder`: a picture file for each frame, and a NumPy file for each array of a shard.
 
-    train/00000/press-1-0000042_00010.png
-    train/00000/force_n.npy        float32 (frames, c, 3), in the order of the rows of the index
+train/00000/press-1-0000042_00010.png
+train/00000/force_n.npy        float32 (frames, c, 3), in the order of the rows of the index
 """
 
 from __future__ import annotations
@@ -76,6 +76,11 @@ class Folder:
         except (OSError, ValueError, EOFError) as error:
             return str(error)
         return ""
+
+    def renumbered(self, file: str, number: int) -> str:
+        """Path of a file of a shard that has another number."""
+        split, _, *inner = file.split("/")
+        return "/".join([split, f"{number:05d}", *inner])
 
 
 FORMAT = Folder()

@@ -10,12 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast, get_args, runtime_checkable
 
 from gelslim_core.errors import GelslimError
 from gelslim_twin.datasets.sample import Sample, Split
 
 PictureKind = Literal["png", "webp", "jpeg"]
+MOST_QUALITY = 100
 
 
 class DataSetError(GelslimError, ValueError):
@@ -38,6 +39,20 @@ class Pictures:
     def suffix(self) -> str:
         """Ending of the files, with its dot."""
         return ".jpg" if self.kind == "jpeg" else f".{self.kind}"
+
+
+def pictures_of(kind: str, quality: int) -> Pictures:
+    """An encoding by name.
+
+    Raises:
+        DataSetError: There is no such kind, or the quality is not 1 to 100.
+    """
+    for known in get_args(PictureKind):
+        if kind == known and 1 <= quality <= MOST_QUALITY:
+            return Pictures(known, quality)
+    if kind in get_args(PictureKind):
+        raise DataSetError(f"quality {quality} of pictures: must be 1 to {MOST_QUALITY}")
+    raise DataSetError(f"pictures {kind!r}: write {', '.join(get_args(PictureKind))}")
 
 
 @dataclass(frozen=True)
@@ -128,6 +143,14 @@ class DataSetFormat(Protocol):
 
     def problem(self, file: Path) -> str:
         """Why one file of a shard cannot be read; empty where it can."""
+
+
+@runtime_checkable
+class MergeableFormat(Protocol):
+    """A format whose shards do not know their numbers but by the names of their files."""
+
+    def renumbered(self, file: str, number: int) -> str:
+        """Path of a file of a shard within a data set where the shard has another number."""
 
 
 FORMATS: Mapping[str, str] = {

@@ -21,6 +21,8 @@ from gelslim_twin.datasets.sample import Sample, Value
 INDEX, RECORDS = "index.parquet", "shards"
 PURPOSE = "the index of a data set"
 _META = b"gelslim"
+MOST_REASONS = 10
+"""Records that are searched for reasons."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,19 @@ def read_record(path: Path) -> ShardRecord | None:
         return None
 
 
+class NothingMadeError(DataSetError):
+    """Not one sample of a data set could be made."""
+
+    def __init__(self, dataset: Path) -> None:
+        reasons = {
+            failure.reason
+            for path in sorted((dataset / RECORDS).glob("*.parquet"))[:MOST_REASONS]
+            if (record := read_record(path)) is not None
+            for failure in record.failures
+        }
+        super().__init__(f"{dataset}: no sample could be made: {'; '.join(sorted(reasons)[:3])}")
+
+
 def write_index(dataset: Path, names: Sequence[str]) -> None:
     """Join the rows of all shards; the memory that it takes does not depend on their number."""
     parquet = load("pyarrow.parquet", PURPOSE)
@@ -149,7 +164,9 @@ def write_index(dataset: Path, names: Sequence[str]) -> None:
                 writer = parquet.ParquetWriter(stream, table.schema, compression="zstd")
             writer.write_table(table)
         if writer is None:
-            raise DataSetError(f"{dataset}: no sample could be made; see the reasons in the records")
+            raise DataSetError(
+                f"{dataset}: no sample could be made; see the reasons in the records"
+            )
         writer.close()
 
 
@@ -167,3 +184,20 @@ def index_rows(dataset: Path) -> Iterator[dict[str, Any]]:
     with source:
         for batch in source.iter_batches():
             yield from batch.to_pylist()
+
+
+def index_schema(dataset: Path) -> list[str]:
+    """Names of the columns of the index with their types. Raises DataSetError."""
+    parquet = load("pyarrow.parquet", PURPOSE)
+    try:
+        return [f"{field.name} ({field.type})" for field in parquet.read_schema(dataset / INDEX)]
+    except (OSError, ValueError) as error:
+        raise DataSetError(f"{dataset / INDEX}: cannot be read ({error}); make it again") from error
+
+
+def index_ids(dataset: Path) -> Iterator[str]:
+    """The ids of the samples of the index, one for each frame."""
+    parquet = load("pyarrow.parquet", PURPOSE)
+    with parquet.ParquetFile(dataset / INDEX) as source:
+        for batch in source.iter_batches(columns=["id"]):
+            yield from batch.column(0).to_pylist()

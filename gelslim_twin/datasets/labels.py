@@ -60,7 +60,7 @@ def labels(pose: Pose, state: GelState, points_mm: Array, cell_mm2: float) -> di
     touched = state.touch != ContactStatus.FREE
     slipping = int((state.touch == ContactStatus.SLIP).sum())
     count = int(touched.sum())
-    values = (
+    values: tuple[Value, ...] = (
         *(pose.x_mm, pose.y_mm, pose.depth_mm),
         *(pose.twist_deg, pose.tilt_x_deg, pose.tilt_y_deg),
         *map(float, (*force, *torque)),
@@ -84,7 +84,7 @@ def _region(
 ) -> tuple[float, float, float, float, float, float]:
     """Centre of pressure x, y, then the extremes of the nodes in contact."""
     if not touched.any():
-        return (math.nan,) * 6  # type: ignore[return-value]
+        return (math.nan,) * 6
     x, y, pressed = places_mm[touched, 0], places_mm[touched, 1], -normal_n[touched]
     total = float(pressed.sum())
     weight = pressed / total if total > 0 else np.full(len(x), math.nan)

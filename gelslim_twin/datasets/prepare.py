@@ -45,9 +45,9 @@ def prepared(
     sensor_folder: Path,
     out: Path,
     *,
-    format_name: str = "folder",
-    pictures: Pictures = Pictures(),
-    frames: FrameChoice = FrameChoice(),
+    format_name: str,
+    pictures: Pictures,
+    frames: FrameChoice,
     frames_per_shard: int = FRAMES_PER_SHARD,
 ) -> DataSetJob:
     """Plan a data set and draw its sensors.

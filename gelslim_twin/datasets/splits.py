@@ -69,7 +69,7 @@ def division(given: variation.Split, names: Sequence[str], seed: int) -> Divisio
             )
     shares = given.validation_share, given.test_share
     if given.by == "sample":
-        return Division(seed, "sample", ("train",) * len(names), shares)
+        return Division(seed, "sample", tuple("train" for _ in names), shares)
     found: dict[str, Split] = {
         **dict.fromkeys(given.validation, "validation"),
         **dict.fromkeys(given.test, "test"),
@@ -109,8 +109,6 @@ def shards(
         numbers = np.flatnonzero(splits == index)
         for k, start in enumerate(range(0, len(numbers), size)):
             mine = tuple(numbers[start : start + size].tolist())
-            found.append(
-                Shard(split, k, first, mine, pictures, frames_per_sample, frame_rate_hz)
-            )
+            found.append(Shard(split, k, first, mine, pictures, frames_per_sample, frame_rate_hz))
             first += len(mine)
     return found

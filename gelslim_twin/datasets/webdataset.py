@@ -12,6 +12,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import re
 import tarfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -98,6 +99,10 @@ class WebDataSet:
         except (OSError, ValueError, EOFError, tarfile.TarError) as error:
             return str(error)
         return ""
+
+    def renumbered(self, file: str, number: int) -> str:
+        """Path of a file of a shard that has another number."""
+        return re.sub(r"shard-[0-9]+", f"shard-{number:05d}", file)
 
 
 def _try(name: str, data: bytes) -> None:

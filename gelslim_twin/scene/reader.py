@@ -13,13 +13,13 @@ from pydantic import ValidationError
 from gelslim_core.yaml.errors import InputError, Problem, shown
 from gelslim_core.yaml.reader import Loaded, read_model
 from gelslim_core.yaml.schema import reference_markdown, schema_text
+from gelslim_twin.scene.draw import Drawn, NamedTool, drawn, drawn_scene, tools_of
 from gelslim_twin.scene.indenter import MeshFile
 from gelslim_twin.scene.mesh_file import KINDS, footprint_mm
 from gelslim_twin.scene.motion import Motion
 from gelslim_twin.scene.pose import Pose, poses
 from gelslim_twin.scene.pose_table import LIMITS, read_pose_table
 from gelslim_twin.scene.scene import FORMAT, Scene, Tolerance
-from gelslim_twin.scene.draw import Drawn, NamedTool, drawn, drawn_scene, tools_of
 
 if TYPE_CHECKING:
     from gelslim_twin.scene.built_look import BuiltLook
@@ -64,11 +64,13 @@ class LoadedScene(Loaded[Scene]):
             return tools_of(self.scene, self.folder)
         except (ValueError, OSError) as error:
             meshes = self.scene.vary.tool_meshes
-            reason = error.strerror if isinstance(error, OSError) else str(error)
+            reason = str(error)
+            if isinstance(error, OSError):
+                reason = (error.strerror or type(error).__name__).lower()
             raise self.problem(
                 "vary.tool_meshes.folder",
                 None if meshes is None else shown(meshes.folder),
-                (reason or type(error).__name__).lower() if isinstance(error, OSError) else reason,
+                reason,
                 "name a folder of meshes, relative to the scene's file",
             ) from None
 

@@ -39,16 +39,17 @@ def _numbers(effect: Effect) -> dict[str, type]:
 
 
 def _block(effect: Effect) -> Any:
-    fields = effect.parameters.model_fields
+    known = effect.parameters.model_fields
+    fields: dict[str, Any] = {
+        name: (Range | None, Field(default=None, description=known[name].description))
+        for name in _numbers(effect)
+    }
     return create_model(
         f"Varied_{effect.name}",
         __base__=_RangesOfEffect,
         __module__=__name__,
         __doc__=_RangesOfEffect.__doc__,
-        **{
-            name: (Range | None, Field(default=None, description=fields[name].description))
-            for name in _numbers(effect)
-        },
+        **fields,
     )
 
 

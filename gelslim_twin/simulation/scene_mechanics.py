@@ -59,8 +59,8 @@ def mechanics_of(
 ) -> Mechanics:
     """The mechanical model of a planned scene on a pad.
 
-    `tool` is that of the scene, where it is made already. Only modules of effects in the plan are imported. Raises ValueError or OSError for a mesh
-    that cannot be read.
+    `tool` is that of the scene, where it is made already. Only modules of effects in the plan are
+    imported. Raises ValueError or OSError for a mesh that cannot be read.
     """
     chosen = {choice.effect: choice for choice in plan.included}
     solver = import_module(chosen["normal_contact"].implementation)

@@ -10,6 +10,7 @@ import typer
 
 from gelslim.cli.answer import print_json, progress_bar, say
 from gelslim.cli.budget import PoseTime, SceneError, budgeted_scene
+from gelslim.cli.commands.trial.dataset import report
 from gelslim.cli.commands.trial.plan import SceneFile
 from gelslim.cli.options import AsJson, out_folder
 
@@ -20,7 +21,8 @@ def simulate(
     count: Annotated[
         int | None,
         typer.Option(
-            min=1, max=100_000, help="Number of scenes of the data set that `vary` describes."
+            min=1,
+            help="Number of samples of the data set that `vary` describes, as `dataset` does.",
         ),
     ] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Number of processes.")] = 1,
@@ -38,8 +40,8 @@ def simulate(
 
     Writes the frames, the true motion of the surface, the true forces, the plan, and a ledger of
     times and residuals. Only the effects that the tolerance of the scene needs are simulated. An
-    interrupted run continues where it stopped. With --count, the command makes a data set: each
-    scene is drawn from the `vary` block, with the tolerance that a budget gives the scene itself.
+    interrupted run continues where it stopped. With --count, the command makes a data set as
+    `gelslim dataset --frames all` does.
     """
     from gelslim.contacts import simulate as simulated
     from gelslim_twin.scene.reader import read_scene
@@ -57,7 +59,11 @@ def simulate(
             overwrite=overwrite,
             progress=tell,
         )
-    answer["seconds_in_all"] = time.monotonic() - started
+    seconds = time.monotonic() - started
+    if count is not None:
+        report(answer, seconds, as_json)
+        return 0
+    answer["seconds_in_all"] = seconds
     if as_json:
         print_json(answer)
     else:
@@ -66,10 +72,8 @@ def simulate(
 
 
 def _report(folder: Path, answer: dict[str, Any]) -> None:
-    many = answer["scenes"]
-    what = "scene" if many == 1 else f"{many} scenes"
     say(
-        f"{what.capitalize()}: {answer['poses_solved']} poses solved, {answer['frames_drawn']} "
+        f"Scene: {answer['poses_solved']} poses solved, {answer['frames_drawn']} "
         f"frames drawn, {answer['frames_kept']} kept from before, "
         f"{answer['seconds_in_all']:.1f} s."
     )
@@ -79,8 +83,6 @@ def _report(folder: Path, answer: dict[str, Any]) -> None:
             f"Worst of any pose: residual {worst['residual']:.1e}, penetration "
             f"{1000 * worst['penetration_mm']:.2g} µm."
         )
-    first = sorted(folder.glob("scene_*"))[:1]
-    where = f"In {folder}/scene_*/" if many > 1 or first else f"In {folder}/"
-    drawn = any(((first or [folder])[0] / "frames").glob("*.png"))
+    drawn = any((folder / "frames").glob("*.png"))
     names = ["truth.csv", "truth.npz", "plan.json", "ledger.json", *(["frames/"] if drawn else [])]
-    print(f"{where}: {', '.join(names)}.")
+    print(f"In {folder}/: {', '.join(names)}.")
