@@ -44,7 +44,6 @@ from gelslim_twin.datasets.sample import SPLITS
 from gelslim_twin.datasets.sensor_files import SENSORS, write_sensors
 from gelslim_twin.datasets.shard_task import WORK, ShardTask, moved, perform
 from gelslim_twin.datasets.splits import shards
-from gelslim_twin.planning.plan import Plan
 from gelslim_twin.scene.pose import frame_times
 
 HERE = Engine()
@@ -234,26 +233,10 @@ def description(job: DataSetJob, count: int) -> dict[str, Any]:
         },
         "sensors": len(job.sensors),
         "effects": list(plan.order),
-        "over_tolerance": over_tolerance(plan),
+        "over_tolerance": {name: dict(found) for name, found in job.over_tolerance.items()},
         "labels": dict(MEANING),
         "scene": json.loads(scene.model_dump_json(exclude_unset=True)),
     }
-
-
-def over_tolerance(plan: Plan) -> dict[str, Any]:
-    """Observables whose errors may exceed the tolerance in the hardest sample.
-
-    For each the sum of the bounds, the tolerance, and the effects with the largest bounds.
-    """
-    found: dict[str, Any] = {}
-    for observable, error in plan.over_tolerance:
-        worst = sorted(plan.choices, key=lambda c: -c.error.of(observable))
-        found[observable] = {
-            "error": error,
-            "tolerance": plan.force_n if observable == "force" else plan.image_px,
-            "largest": [c.effect for c in worst[:2] if c.error.of(observable) > 0],
-        }
-    return found
 
 
 def counted(folder: Path, wanted: Sequence[Shard]) -> dict[str, Any]:

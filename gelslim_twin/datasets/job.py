@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from gelslim_twin.datasets.built_sensors import BuiltSensor, gel_ranges
 from gelslim_twin.datasets.formats import DataSetError, Pictures
@@ -72,6 +74,7 @@ class DataSetJob:
         frames: Frames that are kept.
         frames_per_shard: Frames of a shard, at most, but at least one sample.
         out: Folder of the data set.
+        over_tolerance: Where the effects may miss the tolerance, from `missed`.
     """
 
     loaded: LoadedScene
@@ -86,6 +89,7 @@ class DataSetJob:
     frames: FrameChoice
     frames_per_shard: int
     out: str
+    over_tolerance: Mapping[str, Mapping[str, Any]]
 
     @cached_property
     def key(self) -> str:

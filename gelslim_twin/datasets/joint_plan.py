@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, replace
 from functools import reduce
-from typing import TYPE_CHECKING
+from statistics import median
+from typing import TYPE_CHECKING, Any
 
-from gelslim_twin.effects.effect import Bound
+from gelslim_twin.effects.effect import Bound, unit_of
 from gelslim_twin.effects.registry import EFFECTS
 from gelslim_twin.planning.plan import Choice, Plan
 from gelslim_twin.planning.planner import application_order
@@ -52,6 +53,57 @@ def plan_of_all(
         InputError: As `planned`.
     """
     return joined([planned(one, question(one, figures), compliance) for one in scenes])
+
+
+def missed(
+    plan: Plan, scenes: Sequence[LoadedScene], figures: SensorFigures
+) -> dict[str, dict[str, Any]]:
+    """Where the effects of a plan may miss its tolerance, by observable.
+
+    An effect that is left out counts with its bound in each scene, one that is simulated with the
+    error of its rung.
+
+    Args:
+        plan: The plan of all scenes.
+        scenes: Some samples as they are drawn.
+        figures: Figures of the sensor.
+
+    Returns:
+        For each observable that is missed in a scene: the `tolerance`, in how many of the scenes it
+        is missed, the `median` and the `largest` error, and the effects that err most.
+    """
+    kept = {choice.effect for choice in plan.included}
+    errors: dict[str, list[dict[str, float]]] = {name: [] for name in plan.observe}
+    for scene in scenes:
+        circumstances = question(scene, figures).circumstances
+        for observable in plan.observe:
+            errors[observable].append(
+                {
+                    effect.name: (
+                        plan.choice(effect.name).error
+                        if effect.name in kept
+                        else effect.bound(circumstances)
+                    ).of(observable)
+                    for effect in EFFECTS
+                    if dict(plan.choice(effect.name).shares)
+                }
+            )
+    found: dict[str, dict[str, Any]] = {}
+    for observable, by_scene in errors.items():
+        allowed = plan.force_n if unit_of(observable) == "n" else plan.image_px
+        sums = [sum(values.values()) for values in by_scene]
+        if not sums or max(sums) <= allowed * (1 + 1e-12):
+            continue
+        worst = by_scene[sums.index(max(sums))]
+        found[observable] = {
+            "tolerance": allowed,
+            "samples_judged": len(sums),
+            "samples_over": sum(value > allowed for value in sums),
+            "median": median(sums),
+            "largest": max(sums),
+            "effects": sorted((n for n, v in worst.items() if v > 0), key=lambda n: -worst[n])[:2],
+        }
+    return found
 
 
 def joined(plans: Sequence[Plan]) -> Plan:

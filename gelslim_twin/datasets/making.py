@@ -50,13 +50,9 @@ class PreparedSensor:
         skin = "skin" in self.job.plan.order
         return pad_compliance(self.sensor, Path(self.job.sensor_folder), skin=skin)
 
-    @property
-    def lamps(self) -> int:
-        """Number of sources of light whose gain is drawn."""
-        scene = self.job.loaded.scene
-        if "image" not in scene.observe or scene.vary.light_gain is None:
-            return 0
-        return self.base(self.job.loaded).renderer.light.sources
+    def lamps(self, loaded: LoadedScene) -> int:
+        """Number of sources of light, by the scene of any of its samples."""
+        return self.base(loaded).renderer.light.sources
 
     def base(self, loaded: LoadedScene) -> Viewer:
         """Camera and renderer of the sensor, by the scene of any of its samples."""
@@ -104,7 +100,7 @@ class SampleMaker:
         loaded = job.loaded.with_drawn(what)
         sensor = self.prepared(what.sensor)
         require_no_undercut(loaded, sensor.sensor)
-        gains, stiffer = self._light_gain(what, sensor), self._stiffness_factor(what)
+        gains, stiffer = self._light_gain(what, loaded, sensor), self._stiffness_factor(what)
         frames = tuple(self._frames(loaded, sensor, gains, stiffer))
         return Sample(
             number,
@@ -179,13 +175,16 @@ class SampleMaker:
 
         return Tool.of(indenters, self.job.loaded.folder, seed)
 
-    def _light_gain(self, what: Drawn, sensor: PreparedSensor) -> tuple[float, ...]:
-        given, seed = self.job.loaded.scene.vary.light_gain, self.job.loaded.scene.seed
-        if given is None:
+    def _light_gain(
+        self, what: Drawn, loaded: LoadedScene, sensor: PreparedSensor
+    ) -> tuple[float, ...]:
+        scene = self.job.loaded.scene
+        given = scene.vary.light_gain
+        if given is None or "image" not in scene.observe:
             return ()
         return tuple(
-            value_at(given, share_of(seed, what.number, "light_gain", lamp))
-            for lamp in range(sensor.lamps)
+            value_at(given, share_of(scene.seed, what.number, "light_gain", lamp))
+            for lamp in range(sensor.lamps(loaded))
         )
 
     def _stiffness_factor(self, what: Drawn) -> float:
@@ -223,11 +222,23 @@ def _is_random(loaded: LoadedScene) -> bool:
     return any(getattr(one, "texture", "") == "rough" for one in loaded.scene.indenters)
 
 
+_makers: dict[str, SampleMaker] = {}
+"""The maker of this process for the data set that it works on, so that sensors are kept."""
+
+
+def maker_of(job: DataSetJob) -> SampleMaker:
+    """The maker of this process for a data set; one for another data set is forgotten."""
+    if job.key not in _makers:
+        _makers.clear()
+        _makers[job.key] = SampleMaker(job)
+    return _makers[job.key]
+
+
 def compute_compliance(job: DataSetJob) -> None:
     """Compute and store the whole compliance of every built sensor that has a table of it."""
     from ifem_export.compliance.columns import SurfaceCompliance
 
-    maker = SampleMaker(job)
+    maker = maker_of(job)
     for number in range(len(job.sensors)):
         table = maker.prepared(number).compliance
         if isinstance(table, SurfaceCompliance):

@@ -11,7 +11,7 @@ from gelslim_core.optional_library import load
 from gelslim_twin.datasets.built_sensors import built_sensors
 from gelslim_twin.datasets.formats import Pictures, format_named
 from gelslim_twin.datasets.job import DataSetJob, FrameChoice, gel_of
-from gelslim_twin.datasets.joint_plan import hardest, plan_of_all
+from gelslim_twin.datasets.joint_plan import hardest, missed, plan_of_all
 from gelslim_twin.datasets.splits import division
 from gelslim_twin.planning.plan import Plan
 from gelslim_twin.planning.question import bundle_figures
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ifem_export.compliance.pad_compliance import PadCompliance
 
 FRAMES_PER_SHARD = 1024
+JUDGED = 32
+"""Samples on which the plan is judged."""
 FIXED_STIFFNESS = ("skin", "adhesion")
 """Effects with forces of their own, beside which those of the gel do not scale with its modulus."""
 REMEDY = (
@@ -89,6 +91,7 @@ def prepared(
                 "ratio, thickness, camera nor print",
             )
     names = [tool.name for tool in loaded.tools]
+    some = [loaded.numbered(number) for number in range(JUDGED)]
     return DataSetJob(
         loaded,
         plan,
@@ -102,6 +105,7 @@ def prepared(
         frames,
         frames_per_shard,
         str(out.resolve()),
+        missed(plan, some, bundle_figures(sensor_folder / BUNDLE)),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gelslim_core.files.replaced_file import replace_file
 from gelslim_twin.datasets.formats import Pictures
 from gelslim_twin.datasets.job import DataSetJob
-from gelslim_twin.datasets.making import SampleMaker
+from gelslim_twin.datasets.making import maker_of
 from gelslim_twin.datasets.picture_files import encoded
 from gelslim_twin.scene.draw import Drawn, sensor_values
 
@@ -24,7 +24,7 @@ def write_sensors(job: DataSetJob) -> None:
     observed `markers_mm` (m, 2), the dots on the gel, and `markers_px` (m, 2), their images at
     rest. The picture is that of the untouched gel, with the noise of frame 0.
     """
-    maker = SampleMaker(job)
+    maker = maker_of(job)
     for built in job.sensors:
         path = job.out_folder / SENSORS / f"sensor_{built.number:02d}"
         if path.with_suffix(".npz").is_file():

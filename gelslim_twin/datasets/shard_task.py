@@ -20,14 +20,12 @@ from gelslim_twin.datasets.index_table import (
     write_record,
 )
 from gelslim_twin.datasets.job import DataSetJob
-from gelslim_twin.datasets.making import SampleMaker
+from gelslim_twin.datasets.making import maker_of
 from gelslim_twin.datasets.sample import Sample, Value
 from ifem_export.errors import IfemError
 from ifem_export.operators.single_thread import single_threaded
 
 WORK = ".work-"
-_makers: dict[str, SampleMaker] = {}
-"""The maker of this process for the data set that it works on, so that sensors are kept."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def _performed(task: ShardTask) -> dict[str, Any]:
         rows: list[Mapping[str, Value]] = []
         failures: list[Failure] = []
         arrays: dict[str, tuple[tuple[int, ...], str]] = {}
-        maker = _maker(job)
+        maker = maker_of(job)
         for number in shard.samples:
             try:
                 sample = maker.sample(number)
@@ -91,13 +89,6 @@ def _performed(task: ShardTask) -> dict[str, Any]:
     write_record(job.out_folder, record, rows)
     return {"samples": len(shard.samples) - len(failures), "frames": len(rows),
             "failed": len(failures)}  # fmt: skip
-
-
-def _maker(job: DataSetJob) -> SampleMaker:
-    if job.key not in _makers:
-        _makers.clear()
-        _makers[job.key] = SampleMaker(job)
-    return _makers[job.key]
 
 
 def _arrays_of(sample: Sample) -> dict[str, tuple[tuple[int, ...], str]]:

@@ -124,10 +124,12 @@ def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
     for observable, found in answer.get("over_tolerance", {}).items():
         unit = "N" if observable == "force" else "px"
         print(
-            f"gelslim: the effects chosen may err by {found['error']:.3g} {unit} in the "
-            f"{observable} of the hardest sample, the tolerance is {found['tolerance']:.3g} {unit} "
-            f"(largest: {', '.join(found['largest'])}); narrow the ranges, raise the tolerance, or "
-            "write `auto` for effects that are switched off",
+            f"gelslim: in {found['samples_over']} of {found['samples_judged']} samples the effects "
+            f"chosen may err by more in the {observable} than the tolerance of "
+            f"{found['tolerance']:.3g} {unit}: {found['median']:.3g} {unit} in the median and "
+            f"{found['largest']:.3g} {unit} in the worst, chiefly by {' and '.join(found['effects'])};"
+            " narrow the ranges, raise the tolerance, or write `auto` for an effect that is "
+            "switched off",
             file=sys.stderr,
         )
     if answer["failed"]:
@@ -150,6 +152,5 @@ def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
             "All samples are for training, because fewer than three tools cannot be divided; list "
             "more under `vary.tools`, or write `split: {by: sample}` below `vary`."
         )
-    print(
-        f"In {answer['folder']}/: index.parquet, dataset.json, sensors/, {', '.join(answer['splits'])}."
-    )
+    names = ["index.parquet", "dataset.json", "sensors/", *(f"{name}/" for name in answer["splits"])]
+    print(f"In {answer['folder']}/: {', '.join(names)}.")
