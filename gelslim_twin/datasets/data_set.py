@@ -96,15 +96,16 @@ def _made(
     folder = job.out_folder
     _open(job, count, overwrite)
     about = description(job, count)
-    if manifest(folder).get("state") == "complete" and manifest(folder)["count"] == count:
-        return manifest(folder)
+    wanted = all_shards(job, count)
+    missing = [shard for shard in wanted if not _is_done(job, shard)]
+    before = manifest(folder)
+    if before.get("state") == "complete" and before["count"] == count and not missing:
+        return before
     replace_file(folder / MANIFEST, json_bytes({**about, "state": "running"}))
     replace_file(folder / PLAN, job.plan.to_json().encode())
     tell("sensors", 0, 1)
     compute_compliance(job)
     write_sensors(job)
-    wanted = all_shards(job, count)
-    missing = [s for s in wanted if not _is_done(job, s)]
     done = sum(len(s.samples) for s in wanted) - sum(len(s.samples) for s in missing)
     tell("samples", done, count)
     for number, _ in engine.run(perform, [ShardTask(job, s, about) for s in missing]):
@@ -185,13 +186,22 @@ def split_numbers(job: DataSetJob, count: int) -> NDArray[np.int8]:
 
 
 def _is_done(job: DataSetJob, shard: Shard) -> bool:
+    """Whether a shard has its record and all files have their sizes."""
     record = read_record(record_path(job.out_folder, shard.name))
     return (
         record is not None
         and record.key == job.key
         and record.samples == shard.samples
-        and all((job.out_folder / name).is_file() for name in record.files)
+        and all(_size(job.out_folder / n) == known.bytes for n, known in record.files.items())
     )
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file; -1 if there is none."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return -1
 
 
 def _remove_surplus(folder: Path, wanted: Sequence[Shard]) -> None:

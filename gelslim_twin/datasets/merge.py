@@ -90,9 +90,9 @@ def _require_fitting(folders: Sequence[Path], abouts: Sequence[Mapping[str, Any]
     if len(folders) < 2:
         raise DataSetError("one data set alone cannot be merged; name two or more")
     _renumbering(first["file_format"])
-    ids: dict[str, Path] = {}
+    ids: dict[str, int] = {}
     splits: dict[str, tuple[str, Path]] = {}
-    for folder, about in zip(folders, abouts, strict=True):
+    for number, (folder, about) in enumerate(zip(folders, abouts, strict=True)):
         for name in SAME:
             if about[name] != first[name]:
                 raise DataSetError(
@@ -115,10 +115,10 @@ def _require_fitting(folders: Sequence[Path], abouts: Sequence[Mapping[str, Any]
                     f"`vary: {{split: {{test: [{name}]}}}}`"
                 )
         for identity in index_ids(folder):
-            if ids.setdefault(identity, folder) is not folder:
+            if ids.setdefault(identity, number) != number:
                 raise DataSetError(
-                    f"{folder}: holds the sample {identity} as {ids[identity]} does; give one of "
-                    "the scenes another name or another seed"
+                    f"{folder}: holds the sample {identity} as {folders[ids[identity]]} does; "
+                    "give one of the scenes another name or another seed"
                 )
 
 

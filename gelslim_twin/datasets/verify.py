@@ -75,7 +75,6 @@ def _faults_of_index(folder: Path, about: dict[str, Any], frames: dict[str, int]
 
 def _compared(folder: Path, about: dict[str, Any], frames: dict[str, int]) -> list[str]:
     rows: Counter[str] = Counter()
-    owner: dict[str, str] = {}
     split_of_tool: dict[str, str] = {}
     by_tool = "by sample" not in about["tools"].values()
     found, samples, before = [], 0, None
@@ -85,7 +84,7 @@ def _compared(folder: Path, about: dict[str, Any], frames: dict[str, int]) -> li
             samples, before = samples + 1, row["id"]
         if by_tool and split_of_tool.setdefault(row["tool"], row["split"]) != row["split"]:
             found.append(f"{folder}: the tool {row['tool']} is in two splits")
-        if owner.setdefault(row["split"], row["shard"].rpartition("-")[0]) != row["split"]:
+        if row["shard"].rpartition("-")[0] != row["split"]:
             found.append(f"{folder}: shard {row['shard']} holds samples of {row['split']}")
     if samples != about["samples"]:
         found.append(f"{folder}: the index has {samples} samples, dataset.json {about['samples']}")

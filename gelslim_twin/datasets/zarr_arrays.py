@@ -1,6 +1,6 @@
 """The format `zarr`: a group of arrays for each shard, the picture among them.
 
-    train/shard-00000.zarr.zip     a ZIP store of Zarr 3: `zarr.open_group(path, mode="r")`
+    train/shard-00000.zarr.zip     `zarr.open_group(zarr.storage.ZipStore(path), mode="r")`
         image                      uint8 (frames, h, w, 3), compressed by Zstandard, lossless
         force_n                    float32 (frames, c, 3)
 

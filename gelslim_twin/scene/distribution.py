@@ -9,13 +9,15 @@ from __future__ import annotations
 import hashlib
 import math
 from statistics import NormalDist
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from gelslim_core.yaml.errors import FieldError
+from gelslim_core.yaml.suggest import one_of
 
-Distribution = Literal["uniform", "log_uniform", "normal"]
+DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
+Distribution = Annotated[str, Field(json_schema_extra={"enum": list(DISTRIBUTIONS)})]
 Range = Annotated[
     tuple[float, float] | tuple[float, float, Distribution],
     Field(description="Lowest and highest value, and the distribution: uniform without its name"),
@@ -26,8 +28,14 @@ either side; what lies beyond is not drawn."""
 
 
 def require_ordered(name: str, given: Range) -> None:
-    """Raise FieldError for a range whose ends are exchanged, or that has no logarithm."""
+    """Raise FieldError for a range whose ends are exchanged, or whose distribution is not known."""
     low, high = given[:2]
+    if distribution_of(given) not in DISTRIBUTIONS:
+        raise FieldError(
+            name,
+            f"{distribution_of(given)} is no distribution that is known",
+            f"write {one_of(DISTRIBUTIONS)} third",
+        )
     if low > high:
         raise FieldError(name, f"{low:g} is above {high:g}", "swap the two")
     if distribution_of(given) == "log_uniform" and low <= 0:
@@ -36,7 +44,7 @@ def require_ordered(name: str, given: Range) -> None:
         )
 
 
-def distribution_of(given: Range) -> Distribution:
+def distribution_of(given: Range) -> str:
     """Name of the distribution of a range."""
     return given[2] if len(given) == 3 else "uniform"
 

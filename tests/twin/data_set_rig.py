@@ -44,12 +44,15 @@ vary:
     - {shape: flat_punch, radius_mm: 2}
   light_gain: [0.8, 1.2]
   sensors: 2
-  gel: {youngs_modulus_factor: [0.8, 1.25], poissons_ratio: [0.30, 0.34], thickness_factor: [0.95, 1.05]}
+  gel:
+    youngs_modulus_factor: [0.8, 1.25]
+    poissons_ratio: [0.30, 0.34]
+    thickness_factor: [0.95, 1.05]
   camera: {along_mm: [-0.2, 0.2], turn_deg: [-1, 1]}
   effects:
     exposure: {gain: [0.8, 1.2]}
     marker_print: {jitter_mm: [0.0, 0.02]}
-seed: 4
+seed: 8
 """
 
 

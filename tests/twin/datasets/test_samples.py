@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -109,7 +108,7 @@ def test_a_moved_camera_sees_what_a_turned_scene_shows() -> None:
     assert error < 1e-6
     shifted = VirtualCamera.from_record(moved_camera(record, {"along_mm": 0.3}, 0.0))
     np.testing.assert_allclose(
-        shifted.project(points + [0.3, 0, 0]), before.project(points), atol=1e-6
+        shifted.project(points + np.array([0.3, 0.0, 0.0])), before.project(points), atol=1e-6
     )
     # A thicker gel is one more layer of gel in front of the same window and camera.
     thick = moved_camera(record, {}, 0.5)

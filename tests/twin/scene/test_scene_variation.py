@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scene_samples import GALLERY, MINIMAL, SENSOR, load
+from scipy import stats
 
 from gelslim_core.yaml.errors import InputError
-from gelslim_twin.planning.question import plan_scene
+from gelslim_twin.planning.question import contact_friction, plan_scene
+from gelslim_twin.scene.draw import drawn
 from gelslim_twin.scene.pose import FrameTime, Pose, frame_times
 from gelslim_twin.scene.reader import read_scene
 
@@ -61,6 +65,16 @@ def test_a_varied_scene_is_whole_and_plans():
         ("friction: [1, 0]", "vary.friction: 1 is above 0; swap the two"),
         ("friction: [0, 99]", "must lie in 0 to 10"),
         ("size_factor: [0, 1]", "must be above 0"),
+        ("depth_factor: [0, 1, log_uniform]", "vary.depth_factor: 0 has no logarithm"),
+        ("depth_factor: [0.5, 1, gaussian]", "log_uniform"),
+        ("light_gain: [0, 1]", "must lie in 0.01 to 100"),
+        ("tilt_x_deg: [-60, 0]", "must lie in -45 to 45"),
+        ("gel: {poissons_ratio: [0.3, 0.6]}", "must lie in 0 to 0.499"),
+        ("camera: {turn_deg: [3, 2]}", "3 is above 2"),
+        ("effects: {exposure: {gain: [2, 1]}}", "2 is above 1"),
+        ("effects: {exposure: {gian: [1, 2]}}", "did you mean"),
+        ("split: {validation_share: 0.5, test_share: 0.5}", "leaves nothing to train with"),
+        ("split: {validation: [a], test: [a]}", "listed for validation too"),
         ("fricton: [0, 1]", "did you mean vary.friction"),
     ],
 )
@@ -86,6 +100,102 @@ def test_a_table_varies_in_size_and_friction_only(tmp_path):
     assert [p.depth_mm for p in loaded.poses] == [0, 0.5]
     with pytest.raises(InputError, match="vary"):
         load(tmp_path, table + "vary: {x_mm: [0, 1]}\n").numbered(0)
+
+
+def truncated(low: float, high: float) -> Any:
+    return stats.truncnorm(-2, 2, (low + high) / 2, (high - low) / 4)
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("uniform", lambda low, high: stats.uniform(low, high - low)),
+        ("log_uniform", stats.loguniform),
+        ("normal", truncated),
+    ],
+)
+def test_draws_have_the_distribution_that_is_named(tmp_path: Path, name: str, law: Any) -> None:
+    """Kolmogorov and Smirnov's test against the distributions of SciPy."""
+    text = f"vary: {{depth_factor: [0.5, 1.5, {name}]}}\nseed: 3\n"
+    scene = load(tmp_path, MINIMAL + text).scene
+    values = [drawn(scene, k).values["depth_factor"] for k in range(4000)]
+    assert stats.kstest(values, law(0.5, 1.5).cdf).pvalue > 1e-3
+    assert 0.5 <= min(values) <= max(values) <= 1.5
+    others = [law(*ends) for law in (stats.loguniform, truncated) for ends in [(0.5, 1.5)]]
+    if name == "uniform":
+        assert all(stats.kstest(values, one.cdf).pvalue < 1e-6 for one in others)
+
+
+def test_another_quantity_does_not_disturb_the_draws(tmp_path: Path) -> None:
+    few = load(tmp_path, MINIMAL + "vary: {friction: [0, 1], sensors: 3}\nseed: 5\n").scene
+    more = """
+vary:
+  friction: [0, 1]
+  sensors: 3
+  twist_deg: [-90, 90]
+  tools: [{shape: sphere, radius_mm: 4}, {shape: sphere, radius_mm: 5}]
+  effects: {dirt: {specks: [1, 9]}, exposure: {gain: [0.5, 2]}}
+seed: 5
+"""
+    many = load(tmp_path, MINIMAL + more).scene
+    for number in range(50):
+        one, two = drawn(few, number, 1, 3), drawn(many, number, 2, 3)
+        assert one.values["friction"] == two.values["friction"]
+        assert one.sensor == two.sensor
+    tools = [drawn(many, k, 2, 3).tool for k in range(400)]
+    assert 150 < sum(tools) < 250
+    # What belongs to a built sensor is the same for all its samples.
+    by_sensor = {(d.sensor, d.values["dirt.specks"]) for k in range(60)
+                 if (d := drawn(many, k, 2, 3))}  # fmt: skip
+    assert len(by_sensor) == 3
+    assert all(specks == int(specks) and 1 <= specks <= 9 for _, specks in by_sensor)
+    assert len({drawn(many, k, 2, 3).values["exposure.gain"] for k in range(60)}) == 60
+
+
+def test_the_start_is_turned_and_tilted(tmp_path: Path) -> None:
+    text = "vary: {twist_deg: [20, 30], tilt_x_deg: [-5, -4], tilt_y_deg: [2, 3]}\n"
+    for pose in load(tmp_path, MINIMAL + text).numbered(1).poses:
+        assert 20 <= pose.twist_deg <= 30
+        assert -5 <= pose.tilt_x_deg <= -4
+        assert 2 <= pose.tilt_y_deg <= 3
+
+
+def test_tools_are_those_listed_and_the_meshes_of_a_folder(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="OBJ and PLY files are read by trimesh")
+    (tmp_path / "shapes").mkdir()
+    trimesh.creation.box((4, 3, 2)).export(tmp_path / "shapes" / "b.stl")
+    trimesh.creation.icosphere(radius=3).export(tmp_path / "shapes" / "a.ply")
+    (tmp_path / "shapes" / "notes.txt").write_text("no mesh")
+    text = "vary:\n  tools: [{shape: sphere, radius_mm: 4}]\n  tool_meshes: {folder: shapes}\n"
+    loaded = load(tmp_path, MINIMAL + text)
+    assert [tool.name for tool in loaded.tools] == ["sphere_0", "a.ply", "b.stl"]
+    seen = {loaded.numbered(k).scene.indenters[0].shape for k in range(30)}
+    assert seen == {"sphere", "mesh"}
+    for name in ("nowhere", "."):
+        with pytest.raises(InputError, match="tool_meshes") as caught:
+            load(tmp_path, MINIMAL + text.replace("shapes", name)).numbered(0)
+        assert caught.value.problems[0].line == 13
+
+
+def test_paths_are_drawn(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("time_s,depth_mm\n0,0\n1,0.7\n")
+    text = """
+vary:
+  size_factor: [0.9, 1.1]
+  motions:
+    - {waypoints: [{move: press, depth_mm: 0.3}]}
+    - {csv: p.csv}
+"""
+    loaded = load(tmp_path, MINIMAL + text)
+    depths = {round(loaded.numbered(k).poses[-1].depth_mm, 3) for k in range(20)}
+    assert depths == {0.3, 0.7}
+
+
+def test_a_friction_that_the_scene_leaves_open_stays_open(tmp_path: Path) -> None:
+    """It is then that of the gel's skin, in a data set as in the scene itself."""
+    loaded = load(tmp_path, MINIMAL + "vary: {x_mm: [0, 1]}\n")
+    assert "friction" not in loaded.numbered(2).scene.contact.model_fields_set
+    assert contact_friction(loaded.numbered(2).scene.contact, 0.7) == 0.7
 
 
 POSES = tuple(Pose(time_s=t) for t in (0.0, 0.1, 0.3, 1.0))

@@ -127,9 +127,9 @@ def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
             f"gelslim: in {found['samples_over']} of {found['samples_judged']} samples the effects "
             f"chosen may err by more in the {observable} than the tolerance of "
             f"{found['tolerance']:.3g} {unit}: {found['median']:.3g} {unit} in the median and "
-            f"{found['largest']:.3g} {unit} in the worst, chiefly by {' and '.join(found['effects'])};"
-            " narrow the ranges, raise the tolerance, or write `auto` for an effect that is "
-            "switched off",
+            f"{found['largest']:.3g} {unit} in the worst, chiefly by "
+            f"{' and '.join(found['effects'])}; narrow the ranges, raise the tolerance, or write "
+            "`auto` for an effect that is switched off",
             file=sys.stderr,
         )
     if answer["failed"]:
@@ -152,5 +152,10 @@ def report(answer: dict[str, Any], seconds: float, as_json: bool) -> None:
             "All samples are for training, because fewer than three tools cannot be divided; list "
             "more under `vary.tools`, or write `split: {by: sample}` below `vary`."
         )
-    names = ["index.parquet", "dataset.json", "sensors/", *(f"{name}/" for name in answer["splits"])]
+    names = [
+        "index.parquet",
+        "dataset.json",
+        "sensors/",
+        *(f"{name}/" for name in answer["splits"]),
+    ]
     print(f"In {answer['folder']}/: {', '.join(names)}.")
