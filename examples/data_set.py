@@ -2,10 +2,10 @@
 # # A data set
 #
 # A scene with a `vary` block describes many contacts. Each is drawn from a seed and simulated with its
-# true forces, in a folder of its own; a run that was interrupted goes on where it stopped.
+# true forces; a run that was interrupted goes on where it stopped. The index is a Parquet table, which
+# needs the extra `record`.
 
 # %%
-import csv
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -29,6 +29,11 @@ observe: [displacement, force]
 vary:
   depth_factor: [0.5, 1.2]
   x_mm: [-3, 3]
+  tilt_x_deg: [-5, 5, normal]    # 95 % of a normal distribution
+  tools:
+    - {shape: sphere, radius_mm: 6}
+    - {shape: sphere, radius_mm: 4}
+    - {shape: flat_punch, radius_mm: 3}
 seed: 7
 """,
     encoding="utf-8",
@@ -42,14 +47,26 @@ plan = gelslim.plan(folder / "touches.yaml")
 print([choice.effect for choice in plan.choices if choice.included])
 
 # %%
-answer = gelslim.simulate(folder / "touches.yaml", folder / "out", count=3)
-print(answer["scenes"], "scenes,", answer["poses_solved"], "poses solved")
+out = folder / "out"
+answer = gelslim.data_set(folder / "touches.yaml", out, count=6)
+print(answer["samples"], "samples,", answer["frames"], "frames, splits:", answer["splits"])
+assert gelslim.verify_data_set(out)["faults"] == []
+
+# %% [markdown]
+# The index has a row for each frame: what was drawn, the labels, and where the arrays are. No tool is in
+# two splits.
 
 # %%
-forces_n = []
-for truth_file in sorted((folder / "out").glob("scene_*/truth.csv")):
-    with open(truth_file, newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
-    forces_n.append(float(rows[-1]["fz_n"]))
-print("normal forces in N:", [round(force, 3) for force in forces_n])
-assert len(set(forces_n)) == 3
+import numpy as np
+import pyarrow.parquet as pq
+
+rows = pq.read_table(out / "index.parquet").to_pylist()
+for row in rows:
+    print(row["id"], row["split"], row["tool"], f"{row['fz_n']:.3f} N", row["slip_state"])
+assert len({round(row["fz_n"], 6) for row in rows}) == 6
+
+# %%
+row = rows[0]
+force_n = np.load(out / row["file"] / "force_n.npy")[row["row"]]
+print("nodes:", force_n.shape, "sum of their normal forces in N:", force_n[:, 2].sum())
+assert abs(force_n[:, 2].sum() - row["fz_n"]) < 1e-4

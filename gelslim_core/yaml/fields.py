@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import types
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -221,8 +221,18 @@ def _shape(annotation: Any) -> Shape:
 def _union(members: Any) -> Shape:
     shape = Shape()
     for member in members:
-        shape = shape.merged(_shape(member))
+        other = _shape(member)
+        both = list in shape.types and list in other.types
+        shape = shape.merged(other)
+        if both:
+            shape = replace(shape, length=_either(shape.length, other.length))
     return shape
+
+
+def _either(one: tuple[int, int | None], other: tuple[int, int | None]) -> tuple[int, int | None]:
+    """Lengths of a list that may be of one kind or the other."""
+    most = None if one[1] is None or other[1] is None else max(one[1], other[1])
+    return min(one[0], other[0]), most
 
 
 def _constraints(metadata: Any) -> Shape:
