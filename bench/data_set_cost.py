@@ -170,8 +170,8 @@ def table(data: Mapping[str, Any]) -> str:
         f"ms of processor time per frame that is kept, medians on one core of {data['processor']}; "
         "`picture` holds the labels and the markers too.",
         "",
-        "| scene | draw | gel | picture | PNG | write | all | frames/s and core | hours per million, "
-        "two cores |",
+        "| scene | draw | gel | picture | PNG | write | all | frames/s and core | "
+        "hours per million, two cores |",
         "|---|" + "---:|" * 8,
     ]
     for row in data["rows"]:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import data_set_cost
 import force_sigma
 import linear_gel
 import twin_batch
@@ -83,6 +84,7 @@ PAGES: Mapping[str, Mapping[str, Make]] = {
         "twin-look": _from("twin_look", twin_look.table),
         "drawn-light": _from("drawn_light", drawn_light_table.table),
     },
+    "docs/data_sets.md": {"data-set-cost": _from("data_set_cost", data_set_cost.table)},
     "docs/twin_steps.md": {
         "steps": _from("twin_steps", twin_steps.table),
         "batch": twin_batch.page_table,
