@@ -9,6 +9,9 @@
 from pathlib import Path
 from tempfile import mkdtemp
 
+import numpy as np
+import pyarrow.parquet as pq
+
 import gelslim
 from gelslim.examples import example
 
@@ -57,9 +60,6 @@ assert gelslim.verify_data_set(out)["faults"] == []
 # two splits.
 
 # %%
-import numpy as np
-import pyarrow.parquet as pq
-
 rows = pq.read_table(out / "index.parquet").to_pylist()
 for row in rows:
     print(row["id"], row["split"], row["tool"], f"{row['fz_n']:.3f} N", row["slip_state"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
@@ -64,8 +64,7 @@ def reference_markdown(model: type[BaseModel], level: int = 2) -> str:
     """A reference page: a section for the model and for every block below it, each field a row.
 
     The fields at the top come first, under the heading "Top"; then the blocks in the order of the
-    fields, each followed by the blocks inside it. Items of a list that are blocks described before
-    are linked to that description.
+    fields, each followed by the blocks inside it.
 
     Args:
         model: The class of the model.
@@ -74,7 +73,7 @@ def reference_markdown(model: type[BaseModel], level: int = 2) -> str:
     Returns:
         The sections in Markdown.
     """
-    return "\n".join(_sections("Top", "", model, "#" * level, {}))
+    return "\n".join(_sections("Top", "", model, "#" * level))
 
 
 def heading_anchor(title: str) -> str:
@@ -83,34 +82,25 @@ def heading_anchor(title: str) -> str:
     return "".join(kept).replace(" ", "-")
 
 
-def _sections(
-    title: str, path: str, model: type[BaseModel], marks: str, known: dict[type[BaseModel], str]
-) -> Iterator[str]:
-    """The section of a model and those below it; `known` are the headings of models so far."""
-    known.setdefault(model, title)
+def _sections(title: str, path: str, model: type[BaseModel], marks: str) -> Iterator[str]:
     about = " ".join(_prose(model.__doc__ or "").split()).rstrip(".")
     # The field that distinguishes the members of a union heads its table.
     fields = sorted(model_fields(model, path), key=lambda f: len(f.choices) != 1 or bool(f.types))
-    rows = "".join(_row(field, known) for field in fields)
-    yield f"{marks} {title}\n\n{about}.\n\n{_HEADER}{rows}"
+    yield f"{marks} {title}\n\n{about}.\n\n{_HEADER}" + "".join(map(_row, fields))
     for field in model_fields(model, path):
-        for below, place, heading in _blocks(field, known):
-            if not (place.endswith("[]") and below in known):
-                yield from _sections(heading, place, below, marks, known)
+        for below, place, heading in _blocks(field):
+            yield from _sections(heading, place, below, marks)
 
 
-def _blocks(
-    field: Field, known: Mapping[type[BaseModel], str]
-) -> list[tuple[type[BaseModel], str, str]]:
+def _blocks(field: Field) -> list[tuple[type[BaseModel], str, str]]:
     """The blocks that a field may hold, itself or as items of a list: model, path and heading."""
     items = field.item.models if field.item else ()
     path = f"{field.path}[]" if items else field.path
     models = field.models or items
     kinds = [_kind(model) for model in models] if len(models) > 1 else [""] * len(models)
-    own = [f"{path}: {kind}" if kind else path for kind in kinds]
     return [
-        (model, path, known.get(model, heading) if items else heading)
-        for model, heading in zip(models, own, strict=True)
+        (model, path, f"{path}: {kind}" if kind else path)
+        for model, kind in zip(models, kinds, strict=True)
     ]
 
 
@@ -119,10 +109,10 @@ def _kind(model: type[BaseModel]) -> str:
     return next(str(f.choices[0]) for f in model_fields(model) if len(f.choices) == 1)
 
 
-def _row(field: Field, known: Mapping[type[BaseModel], str]) -> str:
+def _row(field: Field) -> str:
     cells = (
         f"`{field.name}`",
-        _type(field, known),
+        _type(field),
         field.unit.label if field.unit and field.unit.label else "–",
         _default(field),
         _range(field) or "–",
@@ -131,10 +121,10 @@ def _row(field: Field, known: Mapping[type[BaseModel], str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
 
 
-def _type(field: Field, known: Mapping[type[BaseModel], str]) -> str:
+def _type(field: Field) -> str:
     links = [
         f"[{heading.rpartition(': ')[2]}](#{heading_anchor(heading)})"
-        for _, _, heading in _blocks(field, known)
+        for _, _, heading in _blocks(field)
     ]
     words = _words(field)
     if links:
