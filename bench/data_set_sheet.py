@@ -26,7 +26,7 @@ def main() -> None:
     scene = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)[0]
     with TemporaryDirectory() as folder:
         path = Path(folder) / "touches.yaml"
-        path.write_text(scene.replace("designs/", f"{DOCS.parent}/designs/"), encoding="utf-8")
+        path.write_text(scene.replace("../", f"{DOCS.parent}/designs/"), encoding="utf-8")
         out = Path(folder) / "out"
         gelslim.data_set(path, out, count=COUNT)
         rows = pq.read_table(out / "index.parquet").to_pylist()

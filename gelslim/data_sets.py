@@ -36,15 +36,20 @@ def prepared_data_set(
     """
     from gelslim.scene_sensor import require_within_gel, scene_bundle
     from gelslim_twin.datasets.built_sensors import built_sensors, thickness_mm
-    from gelslim_twin.datasets.formats import format_named, pictures_of
+    from gelslim_twin.datasets.formats import pictures_of
     from gelslim_twin.datasets.job import FrameChoice
     from gelslim_twin.datasets.joint_plan import hardest
-    from gelslim_twin.datasets.prepare import FRAMES_PER_SHARD, prepared, require_something_drawn
+    from gelslim_twin.datasets.prepare import (
+        FRAMES_PER_SHARD,
+        prepared,
+        require_libraries,
+        require_something_drawn,
+    )
     from gelslim_twin.simulation.sensor import TwinSensor, store_sensor
 
     require_something_drawn(loaded, count)
     encoding, kept = pictures_of(pictures, quality), FrameChoice.parsed(frames)
-    format_named(file_format).require(encoding)
+    require_libraries(loaded, file_format, encoding)
     if progress:
         progress("sensor", 0, 1)
     bundle = scene_bundle(loaded, with_light="image" in loaded.scene.observe)

@@ -42,6 +42,14 @@ def require_something_drawn(loaded: LoadedScene, count: int) -> None:
         )
 
 
+def require_libraries(loaded: LoadedScene, format_name: str, pictures: Pictures) -> None:
+    """Raise MissingLibraryError or DataSetError for what would fail only after hours of work."""
+    load("pyarrow.parquet", "the index of a data set")
+    if "image" in loaded.scene.observe:
+        load("cv2", "a data set with pictures")
+    format_named(format_name).require(pictures)
+
+
 def prepared(
     loaded: LoadedScene,
     sensor_folder: Path,
@@ -71,10 +79,7 @@ def prepared(
         DataSetError: There is no such format, or it has no such pictures.
         MissingLibraryError: A library is not installed.
     """
-    load("pyarrow.parquet", "the index of a data set")
-    if "image" in loaded.scene.observe:
-        load("cv2", "a data set with pictures")
-    format_named(format_name).require(pictures)
+    require_libraries(loaded, format_name, pictures)
     sensor = stored_sensor(sensor_folder)
     plan = _planned(loaded, sensor, sensor_folder)
     gel = gel_of(loaded, sensor.bundle)

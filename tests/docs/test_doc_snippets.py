@@ -28,7 +28,7 @@ FORCE, TWIN, OWN, BUILT = (
     DOCS / f"{n}.md" for n in ("force_pipeline", "digital_twin", "own_parts", "calibration")
 )
 """Their blocks need frames, simulated data or a solid, and run in tests of their own."""
-LATER = ("budget.md", "contributing.md")
+LATER = ("budget.md", "contributing.md", "data_sets.md")
 PYTHON = [p for p in PAGES if blocks(p, "python") and p not in (FORCE, TWIN, OWN, BUILT)]
 YAML = [(p, k) for p in PAGES for k in range(len(blocks(p, "yaml")))]
 SMALL = """\

@@ -56,7 +56,10 @@ COMMANDS = (
     Command("track", "track {place}/dots -o {out}", "dots=>more_dots"),
     Command("light", f"light {SPEC} --rays 2048 -o {{out}}", "-o=>--seed 3 -o"),
     Command("simulate", "simulate {place}/scene.yaml -o {out}"),
-    Command("data set", "simulate {place}/varied.yaml --count 3 -j 2 -o {out}"),
+    Command(
+        "data set",
+        "dataset {place}/varied.yaml --count 6 --frames all --frames-per-shard 4 -j 2 -o {out}",
+    ),
     Command("explore", f"explore {SPEC} --vary gel.length_mm=16:24:0.02 -j 2 -o {{out}}"),
     Command(
         "optimise", f"optimise {SPEC} --vary gel.length_mm=16:24:0.5 --rounds 1 -j 1 -o {{out}}"

@@ -52,6 +52,7 @@ REFUSED = [
     ("plot", "light {spec} --rays 1024 -o {out}"),
     ("vision", "track {place}/dots -o {out}"),
     ("vision", "simulate {place}/scene.yaml -o {out}"),
+    ("record", "dataset {place}/varied.yaml --count 2 -o {out}"),
     ("cluster", "explore {spec} --vary gel.length_mm=18,20 --scheduler tcp://127.0.0.1:1 -o {out}"),
     ("export", "bundle-export {place}/bundle {out}/k.safetensors"),
 ]

@@ -299,7 +299,10 @@ def test_the_commands(place: Path, data_set: Path, capsys: pytest.CaptureFixture
     assert main(["dataset-verify", out]) == 0
     next((place / "typed").rglob("force_n.npy")).unlink()
     assert main(["dataset-verify", out]) == 1
+    capsys.readouterr()
     assert main(["dataset", scene, "-o", out, *given]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert all((place / "typed" / name).exists() for name in last.split(": ")[1][:-1].split(", "))
     assert main(["dataset-verify", out]) == 0
     assert main(["dataset-merge", out, str(data_set), "-o", str(place / "m")]) == 2
     assert "holds the sample" in capsys.readouterr().err
