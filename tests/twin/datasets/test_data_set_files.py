@@ -67,6 +67,7 @@ def test_a_killed_data_set_goes_on_to_the_same_bytes(
     assert hashes(job.out_folder) == hashes(data_set)
 
 
+@pytest.mark.slow
 def test_a_data_set_grows_to_the_bytes_of_a_larger_one(place: Path, data_set: Path) -> None:
     job = job_in(place / "scene.yaml", "grown")
     make_data_set(job, 5)
@@ -83,6 +84,7 @@ def test_two_processes_give_the_same_bytes(place: Path, data_set: Path) -> None:
     assert hashes(made(place / "scene.yaml", "two", 8, jobs=2)) == hashes(data_set)
 
 
+@pytest.mark.slow
 def test_another_data_set_is_replaced_only_on_demand(copied: Path, place: Path) -> None:
     target = place / "replaced"
     shutil.copytree(copied, target)
@@ -204,6 +206,7 @@ def test_what_does_not_fit_is_not_merged(place: Path, data_set: Path, tmp_path: 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_tar_file_holds_what_the_folder_does(place: Path, data_set: Path) -> None:
     tars = made(place / "scene.yaml", "tars", 8, format_name="webdataset")
     assert verify(tars)["faults"] == []
