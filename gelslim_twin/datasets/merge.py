@@ -44,6 +44,8 @@ from gelslim_twin.datasets.shard_task import moved
 Progress = Callable[[str, int, int], None]
 SAME = ("file_format", "pictures", "frames_kept", "arrays", "observe", "labels")
 """What data sets must have in common."""
+OF_SOURCE = ("name", "seed", "key", "scene", "samples", "effects", "over_tolerance")
+"""What the merged data set keeps of each source."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def _merged(
         "count": sum(a["count"] for a in abouts),
         "sensors": sum(a["sensors"] for a in abouts),
         "tools": {name: split for a in abouts for name, split in a["tools"].items()},
-        "merged": [{n: a[n] for n in ("name", "seed", "key", "scene", "samples")} for a in abouts],
+        "merged": [{name: a[name] for name in OF_SOURCE} for a in abouts],
     }
     inner = work / ".work-complete"
     inner.mkdir()
