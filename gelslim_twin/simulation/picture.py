@@ -78,7 +78,7 @@ class Viewer:
     @cached_property
     def rest_px(self) -> Array:
         """Images (m, 2) of the dots' centres on the untouched gel."""
-        return self.camera.project(self._rest_mm)
+        return self.camera.project(self.rest_mm)
 
     @cached_property
     def renderer(self) -> FrameRenderer:
@@ -109,7 +109,7 @@ class Viewer:
         if look.sensor_noise is not None:
             look = replace(look, sensor_noise=replace(look.sensor_noise, seed=scene.seed))
         found.__dict__["renderer"] = self.renderer.with_look(look, light_gain)
-        for name in ("camera", "_to_markers", "_rest_mm", "surface"):
+        for name in ("camera", "to_markers", "rest_mm", "surface"):
             found.__dict__[name] = getattr(self, name)
         return found
 
