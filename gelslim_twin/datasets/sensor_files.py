@@ -21,7 +21,7 @@ def write_sensors(job: DataSetJob) -> None:
     """Write `sensors/sensor_00.npz` and, where pictures are observed, `sensors/sensor_00.png`.
 
     The archive holds `points_mm` (c, 3), the surface nodes at rest, and where the camera is
-    observed `markers_mm` (m, 2), the dots on the gel, and `markers_px` (m, 2), their images at
+    observed `markers_mm` (m, 3), the dots as printed, and `markers_px` (m, 2), their images at
     rest. The picture is that of the untouched gel, with the noise of frame 0.
     """
     maker = maker_of(job)
@@ -36,7 +36,7 @@ def write_sensors(job: DataSetJob) -> None:
             values = sensor_values(scene, built.number)
             loaded = job.loaded.with_drawn(Drawn(0, sensor=built.number, values=values))
             viewer = prepared.base(loaded)
-            held["markers_mm"] = prepared.sensor.grid.positions_mm
+            held["markers_mm"] = viewer.rest_mm
             held["markers_px"] = viewer.rest_px
             if "image" in scene.observe:
                 picture = encoded(viewer.renderer.frame().image, Pictures())
