@@ -119,17 +119,8 @@ def simulate(
     from gelslim_twin.simulation.sensor import TwinSensor, store_sensor
 
     if count is not None:
-        return data_set(
-            scene,
-            out,
-            budget,
-            count=count,
-            frames="all",
-            jobs=jobs,
-            scheduler=scheduler,
-            overwrite=overwrite,
-            progress=progress,
-        )
+        where: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler, "overwrite": overwrite}
+        return data_set(scene, out, budget, count=count, frames="all", progress=progress, **where)
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
     if progress:
@@ -188,9 +179,7 @@ def data_set(
         BudgetError: No plan keeps the budget.
         DataSetError: The folder holds something else, or the format has no such pictures.
     """
-    from gelslim.data_sets import prepared_data_set
-    from gelslim_core.jobs import Engine
-    from gelslim_twin.datasets.data_set import make_data_set
+    from gelslim.data_sets import made_data_set, prepared_data_set
 
     loaded, _ = with_budget(scene_of(scene), budget)
     folder = Path("out") / loaded.scene.name if out is None else Path(out)
@@ -205,10 +194,7 @@ def data_set(
         frames_per_shard=frames_per_shard,
         progress=progress,
     )
-    answer = make_data_set(
-        job, count, Engine(jobs, scheduler), overwrite=overwrite, progress=progress
-    )
-    return {"folder": str(folder), **answer}
+    return made_data_set(job, folder, count, (jobs, scheduler), overwrite, progress)
 
 
 def validate(

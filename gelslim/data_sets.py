@@ -72,6 +72,22 @@ def prepared_data_set(
     )
 
 
+def made_data_set(
+    job: DataSetJob,
+    folder: Path,
+    count: int,
+    engine: tuple[int, str],
+    overwrite: bool,
+    progress: Progress | None,
+) -> dict[str, Any]:
+    """Make a prepared data set. Arguments and errors are those of `gelslim.data_set`."""
+    from gelslim_core.jobs import Engine
+    from gelslim_twin.datasets.data_set import make_data_set
+
+    answer = make_data_set(job, count, Engine(*engine), overwrite=overwrite, progress=progress)
+    return {"folder": str(folder), **answer}
+
+
 def verify_data_set(
     folder: str | os.PathLike[str], progress: Progress | None = None
 ) -> dict[str, Any]:
