@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol, cast, get_args, runtime_checkable
 from gelslim_core.errors import GelslimError
 from gelslim_twin.datasets.sample import Sample, Split
 
-PictureKind = Literal["png", "webp", "jpeg"]
+PictureKind = Literal["png", "webp", "jpeg", "video"]
 MOST_QUALITY = 100
 
 
@@ -28,8 +28,8 @@ class Pictures:
     """How pictures are encoded.
 
     Attributes:
-        kind: PNG is lossless; WebP is lossless at quality 100; JPEG never is.
-        quality: 1 to 100 of WebP and JPEG.
+        kind: PNG is lossless; WebP and video are lossless at quality 100; JPEG never is.
+        quality: 1 to 100 of WebP, JPEG and video.
     """
 
     kind: PictureKind = "png"

@@ -1,0 +1,91 @@
+"""Statistics of columns, by which LeRobot normalises what a policy takes.
+
+Those of an episode are exact. Minimum, maximum, mean and deviation of the data set follow from them
+exactly; its quantiles are the means of those of the episodes, weighted with their frames, as
+LeRobot itself combines them. Values that do not exist are left out.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+_LEVELS = np.arange(256) / 255
+
+
+def of_values(values: NDArray[Any]) -> dict[str, Array]:
+    """Statistics of values (t,) or (t, ..., k), each (1,) or (k,).
+
+    All axes but the last are taken together, as LeRobot does with fields.
+    """
+    rows = values.reshape(-1, values.shape[-1] if values.ndim > 1 else 1).astype(np.float64)
+    with warnings.catch_warnings():
+        # A column without any value has no statistics.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found = {
+            "min": np.nanmin(rows, axis=0),
+            "max": np.nanmax(rows, axis=0),
+            "mean": np.nanmean(rows, axis=0),
+            "std": np.nanstd(rows, axis=0),
+            **{name: np.nanquantile(rows, share, axis=0) for name, share in QUANTILES.items()},
+        }
+    return {**found, "count": np.array([float(len(values))])}
+
+
+def of_pictures(pictures: Iterable[NDArray[np.uint8]]) -> dict[str, Array]:
+    """Statistics (3, 1, 1) of all pixels of pictures (h, w, 3), as shares of white.
+
+    They are those of the histogram of each channel, so they take the memory of one picture.
+    """
+    histogram, count = np.zeros((3, 256)), 0
+    for picture in pictures:
+        count += 1
+        for channel in range(3):
+            histogram[channel] += np.bincount(picture[..., channel].ravel(), minlength=256)
+    share = histogram / histogram.sum(axis=1, keepdims=True)
+    mean = share @ _LEVELS
+    seen = histogram > 0
+    below = np.cumsum(share, axis=1)
+    found = {
+        "min": _LEVELS[seen.argmax(axis=1)],
+        "max": _LEVELS[255 - seen[:, ::-1].argmax(axis=1)],
+        "mean": mean,
+        "std": np.sqrt(np.sum(share * (_LEVELS - mean[:, None]) ** 2, axis=1)),
+        **{
+            name: _LEVELS[np.argmax(below >= level - 1e-12, axis=1)]
+            for name, level in QUANTILES.items()
+        },
+    }
+    return {**{name: v.reshape(3, 1, 1) for name, v in found.items()}, "count": np.array([count])}
+
+
+def combined(episodes: Mapping[str, Array]) -> dict[str, Array]:
+    """Statistics of all episodes together; components that no episode has are NaN.
+
+    Args:
+        episodes: (n, k) of n episodes by name, and their `count` (n, 1).
+    """
+    count, mean = episodes["count"], episodes["mean"]
+    weight = np.where(np.isfinite(mean), count, 0.0)
+    total = weight.sum(axis=0)
+
+    def weighted(values: Array) -> Array:
+        with np.errstate(invalid="ignore"):
+            share: Array = np.sum(weight * np.nan_to_num(values), axis=0) / total
+        return share
+
+    whole = weighted(mean)
+    return {
+        "min": np.fmin.reduce(episodes["min"]),
+        "max": np.fmax.reduce(episodes["max"]),
+        "mean": whole,
+        "std": np.sqrt(weighted(episodes["std"] ** 2 + (mean - whole) ** 2)),
+        **{name: weighted(episodes[name]) for name in QUANTILES},
+        "count": count.sum(axis=0),
+    }

@@ -1,0 +1,89 @@
+"""A video of one shard, in an encoding that the loader of LeRobot decodes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelslim_core import optional_library
+from gelslim_core.errors import disk_error
+
+_LOSSLESS = 100
+"""Quality whose pictures are those that were written, bit for bit."""
+_WORST_CRF = 63
+_GROUP = "2"
+"""Frames from one key frame to the next: few, because training jumps to and fro."""
+
+
+class VideoFile:
+    """Encodes pictures, one after the other.
+
+    Quality 100 is H.264 in RGB without loss; below, it is AV1, whose blur moves markers.
+    """
+
+    def __init__(self, path: Path, frames_per_s: float, quality: int) -> None:
+        """Begin a video.
+
+        Args:
+            path: The new file; its name ends in .mp4.
+            frames_per_s: Rate in Hz.
+            quality: 1 to 100.
+
+        Raises:
+            MissingLibraryError: PyAV is not installed.
+            OutputError: The file cannot be made.
+        """
+        self._av = library()
+        self.path = path
+        lossless = quality >= _LOSSLESS
+        crf = 0 if lossless else round(_WORST_CRF * (1 - quality / _LOSSLESS))
+        codec, self._pixels = ("libx264rgb", "rgb24") if lossless else ("libsvtav1", "yuv420p")
+        options = {"crf": str(crf), "g": _GROUP, "preset": "veryfast" if lossless else "10"}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._av.open(str(path), "w")
+        except OSError as error:
+            raise disk_error(path, "starting the video", error) from error
+        rate = Fraction(frames_per_s).limit_denominator(1001)
+        self._stream = self._file.add_stream(codec, rate, options=options)
+
+    def append(self, picture: NDArray[np.uint8]) -> None:
+        """Add a picture (h, w, 3). Raises OutputError."""
+        self._stream.height, self._stream.width = picture.shape[:2]
+        self._stream.pix_fmt = self._pixels
+        self._write(self._av.VideoFrame.from_ndarray(picture, format="rgb24"))
+
+    def finish(self) -> None:
+        """Write what is still in the encoder, and close the file. Raises OutputError."""
+        self._write(None)
+        self._file.close()
+
+    def _write(self, frame: Any) -> None:
+        try:
+            for packet in self._stream.encode(frame):
+                self._file.mux(packet)
+        except OSError as error:
+            raise disk_error(self.path, "writing the video", error) from error
+
+
+def library() -> Any:
+    """The module `av`, quiet but for errors. Raises MissingLibraryError."""
+    av = optional_library.load("av", "a data set of LeRobot with videos")
+    av.logging.set_level(av.logging.ERROR)
+    return av
+
+
+def video_problem(path: Path) -> str:
+    """Why a video cannot be read; empty if all its frames can."""
+    av = library()
+    try:
+        with av.open(str(path)) as file:
+            for _ in file.decode(video=0):
+                pass
+    except (OSError, IndexError) as error:
+        return str(error)
+    return ""
