@@ -19,7 +19,7 @@ _FIRST_PICTURE_S = 10.0
 """A camera may take seconds to start, and the pipeline compiles with its first frame."""
 
 
-class GelslimCamera(Camera):  # type: ignore[misc]
+class GelslimCamera(Camera):
     """A finger whose pictures LeRobot reads, with the forces of the picture that it read last.
 
     Attributes:

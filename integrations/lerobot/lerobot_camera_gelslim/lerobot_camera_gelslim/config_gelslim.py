@@ -11,7 +11,7 @@ from gelslim_force.calibration.file import read_calibration
 
 @CameraConfig.register_subclass("gelslim")
 @dataclass(kw_only=True)
-class GelslimCameraConfig(CameraConfig):  # type: ignore[misc]
+class GelslimCameraConfig(CameraConfig):
     """A finger with its camera.
 
     Robots of LeRobot describe their pictures by `width` and `height` of this configuration, so

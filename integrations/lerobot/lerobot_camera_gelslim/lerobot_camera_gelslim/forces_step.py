@@ -20,7 +20,7 @@ from lerobot_camera_gelslim.tactile_features import SCALARS, scalars
 
 @dataclass
 @ProcessorStepRegistry.register("gelslim_forces")
-class GelslimForcesStep(ObservationProcessorStep):  # type: ignore[misc]
+class GelslimForcesStep(ObservationProcessorStep):
     """Adds the forces of fingers to observations, as numbers that become parts of the state.
 
     Attributes:
@@ -45,7 +45,7 @@ class GelslimForcesStep(ObservationProcessorStep):  # type: ignore[misc]
 
     def observation(self, observation: dict[str, Any]) -> dict[str, Any]:
         """The observation with the forces of the pictures in it, such as `finger.fz_n`."""
-        added = {}
+        added: dict[str, float] = {}
         for name, camera in self._fingers.items():
             if name in observation:
                 found = scalars(camera.observation(), self.features)
