@@ -35,6 +35,7 @@ from gelslim_twin.datasets.index_table import (
     ShardRecord,
     read_record,
     record_path,
+    rehash,
     write_index,
 )
 from gelslim_twin.datasets.job import FORMAT, DataSetJob
@@ -173,7 +174,13 @@ def all_shards(job: DataSetJob, count: int) -> list[Shard]:
     rate = job.loaded.scene.camera.frame_rate_hz
     kept = len(job.frames.of(len(frame_times(poses, rate))))
     size = max(1, job.frames_per_shard // kept)
-    return shards(split_numbers(job, count), size, job.pictures, kept if even else None, rate)
+    return shards(
+        split_numbers(job, count),
+        size,
+        job.pictures,
+        kept if even else None,
+        job.frames.rate_hz(rate),
+    )
 
 
 def split_numbers(job: DataSetJob, count: int) -> NDArray[np.int8]:
@@ -217,7 +224,9 @@ def _complete_format(job: DataSetJob, wanted: Sequence[Shard], about: dict[str, 
     work.mkdir()
     try:
         format_named(job.format).complete(work, job.out_folder, wanted, about)
-        about["format_files"] = sorted(moved(work, job.out_folder))
+        files = moved(work, job.out_folder)
+        about["format_files"] = sorted(files)
+        rehash(job.out_folder, [shard.name for shard in wanted], files)
     finally:
         shutil.rmtree(work, ignore_errors=True)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelslim_twin.datasets.formats import FramePlace, Pictures, Shard
+from gelslim_twin.datasets.formats import FramePlace, Pictures, Shard, require_stills
 from gelslim_twin.datasets.picture_files import decoded, encoded
 from gelslim_twin.datasets.sample import Sample
 
@@ -55,7 +55,8 @@ class Folder:
     """Pictures as files, and arrays of whole shards."""
 
     def require(self, pictures: Pictures) -> None:
-        """Nothing but what all formats need."""
+        """Refuse videos. Raises DataSetError."""
+        require_stills(pictures, "folder")
 
     def writer(self, folder: Path, shard: Shard, about: Mapping[str, Any]) -> FolderWriter:
         """Begin a shard."""

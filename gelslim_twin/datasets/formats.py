@@ -55,6 +55,15 @@ def pictures_of(kind: str, quality: int) -> Pictures:
     raise DataSetError(f"pictures {kind!r}: write {', '.join(get_args(PictureKind))}")
 
 
+def require_stills(pictures: Pictures, format_name: str) -> None:
+    """Refuse videos for a format that has none. Raises DataSetError."""
+    if pictures.kind == "video":
+        raise DataSetError(
+            f"pictures video: the format {format_name} holds single pictures; write png, webp or "
+            "jpeg, or choose the format lerobot"
+        )
+
+
 @dataclass(frozen=True)
 class Shard:
     """Consecutive samples of one split, which one worker writes.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +136,28 @@ def read_record(path: Path) -> ShardRecord | None:
         return ShardRecord.from_json(metadata[_META])
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def rehash(dataset: Path, names: Sequence[str], files: Mapping[str, FileHash]) -> None:
+    """Note in the records of shards which of their files a format has written again.
+
+    Args:
+        dataset: The data set.
+        names: Names of the shards.
+        files: Hashes of what was written, by path.
+    """
+    parquet = load("pyarrow.parquet", PURPOSE)
+    for name in names:
+        path = record_path(dataset, name)
+        record = read_record(path)
+        changed = {} if record is None else {n: files[n] for n in record.files if n in files}
+        if record is None or not changed:
+            continue
+        record = replace(record, files={**record.files, **changed})
+        table = parquet.read_table(path).replace_schema_metadata({_META: record.to_json()})
+        stream = io.BytesIO()
+        parquet.write_table(table, stream, compression="zstd")
+        replace_file(path, stream.getvalue())
 
 
 class NothingMadeError(DataSetError):

@@ -34,9 +34,11 @@ from gelslim_twin.datasets.index_table import (
     index_schema,
     read_record,
     record_path,
+    rehash,
     write_index,
     write_record,
 )
+from gelslim_twin.datasets.job import FrameChoice
 from gelslim_twin.datasets.sample import SPLITS
 from gelslim_twin.datasets.sensor_files import SENSORS
 from gelslim_twin.datasets.shard_task import moved
@@ -147,7 +149,9 @@ def _merged(
     inner = work / ".work-complete"
     inner.mkdir()
     format_named(about["file_format"]).complete(inner, work, wanted, about)
-    about["format_files"] = sorted(moved(inner, work))
+    files = moved(inner, work)
+    about["format_files"] = sorted(files)
+    rehash(work, [shard.name for shard in wanted], files)
     shutil.rmtree(inner)
     answer = {**about, **counted(work, wanted)}
     replace_file(work / MANIFEST, json_bytes(answer))
@@ -181,8 +185,8 @@ def _sources(
                 if record is None:
                     raise DataSetError(f"{folder}: the record of {name} is gone; verify it")
                 pictures = pictures_of(**about["pictures"])
-                shard = Shard(split, number[split], first, record.samples, pictures, None,
-                              about["frame_rate_hz"])  # fmt: skip
+                rate = FrameChoice.parsed(about["frames_kept"]).rate_hz(about["frame_rate_hz"])
+                shard = Shard(split, number[split], first, record.samples, pictures, None, rate)
                 found.append(_Source(folder, replace(record, key=key), shard, offset))
                 number[split] += 1
                 first += len(record.samples)

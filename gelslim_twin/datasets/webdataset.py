@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from gelslim_twin.datasets.formats import FramePlace, Pictures, Shard
+from gelslim_twin.datasets.formats import FramePlace, Pictures, Shard, require_stills
 from gelslim_twin.datasets.picture_files import decoded, encoded
 from gelslim_twin.datasets.sample import Sample, SampleFrame, Value
 
@@ -78,7 +78,8 @@ class WebDataSet:
     """Tar files that are read from the first byte to the last."""
 
     def require(self, pictures: Pictures) -> None:
-        """Nothing but what all formats need."""
+        """Refuse videos. Raises DataSetError."""
+        require_stills(pictures, "webdataset")
 
     def writer(self, folder: Path, shard: Shard, about: Mapping[str, Any]) -> TarWriter:
         """Begin a shard."""

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gelslim_core import optional_library
 from gelslim_twin.datasets.formats import DataSetFormat, Pictures, SampleWriter, Shard
 
 __all__ = ["FORMAT"]
@@ -26,8 +25,6 @@ class LerobotFormat:
         arrow_tables.parquet()
         if pictures.kind == "video":
             video_file.library()
-        else:
-            optional_library.load("PIL.Image", "a data set of LeRobot")
 
     def writer(self, folder: Path, shard: Shard, about: Mapping[str, Any]) -> SampleWriter:
         """Begin a shard."""
@@ -49,6 +46,12 @@ class LerobotFormat:
         from gelslim_twin.datasets.lerobot.video_file import video_problem
 
         return video_problem(file) if file.suffix == ".mp4" else parquet_problem(file)
+
+    def renumbered(self, file: str, number: int) -> str:
+        """Path of a file of a shard that has another number."""
+        from gelslim_twin.datasets.lerobot.places import renumbered
+
+        return renumbered(file, number)
 
 
 FORMAT: DataSetFormat = LerobotFormat()

@@ -20,7 +20,10 @@ from gelslim_twin.datasets.sample import Sample, SampleFrame, Value
 TACTILE_SCHEMA = "gelslim-tactile/1"
 PICTURE = "observation.images.tactile"
 WRENCH, STATE, ACTION = "observation.wrench", "observation.state", "action"
-POSE = ("x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")
+POSE = (
+    *("tool_x_mm", "tool_y_mm", "tool_depth_mm"),
+    *("tool_twist_deg", "tool_tilt_x_deg", "tool_tilt_y_deg"),
+)
 """Labels of a frame that make up the state: the pose of the tool."""
 COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 """Columns of every data set of LeRobot."""

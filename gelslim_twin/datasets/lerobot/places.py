@@ -41,6 +41,18 @@ def video_file(shard: Shard) -> Path:
     return Path(VIDEO_PATH.format(video_key=PICTURE, chunk_index=chunk, file_index=file))
 
 
+def renumbered(file: str, number: int) -> str:
+    """Path of a file of a shard that has another number within its split."""
+    path = Path(file)
+    if path.parent.as_posix() == SHARD_EPISODES:
+        split = path.stem.rpartition("-")[0]
+        return (path.parent / f"{split}-{number:05d}.parquet").as_posix()
+    split_number = int(path.parent.name.removeprefix("chunk-")) // CHUNKS_PER_SPLIT
+    chunk, inner = divmod(number, FILES_PER_CHUNK)
+    folder = path.parent.parent / f"chunk-{CHUNKS_PER_SPLIT * split_number + chunk:03d}"
+    return (folder / f"file-{inner:03d}{path.suffix}").as_posix()
+
+
 def episode_file(shard: Shard) -> Path:
     """What a shard tells of its episodes."""
     return Path(SHARD_EPISODES, f"{shard.name}.parquet")

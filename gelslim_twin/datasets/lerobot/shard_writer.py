@@ -22,9 +22,9 @@ from gelslim_twin.datasets.lerobot.features import (
     features_of,
     pictures_of,
 )
-from gelslim_twin.datasets.lerobot.picture_bytes import encoded
 from gelslim_twin.datasets.lerobot.places import data_file, episode_file, video_file
 from gelslim_twin.datasets.lerobot.video_file import VideoFile
+from gelslim_twin.datasets.picture_files import encoded
 from gelslim_twin.datasets.sample import Sample
 
 _GROUP_BYTES = 1 << 26

@@ -18,9 +18,10 @@ import pyarrow.parquet as pq
 from PIL import Image
 
 from gelslim_twin.datasets.formats import DataSetError, Pictures, Shard, format_named
+from gelslim_twin.datasets.labels import MEANING
 from gelslim_twin.datasets.sample import Sample, SampleFrame, Split
 
-POSE = ("x_mm", "y_mm", "depth_mm", "twist_deg", "tilt_x_deg", "tilt_y_deg")
+POSE = tuple(name for name in MEANING if name.startswith("tool_"))
 WRENCH = ("fx_n", "fy_n", "fz_n", "tx_nmm", "ty_nmm", "tz_nmm")
 FRAMES, RATE_HZ = 4, 10.0
 SIZE = (48, 64)

@@ -31,9 +31,12 @@ def dataset(
     frames: Annotated[
         str, typer.Option(help="Frames to keep of each sample: last, all or every:K.")
     ] = "last",
-    pictures: Annotated[str, typer.Option(help="png, webp or jpeg.")] = "png",
+    pictures: Annotated[str, typer.Option(help="png, webp or jpeg; video for lerobot.")] = "png",
     quality: Annotated[
-        int, typer.Option(help="Quality of WebP and JPEG, 1 to 100; WebP is lossless at 100.")
+        int,
+        typer.Option(
+            help="Quality of WebP, JPEG and video, 1 to 100; WebP and video are lossless at 100."
+        ),
     ] = 95,
     jobs: Jobs = 1,
     scheduler: Scheduler = "",
