@@ -49,6 +49,8 @@ from gelslim_twin.scene.pose import frame_times
 
 HERE = Engine()
 """This process."""
+_EVEN_S = 1e-6
+"""Times that differ by less are even."""
 MANIFEST, PLAN = "dataset.json", "plan.json"
 Progress = Callable[[str, int, int], None]
 
@@ -175,12 +177,22 @@ def all_shards(job: DataSetJob, count: int) -> list[Shard]:
     kept = len(job.frames.of(len(frame_times(poses, rate))))
     size = max(1, job.frames_per_shard // kept)
     return shards(
-        split_numbers(job, count),
-        size,
-        job.pictures,
-        kept if even else None,
-        job.frames.rate_hz(rate),
+        split_numbers(job, count), size, job.pictures, kept if even else None, kept_rate_hz(job)
     )
+
+
+def kept_rate_hz(job: DataSetJob) -> float | None:
+    """Frames per second of those that are kept; None where their times are not even."""
+    scene = job.loaded.scene
+    camera_hz = scene.camera.frame_rate_hz
+    if camera_hz is not None:
+        return camera_hz / max(job.frames.every, 1)
+    times = frame_times(job.loaded.poses)
+    kept = np.array([times[k].time_s for k in job.frames.of(len(times))])
+    steps = np.diff(kept)
+    if scene.vary.motions or not len(steps) or np.ptp(steps) > _EVEN_S:
+        return None
+    return round(float(1 / steps.mean()), 6)
 
 
 def split_numbers(job: DataSetJob, count: int) -> NDArray[np.int8]:
@@ -245,6 +257,7 @@ def description(job: DataSetJob, count: int) -> dict[str, Any]:
         "frames_kept": str(job.frames),
         "frames_per_shard": job.frames_per_shard,
         "frame_rate_hz": scene.camera.frame_rate_hz,
+        "kept_rate_hz": kept_rate_hz(job),
         "observe": list(scene.observe),
         "tools": {
             tool.name: job.division.tools[k] if job.division.by == "tool" else "by sample"

@@ -52,10 +52,6 @@ class FrameChoice:
         """As `parsed` reads it."""
         return {0: "last", 1: "all"}.get(self.every, f"every:{self.every}")
 
-    def rate_hz(self, camera_hz: float | None) -> float | None:
-        """Rate of the frames that are kept; None where that of the camera is not even."""
-        return None if camera_hz is None else camera_hz / max(self.every, 1)
-
     def of(self, count: int) -> range:
         """Numbers of the frames that are kept of `count`."""
         return range(count - 1, count) if self.every == 0 else range(0, count, self.every)

@@ -38,7 +38,6 @@ from gelslim_twin.datasets.index_table import (
     write_index,
     write_record,
 )
-from gelslim_twin.datasets.job import FrameChoice
 from gelslim_twin.datasets.sample import SPLITS
 from gelslim_twin.datasets.sensor_files import SENSORS
 from gelslim_twin.datasets.shard_task import moved
@@ -185,8 +184,8 @@ def _sources(
                 if record is None:
                     raise DataSetError(f"{folder}: the record of {name} is gone; verify it")
                 pictures = pictures_of(**about["pictures"])
-                rate = FrameChoice.parsed(about["frames_kept"]).rate_hz(about["frame_rate_hz"])
-                shard = Shard(split, number[split], first, record.samples, pictures, None, rate)
+                shard = Shard(split, number[split], first, record.samples, pictures, None,
+                              about["kept_rate_hz"])  # fmt: skip
                 found.append(_Source(folder, replace(record, key=key), shard, offset))
                 number[split] += 1
                 first += len(record.samples)

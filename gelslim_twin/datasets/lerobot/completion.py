@@ -81,9 +81,10 @@ def complete(
         raise DataSetError(f"{dataset}: no sample was solved, so there is nothing to describe")
     features = written[0].features
     for other in written:
-        if other.features != features:
+        alike = (other.features, frame_rate_hz(other.shard))
+        if alike != (features, frame_rate_hz(written[0].shard)):
             raise DataSetError(
-                f"{dataset}: shard {other.shard.name} has other columns than "
+                f"{dataset}: shard {other.shard.name} has other columns or another frame rate than "
                 f"{written[0].shard.name}; write both with the same scene"
             )
     task = task_of(about)
