@@ -1,0 +1,87 @@
+"""Data sets of LeRobot from `gelslim dataset`: grown, merged, verified, and read by LeRobot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pyarrow", reason="NOT TESTED: data sets need pyarrow")
+pytest.importorskip("cv2", reason="NOT TESTED: data sets with pictures need OpenCV")
+import pyarrow.parquet as pq
+
+import gelslim
+from gelslim.data_sets import merge_data_sets, verify_data_set
+from gelslim.examples import example
+
+pytestmark = pytest.mark.slow
+SCENE = """\
+format: gelslim-scene/1
+name: touches
+sensor: {{spec: finger.yaml}}
+indenters: [{{shape: sphere, radius_mm: 6}}]
+motion:
+  waypoints: [{{move: press, depth_mm: 0.4, steps: 4, duration_s: 0.2}}]
+observe: [force, image]
+vary: {{x_mm: [-3, 3], depth_factor: [0.5, 1.2], split: {{by: sample, test_share: 0.3}}}}
+seed: {seed}
+"""
+
+
+def made(folder: Path, count: int, seed: int = 7) -> dict[str, Any]:
+    """A data set with every second frame, in shards of two samples."""
+    for name, text in example("mini20").files("finger").items():
+        (folder / name).write_text(text, encoding="utf-8")
+    scene = folder / f"touches_{seed}.yaml"
+    scene.write_text(SCENE.format(seed=seed), encoding="utf-8")
+    return gelslim.data_set(
+        scene, folder / f"set_{seed}", count=count, file_format="lerobot", frames="every:2",
+        frames_per_shard=6,
+    )  # fmt: skip
+
+
+def read(folder: Path) -> Any:
+    pytest.importorskip(
+        "lerobot.datasets.lerobot_dataset", reason="NOT TESTED: reading back needs lerobot"
+    )
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+    return LeRobotDataset("local/touches", root=folder)
+
+
+def test_a_data_set_grows_is_merged_and_is_read(tmp_path: Path) -> None:
+    for count in (3, 6):
+        about = made(tmp_path, count)
+        assert verify_data_set(tmp_path / "set_7")["faults"] == []
+        rows = [
+            row
+            for file in sorted((tmp_path / "set_7/data").glob("*/*.parquet"))
+            for row in pq.read_table(file, columns=["index", "episode_index"]).to_pylist()
+        ]
+        assert [r["index"] for r in rows] == list(range(about["frames"]))
+        assert [r["episode_index"] for r in rows] == np.repeat(range(count), 3).tolist()
+    made(tmp_path, 2, seed=8)
+    merged = merge_data_sets([tmp_path / "set_7", tmp_path / "set_8"], tmp_path / "both")
+    assert merged["samples"] == 8
+    for name in ("set_7", "set_8", "both"):
+        assert verify_data_set(tmp_path / name)["faults"] == [], name
+    data = read(tmp_path / "both")
+    assert (data.num_episodes, len(data), data.fps) == (8, 24, 10)
+    table = pq.read_table(tmp_path / "both/index.parquet").to_pylist()
+    for number, row in enumerate(table):
+        item = data[number]
+        assert float(item["timestamp"]) == pytest.approx(row["time_s"], abs=1e-6)
+        assert float(item["observation.wrench"][2]) == pytest.approx(row["fz_n"], rel=1e-6)
+        force = item["tactile.force_n"].numpy().sum(axis=0)
+        np.testing.assert_allclose(force[2], row["fz_n"], rtol=1e-4, atol=1e-5)
+        assert data.meta.episodes[int(item["episode_index"])]["gelslim/id"] == row["id"]
+
+
+def test_videos_are_for_lerobot_alone(tmp_path: Path) -> None:
+    from gelslim_twin.datasets.formats import DataSetError, Pictures, format_named
+
+    for name in ("folder", "webdataset"):
+        with pytest.raises(DataSetError):
+            format_named(name).require(Pictures("video"))
